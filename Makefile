@@ -1,0 +1,69 @@
+# make bench    play the bundled suite with the oracle and the random agent, and print the table
+# make test     run the tests
+# make lint     check style and types
+# make clean    remove what these left behind, the virtual environment included; runs/ stays
+#
+# Each does the set-up that it needs in $(VENV), once. Another Python: make bench PYTHON=python3.12
+
+PYTHON ?= python3
+VENV ?= .venv
+WORKERS ?= 2
+
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+# Python compiles what it imports; compiling all of it beforehand only takes time.
+INSTALL := $(PIP) install --quiet --no-compile --constraint constraints.txt
+MARK := $(VENV)/.er-gym
+
+.PHONY: bench test lint clean help
+.DELETE_ON_ERROR:
+
+help:
+	@sed -n 's/^# \(make .*\)/\1/p' Makefile
+
+bench: $(MARK)-core
+	$(BIN)/er-gym bench --suite mini --agent oracle --workers $(WORKERS) --out runs/mini-oracle
+	$(BIN)/er-gym bench --suite mini --agent random --workers $(WORKERS) --out runs/mini-random
+	$(BIN)/er-gym report runs/mini-oracle runs/mini-random
+
+test: $(MARK)-dev
+	$(BIN)/python -m pytest $(ARGS)
+
+lint: $(MARK)-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+clean:
+	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache build dist
+	find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
+
+# ai2thor brings opencv-python and we ask for opencv-python-headless; both install a cv2, the last
+# one written wins, and uninstalling either takes files of both. So: that one away, ours anew.
+define headless
+if $(PIP) show --quiet opencv-python 2>/dev/null; then \
+	$(PIP) uninstall --quiet --yes opencv-python && \
+	$(INSTALL) --no-deps --force-reinstall opencv-python-headless; \
+fi
+endef
+
+$(MARK)-core: pyproject.toml constraints.txt | $(BIN)/python
+	@echo 'Installing er-gym in $(VENV), once'
+	@$(INSTALL) --editable .
+	@$(headless)
+	@touch $@
+
+$(MARK)-dev: pyproject.toml constraints.txt | $(BIN)/python
+	@echo 'Installing er-gym and what its tests need in $(VENV), once'
+	@$(INSTALL) --editable '.[dev]'
+	@$(headless)
+	@touch $(MARK)-core $@
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || { \
+	  echo "er-gym needs Python 3.10 or newer, and $(PYTHON) is not one; name one: make PYTHON=python3.12" >&2; \
+	  exit 2; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	  echo "$(PYTHON) cannot make virtual environments; on Debian or Ubuntu: sudo apt install python3-venv" >&2; \
+	  exit 2; }
+	@$(PYTHON) -m venv $(VENV)

@@ -1,0 +1,1 @@
+"""Agents without a model: the oracle, and the random one."""

@@ -1,0 +1,155 @@
+"""What is kept of an episode: enough to score it again later, without the environment.
+
+These are wire formats: one :class:`EpisodeRecord` is one JSON file. A change that an older reader
+would misread takes a new ``format``.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from er_gym.tasks.task import Task
+from er_gym.tasks.verbs import INIT
+
+ERROR = "error"
+"""The verb recorded for a reply that named no known action."""
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class KeyActionRecord(_Record):
+    """A key action of the task, as its file states it.
+
+    Attributes:
+        verb: canonical (see :mod:`er_gym.tasks.verbs`).
+        object_id: the AI2-THOR id of its object, ``""`` for ``end``.
+        object_type: the type that the task file states, which may be empty or wrong.
+        reward: what doing it is worth.
+    """
+
+    verb: str
+    object_id: str = ""
+    object_type: str = ""
+    reward: float = 1.0
+
+
+class StepRecord(_Record):
+    """One step, and what was possible after it.
+
+    Attributes:
+        verb: canonical; ``init`` for the first step, in which the agent is placed; :data:`ERROR`
+            for a reply that named no known action.
+        object_type: as the agent named it.
+        object_id: the object that the name stood for, ``""`` if none.
+        success: whether the action was legal and the simulator did it.
+        feedback: what the agent was told.
+        navigable, interactable: object types that were legal targets after the step.
+        reward: what the step earned.
+        thought: what the agent said to itself.
+        text: the action as the agent gave it.
+    """
+
+    verb: str
+    object_type: str = ""
+    object_id: str = ""
+    success: bool
+    feedback: str = ""
+    navigable: list[str] = []
+    interactable: list[str] = []
+    reward: float = 0.0
+    thought: str = ""
+    text: str = ""
+
+
+class EpisodeRecord(_Record):
+    """One episode of one task.
+
+    Attributes:
+        format: the version of this layout.
+        task_id, task_type, scene, instruction, name, key_actions: the task's; ``task_type`` is the
+            paper's name for it and ``name`` the instruction before paraphrase.
+        max_steps: the episode's step limit, the first step being the placing of the agent.
+        agent: the agent's spec.
+        seed: the seed of this episode (not of the run).
+        steps: from ``init`` to the last.
+        success: what the environment said at the end; scores are computed from the steps.
+        end_reason: why it ended, in the environment's words; ``""`` if it crashed.
+        total_reward: the sum over the steps.
+        seconds: wall-clock time.
+        error: what it crashed with, in one line; ``""`` if it did not.
+    """
+
+    format: Literal["er-gym/episode/1"] = "er-gym/episode/1"
+    task_id: str
+    task_type: str
+    scene: str
+    instruction: str
+    name: str
+    key_actions: list[KeyActionRecord]
+    max_steps: int = Field(gt=0)
+    agent: str
+    seed: int
+    steps: list[StepRecord]
+    success: bool
+    end_reason: str
+    total_reward: float
+    seconds: float
+    error: str = ""
+
+    @property
+    def predicted(self) -> list[StepRecord]:
+        """The steps that the agent asked for by naming a known action."""
+        return [step for step in self.steps if step.verb not in (INIT, ERROR)]
+
+    @property
+    def num_steps(self) -> int:
+        """How many steps were recorded, ``init`` and ``end`` included, :data:`ERROR` left out."""
+        return sum(step.verb != ERROR for step in self.steps)
+
+
+def record_episode(
+    task: Task,
+    *,
+    agent: str,
+    seed: int,
+    max_steps: int | None = None,
+    steps: list[StepRecord] | None = None,
+    success: bool = False,
+    end_reason: str = "",
+    seconds: float = 0.0,
+    error: str = "",
+) -> EpisodeRecord:
+    """Put a task and what happened in it into one record.
+
+    ``max_steps=None`` stands for the task's own limit.
+    """
+    steps = steps or []
+    return EpisodeRecord(
+        task_id=task.id,
+        task_type=task.type.name,
+        scene=task.scene,
+        instruction=task.instruction,
+        name=task.name or task.instruction,
+        key_actions=[
+            KeyActionRecord(
+                verb=key.verb,
+                object_id=key.object_id,
+                object_type=key.object_type,
+                reward=key.reward,
+            )
+            for key in task.key_actions
+        ],
+        max_steps=task.max_steps if max_steps is None else max_steps,
+        agent=agent,
+        seed=seed,
+        steps=steps,
+        success=success,
+        end_reason=end_reason,
+        total_reward=sum(step.reward for step in steps),
+        seconds=seconds,
+        error=error,
+    )

@@ -1,0 +1,197 @@
+"""One or several run directories, scored and laid out for reading or for other programs."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.episode import EpisodeRecord
+from benchmarks.metrics import (
+    CORRECTED,
+    METRICS,
+    PAPER,
+    SCORERS,
+    Score,
+    Summary,
+    score_episode,
+    summarise,
+    summarise_by,
+)
+from benchmarks.store import Manifest, RunStore
+from er_gym.tasks.types import BY_NAME, GROUPS
+
+BOTH = "both"
+"""The choice of scorer that shows each where they differ and one line where they do not."""
+
+SCORER_CHOICES = (BOTH, *SCORERS)
+
+
+@dataclass(frozen=True)
+class Miss:
+    """An episode that is no success under the ``corrected`` scorer, and why.
+
+    Attributes:
+        task_id, task_type, scene: what was played.
+        end_reason: why the episode ended, ``"crashed"`` if it crashed.
+        feedback: the error, or what the agent was told last.
+        missing: the key actions that were not done, as ``"verb Type"``.
+    """
+
+    task_id: str
+    task_type: str
+    scene: str
+    end_reason: str
+    feedback: str
+    missing: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """A run directory's episodes and their scores.
+
+    Attributes:
+        path: the directory.
+        manifest: what was played.
+        episodes: in the order of their file names.
+        scores: for each scorer's name, one score per episode, in the same order.
+    """
+
+    path: Path
+    manifest: Manifest
+    episodes: tuple[EpisodeRecord, ...]
+    scores: dict[str, tuple[Score, ...]]
+
+    @property
+    def differ(self) -> tuple[str, ...]:
+        """The ids of the tasks that the scorers score differently."""
+        pairs = zip(self.scores[PAPER.name], self.scores[CORRECTED.name], strict=True)
+        return tuple(
+            paper.task_id
+            for paper, corrected in pairs
+            if any(getattr(paper, name) != getattr(corrected, name) for name in METRICS)
+        )
+
+    @property
+    def misses(self) -> tuple[Miss, ...]:
+        """Every episode without success, and why."""
+        pairs = zip(self.episodes, self.scores[CORRECTED.name], strict=True)
+        return tuple(_miss(episode, each) for episode, each in pairs if not each.success)
+
+    @property
+    def crashed(self) -> int:
+        """How many episodes crashed; the same command as before plays them again."""
+        return sum(bool(episode.error) for episode in self.episodes)
+
+    def shown(self, scorer: str) -> dict[str, tuple[Score, ...]]:
+        """The scores to show for a choice of :data:`SCORER_CHOICES`, by the name to show."""
+        if scorer != BOTH:
+            return {scorer: self.scores[scorer]}
+        if not self.differ:
+            return {BOTH: self.scores[CORRECTED.name]}
+        return self.scores
+
+
+def load_run(path: Path) -> RunReport:
+    """Read and score a run directory.
+
+    Raises:
+        RunDirectoryError: there is no run.
+    """
+    store = RunStore.open(path)
+    episodes = tuple(store.episodes())
+    scores = {
+        name: tuple(score_episode(episode, scorer) for episode in episodes)
+        for name, scorer in SCORERS.items()
+    }
+    return RunReport(path, store.manifest, episodes, scores)
+
+
+def _miss(episode: EpisodeRecord, scored: Score) -> Miss:
+    last = episode.steps[-1].feedback if episode.steps else ""
+    return Miss(
+        task_id=episode.task_id,
+        task_type=episode.task_type,
+        scene=episode.scene,
+        end_reason="crashed" if episode.error else episode.end_reason,
+        feedback=" ".join((episode.error or last).split()),
+        missing=scored.missing,
+    )
+
+
+def slices(scores: Sequence[Score]) -> list[tuple[str, str, Summary]]:
+    """(level, name, summary) overall, for each group and for each task type that was played."""
+    if not scores:
+        return []
+    return [
+        ("overall", "all", summarise(scores)),
+        *(("group", *each) for each in by_group(scores).items()),
+        *(("type", *each) for each in by_type(scores).items()),
+    ]
+
+
+def by_group(scores: Sequence[Score]) -> dict[str, Summary]:
+    """Summaries of the groups that were played, in the order of the paper's table."""
+    return summarise_by(scores, lambda each: each.group, GROUPS)
+
+
+def by_type(scores: Sequence[Score]) -> dict[str, Summary]:
+    """Summaries of the task types that were played, in the order of the table of task types."""
+    return summarise_by(scores, lambda each: each.task_type, BY_NAME)
+
+
+def as_json(runs: Sequence[RunReport]) -> str:
+    """Everything: manifests, every slice's means and intervals, every episode's scores, misses."""
+    return json.dumps({"format": "er-gym/report/1", "runs": [_run(run) for run in runs]}, indent=2)
+
+
+def _run(run: RunReport) -> dict[str, Any]:
+    return {
+        "path": str(run.path),
+        "manifest": run.manifest.model_dump(),
+        "episodes": len(run.episodes),
+        "crashed": run.crashed,
+        "scorers_differ": run.differ,
+        "scorers": {
+            name: {
+                "slices": [
+                    {
+                        "level": level,
+                        "name": part,
+                        "n": summary.n,
+                        **{key: dataclasses.asdict(summary[key]) for key in METRICS},
+                    }
+                    for level, part, summary in slices(scores)
+                ],
+                "episodes": [dataclasses.asdict(each) for each in scores],
+            }
+            for name, scores in run.scores.items()
+        },
+        "misses": [dataclasses.asdict(miss) for miss in run.misses],
+    }
+
+
+def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = False) -> str:
+    """One line per run, scorer and slice (overall and groups; task types if asked for).
+
+    Rates are fractions; a missing interval is empty.
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    columns = [f"{metric}{end}" for metric in METRICS for end in ("", "_low", "_high")]
+    writer.writerow(["run", "agent", "suite", "scorer", "level", "name", "n", *columns])
+    for run in runs:
+        head = [str(run.path), run.manifest.agent, run.manifest.suite]
+        for name, scores in run.shown(scorer).items():
+            for level, part, summary in slices(scores):
+                if level == "type" and not with_types:
+                    continue
+                estimates = [dataclasses.astuple(summary[metric]) for metric in METRICS]
+                numbers = [number for estimate in estimates for number in estimate]
+                writer.writerow([*head, name, level, part, summary.n, *numbers])
+    return out.getvalue()

@@ -1,0 +1,75 @@
+"""The action space: a verb, alone or with an object type, the same in every scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from er_gym.tasks import verbs
+from er_gym.thor import OBJECT_TYPES
+
+
+@dataclass(frozen=True)
+class Action:
+    """A high-level action.
+
+    Attributes:
+        verb: one of :data:`er_gym.tasks.verbs.BARE_VERBS` or ``OBJECT_VERBS``.
+        object_type: an AI2-THOR object type for the latter, ``""`` for the former.
+    """
+
+    verb: str
+    object_type: str = ""
+
+    def __str__(self) -> str:
+        """As the paper writes it: ``navigate to Fridge``, ``end``."""
+        return f"{self.verb} {self.object_type}".rstrip()
+
+
+_PROPERTY_FOR = {
+    verbs.PICKUP: "pickupable",
+    verbs.PUT: "receptacle",
+    verbs.OPEN: "openable",
+    verbs.CLOSE: "openable",
+    verbs.TOGGLE: "toggleable",
+}
+STANDS_FOR = {"Sink": "SinkBasin", "Bathtub": "BathtubBasin"}
+"""Types that one puts things into by way of a part of theirs."""
+_ALSO = {verbs.TOGGLE: {"StoveBurner"}, verbs.PUT: set(STANDS_FOR)}
+"""Types that lack the property but take the verb: a burner is toggled by its knob."""
+_NOWHERE = {"Floor"}
+"""Types that cannot be navigated to: one is there already."""
+
+
+def applies(verb: str, object_type: str) -> bool:
+    """Whether a verb makes sense for a type at all, in some scene and some state."""
+    if verb == verbs.NAVIGATE:
+        return object_type not in _NOWHERE
+    needed = _PROPERTY_FOR[verb]
+    return needed in OBJECT_TYPES[object_type].properties or object_type in _ALSO.get(verb, ())
+
+
+def _all_actions() -> Iterator[Action]:
+    yield from (Action(verb) for verb in verbs.BARE_VERBS)
+    for verb in verbs.OBJECT_VERBS:
+        yield from (Action(verb, name) for name in OBJECT_TYPES if applies(verb, name))
+
+
+ACTIONS: tuple[Action, ...] = tuple(_all_actions())
+"""Every action; a discrete action is an index into this."""
+INDEX: dict[Action, int] = {action: index for index, action in enumerate(ACTIONS)}
+_BY_TEXT = {str(action).lower(): action for action in ACTIONS}
+_VERBS_LONGEST_FIRST = sorted(
+    {*verbs.OBJECT_VERBS, *verbs.ALIASES}, key=len, reverse=True
+)  # so that "put in" is tried before "put"
+
+
+def parse(text: str) -> Action | None:
+    """The action that a text names, None if it names none. Case and spacing do not matter."""
+    words = " ".join(text.lower().split())
+    if words in _BY_TEXT:
+        return _BY_TEXT[words]
+    for verb in _VERBS_LONGEST_FIRST:
+        if words.startswith(f"{verb} "):
+            return _BY_TEXT.get(f"{verbs.canonical_verb(verb)} {words[len(verb) + 1 :]}")
+    return None

@@ -1,0 +1,447 @@
+"""The environment: it owns the loop, and nothing but the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
+
+from er_gym.envs import instances as which
+from er_gym.envs import skills
+from er_gym.envs.actions import ACTIONS, INDEX, Action, parse
+from er_gym.envs.legality import Surroundings, legal_actions, objection, suited, surroundings
+from er_gym.envs.observations import OBSERVATIONS, Memory, Situation, parse_obs_mode
+from er_gym.envs.reward import Progress, search_targets
+from er_gym.tasks import verbs
+from er_gym.tasks.suites import load_suite
+from er_gym.tasks.task import Task
+from er_gym.tasks.types import task_type as look_up_type
+from er_gym.thor import make_controller
+
+MAX_REPEATS = 3
+"""The same action once more than this in a row ends the episode, unexecuted."""
+MAX_UNKNOWN = 3
+"""So many replies in a row that name no known action end the episode."""
+
+
+class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
+    """A household task in an AI2-THOR room, played with high-level actions.
+
+    ## Description
+    The agent stands in a corner of a room and is told what to do: find a thing, pick one up, switch
+    one on, carry one somewhere. It walks, opens, takes and puts by naming object types, as in the
+    paper *Embodied-Reasoner* (arXiv 2503.21696), and is judged by the task's key actions.
+
+    ## Action Space
+    ``Discrete`` over :data:`er_gym.envs.actions.ACTIONS`, the same in every scene: ``observe``,
+    ``move forward``, ``end``, and a verb with an object type for ``navigate to``, ``pickup``, ``put
+    in``, ``open``, ``close`` and ``toggle``. ``step`` also takes an
+    :class:`~er_gym.envs.actions.Action` or its text (``"navigate to Fridge"``).
+    ``info["action_mask"]`` and :meth:`action_masks` say which are legal now.
+
+    - ``navigate to`` goes to where the object can be handled. Legal for what is, or was once in
+      this episode, plain to see (:func:`er_gym.envs.legality.is_navigable`), and for the task's own
+      ``navigable_objects``.
+    - ``pickup``, ``put in``, ``open``, ``close``, ``toggle`` need the object to be plain to see
+      now, or visible and of a type that lies in the receptacle last navigated to.
+    - ``observe`` looks right, behind and left; ``info["views"]`` has the pictures.
+    - ``end`` says that the task is done.
+
+    An illegal action costs a step, changes nothing and is answered in words.
+
+    ## Observation Space
+    ``Dict`` of what ``obs_mode`` asks for, joined with ``+``:
+
+    - ``rgb``: the agent's view, ``(height, width, 3)`` uint8.
+    - ``state``: ``(D,)`` float32 in [-1, 1], see :data:`er_gym.envs.observations.STATE_LAYOUT`.
+    - ``text``: the task, what is seen, held and possible, and feedback, in words.
+
+    ## Rewards
+    Each key action of the task is worth its reward (1) once, in any order unless the type of task
+    is ordered; which instance of a type it is done to does not matter. ``end`` is worth its own
+    only when all others but navigation are done, and, for a search, when the target can be
+    interacted with. ``step_penalty`` and ``illegal_penalty`` are subtracted for each counted step
+    and each illegal action.
+
+    ## Starting State
+    The agent stands at the reachable position nearest to a corner of the scene's bounds and looks
+    diagonally into the room. ``reset(seed=…)`` draws a task from ``tasks``; ``options={"task":
+    task}`` chooses one (a :class:`~er_gym.tasks.task.Task`, or the id of one of ``tasks``).
+
+    ## Episode End
+    Terminates on ``end``; on the fourth same action in a row; on the third reply in a row that
+    names no known action (such a reply costs no step). Truncates at ``max_steps``, placing the
+    agent counting as the first step. ``info["end_reason"]`` says which.
+
+    ## Arguments
+    - ``tasks``: what episodes are drawn from; default: the bundled suite ``mini``, those of
+      ``task_type`` if that is given.
+    - ``backend``: ``"embedded"`` or ``"unity"`` (:func:`er_gym.thor.make_controller`).
+    - ``width``, ``height`` pixels; ``field_of_view`` degrees, vertical; ``grid_size`` and
+      ``visibility_distance`` metres.
+    - ``instances``: ``"target"``: a type name stands for the task's object of that type first, as
+      in the paper; ``"explore"``: for the nearest not yet visited (navigation) or the nearest
+      (interaction), whatever the task.
+    - ``max_steps``: default: the task type's own.
+
+    ## Version History
+    - v0: first.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012  (Gymnasium's own)
+
+    def __init__(
+        self,
+        tasks: Sequence[Task] | None = None,
+        *,
+        task_type: str | None = None,
+        obs_mode: str = "rgb+text",
+        backend: str = "embedded",
+        width: int = 800,
+        height: int = 450,
+        field_of_view: float = 90.0,
+        grid_size: float = 0.1,
+        visibility_distance: float = 20.0,
+        instances: str = which.TARGET,
+        max_steps: int | None = None,
+        step_penalty: float = 0.0,
+        illegal_penalty: float = 0.0,
+        render_mode: str | None = None,
+    ) -> None:
+        EzPickle.__init__(
+            self, tasks, task_type=task_type, obs_mode=obs_mode, backend=backend, width=width,
+            height=height, field_of_view=field_of_view, grid_size=grid_size,
+            visibility_distance=visibility_distance, instances=instances, max_steps=max_steps,
+            step_penalty=step_penalty, illegal_penalty=illegal_penalty, render_mode=render_mode,
+        )  # fmt: skip
+        if instances not in which.POLICIES:
+            raise ValueError(
+                f"unknown instances {instances!r}; choose one of: {', '.join(which.POLICIES)}"
+            )
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"unknown render_mode {render_mode!r}; choose 'rgb_array' or None")
+        self.tasks = tuple(_default_tasks(task_type) if tasks is None else tasks)
+        self.render_mode = render_mode
+        self._obs = parse_obs_mode(obs_mode)
+        self._draws = "rgb" in self._obs
+        self._instances = instances
+        self._max_steps = max_steps
+        self._step_penalty, self._illegal_penalty = step_penalty, illegal_penalty
+        self._grid_size = grid_size
+        self._backend = backend
+        self._controller_arguments = {
+            "width": width,
+            "height": height,
+            "fieldOfView": field_of_view,
+            "gridSize": grid_size,
+            "visibilityDistance": visibility_distance,
+            "snapToGrid": False,
+            "headless": not self._draws,
+        }
+        self._controller: Any = None
+        self._event: Any = None
+        self.action_space = spaces.Discrete(len(ACTIONS))
+        self.observation_space = spaces.Dict(
+            {name: OBSERVATIONS[name].space(width, height) for name in self._obs}
+        )
+
+    # -- Gymnasium's interface -------------------------------------------------------------------
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Begin an episode; ``options={"task": …}`` chooses its task."""
+        super().reset(seed=seed)
+        self.task = self._choose((options or {}).get("task"))
+        controller = self._started_controller(self.task.scene)
+        event = controller.reset(self.task.scene)
+        event = controller.step(action="GetReachablePositions", renderImage=False)
+        self._reachable = skills.Reachable.of(event.metadata["actionReturn"])
+        pose = skills.start_pose(event.metadata, self._reachable)
+        self._memory = Memory(pose)
+        self._progress = Progress.start(self.task)
+        self._known = {name for name in self.task.navigable_objects if name != "Floor"}
+        self._at = ""  # id of the object last navigated to
+        self._visited: dict[str, list[str]] = {}
+        self._steps = 1
+        self._limit = self._max_steps or self.task.max_steps
+        self._last: Action | None = None
+        self._repeats = self._unknown = 0
+        self._end_reason = ""
+        self._success = False
+        placed = skills.place(controller, pose)
+        self._take_in(placed.event)
+        return self._observation("You look around the room.", True), self._info(
+            None, "", placed.success, "", "You look around the room."
+        )
+
+    def step(
+        self, action: Action | str | int | np.integer[Any]
+    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Do an action: an index, an :class:`~er_gym.envs.actions.Action` or its text.
+
+        Raises:
+            gymnasium.error.ResetNeeded: there is no episode, or it is over.
+            gymnasium.error.InvalidAction: an index that is out of range, or something else that is
+                no action at all. (Text that names no known action is answered, not raised.)
+        """
+        if self._controller is None or self._end_reason:
+            raise gymnasium.error.ResetNeeded("call reset() first: no episode is under way")
+        understood, text = _understand(action)
+        if understood is None:
+            return self._not_understood(text)
+        self._unknown = 0
+        self._repeats = self._repeats + 1 if understood == self._last else 1
+        self._last = understood
+        if self._repeats > MAX_REPEATS:
+            self._end_reason = "repeated action"
+            feedback = f"You have tried to {understood} {self._repeats} times in a row; that is it."
+            return self._reply(understood, text, False, "", feedback, 0.0)
+        self._steps += 1
+        refused = objection(understood, self._around, self._known)
+        if refused:
+            object_id, outcome = "", skills.Outcome(self._event, False, refused)
+        else:
+            object_id, outcome = self._do(understood)
+        self._take_in(outcome.event, outcome.views)
+        reward = self._judge(understood, outcome) - self._step_penalty
+        if refused:
+            reward -= self._illegal_penalty
+        if understood.verb == verbs.END:
+            self._end_reason = "end"
+        elif self._steps >= self._limit:
+            self._end_reason = "step limit"
+        feedback = refused or _feedback(understood, outcome)
+        return self._reply(
+            understood, text, outcome.success, object_id, feedback, reward, outcome.views
+        )
+
+    def action_masks(self) -> NDArray[np.int8]:
+        """(len(ACTIONS),) int8: 1 for each action that is legal now."""
+        mask = np.zeros(len(ACTIONS), dtype=np.int8)
+        for action in legal_actions(self._around, self._known):
+            mask[INDEX[action]] = 1
+        return mask
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``."""
+        if self.render_mode is None or self._controller is None:
+            return None
+        if self._event.frame is None:
+            headless, self._controller.headless = self._controller.headless, False
+            self._event = self._controller.step(action="Pass")
+            self._controller.headless = headless
+        return np.ascontiguousarray(self._event.frame)
+
+    def close(self) -> None:
+        """Stop the controller."""
+        if self._controller is not None:
+            self._controller.stop()
+            self._controller = None
+
+    # -- the loop's parts ------------------------------------------------------------------------
+
+    def _started_controller(self, scene: str) -> Any:
+        if self._controller is None:
+            self._controller = make_controller(
+                self._backend, scene=scene, **self._controller_arguments
+            )
+        return self._controller
+
+    def _choose(self, wanted: Task | str | None) -> Task:
+        if isinstance(wanted, Task):
+            return wanted
+        if wanted is not None:
+            for task in self.tasks:
+                if task.id == wanted:
+                    return task
+            raise ValueError(f"no task {wanted!r} among this environment's {len(self.tasks)} tasks")
+        if not self.tasks:
+            raise ValueError("this environment has no tasks; pass tasks=… or options={'task': …}")
+        return self.tasks[int(self.np_random.integers(len(self.tasks)))]
+
+    def _take_in(self, event: Any, views: Mapping[str, Any] | None = None) -> None:
+        """Remember what can be seen after a step, and in the views of an "observe"."""
+        for seen in (*(views or {}).values(), event):
+            self._event = seen
+            self._around = surroundings(seen.metadata, self._types_nearby(seen))
+            self._known |= self._around.types(self._around.navigable)
+            self._memory.look(self._around)
+
+    def _types_nearby(self, event: Any) -> frozenset[str]:
+        """The types of what lies in the receptacle last navigated to."""
+        for entry in event.metadata["objects"]:
+            if entry["objectId"] == self._at:
+                return frozenset(
+                    other["objectType"]
+                    for other in event.metadata["objects"]
+                    if other["objectId"] in set(entry["receptacleObjectIds"] or ())
+                )
+        return frozenset()
+
+    def _do(self, action: Action) -> tuple[str, skills.Outcome]:
+        if action.verb == verbs.OBSERVE:
+            return "", skills.observe(self._controller)
+        if action.verb == verbs.MOVE_FORWARD:
+            return "", skills.move_forward(self._controller, self._grid_size)
+        if action.verb == verbs.END:
+            return "", skills.Outcome(self._event, True)
+        if action.verb == verbs.NAVIGATE:
+            return self._navigate(action.object_type)
+        around = self._around
+        able = [i for i in suited(action.verb, around) if _is(around, i, action.object_type)]
+        if self._instances == which.TARGET:
+            chosen = which.by_task(self.task, self._progress.left, action.verb, able)
+        else:
+            chosen = which.nearest(able, around.objects, self._agent_position)
+        done = skills.interact(
+            self._controller, action.verb, around.objects[chosen], around.objects
+        )
+        return chosen, done
+
+    def _navigate(self, object_type: str) -> tuple[str, skills.Outcome]:
+        objects = self._around.objects
+        able = [i for i in objects if _is(self._around, i, object_type)]
+        if not able:
+            return "", skills.Outcome(self._event, False, f"there is no {object_type} any more")
+        if self._instances == which.TARGET:
+            goal = which.by_task(self.task, self._progress.left, verbs.NAVIGATE, able)
+            aim = which.redirected(self.task, goal, objects)
+        else:
+            visited = self._visited.setdefault(object_type, [])
+            if len(visited) >= len(able):
+                visited.clear()
+            aim = goal = which.nearest(able, objects, self._agent_position, visited)
+            visited.append(goal)
+        pose = self.task.poses.get(goal)
+        if pose is not None:
+            outcome = skills.place(self._controller, pose)
+        else:
+            aim = which.container_in_the_way(aim, objects) or aim
+            outcome = skills.navigate(self._controller, objects[aim], self._reachable)
+        if outcome.success:
+            self._at = goal
+        return goal, outcome
+
+    @property
+    def _agent_position(self) -> Mapping[str, float]:
+        position: Mapping[str, float] = self._event.metadata["agent"]["position"]
+        return position
+
+    def _judge(self, action: Action, outcome: skills.Outcome) -> float:
+        """The reward that an action earned; decides success at ``end``."""
+        if not outcome.success:
+            return 0.0
+        if action.verb == verbs.END:
+            targets = search_targets(self.task) if self.task.type.search else frozenset()
+            in_reach = self._around.types(self._around.interactable)
+            if not self._progress.only_end_left or not targets <= in_reach:
+                return 0.0
+            self._success = True
+        self._progress, reward = self._progress.after(action)
+        return reward
+
+    def _not_understood(
+        self, text: str
+    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        self._unknown += 1
+        if self._unknown >= MAX_UNKNOWN:
+            self._end_reason = "no known action"
+        feedback = (
+            f"{text!r} names no action. Say one of: {', '.join(verbs.BARE_VERBS)}; or one of "
+            f"{', '.join(verbs.OBJECT_VERBS)} with an object type, such as 'navigate to Fridge'."
+        )
+        return self._reply(None, text, False, "", feedback, 0.0)
+
+    # -- what is handed out ----------------------------------------------------------------------
+
+    def _reply(
+        self,
+        action: Action | None,
+        text: str,
+        success: bool,
+        object_id: str,
+        feedback: str,
+        reward: float,
+        views: Mapping[str, Any] | None = None,
+    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        truncated = self._end_reason == "step limit"
+        terminated = bool(self._end_reason) and not truncated
+        info = self._info(action, text, success, object_id, feedback)
+        if views:
+            info["views"] = {name: view.frame for name, view in views.items()}
+        return self._observation(feedback, success), reward, terminated, truncated, info
+
+    def _observation(self, feedback: str, success: bool) -> dict[str, Any]:
+        at = self._around.objects.get(self._at)
+        situation = Situation(
+            event=self._event,
+            around=self._around,
+            memory=self._memory,
+            known=frozenset(self._known),
+            instruction=self.task.instruction,
+            feedback=feedback,
+            at="" if at is None else str(at["objectType"]),
+            success=success,
+            steps=self._steps,
+            max_steps=self._limit,
+        )
+        return {name: OBSERVATIONS[name].build(situation) for name in self._obs}
+
+    def _info(
+        self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
+    ) -> dict[str, Any]:
+        around = self._around
+        return {
+            "task": self.task,
+            "action": action,
+            "action_text": text,
+            "action_success": success,
+            "object_id": object_id,
+            "feedback": feedback,
+            "success": self._success,
+            "key_actions_done": self._progress.done,
+            "key_actions_left": self._progress.left,
+            "navigable": tuple(sorted(self._known)),
+            "interactable": tuple(sorted(around.types(around.interactable))),
+            "steps": self._steps,
+            "end_reason": self._end_reason,
+            "action_mask": self.action_masks(),
+        }
+
+
+def _default_tasks(task_type: str | None) -> list[Task]:
+    tasks = load_suite("mini").tasks
+    if task_type is None:
+        return list(tasks)
+    wanted = look_up_type(task_type)
+    return [task for task in tasks if task.type is wanted]
+
+
+def _understand(action: Action | str | int | np.integer[Any]) -> tuple[Action | None, str]:
+    """The action meant, None if a text names none; and the text."""
+    if isinstance(action, str):
+        return parse(action), action
+    if isinstance(action, Action):
+        return parse(str(action)), str(action)
+    if isinstance(action, int | np.integer | np.ndarray) and 0 <= int(action) < len(ACTIONS):
+        return ACTIONS[int(action)], str(ACTIONS[int(action)])
+    raise gymnasium.error.InvalidAction(
+        f"{action!r} is no action: give an index from 0 to {len(ACTIONS) - 1}, an Action, or text "
+        "such as 'navigate to Fridge'"
+    )
+
+
+def _is(around: Surroundings, object_id: str, object_type: str) -> bool:
+    return bool(around.objects[object_id]["objectType"] == object_type)
+
+
+def _feedback(action: Action, outcome: skills.Outcome) -> str:
+    if outcome.success:
+        return f"Done: {action}."
+    return f"You could not {action}: {outcome.problem}"

@@ -1,0 +1,11 @@
+"""AI2-THOR's actions, one small file a family. Importing this package registers them all."""
+
+from er_gym.sim.actions import (  # noqa: F401  (imported for their registrations)
+    look,
+    move,
+    open_toggle,
+    pick_place,
+    query,
+    setup,
+    state_change,
+)

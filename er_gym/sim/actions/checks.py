@@ -1,0 +1,38 @@
+"""Conditions that several actions share; each returns the object's row or says what is wrong."""
+
+from __future__ import annotations
+
+from er_gym.sim.errors import ActionFailed
+from er_gym.sim.space.visibility import visible
+from er_gym.sim.world import World
+
+
+def target(world: World, object_id: str, force: bool) -> int:
+    """The object that an action names; unless forced it has to be in view and within reach.
+
+    Raises:
+        ActionFailed: there is no such object, it is shut away, or it cannot be seen from here.
+    """
+    i = world.find(object_id)
+    if force:
+        return i
+    if world.hidden[i]:
+        shut = next(a for a in world.ancestors(i) if world.is_shut(a))
+        raise ActionFailed(
+            f"{object_id} is inside {world.object_ids[shut]}, which is closed.", "NotVisible"
+        )
+    if not visible(world)[i]:
+        raise ActionFailed(
+            f"{object_id} is not visible from here: it is out of view, farther than "
+            f"{world.settings.visibility_distance:g} m, or hidden.",
+            "NotVisible",
+        )
+    return i
+
+
+def require(world: World, i: int, prop: str, what: str) -> None:
+    """Refuse an action on an object that lacks a property."""
+    if not world.has(i, prop):
+        raise ActionFailed(
+            f"{world.object_ids[i]} is not {what}.", f"Not{prop[0].upper()}{prop[1:]}"
+        )

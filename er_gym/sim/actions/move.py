@@ -1,0 +1,115 @@
+"""Moving about: steps on the walkable floor, and teleports."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.world import World
+
+_HEIGHT_TOLERANCE = 0.3
+"""A position whose height is farther off than this is not on the floor, metres."""
+
+
+def _step(world: World, magnitude: float | None, heading: float) -> None:
+    size = world.settings.grid_size if magnitude is None else magnitude
+    if size < 0:
+        raise ActionFailed(f"moveMagnitude must be 0 or more, not {size:g}.", INVALID_ARGUMENT)
+    angle = np.radians(world.agent.rotation + heading)
+    start = world.agent.position
+    end = start + size * np.array([np.sin(angle), 0.0, np.cos(angle)])
+    if world.settings.snap_to_grid:
+        grid = world.settings.grid_size
+        end[[0, 2]] = np.round(end[[0, 2]] / grid) * grid
+    if size > 1e3 or not world.floor.path_is_clear(start[[0, 2]], end[[0, 2]]):
+        dx, _, dz = end - start
+        raise ActionFailed(
+            f"{_obstacle(world, end)} is blocking the agent from moving by ({dx:.4f}, {dz:.4f})."
+        )
+    world.place_agent(replace(world.agent, position=end))
+
+
+def _obstacle(world: World, end: np.ndarray) -> str:
+    """The standing object nearest to where the agent wanted to go, or a wall."""
+    rows = [
+        i
+        for i in np.flatnonzero(world.exists)
+        if world.low[i, 1] < 1.6 and world.types[i] != "Floor" and world.high[i, 1] > 0.1
+    ]
+    gap = np.clip(end, world.low[rows], world.high[rows]) - end
+    distance = np.linalg.norm(gap[:, [0, 2]], axis=1)
+    nearest = int(distance.argmin())
+    return world.object_ids[rows[nearest]] if distance[nearest] < 0.25 else "A wall"
+
+
+@action("MoveAhead")
+def move_ahead(world: World, *, moveMagnitude: float | None = None) -> None:
+    """Step forward by moveMagnitude metres (default: gridSize)."""
+    _step(world, moveMagnitude, 0.0)
+
+
+@action("MoveBack")
+def move_back(world: World, *, moveMagnitude: float | None = None) -> None:
+    """Step backward."""
+    _step(world, moveMagnitude, 180.0)
+
+
+@action("MoveLeft")
+def move_left(world: World, *, moveMagnitude: float | None = None) -> None:
+    """Step to the left without turning."""
+    _step(world, moveMagnitude, 270.0)
+
+
+@action("MoveRight")
+def move_right(world: World, *, moveMagnitude: float | None = None) -> None:
+    """Step to the right without turning."""
+    _step(world, moveMagnitude, 90.0)
+
+
+@action("Teleport", "TeleportFull")
+def teleport(
+    world: World,
+    *,
+    position: Vector | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    z: float | None = None,
+    rotation: Vector | None = None,
+    horizon: float | None = None,
+    standing: bool | None = None,
+    forceAction: bool = False,
+) -> None:
+    """Put the agent at a pose; what is not given stays as it is."""
+    agent = world.agent
+    if position is not None:
+        x, y, z = position.x, position.y, position.z
+    here = agent.position
+    there = np.array(
+        [here[0] if x is None else x, here[1] if y is None else y, here[2] if z is None else z]
+    )
+    if abs(there[1] - here[1]) > _HEIGHT_TOLERANCE and not forceAction:
+        raise ActionFailed(
+            f"Cannot teleport to height {there[1]:.3f}: the agent's centre is at {here[1]:.3f}."
+        )
+    if not forceAction and not world.floor.contains(there[[0, 2]]):
+        raise ActionFailed(
+            f"Cannot teleport to ({there[0]:.3f}, {there[2]:.3f}): {_obstacle(world, there)} is "
+            "there. GetReachablePositions lists where the agent can stand."
+        )
+    if horizon is not None and not forceAction and not -90.0 <= horizon <= 90.0:
+        raise ActionFailed(
+            f"horizon must be within -90 and 90 degrees, not {horizon:g}.", INVALID_ARGUMENT
+        )
+    there[1] = here[1]
+    world.place_agent(
+        replace(
+            agent,
+            position=there,
+            rotation=agent.rotation if rotation is None else rotation.y % 360.0,
+            horizon=agent.horizon if horizon is None else horizon,
+            standing=agent.standing if standing is None else standing,
+        )
+    )

@@ -1,0 +1,69 @@
+"""Opening and closing, switching on and off."""
+
+from __future__ import annotations
+
+from er_gym.sim import consequences
+from er_gym.sim.actions.checks import require, target
+from er_gym.sim.actions.registry import action
+from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.world import World
+
+_ONLY_SHUT = frozenset({"Microwave"})
+"""Types that run only when shut, and open only when off."""
+
+
+@action("OpenObject")
+def open_object(
+    world: World, *, objectId: str, openness: float = 1.0, forceAction: bool = False
+) -> None:
+    """Open an object, to a share of its full opening in (0, 1]."""
+    i = target(world, objectId, forceAction)
+    require(world, i, "openable", "an openable object")
+    if not 0.0 <= openness <= 1.0:
+        raise ActionFailed(f"openness must be within 0 and 1, not {openness:g}.", INVALID_ARGUMENT)
+    if world.state(i, "isOpen") and world.openness[i] == openness:
+        raise ActionFailed(f"{objectId} is open already.")
+    if world.types[i] in _ONLY_SHUT and world.state(i, "isToggled"):
+        raise ActionFailed(f"{objectId} is on; switch it off before opening it.")
+    world.openness[i] = openness
+    world.set_state(i, "isOpen", openness > 0.0)
+
+
+@action("CloseObject")
+def close_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
+    """Close an object."""
+    i = target(world, objectId, forceAction)
+    require(world, i, "openable", "an openable object")
+    if not world.state(i, "isOpen"):
+        raise ActionFailed(f"{objectId} is closed already.")
+    world.openness[i] = 0.0
+    world.set_state(i, "isOpen", False)
+
+
+def _toggle(world: World, object_id: str, force: bool, on: bool) -> None:
+    i = target(world, object_id, force)
+    if world.types[i] == "StoveBurner":
+        knobs = [k for k in world.of_type("StoveKnob") if i in (world.controlled[k] or ())]
+        which = " or ".join(world.object_ids[k] for k in knobs) or "a StoveKnob"
+        raise ActionFailed(
+            f"{object_id} is not toggled itself: turn {which}, which controls it.", "NotToggleable"
+        )
+    require(world, i, "toggleable", "a toggleable object")
+    if world.state(i, "isToggled") is on:
+        raise ActionFailed(f"{object_id} is {'on' if on else 'off'} already.")
+    if on and world.types[i] in _ONLY_SHUT and world.state(i, "isOpen"):
+        raise ActionFailed(f"{object_id} must be closed before it is switched on.")
+    world.set_state(i, "isToggled", on)
+    consequences.apply(world)
+
+
+@action("ToggleObjectOn")
+def toggle_on(world: World, *, objectId: str, forceAction: bool = False) -> None:
+    """Switch an object on."""
+    _toggle(world, objectId, forceAction, on=True)
+
+
+@action("ToggleObjectOff")
+def toggle_off(world: World, *, objectId: str, forceAction: bool = False) -> None:
+    """Switch an object off."""
+    _toggle(world, objectId, forceAction, on=False)

@@ -1,0 +1,87 @@
+"""Questions about the scene that change nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.scene import SCENE_NAMES
+from er_gym.sim.space.poses import HORIZONS, interactable_poses
+from er_gym.sim.space.walk import walkable_grid
+from er_gym.sim.world import World
+
+
+@action("Pass", "Done", "AdvancePhysicsStep", "PausePhysicsAutoSim", "UnpausePhysicsAutoSim")
+def do_nothing(world: World) -> None:
+    """Answer with the state of the world as it is."""
+
+
+@action("GetScenesInBuild")
+def get_scenes_in_build(world: World) -> list[str]:
+    """Names of the scenes, as the Unity build spells them."""
+    return [f"{name}_physics" for name in SCENE_NAMES]
+
+
+def _grid(world: World, step: float | None) -> np.ndarray:
+    size = world.settings.grid_size if step is None else step
+    if size < 0.01:
+        raise ActionFailed(
+            f"A grid needs a step of 0.01 m or more, not {size:g}.", INVALID_ARGUMENT
+        )
+    return walkable_grid(world.scene.name, float(size))
+
+
+@action("GetReachablePositions")
+def get_reachable_positions(
+    world: World, *, gridSize: float | None = None
+) -> list[dict[str, float]]:
+    """Every position of the grid where the agent can stand, metres."""
+    y = float(world.agent.position[1])
+    return [{"x": x, "y": y, "z": z} for x, z in _grid(world, gridSize).tolist()]
+
+
+@action("GetInteractablePoses")
+def get_interactable_poses(
+    world: World,
+    *,
+    objectId: str,
+    positions: list[Vector] | None = None,
+    rotations: list[float] | None = None,
+    horizons: list[float] | None = None,
+    standings: list[bool] | None = None,
+    maxPoses: int | None = None,
+) -> list[dict[str, Any]]:
+    """Every pose from which an object can be interacted with; each filter narrows the search."""
+    i = world.find(objectId)
+    places = (
+        _grid(world, None)
+        if positions is None
+        else np.array([(p.x, p.z) for p in positions]).reshape(-1, 2)
+    )
+    places = places[world.floor.contains(places)] if len(places) else places
+    if rotations is None:
+        step = world.settings.rotate_step
+        rotations = [k * step for k in range(int(360 // step))]
+    poses = interactable_poses(
+        world,
+        i,
+        places,
+        rotations,
+        HORIZONS if horizons is None else horizons,
+        (True, False) if standings is None else standings,
+        maxPoses,
+    )
+    return [
+        {
+            "x": float(pose.position[0]),
+            "y": float(pose.position[1]),
+            "z": float(pose.position[2]),
+            "rotation": pose.rotation,
+            "standing": pose.standing,
+            "horizon": pose.horizon,
+        }
+        for pose in poses
+    ]

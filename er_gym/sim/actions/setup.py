@@ -1,0 +1,90 @@
+"""What the client says before an episode: settings and resolution."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from er_gym.sim.actions.registry import action
+from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.space.visibility import NEAR_PLANE
+from er_gym.sim.world import World
+
+_FAR_PLANE = 20.0
+
+
+def _check(name: str, value: float | None, low: float, high: float) -> None:
+    if value is not None and not low <= value <= high:
+        raise ActionFailed(
+            f"{name} must be within {low:g} and {high:g}, not {value:g}.", INVALID_ARGUMENT
+        )
+
+
+@action("Initialize")
+def initialize(
+    world: World,
+    *,
+    gridSize: float | None = None,
+    snapToGrid: bool | None = None,
+    continuous: bool | None = None,
+    visibilityDistance: float | None = None,
+    fieldOfView: float | None = None,
+    rotateStepDegrees: float | None = None,
+    renderDepthImage: bool | None = None,
+    renderInstanceSegmentation: bool | None = None,
+    renderSemanticSegmentation: bool | None = None,
+    renderClassImage: bool | None = None,
+    renderObjectImage: bool | None = None,
+    renderNormalsImage: bool | None = None,
+    agentMode: str = "default",
+    agentCount: int = 1,
+    massThreshold: float | None = None,
+    visibilityScheme: str | None = None,
+    makeAgentsVisible: bool = True,
+    fastActionEmit: bool = True,
+) -> dict[str, Any]:
+    """Set what the engine goes by; distances in metres, angles in degrees.
+
+    ``agentMode`` other than "default" and more than one agent are refused: the embedded engine has
+    neither arm, drone nor crowd. ``massThreshold`` is accepted and has no effect, for nothing here
+    is pushed.
+    """
+    if agentMode.lower() != "default":
+        raise ActionFailed(
+            f"The embedded engine has agentMode 'default' only, not {agentMode!r}; "
+            "use backend='unity' for others.",
+            INVALID_ARGUMENT,
+        )
+    if agentCount != 1:
+        raise ActionFailed(
+            f"The embedded engine has one agent, not {agentCount}.", INVALID_ARGUMENT
+        )
+    _check("gridSize", gridSize, 0.01, 10.0)
+    _check("visibilityDistance", visibilityDistance, 0.0, 1000.0)
+    _check("fieldOfView", fieldOfView, 1.0, 179.0)
+    _check("rotateStepDegrees", rotateStepDegrees, 1.0, 360.0)
+    if continuous is not None and snapToGrid is None:
+        snapToGrid = not continuous
+    chosen = {
+        "grid_size": gridSize,
+        "snap_to_grid": snapToGrid,
+        "visibility_distance": visibilityDistance,
+        "field_of_view": fieldOfView,
+        "rotate_step": rotateStepDegrees,
+        "render_depth": renderDepthImage,
+        "render_instances": renderInstanceSegmentation or renderObjectImage,
+    }
+    world.configure(**{name: value for name, value in chosen.items() if value is not None})
+    return {"cameraNearPlane": NEAR_PLANE, "cameraFarPlane": _FAR_PLANE}
+
+
+@action("ChangeResolution")
+def change_resolution(world: World, *, x: int, y: int) -> None:
+    """Set the width and height of frames in pixels."""
+    _check("x", x, 1, 8192)
+    _check("y", y, 1, 8192)
+    world.configure(width=x, height=y)
+
+
+@action("ChangeQuality")
+def change_quality(world: World, *, quality: str = "") -> None:
+    """Accepted for the client's sake: the embedded engine draws in one quality."""

@@ -1,0 +1,149 @@
+"""What can be done to a thing besides moving it: slice, cook, clean, fill, break, use up."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er_gym.sim import consequences
+from er_gym.sim.actions.checks import require, target
+from er_gym.sim.actions.registry import action
+from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.world import World
+
+LIQUIDS = ("coffee", "water", "wine")
+_SLICES = {"Apple": 6, "Bread": 6, "Lettuce": 6, "Potato": 6, "Tomato": 6}
+"""How many slices a whole thing gives (an egg cracks into one)."""
+_COOKABLE_PARTS = frozenset({"BreadSliced", "PotatoSliced", "EggCracked"})
+
+
+def parts_of(kind: str) -> tuple[str, bool]:
+    """What slicing a type gives: the type of the parts, and whether they can be cooked."""
+    part = "EggCracked" if kind == "Egg" else f"{kind}Sliced"
+    return part, part in _COOKABLE_PARTS
+
+
+@action("SliceObject")
+def slice_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
+    """Cut an object up: its slices take its place. An egg cracks open."""
+    i = target(world, objectId, forceAction)
+    require(world, i, "sliceable", "something that can be sliced")
+    if i == world.held:
+        raise ActionFailed(f"{objectId} is in the agent's hand; put it down before slicing it.")
+    _cut_up(world, i)
+
+
+def _cut_up(world: World, i: int) -> None:
+    """Put the parts of object i, side by side along its longer side, where it was."""
+    kind, cookable = parts_of(world.types[i])
+    whole = world.object_ids[i]
+    count = _SLICES.get(world.types[i], 1)
+    ids = [f"{whole}|{kind}_{k}" for k in range(count)] if count > 1 else [f"{whole}|{kind}"]
+    size = world.high[i] - world.low[i]
+    axis = 0 if size[0] >= size[2] else 2
+    share = np.ones(3)
+    share[axis] = 1.0 / count
+    for k, object_id in enumerate(ids):
+        part = world.add_object(i, object_id, kind, f"{world.names[i]}_{kind}_{k}")
+        world.set_property(part, "sliceable", False)
+        world.set_property(part, "cookable", cookable)
+        if count > 1:
+            # The oriented box no longer tells the part's shape: an axis-aligned one stands in.
+            low, extent = world.low[part], world.high[part] - world.low[part]
+            corner = low - world.position[part]
+            corner[axis] += k * extent[axis] / count
+            world.rotation[part] = 0.0
+            world.obb[part] = [corner, *np.diag(extent * share)]
+            world.turn(part, 0.0)
+            centre = (world.low[part] + world.high[part]) / 2
+            world.obb[part, 0] += world.position[part] - centre
+            world.position[part] = centre
+    world.exists[i] = False
+    world.states[i] = False
+    world.relocate(i, ())
+    consequences.apply(world)
+
+
+@action("BreakObject")
+def break_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
+    """Break an object; an egg cracks open."""
+    i = target(world, objectId, forceAction)
+    require(world, i, "breakable", "something that can be broken")
+    if world.state(i, "isBroken"):
+        raise ActionFailed(f"{objectId} is broken already.")
+    if world.types[i] == "Egg":
+        if i == world.held:
+            raise ActionFailed(
+                f"{objectId} is in the agent's hand; put it down before breaking it."
+            )
+        _cut_up(world, i)
+        return
+    world.set_state(i, "isBroken", True)
+
+
+@action("CookObject")
+def cook_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
+    """Cook an object as if by magic, without a source of heat."""
+    i = target(world, objectId, forceAction)
+    require(world, i, "cookable", "something that can be cooked")
+    if world.state(i, "isCooked"):
+        raise ActionFailed(f"{objectId} is cooked already.")
+    consequences.cook(world, i)
+
+
+@action("DirtyObject")
+def dirty_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
+    """Make an object dirty."""
+    i = target(world, objectId, forceAction)
+    require(world, i, "dirtyable", "something that can be dirty")
+    if world.state(i, "isDirty"):
+        raise ActionFailed(f"{objectId} is dirty already.")
+    world.set_state(i, "isDirty", True)
+    consequences.apply(world)
+
+
+@action("CleanObject")
+def clean_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
+    """Clean an object."""
+    i = target(world, objectId, forceAction)
+    require(world, i, "dirtyable", "something that can be dirty")
+    if not world.state(i, "isDirty"):
+        raise ActionFailed(f"{objectId} is clean already.")
+    world.set_state(i, "isDirty", False)
+
+
+@action("FillObjectWithLiquid")
+def fill_object(
+    world: World, *, objectId: str, fillLiquid: str = "water", forceAction: bool = False
+) -> None:
+    """Fill an object with one of :data:`LIQUIDS`."""
+    if fillLiquid not in LIQUIDS:
+        raise ActionFailed(
+            f"fillLiquid must be one of {', '.join(LIQUIDS)}, not {fillLiquid!r}.", INVALID_ARGUMENT
+        )
+    i = target(world, objectId, forceAction)
+    require(world, i, "canFillWithLiquid", "something that can be filled")
+    if world.state(i, "isFilledWithLiquid"):
+        raise ActionFailed(f"{objectId} is filled already.")
+    consequences.fill(world, i, fillLiquid)
+
+
+@action("EmptyLiquidFromObject")
+def empty_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
+    """Pour out what an object is filled with."""
+    i = target(world, objectId, forceAction)
+    require(world, i, "canFillWithLiquid", "something that can be filled")
+    if not world.state(i, "isFilledWithLiquid"):
+        raise ActionFailed(f"{objectId} is empty already.")
+    world.fill_liquid[i] = None
+    world.set_state(i, "isFilledWithLiquid", False)
+    consequences.apply(world)
+
+
+@action("UseUpObject")
+def use_up_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
+    """Use an object up, such as a roll of paper."""
+    i = target(world, objectId, forceAction)
+    require(world, i, "canBeUsedUp", "something that can be used up")
+    if world.state(i, "isUsedUp"):
+        raise ActionFailed(f"{objectId} is used up already.")
+    world.set_state(i, "isUsedUp", True)

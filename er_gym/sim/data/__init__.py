@@ -1,0 +1,1 @@
+"""The packaged scene tables (``scenes/*.npz``) and the script that builds them."""

@@ -1,0 +1,1 @@
+"""Pictures of the embedded engine's world, drawn on the CPU."""

@@ -1,0 +1,385 @@
+"""The mutable state of a scene: what is where, in which state, and where the agent is.
+
+Struct of arrays: row ``i`` of every array is object ``i``. Rows are never removed; an object that
+is no more (a whole apple after slicing) has ``exists[i]`` False. Whoever changes what can be seen
+calls :meth:`World.changed`, and everything derived is computed anew when next asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.errors import ActionFailed
+from er_gym.sim.scene import PROPERTIES, STATES, Scene
+from er_gym.sim.space.rotation import unity_rotation
+from er_gym.sim.space.shapes import Solid, solid_boxes, solid_part, surface_fractions
+from er_gym.sim.space.walk import WalkableFloor, walkable_floor
+
+AGENT_HEIGHT = 0.900999128818512
+"""Height of the agent's centre above the top of the scene's Floor, metres, as AI2-THOR has it."""
+CAMERA_STANDING, CAMERA_CROUCHING = 0.675, 0.0
+"""Height of the camera above the agent's centre, metres."""
+HAND_OFFSET = np.array([0.0, -0.16, 0.38])
+"""Where the hand is in the camera's frame (right, up, forward), metres."""
+_PROPERTY = {name: column for column, name in enumerate(PROPERTIES)}
+_STATE = {name: column for column, name in enumerate(STATES)}
+
+
+def settled(rotation: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
+    """(3,) degrees: a rotation with its tilts rounded to quarter turns, and another heading."""
+    x, _, z = np.round(rotation / 90.0) * 90.0 % 360.0
+    return np.array([x, yaw % 360.0, z])
+
+
+@dataclass(frozen=True)
+class Agent:
+    """The agent's pose: position (3,) of its centre in metres, degrees, AI2-THOR's frame."""
+
+    position: NDArray[np.float64]
+    rotation: float = 0.0
+    horizon: float = 0.0
+    standing: bool = True
+
+    @property
+    def camera(self) -> NDArray[np.float64]:
+        """Position (3,) of the camera, metres."""
+        lift = CAMERA_STANDING if self.standing else CAMERA_CROUCHING
+        return np.asarray(self.position + np.array([0.0, lift, 0.0]))
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What ``Initialize`` sets; lengths in metres, angles in degrees."""
+
+    grid_size: float = 0.25
+    snap_to_grid: bool = True
+    visibility_distance: float = 1.5
+    field_of_view: float = 90.0
+    rotate_step: float = 90.0
+    width: int = 300
+    height: int = 300
+    render_depth: bool = False
+    render_instances: bool = False
+
+
+@dataclass
+class World:
+    """A scene being lived in. Made by :meth:`World.load`.
+
+    Attributes mirror AI2-THOR's object metadata, one row an object: ``position``, ``rotation``,
+    ``low`` and ``high`` (corners of the axis-aligned box) are (N, 3), metres and degrees;
+    ``properties`` and ``states`` are (N, P) and (N, S) bool, see :meth:`has` and :meth:`state`.
+    ``parents[i]`` are the receptacles that object i is in, innermost first as recorded.
+    ``entries`` is where :mod:`er_gym.sim.metadata` keeps what it said of objects that have not
+    changed since, ``sights`` where :mod:`er_gym.sim.space.visibility` keeps what can be seen from
+    where while nothing has.
+    """
+
+    scene: Scene
+    settings: Settings
+    agent: Agent
+    object_ids: list[str]
+    names: list[str]
+    types: list[str]
+    asset_ids: list[str]
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    obb: NDArray[np.float64]
+    properties: NDArray[np.bool_]
+    states: NDArray[np.bool_]
+    openness: NDArray[np.float64]
+    mass: NDArray[np.float64]
+    exists: NDArray[np.bool_]
+    temperature: list[str]
+    fill_liquid: list[str | None]
+    parents: list[tuple[int, ...]]
+    controlled: list[tuple[int, ...] | None]
+    salient_materials: list[tuple[str, ...] | None]
+    held: int = -1
+    index: dict[str, int] = field(default_factory=dict)
+    _derived: dict[str, object] = field(default_factory=dict)
+    _samples: dict[int, NDArray[np.float64]] = field(default_factory=dict)
+    entries: dict[int, dict[str, object]] = field(default_factory=dict)
+    sights: dict[tuple[float, ...], tuple[NDArray[np.float64], NDArray[np.int64]]] = field(
+        default_factory=dict
+    )
+
+    @staticmethod
+    def load(scene: Scene, settings: Settings) -> World:
+        """The scene as recorded, with the agent at the walkable position nearest its middle."""
+        floor = scene.reachable
+        middle = floor[np.argmin(np.linalg.norm(floor - floor.mean(axis=0), axis=1))]
+        half = scene.aabb_size / 2
+        ground = (scene.aabb_center + half)[scene.types.index("Floor"), 1]
+        world = World(
+            scene=scene,
+            settings=settings,
+            agent=Agent(np.array([middle[0], ground + AGENT_HEIGHT, middle[1]])),
+            object_ids=list(scene.object_ids),
+            names=list(scene.names),
+            types=list(scene.types),
+            asset_ids=list(scene.asset_ids),
+            position=scene.position.copy(),
+            rotation=scene.rotation.copy(),
+            low=scene.aabb_center - half,
+            high=scene.aabb_center + half,
+            obb=scene.obb.copy(),
+            properties=scene.properties.copy(),
+            states=scene.states.copy(),
+            openness=scene.openness.copy(),
+            mass=scene.mass.copy(),
+            exists=np.ones(len(scene.object_ids), dtype=bool),
+            temperature=list(scene.temperature),
+            fill_liquid=[None] * len(scene.object_ids),
+            parents=list(scene.parents),
+            controlled=list(scene.controlled),
+            salient_materials=list(scene.salient_materials),
+        )
+        world.index = {object_id: i for i, object_id in enumerate(world.object_ids)}
+        return world
+
+    # -- reading ---------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        return len(self.object_ids)
+
+    def has(self, i: int, prop: str) -> bool:
+        """Whether object i has a property of :data:`er_gym.sim.scene.PROPERTIES`."""
+        return bool(self.properties[i, _PROPERTY[prop]])
+
+    def state(self, i: int, name: str) -> bool:
+        """Whether object i is in a state of :data:`er_gym.sim.scene.STATES`."""
+        return bool(self.states[i, _STATE[name]])
+
+    def of_type(self, *types: str) -> Iterator[int]:
+        """The existing objects of some types, in scene order."""
+        return (i for i, t in enumerate(self.types) if t in types and self.exists[i])
+
+    def find(self, object_id: str) -> int:
+        """The row of an object.
+
+        Raises:
+            ActionFailed: there is none of that id.
+        """
+        i = self.index.get(object_id)
+        if i is None or not self.exists[i]:
+            raise ActionFailed(
+                f"No object with ID {object_id!r} is in {self.scene.name}.", "ObjectNotFound"
+            )
+        return i
+
+    @property
+    def floor(self) -> WalkableFloor:
+        """Where the agent can stand."""
+        return walkable_floor(self.scene.name)
+
+    @property
+    def contents(self) -> list[list[int]]:
+        """For each object, the rows of what lies in or on it."""
+        found = self._derived.get("contents")
+        if found is None:
+            lists: list[list[int]] = [[] for _ in range(len(self))]
+            for i, parents in enumerate(self.parents):
+                if self.exists[i]:
+                    for parent in parents:
+                        lists[parent].append(i)
+            found = self._derived["contents"] = lists
+        return found  # type: ignore[return-value]  # the only writer is above
+
+    def ancestors(self, i: int) -> set[int]:
+        """Every receptacle that object i is in, directly or through others."""
+        seen: set[int] = set()
+        todo = list(self.parents[i])
+        while todo:
+            parent = todo.pop()
+            if parent not in seen:
+                seen.add(parent)
+                todo.extend(self.parents[parent])
+        return seen
+
+    def inside(self, i: int) -> list[int]:
+        """Everything in or on object i, directly or through others, nearest first."""
+        found: list[int] = []
+        todo = list(self.contents[i])
+        while todo:
+            child = todo.pop(0)
+            if child not in found and child != i:
+                found.append(child)
+                todo.extend(self.contents[child])
+        return found
+
+    def is_shut(self, i: int) -> bool:
+        """Whether i is a receptacle that opens and is closed now."""
+        return self.has(i, "receptacle") and self.has(i, "openable") and not self.state(i, "isOpen")
+
+    @property
+    def hidden(self) -> NDArray[np.bool_]:
+        """(N,) which objects lie in something shut, or are no more."""
+        found = self._derived.get("hidden")
+        if not isinstance(found, np.ndarray):
+            found = ~self.exists
+            for i in range(len(self)):
+                if self.parents[i] and any(self.is_shut(a) for a in self.ancestors(i)):
+                    found[i] = True
+            self._derived["hidden"] = found
+        return found
+
+    @property
+    def in_hand(self) -> list[int]:
+        """The held object and all that lies in it; empty when the hand is."""
+        return [] if self.held < 0 else [self.held, *self.inside(self.held)]
+
+    def solids(
+        self,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
+        """Boxes that block lines of sight: (M, 3) corners, and (M,) whose they are."""
+        found = self._derived.get("solids")
+        if found is None:
+            rows: list[int] = []
+            parts: list[Solid] = []
+            skip = set(self.in_hand)
+            for i in np.flatnonzero(~self.hidden).tolist():
+                part = solid_part(self.types[i], self.has(i, "pickupable"))
+                if part is not None and i not in skip:
+                    rows.append(i)
+                    parts.append(part)
+            owners = np.array(rows, dtype=np.int64)
+            found = (*solid_boxes(self.low[owners], self.high[owners], parts), owners)
+            self._derived["solids"] = found
+        return found  # type: ignore[return-value]  # the only writer is above
+
+    def obb_corners(self, i: int) -> NDArray[np.float64] | None:
+        """(8, 3) corners of object i's oriented box in AI2-THOR's order, None where none is."""
+        if np.isnan(self.obb[i, 0, 0]):
+            return None
+        turn = unity_rotation(self.rotation[i])
+        corner, right, up, forward = self.obb[i] @ turn.T
+        corner = corner + self.position[i]
+        bottom = np.array([corner, corner + right, corner + right + forward, corner + forward])
+        return np.concatenate([bottom, bottom + up])
+
+    def sample_points(self, i: int) -> NDArray[np.float64]:
+        """(P, 3) points over the surface of object i's box: the oriented one, where recorded."""
+        points = self._samples.get(i)
+        if points is None:
+            if np.isnan(self.obb[i, 0, 0]):
+                size = self.high[i] - self.low[i]
+                points = self.low[i] + surface_fractions(size) * size
+            else:
+                corner, edges = self.obb[i, 0], self.obb[i, 1:]
+                size = np.linalg.norm(edges, axis=1)
+                points = corner + surface_fractions(size) @ edges
+                points = points @ unity_rotation(self.rotation[i]).T + self.position[i]
+            self._samples[i] = points
+        return points
+
+    def _shift(self, rows: list[int], offset: NDArray[np.float64]) -> None:
+        self.position[rows] += offset
+        self.low[rows] += offset
+        self.high[rows] += offset
+        self._touch(rows)
+
+    def _touch(self, rows: Iterable[int]) -> None:
+        """Forget what was derived for some objects one by one."""
+        for i in rows:
+            self._samples.pop(i, None)
+            self.entries.pop(i, None)
+
+    # -- changing --------------------------------------------------------------------------------
+
+    def changed(self) -> None:
+        """Say that something that can be seen has changed."""
+        self._derived.clear()
+        self.sights.clear()
+
+    def set_state(self, i: int, name: str, value: bool) -> None:
+        """Put object i into a state of :data:`er_gym.sim.scene.STATES`, or out of it."""
+        self.states[i, _STATE[name]] = value
+        self._touch([i])
+        self.changed()
+
+    def set_temperature(self, i: int, temperature: str) -> None:
+        """Make object i "Hot", "Cold" or "RoomTemp"."""
+        self.temperature[i] = temperature
+        self._touch([i])
+
+    def set_property(self, i: int, name: str, value: bool) -> None:
+        """Give object i a property, or take it away."""
+        self.properties[i, _PROPERTY[name]] = value
+        self._touch([i])
+        self.changed()
+
+    def relocate(self, i: int, parents: Sequence[int]) -> None:
+        """Say in which receptacles object i lies from now on; what lies in it goes along."""
+        within = self.inside(i)
+        moving = {i, *within}
+        self._touch([*moving, *self.parents[i], *parents])
+        self.parents[i] = tuple(parents)
+        for child in within:
+            own = tuple(p for p in self.parents[child] if p in moving)
+            self.parents[child] = (*own, *(p for p in parents if p not in own))
+        self.changed()
+
+    def turn(self, i: int, yaw: float) -> None:
+        """Turn object i about the vertical to a heading in degrees, its box following.
+
+        What was leaning is set straight, to the nearest quarter turn: what lay flat lies flat.
+        """
+        self.rotation[i] = settled(self.rotation[i], yaw)
+        corners = self.obb_corners(i)
+        if corners is not None:
+            self.low[i], self.high[i] = corners.min(axis=0), corners.max(axis=0)
+        self._touch([i])
+        self.changed()
+
+    def move_by(self, i: int, offset: NDArray[np.float64]) -> None:
+        """Shift object i by (3,) metres, and what lies in it with it."""
+        self._shift([i, *self.inside(i)], offset)
+        self.changed()
+
+    def place_agent(self, agent: Agent) -> None:
+        """Put the agent somewhere; what it holds goes along."""
+        self.agent = agent
+        if self.held >= 0:
+            self.carry()
+
+    def carry(self) -> None:
+        """Bring the held object to where the hand is."""
+        centre = (self.low[self.held] + self.high[self.held]) / 2
+        heading = unity_rotation(np.array([self.agent.horizon, self.agent.rotation, 0.0]))
+        hand = self.agent.camera + heading @ HAND_OFFSET
+        # What is in the hand hides nothing, so lines of sight stay as they were: no `changed`.
+        self._shift(self.in_hand, hand - centre)
+
+    def add_object(self, like: int, object_id: str, object_type: str, name: str) -> int:
+        """Append a copy of an object under another id and type; returns its row."""
+        row = len(self)
+        for array in ("position", "rotation", "low", "high", "obb", "properties", "states"):
+            old = getattr(self, array)
+            setattr(self, array, np.concatenate([old, old[like : like + 1]]))
+        for array in ("openness", "mass", "exists"):
+            old = getattr(self, array)
+            setattr(self, array, np.append(old, old[like]))
+        self.object_ids.append(object_id)
+        self.names.append(name)
+        self.types.append(object_type)
+        self.asset_ids.append("")
+        self.temperature.append(self.temperature[like])
+        self.fill_liquid.append(None)
+        self.parents.append(self.parents[like])
+        self.controlled.append(None)
+        self.salient_materials.append(self.salient_materials[like])
+        self.index[object_id] = row
+        self._touch(self.parents[row])
+        self.changed()
+        return row
+
+    def configure(self, **changes: object) -> None:
+        """Change settings by name."""
+        self.settings = replace(self.settings, **changes)  # type: ignore[arg-type]

@@ -1,0 +1,195 @@
+"""Our own task file: JSON lines, versioned, compact, one task a line below a header line.
+
+The header is ``{"format": "er-gym/tasks/1", "tasks": 110, …}``; the number of tasks guards against
+a file cut short, and further fields (how the file was made) are the writer's own. A task's line has
+the fields of :class:`TaskRecord`, those at their default left out.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+from er_gym.tasks.errors import TaskFileError
+from er_gym.tasks.files import (
+    checked_ids,
+    known_scene,
+    known_type,
+    known_verb,
+    parse_json,
+    read_text,
+    validated,
+)
+from er_gym.tasks.task import AgentPose, KeyAction, Task, type_of_id
+
+FORMAT = "er-gym/tasks/1"
+
+
+class _Strict(BaseModel):
+    """A misspelled field is a mistake worth hearing of."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class KeyActionRecord(_Strict):
+    """A key action; without ``object_type`` it is the one that the object's id names."""
+
+    verb: str
+    object_id: str = ""
+    object_type: str | None = None
+    related_objects: tuple[str, ...] = ()
+    reward: float = 1.0
+
+
+class PoseRecord(_Strict):
+    """A pose of the agent: metres and degrees, AI2-THOR's frame."""
+
+    x: float
+    y: float
+    z: float
+    rotation: float
+    horizon: float = 0.0
+    standing: bool = True
+
+
+class TaskRecord(_Strict):
+    """A task; the fields are those of :class:`~er_gym.tasks.task.Task`."""
+
+    id: str
+    type: str
+    scene: str
+    instruction: str
+    name: str = ""
+    key_actions: tuple[KeyActionRecord, ...]
+    target_objects: tuple[str, ...] = ()
+    related_objects: tuple[str, ...] = ()
+    navigable_objects: tuple[str, ...] = ()
+    poses: dict[str, PoseRecord] = {}
+    extra: dict[str, Any] = {}
+
+
+class Header(BaseModel):
+    """The first line of a file."""
+
+    model_config = ConfigDict(extra="allow")
+
+    format: str
+    tasks: int
+
+
+def read_tasks(path: str | Path) -> list[Task]:
+    """Read a task file.
+
+    Raises:
+        TaskFileError: the file cannot be used; one line says where and why.
+    """
+    path = Path(path)
+    lines = read_text(path).splitlines()
+    header = _header(lines, path)
+    tasks = checked_ids(_tasks(lines[1:], path), path)
+    if len(tasks) != header.tasks:
+        raise TaskFileError(
+            f"{path}: cut short or edited: its header says {header.tasks} tasks, "
+            f"and it has {len(tasks)}"
+        )
+    return tasks
+
+
+def write_tasks(path: str | Path, tasks: Iterable[Task], **made: object) -> None:
+    """Write a task file; ``made`` (generator, seed and so on) goes into its header."""
+    tasks = list(tasks)
+    header = json.dumps({"format": FORMAT, "tasks": len(tasks), **made}, ensure_ascii=False)
+    lines = [header, *(_line(_record(task)) for task in tasks)]
+    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def digest(tasks: Iterable[Task]) -> str:
+    """The sha256, in hex, of what is asked in tasks, in their order; ``extra`` has no part in it.
+
+    The same tasks have the same digest whichever format they were read from.
+    """
+    total = hashlib.sha256(FORMAT.encode())
+    for task in tasks:
+        total.update(b"\n" + _line(_record(task).model_copy(update={"extra": {}})).encode())
+    return total.hexdigest()
+
+
+def _header(lines: list[str], path: Path) -> Header:
+    where = f"{path}: the header"
+    if not lines:
+        raise TaskFileError(f'{path}: empty; its first line should be {{"format": "{FORMAT}", …}}')
+    header = validated(Header, parse_json(lines[0], path), where)
+    if header.format != FORMAT:
+        raise TaskFileError(f"{where} says format {header.format!r}; this er-gym reads {FORMAT!r}")
+    return header
+
+
+def _tasks(lines: list[str], path: Path) -> Iterator[Task]:
+    for number, line in enumerate(lines, 2):
+        if line.strip():
+            where = f"{path}: the task in line {number}"
+            yield _task(validated(TaskRecord, parse_json(line, path, number), where), where)
+
+
+def _task(record: TaskRecord, where: str) -> Task:
+    return Task(
+        id=record.id,
+        type=known_type(record.type, where),
+        scene=known_scene(record.scene, where),
+        instruction=record.instruction,
+        name=record.name,
+        key_actions=tuple(_key_action(action, where) for action in record.key_actions),
+        target_objects=record.target_objects,
+        related_objects=record.related_objects,
+        navigable_objects=record.navigable_objects,
+        poses={key: AgentPose(**pose.model_dump()) for key, pose in record.poses.items()},
+        extra=record.extra,
+    )
+
+
+def _key_action(record: KeyActionRecord, where: str) -> KeyAction:
+    stated = record.object_type
+    return KeyAction(
+        verb=known_verb(record.verb, where),
+        object_id=record.object_id,
+        object_type=type_of_id(record.object_id) if stated is None else stated,
+        related_objects=record.related_objects,
+        reward=record.reward,
+    )
+
+
+def _record(task: Task) -> TaskRecord:
+    return TaskRecord(
+        id=task.id,
+        type=task.type.name,
+        scene=task.scene,
+        instruction=task.instruction,
+        name=task.name,
+        key_actions=tuple(_key_action_record(action) for action in task.key_actions),
+        target_objects=task.target_objects,
+        related_objects=task.related_objects,
+        navigable_objects=task.navigable_objects,
+        poses={key: PoseRecord(**asdict(pose)) for key, pose in task.poses.items()},
+        extra=dict(task.extra),
+    )
+
+
+def _key_action_record(action: KeyAction) -> KeyActionRecord:
+    usual = action.object_type == type_of_id(action.object_id)
+    return KeyActionRecord(
+        verb=action.verb,
+        object_id=action.object_id,
+        object_type=None if usual else action.object_type,
+        related_objects=action.related_objects,
+        reward=action.reward,
+    )
+
+
+def _line(record: TaskRecord) -> str:
+    return record.model_dump_json(exclude_defaults=True)

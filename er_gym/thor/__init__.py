@@ -1,0 +1,18 @@
+"""The boundary: everything above speaks the AI2-THOR 5 Controller API and asks for one here."""
+
+from er_gym.sim.compatibility import accepts, placement_table
+from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError
+from er_gym.thor.backends import BACKENDS, BackendError, make_controller
+from er_gym.thor.object_types import OBJECT_TYPES, ObjectType
+
+__all__ = [
+    "BACKENDS",
+    "OBJECT_TYPES",
+    "SCENE_NAMES",
+    "BackendError",
+    "ObjectType",
+    "UnknownSceneError",
+    "accepts",
+    "make_controller",
+    "placement_table",
+]

@@ -1,0 +1,60 @@
+"""``make_controller``: the same Controller API on either engine."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+from ai2thor.controller import Controller
+
+
+class BackendError(RuntimeError):
+    """An engine cannot be started on this machine; the message says what would mend it."""
+
+
+def _embedded(arguments: dict[str, Any]) -> Controller:
+    from er_gym.sim.controller import EmbeddedController
+
+    return EmbeddedController(**arguments)
+
+
+def _unity(arguments: dict[str, Any]) -> Controller:
+    if "DISPLAY" not in os.environ and "local_executable_path" not in arguments:
+        from ai2thor.platform import CloudRendering
+
+        arguments.setdefault("platform", CloudRendering)
+    try:
+        return Controller(**arguments)
+    except Exception as error:  # whatever the client raises here means: no Unity on this machine
+        reason = (str(error).strip().splitlines() or [""])[0]
+        raise BackendError(
+            "backend 'unity' could not start AI2-THOR's Unity build "
+            f"({type(error).__name__}: {reason}). "
+            "It needs network access to download the build once, and a GPU driver with Vulkan "
+            "(libvulkan1) or an X display. backend='embedded' needs none of that."
+        ) from error
+
+
+BACKENDS: dict[str, Callable[[dict[str, Any]], Controller]] = {
+    "embedded": _embedded,
+    "unity": _unity,
+}
+
+
+def make_controller(backend: str = "embedded", **arguments: Any) -> Controller:
+    """A started AI2-THOR controller.
+
+    Args:
+        backend: "embedded" (our engine, in this process) or "unity" (the real simulator;
+            CloudRendering when there is no display).
+        **arguments: those of ``ai2thor.controller.Controller``.
+
+    Raises:
+        ValueError: there is no such backend.
+        BackendError: it cannot be started here.
+    """
+    start = BACKENDS.get(backend)
+    if start is None:
+        raise ValueError(f"unknown backend {backend!r}; choose one of: {', '.join(BACKENDS)}")
+    return start(dict(arguments))

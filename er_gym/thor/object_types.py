@@ -1,0 +1,32 @@
+"""Every object type of the iTHOR scenes, and what things of that type can do."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from types import MappingProxyType
+
+
+@dataclass(frozen=True)
+class ObjectType:
+    """A kind of object.
+
+    Attributes:
+        name: AI2-THOR's ``objectType``.
+        properties: AI2-THOR's property names ("pickupable", "openable", …) that at least one
+            instance in the 120 scenes has.
+    """
+
+    name: str
+    properties: frozenset[str]
+
+
+def _load() -> dict[str, ObjectType]:
+    text = files("er_gym.sim.data").joinpath("object_types.json").read_text()
+    return {name: ObjectType(name, frozenset(has)) for name, has in json.loads(text).items()}
+
+
+OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(_load())
+"""By name, in alphabetical order; the parts that slicing makes are among them."""

@@ -1,0 +1,325 @@
+"""The command as a user gives it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from benchmarks import cli, runner
+from benchmarks.runner import Outcome
+from benchmarks.store import RunStore
+from er_gym.tasks.types import TASK_TYPES
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMAND = [sys.executable, "-m", "benchmarks.cli"]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+
+
+@pytest.fixture
+def er_gym(capsys):
+    """Runs the command in this process; returns exit code, stdout and stderr."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as left:
+            cli.main([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        return left.value.code, out, err
+
+    return run
+
+
+def episode_times(out: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_mtime_ns for path in (out / "episodes").glob("*.json")}
+
+
+# -- bad input -----------------------------------------------------------------------------------
+
+
+def without(field):
+    def change(tasks):
+        del tasks[3][field]
+
+    return change
+
+
+def with_value(field, value):
+    def change(tasks):
+        tasks[3][field] = value
+
+    return change
+
+
+def with_unknown_object(tasks):
+    tasks[3]["task_metadata"]["actions"][1]["objectId"] = "Apple|+99.00|+99.00|+99.00"
+
+
+BAD_FILES = {
+    "no scene of that name": (with_value("scene", "FloorPlan999"), ["FloorPlan999", "identity 3"]),
+    "no field": (without("tasktype"), ["lacks field 'tasktype'", "identity 3"]),
+    "no type of that name": (with_value("tasktype", "cook"), ["'cook'", "single_search"]),
+    "no object of that id": (
+        with_unknown_object,
+        ["paper-3", "Apple|+99.00|+99.00|+99.00", "FloorPlan1"],
+    ),
+}
+
+
+def one_line(err: str) -> str:
+    assert err.startswith("er-gym: ")
+    assert err.count("\n") == 1
+    assert err.endswith("\n")
+    return err
+
+
+@pytest.mark.parametrize(("change", "words"), BAD_FILES.values(), ids=BAD_FILES)
+def test_a_bad_task_file(er_gym, tasks_file, paper_tasks, tmp_path, change, words):
+    change(paper_tasks)
+    tasks_file.write_text(json.dumps(paper_tasks))
+    out = tmp_path / "out"
+    code, shown, err = er_gym(
+        *("bench", "--tasks-file", tasks_file, "--agent", "oracle", "--out", out)
+    )
+    assert (code, shown) == (2, "")
+    assert all(word in one_line(err) for word in words)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("text", ["", "{", "no json", '{"a": 1}'])
+def test_a_task_file_that_is_none(er_gym, tasks_file, text):
+    tasks_file.write_text(text)
+    code, shown, err = er_gym("bench", "--tasks-file", tasks_file, "--agent", "oracle")
+    assert (code, shown) == (2, "")
+    assert str(tasks_file) in one_line(err)
+
+
+BAD_OPTIONS = {
+    "agent": (["--agent", "nobody"], ["'nobody'", "oracle", "random"]),
+    "backend": (["--backend", "unreal"], ["'unreal'", "embedded", "unity"]),
+    "instances": (["--instances", "any"], ["'any'", "target", "explore"]),
+    "both sources": (["--suite", "mini"], ["either --suite", "--tasks-file"]),
+    "task": (["--task-ids", "paper-1,paper-99"], ["'paper-99'", "paper-0"]),
+    "shard": (["--shard", "9/8"], ["'9/8'", "2/8"]),
+    "limit": (["--limit", "0"], ["--limit", "er-gym bench --help"]),
+    "workers": (["--workers", "none"], ["--workers", "er-gym bench --help"]),
+    "scorer": (["--scorer", "kind"], ["'kind'", "corrected"]),
+    "poses": (["--poses", __file__], [Path(__file__).name, "not JSON"]),
+    "option": (["--fast"], ["--fast", "er-gym bench --help"]),
+}
+
+
+@pytest.mark.parametrize(("options", "words"), BAD_OPTIONS.values(), ids=BAD_OPTIONS)
+def test_a_bad_option(er_gym, tasks_file, tmp_path, options, words):
+    out = tmp_path / "out"
+    code, shown, err = er_gym(
+        *("bench", "--tasks-file", tasks_file, "--agent", "oracle", "--out", out, *options)
+    )
+    assert (code, shown) == (2, "")
+    assert all(word in one_line(err) for word in words)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["bench", "--agent", "oracle"], ["--suite", "mini"]),
+        (["bench", "--suite", "huge", "--agent", "oracle"], ["'huge'", "mini"]),
+        (["bench", "--suite", "mini"], ["--agent"]),
+        (["bench", "--suite", "mini", "--agent", "oracle", "--poses", __file__], ["--poses"]),
+        (["report"], ["RUN"]),
+        (["report", "nowhere"], ["nowhere", "run.json"]),
+        (["report", "nowhere", "--misses", "--format", "csv"], ["--misses", "json"]),
+        (["report", "nowhere", "--format", "pdf"], ["'pdf'", "json"]),
+        (["race"], ["'race'", "er-gym --help"]),
+    ],
+    ids=" ".join,
+)
+def test_a_bad_command(er_gym, arguments, words):
+    code, shown, err = er_gym(*arguments)
+    assert (code, shown) == (2, "")
+    assert all(word in one_line(err) for word in words)
+
+
+def test_the_directory_of_another_run_is_left_alone(er_gym, tasks_file, store, episode):
+    store.write(episode(("end",), ("end",)))
+    before = {path: path.read_bytes() for path in store.path.rglob("*.json")}
+    code, shown, err = er_gym(
+        *("bench", "--tasks-file", tasks_file, "--agent", "oracle", "--out", store.path)
+    )
+    assert (code, shown) == (2, "")
+    assert "its suite is 'hand-made', this one's 'tasks'; choose another --out" in one_line(err)
+    assert {path: path.read_bytes() for path in store.path.rglob("*.json")} == before
+
+
+def test_a_directory_that_cannot_be_made(er_gym, tasks_file, tmp_path):
+    (tmp_path / "file").touch()
+    code, _, err = er_gym(
+        *("bench", "--tasks-file", tasks_file, "--agent", "oracle"),
+        *("--out", tmp_path / "file" / "run"),
+    )
+    assert code == 2
+    assert "file" in one_line(err)
+
+
+# -- the small commands --------------------------------------------------------------------------
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys; from benchmarks import cli\n"
+        "try: cli.main(['bench', '--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'gymnasium', 'numpy', 'pydantic', 'rich', 'ai2thor', 'er_gym', 'agents'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, text=True
+    )
+    assert done.stderr == ""
+    assert "--suite" in done.stdout
+
+
+def test_help_is_shown_without_a_command(er_gym):
+    code, out, err = er_gym()
+    assert (code, err) == (0, "")
+    assert all(name in out for name in ("bench", "report", "suites", "envs", "--version"))
+
+
+def test_version(er_gym):
+    from er_gym import __version__
+
+    assert er_gym("--version") == (0, f"er-gym {__version__}\n", "")
+
+
+def test_envs(er_gym):
+    code, out, _ = er_gym("envs")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()] == [kind.env_id for kind in TASK_TYPES]
+
+
+def test_suites(er_gym):
+    code, out, _ = er_gym("suites")
+    assert code == 0
+    (line,) = [line for line in out.splitlines() if line.startswith("mini: ")]
+    assert int(line.split()[1]) >= 100
+
+
+# -- bench and report ----------------------------------------------------------------------------
+
+
+def bench(tasks_file: Path, out: Path, *more: str) -> list[str]:
+    options = ["--tasks-file", str(tasks_file), "--out", str(out), *more]
+    return [*COMMAND, "bench", *options]
+
+
+def test_bench_continues_and_report_reports(tasks_file, tmp_path, er_gym):
+    out = tmp_path / "run"
+    first = subprocess.run(
+        bench(tasks_file, out, "--agent", "oracle", "--limit", "3", "--workers", "2"),
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+    )
+    assert first.returncode == 0, first.stderr
+    assert "tasks, oracle: 3/3 episodes, 100.0 % success" in first.stderr
+    assert ["oracle", "3/7", "100.00"] in [line.split()[:3] for line in first.stdout.splitlines()]
+    before = episode_times(out)
+    assert set(before) == {"paper-0.json", "paper-1.json", "paper-2.json"}
+
+    code, shown, err = er_gym(
+        "bench", "--tasks-file", tasks_file, "--agent", "oracle", "--out", out
+    )
+    assert code == 0
+    assert "7/7 episodes" in err
+    assert "oracle" in shown
+    after = episode_times(out)
+    assert len(after) == 7
+    assert {name: after[name] for name in before} == before
+
+    code, shown, _ = er_gym("report", out, "--format", "json")
+    (run,) = json.loads(shown)["runs"]
+    assert (run["episodes"], run["misses"], run["scorers_differ"]) == (7, [], [])
+    assert run["manifest"]["env"] == {"backend": "embedded", "obs_mode": "text"}
+    code, shown, _ = er_gym("report", out, "--format", "csv")
+    assert [row["name"] for row in csv.DictReader(io.StringIO(shown))] == ["all", "Manipulate"]
+    code, shown, _ = er_gym("report", out, "--format", "md", "--misses", "--by-type")
+    assert "| oracle | 7 | 100.00 | 64.6 to 100.0 | 100.00 | 100.00 | - | 100.00 | - | - |" in shown
+    assert f"**{out}: 0 of 7 episodes without success**" in shown
+    code, shown, err = er_gym("report", out, "--misses", "--scorer", "paper")
+    assert (code, err) == (0, "")
+    assert "scorer paper" in shown
+
+
+def start(command: list[str]) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        command,
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+@pytest.mark.parametrize("signum", [signal.SIGKILL, signal.SIGINT], ids=["KILL", "INT"])
+def test_an_ended_run_continues(tasks_file, tmp_path, signum):
+    out = tmp_path / "run"
+    command = bench(tasks_file, out, "--agent", "random", "--workers", "2")
+    process = start(command)
+    deadline = time.monotonic() + 60
+    while not (out / "episodes").exists() or not episode_times(out):
+        assert process.poll() is None, process.communicate()[1]
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    if signum == signal.SIGINT:
+        os.killpg(process.pid, signum)  # as the terminal does on Ctrl-C
+    else:
+        process.send_signal(signum)
+    shown, err = process.communicate(timeout=30)
+    before = episode_times(out)
+    assert 1 <= len(before) < 7
+    if signum == signal.SIGINT:
+        assert process.returncode == 130
+        assert shown == ""
+        last = err.splitlines()[-1]
+        assert last == (
+            f"er-gym: interrupted: {len(before)} of 7 episodes are in {out}; "
+            "the same command continues"
+        )
+        assert "Traceback" not in err
+
+    again = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True)
+    assert again.returncode == 0, again.stderr
+    after = episode_times(out)
+    assert len(after) == 7
+    assert {name: after[name] for name in before} == before
+    assert not any(episode.error for episode in RunStore.open(out).episodes())
+
+
+def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, episode):
+    crashed = episode(("end",), (), task_id="paper-2", error="ValueError: no")
+
+    def run(store, tasks, *, workers, on_episode):
+        store.write(crashed)
+        on_episode(crashed)
+        return Outcome(played=7, kept=0, crashed=(crashed,))
+
+    monkeypatch.setattr(runner, "run", run)
+    out = tmp_path / "run"
+    code, shown, err = er_gym(
+        *("bench", "--tasks-file", tasks_file, "--agent", "oracle", "--out", out)
+    )
+    assert code == 1
+    assert "1 of 1 episodes crashed and count as failures" in shown
+    assert err.splitlines()[-1] == (
+        "er-gym: 1 of 7 episodes crashed, the first of them paper-2: ValueError: no; "
+        "the same command plays them again"
+    )

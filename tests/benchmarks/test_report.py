@@ -1,0 +1,219 @@
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import pytest
+from rich.console import Console
+
+from benchmarks import cli, report
+from benchmarks.report import load_run
+from benchmarks.store import RunStore
+from benchmarks.tables import as_markdown, print_tables, tables
+
+KEYS = ("navigate to CounterTop", "pickup Egg", "navigate to Bowl", "put in Bowl", "end")
+UNTYPED = ("pickup Egg", "put in = Plate|-01.47|+01.31|+00.24", "end")
+LONG_RANGE = "long-range tasks with dependency relationships"
+
+
+@pytest.fixture
+def run(store, episode):
+    """One success, and one that only the corrected scorer sees: 2 of a suite of 2."""
+    store.write(episode(KEYS, KEYS))
+    played = ("pickup Egg", "put in Plate", "end")
+    store.write(episode(UNTYPED, played, task_id="task-2", task_type=LONG_RANGE))
+    return load_run(store.path)
+
+
+@pytest.fixture
+def failing_run(store, episode):
+    """One success, one given up, one crashed, out of a suite that says it has 2."""
+    store.write(episode(KEYS, KEYS))
+    store.write(
+        episode(
+            KEYS,
+            ("!pickup Egg", "!pickup | Egg"),
+            task_id="task-2",
+            end_reason="step limit",
+        )
+    )
+    store.write(episode(KEYS, (), task_id="task-3", end_reason="", error="ValueError: no\nmore"))
+    return load_run(store.path)
+
+
+def test_where_the_scorers_differ_there_are_two_rows_and_a_note(run):
+    overview = tables([run])[0]
+    assert overview.title == "Results, suite hand-made, in %"
+    # Wilson for 1 of 2 is 9.45 to 90.55, for 2 of 2 it is 34.24 to 100.
+    # Efficiency: 6/6 and, with three key actions in four steps, 4/4.
+    assert overview.rows == (
+        (
+            *("oracle", "paper", "2", "50.00", "9.5 to 90.5"),
+            *("50.00", "83.33", "-", "-", "100.00", "0.00"),
+        ),
+        (
+            *("oracle", "corrected", "2", "100.00", "34.2 to 100.0"),
+            *("100.00", "100.00", "-", "-", "100.00", "100.00"),
+        ),
+    )
+    assert overview.notes == (f"{run.path}: the scorers differ in 1 of 2 episodes: task-2",)
+
+
+def test_where_they_agree_there_is_one(store, episode):
+    store.write(episode(KEYS, KEYS))
+    overview = tables([load_run(store.path)])[0]
+    assert overview.title == "Results, suite hand-made, scorer both, in %"
+    assert [row[:3] for row in overview.rows] == [("oracle", "1/2", "100.00")]
+
+
+@pytest.mark.parametrize(("scorer", "rate"), [("paper", "50.00"), ("corrected", "100.00")])
+def test_one_scorer_can_be_chosen(run, scorer, rate):
+    overview = tables([run], scorer=scorer)[0]
+    assert f"scorer {scorer}" in overview.title
+    assert [row[2] for row in overview.rows] == [rate]
+
+
+def test_the_columns_are_the_papers(run):
+    assert tables([run])[0].head[-7:] == (
+        "95 %",
+        "Search efficiency",
+        "Task completeness",
+        "Search",
+        "Manipulate",
+        "Transport",
+        "Composite",
+    )
+
+
+def test_a_run_without_episodes_is_a_row_of_dashes(store):
+    loaded = load_run(store.path)
+    (row,) = tables([loaded], with_types=True, with_misses=True)[0].rows
+    assert row[1:] == ("0/2", *["-"] * 8)
+    assert json.loads(report.as_json([loaded]))["runs"][0]["episodes"] == 0
+    assert len(report.as_csv([loaded]).splitlines()) == 1
+
+
+def test_what_differs_between_runs_has_a_column(run, tmp_path, manifest, episode):
+    other = RunStore.create(tmp_path / "y", manifest.model_copy(update={"suite": "other"}))
+    other.write(episode(KEYS, KEYS))
+    overview = tables([run, load_run(other.path)])[0]
+    assert overview.title == "Results, in %"
+    assert overview.head[:4] == ("Agent", "Suite", "Scorer", "n")
+    assert [row[:4] for row in overview.rows] == [
+        ("oracle", "hand-made", "paper", "2"),
+        ("oracle", "hand-made", "corrected", "2"),
+        ("oracle", "other", "both", "1/2"),
+    ]
+
+
+def test_by_type(run):
+    _, paper, corrected = tables([run], with_types=True)
+    assert paper.title.endswith("scorer paper, in %")
+    assert [row[:2] for row in paper.rows] == [
+        ("All", "2"),
+        ("Transport", "1"),
+        ("Composite", "1"),
+        ("Exposed-to-Exposed Object Transfer", "1"),
+        ("Long-Range Task with Dependencies", "1"),
+    ]
+    by_name = {row[0]: dict(zip(paper.head, row, strict=True)) for row in paper.rows}
+    assert by_name["Composite"]["Success"] == "0.00"
+    assert by_name["Composite"]["Ordered completeness"] == "66.67"
+    assert by_name["Transport"]["Steps saved"] == "80.00"
+    assert corrected.rows[2][2] == "100.00"
+
+
+def test_misses_say_why(failing_run):
+    misses = tables([failing_run], with_misses=True)[1]
+    assert misses.title.endswith("2 of 3 episodes without success")
+    assert misses.rows == (
+        (
+            *("task-2", "pickup_and_put", "FloorPlan1", "step limit"),
+            *("you cannot: pickup | Egg", "pickup Egg, put in Bowl, end"),
+        ),
+        (
+            *("task-3", "pickup_and_put", "FloorPlan1", "crashed"),
+            *("ValueError: no more", "pickup Egg, put in Bowl, end"),
+        ),
+    )
+
+
+def test_crashes_are_noted(failing_run):
+    assert tables([failing_run])[0].notes == (
+        f"{failing_run.path}: 1 of 3 episodes crashed and count as failures; "
+        "running the same command again plays them again",
+    )
+
+
+def test_markdown(failing_run):
+    text = as_markdown(tables([failing_run], with_misses=True))
+    lines = text.splitlines()
+    assert lines[0] == "**Results, suite hand-made, scorer both, in %**"
+    assert lines[2].startswith("| Agent | n | Success | 95 % |")
+    assert lines[3].startswith("| --- | ---: |")
+    widths = {line.replace("\\|", "").count("|") for line in lines[2:5]}
+    assert widths == {11}
+    assert "you cannot: pickup \\| Egg" in text
+
+
+def test_csv_has_a_line_per_slice(run):
+    rows = list(csv.DictReader(io.StringIO(report.as_csv([run]))))
+    slices = [(row["scorer"], row["level"], row["name"]) for row in rows]
+    assert slices == [
+        (scorer, level, name)
+        for scorer in ("paper", "corrected")
+        for level, name in [("overall", "all"), ("group", "Transport"), ("group", "Composite")]
+    ]
+    assert float(rows[0]["success"]) == 0.5
+    assert float(rows[0]["completeness"]) == pytest.approx(5 / 6)
+    assert float(rows[0]["success_low"]) == pytest.approx(0.0945, abs=1e-4)
+    assert rows[1]["completeness_low"] == ""  # one episode has no interval
+    with_types = csv.DictReader(io.StringIO(report.as_csv([run], "paper", with_types=True)))
+    assert [row["level"] for row in with_types] == ["overall", "group", "group", "type", "type"]
+
+
+def test_json_carries_everything(failing_run):
+    (data,) = json.loads(report.as_json([failing_run]))["runs"]
+    assert data["manifest"]["suite_digest"] == "abc"
+    assert (data["episodes"], data["crashed"], data["scorers_differ"]) == (3, 1, [])
+    assert set(data["scorers"]) == {"paper", "corrected"}
+    overall, group, kind = data["scorers"]["paper"]["slices"]
+    assert (overall["level"], overall["n"]) == ("overall", 3)
+    assert overall["success"]["mean"] == pytest.approx(1 / 3)
+    assert (group["name"], kind["name"]) == ("Transport", "pickup_and_put")
+    assert [each["success"] for each in data["scorers"]["corrected"]["episodes"]] == [
+        True,
+        False,
+        False,
+    ]
+    assert [miss["task_id"] for miss in data["misses"]] == ["task-2", "task-3"]
+
+
+@pytest.mark.parametrize("width", [40, 80, 240])
+def test_nothing_is_cut_off(run, failing_run, width):
+    shown = tables([run, failing_run], with_types=True, with_misses=True)
+    out = io.StringIO()
+    print_tables(shown, Console(file=out, width=width))
+    figures = [cell for table in shown for row in table.rows for cell in row[table.text_columns :]]
+    text = out.getvalue()
+    assert len(figures) > 50
+    for figure in set(figures):
+        assert text.count(figure) >= figures.count(figure)
+
+
+def test_a_narrow_terminal_turns_the_results(run):
+    def lines(width):
+        out = io.StringIO()
+        print_tables(tables([run])[:1], Console(file=out, width=width))
+        return [" ".join(line.split()) for line in out.getvalue().splitlines()]
+
+    assert "oracle paper 2 50.00 9.5 to 90.5 50.00 83.33 - - 100.00 0.00" in lines(120)
+    assert "Scorer paper corrected" in lines(80)
+    assert "Task completeness 83.33 100.00" in lines(80)
+    narrow = [line for line in lines(80) if not line.startswith("/")]
+    assert max(map(len, narrow)) <= 80
+
+
+def test_the_command_offers_the_scorers_there_are():
+    assert cli.SCORER_CHOICES == report.SCORER_CHOICES

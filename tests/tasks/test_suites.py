@@ -1,0 +1,147 @@
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import yaml
+
+from er_gym.tasks import (
+    AgentPose,
+    KeyAction,
+    Task,
+    TaskFileError,
+    load_suite,
+    suite_from_file,
+    suite_names,
+    task_type,
+    verbs,
+)
+from er_gym.tasks.generate import GENERATED_TYPES
+from er_gym.tasks.jsonl_format import FORMAT, digest, read_tasks, write_tasks
+from er_gym.tasks.paper_format import write_tasks as write_paper_tasks
+from er_gym.tasks.rooms import ROOM_KINDS, room_kind
+
+PLATE = "Plate|+00.96|+01.65|-02.61"
+TASK = Task(
+    id="FloorPlan1-a",
+    type=task_type("pickup_and_put"),
+    scene="FloorPlan1",
+    instruction="Bring the café’s Cup to the Plate.",
+    name="put the Cup on the Plate",
+    key_actions=(
+        KeyAction(verbs.PICKUP, "Cup|+00.37|+01.64|-02.58", "Cup", reward=0.5),
+        KeyAction(verbs.PUT, PLATE, "", (PLATE,)),
+        KeyAction(verbs.END),
+    ),
+    target_objects=(PLATE,),
+    navigable_objects=("Fridge",),
+    poses={PLATE: AgentPose(0.25, 0.9, -1.5, 180.0, horizon=-18.0)},
+    extra={"identity": 3},
+)
+HEADER = {"format": FORMAT, "tasks": 1}
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    def write(*lines: object) -> Path:
+        path = tmp_path / "tasks.jsonl"
+        text = "\n".join(line if isinstance(line, str) else json.dumps(line) for line in lines)
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_reading_gives_back_what_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "own.jsonl"
+    tasks = [TASK, replace(TASK, id="b", poses={}, extra={})]
+    write_tasks(path, tasks, seed=3)
+    assert read_tasks(path) == tasks
+    header = json.loads(path.read_text(encoding="utf-8").splitlines()[0])
+    assert header == {"format": "er-gym/tasks/1", "tasks": 2, "seed": 3}
+
+
+def test_an_empty_object_type_is_kept_and_a_usual_one_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "own.jsonl"
+    write_tasks(path, [TASK])
+    actions = json.loads(path.read_text(encoding="utf-8").splitlines()[1])["key_actions"]
+    assert "object_type" not in actions[0]
+    assert actions[1]["object_type"] == ""
+
+
+def test_the_digest_is_that_of_what_is_asked(tmp_path: Path) -> None:
+    assert digest([TASK]) == digest([replace(TASK, extra={})])
+    assert digest([TASK]) != digest([replace(TASK, instruction="Sit.")])
+    assert digest([TASK, replace(TASK, id="b")]) != digest([replace(TASK, id="b"), TASK])
+
+
+def test_the_digest_does_not_depend_on_the_format(tmp_path: Path) -> None:
+    paper, own = tmp_path / "x.json", tmp_path / "x.jsonl"
+    write_paper_tasks(paper, [TASK])
+    from_paper = suite_from_file(paper)
+    write_tasks(own, from_paper.tasks)
+    assert suite_from_file(own).digest == from_paper.digest
+    assert from_paper.name == "x"
+
+
+TASK_LINE = {"id": "a", "type": "single_toggle", "scene": "FloorPlan1", "instruction": "Toggle."}
+WRONG = {
+    "empty": ([], "empty; its first line should be"),
+    "no header": ([{**TASK_LINE, "key_actions": []}], "the header lacks field 'format'"),
+    "newer": ([{**HEADER, "format": "er-gym/tasks/9"}], "format 'er-gym/tasks/9'; this er-gym"),
+    "cut short": ([HEADER], "its header says 1 tasks, and it has 0"),
+    "not JSON": ([HEADER, "", '{"id": '], "not JSON: Expecting value (line 3, column 8)"),
+    "lacks field": ([HEADER, TASK_LINE], "the task in line 2 lacks field 'key_actions'"),
+    "misspelled": (
+        [HEADER, {**TASK_LINE, "key_actions": [], "poise": 1}],
+        "the task in line 2 has a wrong field 'poise'",
+    ),
+    "verb": (
+        [HEADER, {**TASK_LINE, "key_actions": [{"verb": "hop"}]}],
+        "the task in line 2 has unknown action 'hop'",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("lines", "message"), WRONG.values(), ids=WRONG)
+def test_a_wrong_file_gives_one_clear_line(
+    lines: list[object], message: str, write: Callable[..., Path]
+) -> None:
+    with pytest.raises(TaskFileError) as caught:
+        suite_from_file(write(*lines))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(TaskFileError, match=r"ends in \.json \(the paper's format\) or \.jsonl"):
+        suite_from_file(tmp_path / "tasks.csv")
+
+
+def test_an_unknown_suite_is_answered_with_those_there_are() -> None:
+    with pytest.raises(ValueError, match=r"unknown suite 'maxi'; choose one of: .*mini"):
+        load_suite("maxi")
+    with pytest.raises(ValueError, match=r"unknown suite '\.\./mini'"):
+        load_suite("../mini")
+
+
+@pytest.mark.parametrize("name", suite_names())
+def test_a_bundled_suite_loads(name: str, repository: Path) -> None:
+    suite = load_suite(name)
+    assert (suite.name, suite.digest) == (name, digest(suite.tasks))
+    config = yaml.safe_load((repository / "configs" / "suites" / f"{name}.yaml").read_text())
+    assert (suite.description, suite.env) == (config["description"], config["env"])
+    assert not any(task.navigable_objects or task.poses for task in suite.tasks)
+
+
+def test_mini_has_all_ten_types_and_all_kinds_of_room() -> None:
+    tasks = load_suite("mini").tasks
+    assert len(tasks) >= 100
+    per_type = Counter(task.type for task in tasks)
+    assert set(per_type) == set(GENERATED_TYPES)
+    assert max(per_type.values()) <= 2 * min(per_type.values())
+    assert {room_kind(task.scene) for task in tasks} == set(ROOM_KINDS)

@@ -1,0 +1,85 @@
+"""A layer imports only from those below it; DESIGN and CONTRIBUTING say why."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+_TASKS = {"er_gym.thor", "er_gym.tasks"}
+_ENVS = {*_TASKS, "er_gym.envs"}
+_AGENTS = {*_ENVS, "er_gym", "agents"}
+_BENCHMARKS = {*_AGENTS, "benchmarks"}
+ALLOWED = {
+    "er_gym.sim": {"er_gym.sim"},
+    "er_gym.thor": {"er_gym.sim", "er_gym.thor"},
+    "er_gym.tasks": _TASKS,
+    "er_gym.envs": _ENVS,
+    "er_gym": _ENVS,
+    "agents": _AGENTS,
+    "benchmarks": _BENCHMARKS,
+    # Speed and fidelity scripts look at the engine itself.
+    "benchmarks.perf": {*_BENCHMARKS, "benchmarks.perf", "er_gym.sim"},
+}
+"""Layer to the layers that it may import; ``er_gym`` alone is its own top-level modules."""
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCES = sorted(
+    path
+    for package in ("er_gym", "agents", "benchmarks")
+    for path in (ROOT / package).rglob("*.py")
+)
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def layer(module: str) -> str | None:
+    """The longest layer name that a module's name begins with; None for what is not ours."""
+    fitting = (name for name in ALLOWED if module == name or module.startswith(name + "."))
+    return max(fitting, key=len, default=None)
+
+
+def imported_modules(source: str, package: str) -> Iterator[tuple[int, str]]:
+    """Line and name of everything that a module imports, at whatever depth of its code.
+
+    ``from a import b`` yields ``a.b``, because b may be a module.
+    """
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            up = package.rsplit(".", node.level - 1)[0] + "." if node.level else ""
+            base = (up + (node.module or "")).rstrip(".")
+            yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_only_from_layers_below(path: Path) -> None:
+    name = module_name(path)
+    mine = layer(name)
+    assert mine is not None
+    package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    wrong = [
+        f"line {line}: {mine} may not import {imported}"
+        for line, imported in imported_modules(path.read_text(encoding="utf-8"), package)
+        if (theirs := layer(imported)) is not None and theirs not in ALLOWED[mine]
+    ]
+    assert not wrong
+
+
+def test_sees_late_and_relative_imports() -> None:
+    source = "def f():\n    from ..sim import scene\n    import agents.base\n"
+    found = list(imported_modules(source, "er_gym.envs"))
+    assert found == [(2, "er_gym.sim.scene"), (3, "agents.base")]
+    assert [layer(module) for _, module in found] == ["er_gym.sim", "agents"]
+
+
+def test_an_unlisted_layer_is_not_taken_for_another() -> None:
+    assert layer("er_gym_extras") is None
+    assert layer("numpy") is None
+    assert layer("er_gym.registration") == "er_gym"
