@@ -154,8 +154,8 @@ def bench(
                 workers=workers,
                 on_episode=lambda episode: progress.episode(score_episode(episode, judge).success),
             )
-    except WorkerSetupError as error:
-        raise click.ClickException(str(error)) from error
+    except (WorkerSetupError, OSError) as error:  # OSError: the disk is full, the share is gone
+        raise click.ClickException(f"{error}; the episodes done are in {out}") from error
     except KeyboardInterrupt:
         _complain(
             f"interrupted: {len(finished(store, tasks))} of {len(tasks)} episodes are in {out}; "

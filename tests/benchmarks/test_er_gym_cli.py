@@ -323,3 +323,16 @@ def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, epi
         "er-gym: 1 of 7 episodes crashed, the first of them paper-2: ValueError: no; "
         "the same command plays them again"
     )
+
+
+def test_a_full_disk_is_told_in_one_line(tasks_file, tmp_path, er_gym, monkeypatch):
+    def run(store, tasks, *, workers, on_episode):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(runner, "run", run)
+    out = tmp_path / "run"
+    code, shown, err = er_gym(
+        *("bench", "--tasks-file", tasks_file, "--agent", "oracle", "--out", out)
+    )
+    assert (code, shown) == (1, "")
+    assert "No space left on device; the episodes done are in" in one_line(err)
