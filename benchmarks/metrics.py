@@ -83,10 +83,9 @@ def _label(verb: str, object_type: str) -> str:
 
 
 def _search_answered(episode: EpisodeRecord, end: StepRecord, came_from_key_action: bool) -> bool:
-    """Whether ``end`` answers a search: a type within reach is named by the task, or the last thing
-    done was a key action (going to where the target is)."""
-    name = episode.name.lower()
-    return any(kind.lower() in name for kind in end.interactable) or came_from_key_action
+    """Whether ``end`` answers a search: a type within reach is named by the task, or the last look
+    or move was a key action (going to where the target is)."""
+    return any(kind in episode.name for kind in end.interactable) or came_from_key_action
 
 
 def tally(episode: EpisodeRecord, scorer: Scorer) -> Tally:
@@ -124,7 +123,8 @@ def tally(episode: EpisodeRecord, scorer: Scorer) -> Tally:
             else:
                 scored.append(label)
                 points += 1
-        previous = label
+        if step.verb in UNSCORED:
+            previous = label
     return Tally(tuple(expected), tuple(scored), points, routes)
 
 

@@ -199,7 +199,8 @@ class Observation:
 OBSERVATIONS: Mapping[str, Observation] = {
     "rgb": Observation(
         lambda width, height: spaces.Box(0, 255, (height, width, 3), np.uint8),
-        lambda situation: np.ascontiguousarray(situation.event.frame),
+        # A copy: after an illegal action the event, and its frame, are those of the step before.
+        lambda situation: np.array(situation.event.frame),
     ),
     "state": Observation(
         lambda width, height: spaces.Box(-1.0, 1.0, (len(STATE_LAYOUT),), np.float32), _state

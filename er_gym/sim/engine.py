@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import er_gym.sim.actions  # noqa: F401  (registers the actions)
-from er_gym.sim.actions.registry import perform
+from er_gym.sim.actions import perform
 from er_gym.sim.errors import INVALID_ARGUMENT, MISSING_ARGUMENTS, ActionFailed
 from er_gym.sim.metadata import metadata
 from er_gym.sim.render.view import View, draw

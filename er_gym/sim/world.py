@@ -35,6 +35,21 @@ def settled(rotation: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
     return np.array([x, yaw % 360.0, z])
 
 
+def _plausible_parents(scene: Scene) -> list[tuple[int, ...]]:
+    """The recorded containments, less the 20 that cannot be.
+
+    AI2-THOR's trigger boxes overlap: a few records put a fridge into the cabinet beside it, a
+    counter onto a plate, the floor into a bin. What cannot be carried is in nothing that opens or
+    can be carried, and the floor is in nothing.
+    """
+    carried = scene.properties[:, _PROPERTY["pickupable"]]
+    no_place = carried | scene.properties[:, _PROPERTY["openable"]]
+    return [
+        () if kind == "Floor" else tuple(p for p in parents if carried[i] or not no_place[p])
+        for i, (kind, parents) in enumerate(zip(scene.types, scene.parents, strict=True))
+    ]
+
+
 @dataclass(frozen=True)
 class Agent:
     """The agent's pose: position (3,) of its centre in metres, degrees, AI2-THOR's frame."""
@@ -137,7 +152,7 @@ class World:
             exists=np.ones(len(scene.object_ids), dtype=bool),
             temperature=list(scene.temperature),
             fill_liquid=[None] * len(scene.object_ids),
-            parents=list(scene.parents),
+            parents=_plausible_parents(scene),
             controlled=list(scene.controlled),
             salient_materials=list(scene.salient_materials),
         )

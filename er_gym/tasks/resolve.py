@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.task import Task, type_of_id
@@ -13,14 +12,14 @@ from er_gym.thor import make_controller
 
 def _coordinates(object_id: str) -> tuple[str, ...]:
     """An id with its coordinates as numbers: ``+00.00``, ``-00.00`` and ``00.00`` are one."""
-    return tuple(_number(part) for part in object_id.split("|"))
 
+    def number(part: str) -> str:
+        try:
+            return f"{float(part) + 0.0:.2f}"
+        except ValueError:
+            return part
 
-def _number(part: str) -> str:
-    try:
-        return f"{float(part) + 0.0:.2f}"
-    except ValueError:
-        return part
+    return tuple(number(part) for part in object_id.split("|"))
 
 
 def resolve_task(task: Task, scene_ids: Collection[str]) -> tuple[Task, list[str]]:
@@ -88,22 +87,21 @@ def _doubtful(task: Task) -> Mapping[str, str]:
     return notes
 
 
-@lru_cache(maxsize=256)
-def scene_object_ids(scene: str, backend: str = "embedded") -> tuple[str, ...]:
-    """The ids of a scene's objects, as the backend has them.
+def resolve_tasks(tasks: Sequence[Task], backend: str = "embedded") -> tuple[list[Task], list[str]]:
+    """:func:`resolve_task` for each of several tasks, in the scenes of a backend.
 
     Raises:
-        ValueError: the backend has no such scene, or there is no such backend.
+        ValueError: the backend does not have one of the scenes, or there is no such backend.
+        TaskFileError: as for :func:`resolve_task`.
     """
-    with make_controller(backend, scene=scene, headless=True) as controller:
-        return tuple(entry["objectId"] for entry in controller.last_event.metadata["objects"])
-
-
-def resolve_tasks(tasks: Iterable[Task], backend: str = "embedded") -> tuple[list[Task], list[str]]:
-    """:func:`resolve_task` for each of several tasks, in the scenes of a backend."""
+    scene_ids: dict[str, list[str]] = {}
+    with make_controller(backend, headless=True) as controller:
+        for scene in dict.fromkeys(task.scene for task in tasks):
+            metadata = controller.reset(scene).metadata
+            scene_ids[scene] = [entry["objectId"] for entry in metadata["objects"]]
     fitted, notes = [], []
     for task in tasks:
-        one, said = resolve_task(task, scene_object_ids(task.scene, backend))
+        one, said = resolve_task(task, scene_ids[task.scene])
         fitted.append(one)
         notes.extend(said)
     return fitted, notes

@@ -157,6 +157,24 @@ def test_a_search_is_answered_by_having_gone_where_the_task_says(episode, step):
     assert scored.key_action_precision == 1.0
 
 
+def test_what_is_done_in_between_does_not_make_it_forget_where_it_went(episode, step):
+    end = step("end", interactable=("Mug",))
+    steps = ("navigate to CounterTop", "open Drawer", "!navigate to Shelf", end)
+    assert score_episode(search(episode, steps), PAPER).success
+    steps = ("navigate to CounterTop", "observe", end)
+    assert not score_episode(search(episode, steps), PAPER).success
+
+
+def test_a_type_within_reach_must_be_named_as_it_is_spelled(episode, step):
+    """ "CreditCards" has a Card in it but no card, and "open" no Pen."""
+    end = step("end", interactable=("Pen",))
+    steps = ("navigate to Shelf", end)
+    opened = search(episode, steps, name="open the room and look for the CreditCard")
+    assert not score_episode(opened, PAPER).success
+    pencil = search(episode, steps, name="Look for the Pencil in the room.")
+    assert score_episode(pencil, PAPER).success  # the paper's scorer looks no closer
+
+
 @pytest.mark.parametrize(
     "steps",
     [

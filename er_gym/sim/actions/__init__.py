@@ -9,3 +9,6 @@ from er_gym.sim.actions import (  # noqa: F401  (imported for their registration
     setup,
     state_change,
 )
+from er_gym.sim.actions.registry import ACTIONS, perform
+
+__all__ = ["ACTIONS", "perform"]

@@ -33,11 +33,18 @@ def _step(world: World, magnitude: float | None, heading: float) -> None:
 
 
 def _obstacle(world: World, end: np.ndarray) -> str:
-    """The standing object nearest to where the agent wanted to go, or a wall."""
+    """The standing object nearest to where the agent wanted to go, or a wall.
+
+    A box in which the agent stands already is a counter's that bends round it: not that one.
+    """
+    here = world.agent.position
     rows = [
         i
         for i in np.flatnonzero(world.exists)
-        if world.low[i, 1] < 1.6 and world.types[i] != "Floor" and world.high[i, 1] > 0.1
+        if world.low[i, 1] < 1.6
+        and world.types[i] != "Floor"
+        and world.high[i, 1] > 0.1
+        and not ((world.low[i] < here) & (here < world.high[i]))[[0, 2]].all()
     ]
     gap = np.clip(end, world.low[rows], world.high[rows]) - end
     distance = np.linalg.norm(gap[:, [0, 2]], axis=1)

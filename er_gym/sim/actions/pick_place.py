@@ -61,8 +61,11 @@ def put_object(
     require(world, receptacle, "receptacle", "a receptacle")
     if receptacle in world.in_hand:
         raise ActionFailed(f"{objectId} is in the agent's own hand.")
-    if world.is_shut(receptacle):
-        raise ActionFailed(f"{objectId} is closed; open it before putting something into it.")
+    shut = next((r for r in (receptacle, *world.ancestors(receptacle)) if world.is_shut(r)), None)
+    if shut is not None:
+        raise ActionFailed(
+            f"{world.object_ids[shut]} is closed; open it before putting something into it."
+        )
     held, kind = world.types[i], world.types[receptacle]
     if not forceAction and not accepts(held, kind):
         raise ActionFailed(f"A {kind} does not take a {held}.")
@@ -88,7 +91,7 @@ def drop_hand_object(
         # Over furniture: it lands on the highest surface there; over a wall it slides to the feet.
         under = [
             r
-            for r in np.flatnonzero(world.exists)
+            for r in np.flatnonzero(~world.hidden)
             if world.has(int(r), "receptacle")
             and not world.has(int(r), "openable")
             and r not in world.in_hand

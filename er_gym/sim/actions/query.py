@@ -55,6 +55,8 @@ def get_interactable_poses(
     maxPoses: int | None = None,
 ) -> list[dict[str, Any]]:
     """Every pose from which an object can be interacted with; each filter narrows the search."""
+    if maxPoses is not None and maxPoses < 1:
+        raise ActionFailed(f"maxPoses must be 1 or more, not {maxPoses}.", INVALID_ARGUMENT)
     i = world.find(objectId)
     places = (
         _grid(world, None)

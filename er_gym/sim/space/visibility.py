@@ -120,5 +120,5 @@ def visible(world: World, agent: Agent | None = None) -> NDArray[np.bool_]:
     )
     result = np.zeros(len(world), dtype=bool)
     result[of_object[seen]] = True
-    result[world.in_hand] = True
+    result[[i for i in world.in_hand if not world.hidden[i]]] = True
     return result

@@ -65,10 +65,10 @@ class WalkableFloor:
 
     def contains(self, points: NDArray[np.float64], *, tolerant: bool = True) -> NDArray[np.bool_]:
         """Which of (..., 2) x, z points can be stood on, to within 2.5 cm (tolerant: 7.5 cm)."""
-        cells = np.round((points - self.origin) / _FINE).astype(int)
+        cells = np.round((points - self.origin) / _FINE)
         bitmap = self.near if tolerant else self.exact
         inside = np.all((cells >= 0) & (cells < bitmap.shape), axis=-1)
-        cells = np.where(inside[..., None], cells, 0)
+        cells = np.where(inside[..., None], cells, 0).astype(int)
         return np.asarray(inside & bitmap[cells[..., 0], cells[..., 1]])
 
     def path_is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:

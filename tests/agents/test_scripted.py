@@ -1,0 +1,72 @@
+"""The ceiling and the floor: the oracle solves what can be solved, the random agent next to nothing."""
+
+from __future__ import annotations
+
+import pytest
+
+from agents import AGENTS, make_agent
+from benchmarks.metrics import CORRECTED, PAPER, score_episode
+from benchmarks.play import episode_seed, play_episode
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.tasks.paper_format import read_tasks
+from er_gym.tasks.resolve import resolve_tasks
+from er_gym.tasks.suites import load_suite
+
+
+def play_all(agent: str, tasks, **env_arguments):
+    env = EmbodiedEnv([], obs_mode="text", **env_arguments)
+    records = []
+    for task in tasks:
+        seed = episode_seed(0, task.id)
+        records.append(play_episode(env, make_agent(agent, seed), task, seed))
+    env.close()
+    assert [record.error for record in records] == [""] * len(records)
+    return records
+
+
+def test_the_oracle_solves_the_paper_tasks(shared_data) -> None:
+    tasks, _ = resolve_tasks(read_tasks(shared_data / "paper_tasks_dev.json"))
+    records = play_all("oracle", tasks)
+    missed = [r.task_id for r in records if not score_episode(r, CORRECTED).success]
+    assert len(missed) <= 0.03 * len(records), missed
+    assert [r.success for r in records] == [r.task_id not in missed for r in records]
+    uncountable = [
+        r.task_id
+        for r in records
+        if not score_episode(r, PAPER).success and score_episode(r, CORRECTED).success
+    ]
+    assert uncountable == ["paper-788", "paper-791", "paper-794", "paper-797"]
+
+
+def test_the_oracle_solves_every_task_of_mini() -> None:
+    suite = load_suite("mini")
+    records = play_all("oracle", suite.tasks)
+    assert [r.task_id for r in records if not score_episode(r, CORRECTED).success] == []
+
+
+def test_the_random_agent_solves_next_to_nothing() -> None:
+    records = play_all("random", load_suite("mini").tasks)
+    solved = [r.task_id for r in records if score_episode(r, CORRECTED).success]
+    assert len(solved) < 0.05 * len(records), solved
+
+
+@pytest.mark.parametrize("name", AGENTS)
+def test_the_same_seed_plays_the_same_episode(name: str) -> None:
+    task = load_suite("mini").tasks[0]
+    env = EmbodiedEnv([], obs_mode="text")
+    first, again = (play_episode(env, make_agent(name, 7), task, 7) for _ in range(2))
+    env.close()
+    assert [step.text for step in first.steps] == [step.text for step in again.steps]
+
+
+def test_the_oracle_finds_its_way_without_being_told_where_it_may_go() -> None:
+    """The tasks of mini state no navigable objects: it has to look round and walk about."""
+    suite = load_suite("mini")
+    assert all(task.navigable_objects == () for task in suite.tasks)
+    records = play_all("oracle", suite.tasks[:40])
+    assert any(step.verb == "observe" for record in records for step in record.steps)
+
+
+def test_an_unknown_agent_lists_those_there_are() -> None:
+    with pytest.raises(ValueError, match="unknown agent 'genius'; choose one of: oracle, random"):
+        make_agent("genius")

@@ -1,0 +1,109 @@
+"""State and text say what the agent could know, and nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import make_task
+
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.observations import GOAL_VERBS, STATE_LAYOUT, goal, parse_obs_mode
+
+FRIDGE = "Fridge|-02.10|+00.00|+01.07"
+
+
+def entry(obs: dict[str, np.ndarray], name: str) -> float:
+    return float(obs["state"][STATE_LAYOUT.index(name)])
+
+
+@pytest.fixture(scope="module")
+def state_env() -> EmbodiedEnv:
+    return EmbodiedEnv([], obs_mode="state+text")
+
+
+@pytest.mark.parametrize(
+    ("instruction", "names"),
+    [
+        ("Find the CreditCard in the room.", ["CreditCard"]),
+        ("put the credit card on the dining table", ["CreditCard", "DiningTable"]),
+        ("First Cup on GarbageCan, then Mug.", ["Cup", "GarbageCan", "Mug"]),
+        ("Switch on the TV remote control", ["RemoteControl"]),
+        ("Pick up the pencils", ["Pencil"]),
+        ("Find the CD", ["CD"]),
+        ("Stop panicking", []),
+    ],
+)  # fmt: skip
+def test_goal_names(instruction: str, names: list[str]) -> None:
+    assert [name for name, _ in goal(instruction)[1]] == names
+
+
+def test_goal_weights_fall_with_the_order_of_mention() -> None:
+    assert [weight for _, weight in goal("an Apple, a Bowl and a Cup")[1]] == [1.0, 0.5, 1 / 3]
+
+
+@pytest.mark.parametrize(
+    ("instruction", "verbs"),
+    [
+        ("Find the Apple.", {"search"}),
+        ("Please take the Apple.", {"pickup"}),
+        ("First put the Apple on the Desk", {"put", "then"}),
+        ("Turn on the lamp", {"toggle"}),
+    ],
+)
+def test_goal_verbs(instruction: str, verbs: set[str]) -> None:
+    asked = goal(instruction)[0]
+    assert {name for name, yes in zip(GOAL_VERBS, asked, strict=True) if yes} == verbs
+
+
+def test_state_follows_what_happens(state_env: EmbodiedEnv) -> None:
+    task = make_task("single_pickup", ("open", FRIDGE), instruction="Take the Egg.")
+    obs, _ = state_env.reset(options={"task": task})
+    assert [entry(obs, name) for name in ("right", "ahead", "sin", "cos")] == [0, 0, 0, 1]
+    assert entry(obs, "goal:Egg") == 1.0
+    assert entry(obs, "seen:Egg") == 0.0
+    assert entry(obs, "holding") == 0.0
+    state_env.step("navigate to Fridge")
+    obs, *_ = state_env.step("open Fridge")
+    assert [entry(obs, f"{f}:Fridge") for f in ("at", "open", "visible")] == [1, 1, 1]
+    assert [entry(obs, f"{f}:Egg") for f in ("visible", "seen", "interactable")] == [1, 1, 1]
+    obs, *_ = state_env.step("pickup Egg")
+    assert entry(obs, "held:Egg") == 1.0
+    assert entry(obs, "holding") == 1.0
+    obs, *_ = state_env.step("navigate to Window")
+    assert entry(obs, "visible:Fridge") == 0.0
+    assert entry(obs, "open:Fridge") == 1.0  # remembered
+    assert entry(obs, "at:Fridge") == 0.0
+
+
+def test_state_does_not_know_what_lies_in_a_closed_thing(state_env: EmbodiedEnv) -> None:
+    """Two tasks that differ only in what the agent cannot know look the same."""
+    cup, plate = "Cup|+00.37|+01.64|-02.58", "Plate|+00.96|+01.65|-02.61"
+    seen = []
+    for hidden in (cup, plate):
+        task = make_task("single_pickup", ("pickup", hidden), instruction="Take it.")
+        obs, _ = state_env.reset(options={"task": task})
+        seen.append(obs)
+    assert (seen[0]["state"] == seen[1]["state"]).all()
+    assert seen[0]["text"] == seen[1]["text"]
+    assert "Plate" not in seen[0]["text"]
+
+
+def test_state_is_relative_to_the_start(state_env: EmbodiedEnv) -> None:
+    task = make_task("single_pickup", ("open", FRIDGE))
+    state_env.reset(options={"task": task})
+    obs, *_ = state_env.step("move forward")
+    assert entry(obs, "ahead") == pytest.approx(0.05, abs=1e-6)  # half a metre, by 10 m
+    assert entry(obs, "right") == pytest.approx(0.0, abs=1e-6)
+
+
+def test_text_keeps_to_its_characters(state_env: EmbodiedEnv) -> None:
+    task = make_task("single_pickup", ("open", FRIDGE), instruction="Find the “Egg” — 找鸡蛋")
+    obs, _ = state_env.reset(options={"task": task})
+    assert obs["text"].startswith('Task: Find the "Egg" - ???')
+    assert obs["text"] in state_env.observation_space["text"]
+
+
+@pytest.mark.parametrize("mode", ["", "rgb+rgb", "depth", "rgb,state"])
+def test_bad_obs_modes(mode: str) -> None:
+    with pytest.raises(ValueError, match="unknown obs_mode"):
+        parse_obs_mode(mode)
