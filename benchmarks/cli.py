@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from benchmarks.cli_player import doctor, player
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -73,6 +75,10 @@ def cli(context: click.Context, version: bool) -> None:
         context.exit()
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
+
+
+cli.add_command(player)
+cli.add_command(doctor)
 
 
 @cli.command()

@@ -10,12 +10,13 @@ from typing import Any
 
 from er_gym.envs.registration import register_all
 
-__all__ = ["EmbodiedEnv", "make_controller"]
+__all__ = ["EmbodiedEnv", "make_controller", "thor_executable"]
 __version__ = "0.1.0"
 
 _LAZY = {
     "EmbodiedEnv": "er_gym.envs.embodied_env",
     "make_controller": "er_gym.thor",
+    "thor_executable": "er_gym.thor",
 }
 
 register_all()

@@ -58,6 +58,8 @@ def _all_actions() -> Iterator[Action]:
 ACTIONS: tuple[Action, ...] = tuple(_all_actions())
 """Every action; a discrete action is an index into this."""
 INDEX: dict[Action, int] = {action: index for index, action in enumerate(ACTIONS)}
+INDEX_OF = {(action.verb, action.object_type): index for index, action in enumerate(ACTIONS)}
+"""The same by verb and object type; pairs that make no sense in any scene are not in it."""
 _BY_TEXT = {str(action).lower(): action for action in ACTIONS}
 _VERBS_LONGEST_FIRST = sorted(
     {*verbs.OBJECT_VERBS, *verbs.ALIASES}, key=len, reverse=True

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from er_gym.envs import instances as which
 from er_gym.envs import skills
-from er_gym.envs.actions import ACTIONS, INDEX, Action, parse
-from er_gym.envs.legality import Surroundings, legal_actions, objection, suited, surroundings
+from er_gym.envs.actions import ACTIONS, Action, parse
+from er_gym.envs.legality import Surroundings, legal_indices, objection, suited, surroundings
 from er_gym.envs.observations import OBSERVATIONS, Memory, Situation, parse_obs_mode
 from er_gym.envs.reward import Progress, search_targets
 from er_gym.tasks import verbs
@@ -145,6 +145,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         }
         self._controller: Any = None
         self._event: Any = None
+        self._reachables: dict[str, skills.Reachable] = {}
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = spaces.Dict(
             {name: OBSERVATIONS[name].space(width, height) for name in self._obs}
@@ -160,8 +161,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self.task = self._choose((options or {}).get("task"))
         controller = self._started_controller(self.task.scene)
         event = controller.reset(self.task.scene)
-        event = controller.step(action="GetReachablePositions", renderImage=False)
-        self._reachable = skills.Reachable.of(event.metadata["actionReturn"])
+        self._reachable = self._reachable_in(self.task.scene)
         pose = skills.start_pose(event.metadata, self._reachable)
         self._memory = Memory(pose)
         self._progress = Progress.start(self.task)
@@ -224,8 +224,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def action_masks(self) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
         mask = np.zeros(len(ACTIONS), dtype=np.int8)
-        for action in legal_actions(self._around, self._known):
-            mask[INDEX[action]] = 1
+        mask[legal_indices(self._around, self._known)] = 1
         return mask
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -252,6 +251,13 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                 self._backend, scene=scene, **self._controller_arguments
             )
         return self._controller
+
+    def _reachable_in(self, scene: str) -> skills.Reachable:
+        """Where the agent can stand: asked for once a scene, since it does not change."""
+        if scene not in self._reachables:
+            event = self._controller.step(action="GetReachablePositions", renderImage=False)
+            self._reachables[scene] = skills.Reachable(event.metadata["actionReturn"])
+        return self._reachables[scene]
 
     def _choose(self, wanted: Task | str | None) -> Task:
         if isinstance(wanted, Task):

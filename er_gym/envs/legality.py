@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
-from er_gym.envs.actions import STANDS_FOR, Action, applies
+from er_gym.envs.actions import INDEX_OF, STANDS_FOR, Action, applies
 from er_gym.tasks import verbs
 
 Objects = Mapping[str, Mapping[str, Any]]
@@ -130,7 +130,8 @@ def suited(verb: str, around: Surroundings) -> list[str]:
     """Ids of the interactable objects that the verb can be done to in their present state."""
     if (verb == verbs.PICKUP and around.holding) or (verb == verbs.PUT and not around.holding):
         return []
-    return [i for i in around.interactable if _CONDITIONS[verb].holds(around.objects[i])]
+    holds, objects = _CONDITIONS[verb].holds, around.objects
+    return [i for i in around.interactable if holds(objects[i])]
 
 
 def objection(action: Action, around: Surroundings, known: Collection[str]) -> str:
@@ -166,18 +167,13 @@ def objection(action: Action, around: Surroundings, known: Collection[str]) -> s
     return ""
 
 
-def legal_actions(around: Surroundings, known: Collection[str]) -> list[Action]:
-    """Every action to which :func:`objection` has none."""
-    return [
-        *(Action(verb) for verb in verbs.BARE_VERBS),
-        *(Action(verbs.NAVIGATE, name) for name in sorted(known)),
-        *(
-            Action(verb, name)
-            for verb in verbs.INTERACTIONS
-            for name in sorted(around.types(suited(verb, around)))
-            if applies(verb, name)
-        ),
-    ]
+def legal_indices(around: Surroundings, known: Collection[str]) -> list[int]:
+    """The index of every action to which :func:`objection` has none."""
+    pairs = [(verb, "") for verb in verbs.BARE_VERBS]
+    pairs += [(verbs.NAVIGATE, name) for name in known]
+    for verb in verbs.INTERACTIONS:
+        pairs += [(verb, name) for name in around.types(suited(verb, around))]
+    return [INDEX_OF[pair] for pair in pairs if pair in INDEX_OF]
 
 
 def _type(around: Surroundings, object_id: str) -> str:

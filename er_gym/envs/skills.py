@@ -6,13 +6,12 @@ may be used now is not its business (see :mod:`er_gym.envs.legality`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import atan2, degrees, hypot
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er_gym.envs.actions import STANDS_FOR
 from er_gym.envs.legality import Objects
@@ -24,28 +23,44 @@ FORWARD_STEP = 0.5
 _COMFORTABLE = 0.7
 """How far from an object's middle one likes to stand, metres."""
 _POSITIONS_AT_ONCE = 12
+_ROTATIONS = (0, 90, 180, 270)
+_HORIZONS = (-30, 0, 30, 60)
 _VIEWS = ("right", "behind", "left")
 
 Position = Mapping[str, float]
 
 
-@dataclass(frozen=True)
 class Reachable:
-    """Where the agent can stand: AI2-THOR's list of positions, and its (P, 2) x and z, metres."""
+    """Where the agent can stand in a scene: the ``actionReturn`` of GetReachablePositions."""
 
-    positions: Sequence[Position]
-    xz: NDArray[np.float64]
+    def __init__(self, positions: Sequence[Position]) -> None:
+        self._positions = [{axis: position[axis] for axis in "xyz"} for position in positions]
+        self._xz = np.array([(p["x"], p["z"]) for p in positions]).reshape(-1, 2)
+        self._best_views: dict[tuple[float, float, float], Mapping[str, float]] = {}
 
-    @staticmethod
-    def of(positions: Sequence[Position]) -> Reachable:
-        """From the ``actionReturn`` of GetReachablePositions."""
-        return Reachable(positions, np.array([(p["x"], p["z"]) for p in positions]).reshape(-1, 2))
+    def nearest_to(self, x: float, z: float) -> Iterator[list[Position]]:
+        """The positions in batches, those nearest to a point first."""
+        distance = np.hypot(self._xz[:, 0] - x, self._xz[:, 1] - z).round(6)
+        order = np.lexsort((self._xz[:, 1], self._xz[:, 0], distance))
+        for first in range(0, len(order), _POSITIONS_AT_ONCE):
+            batch = order[first : first + _POSITIONS_AT_ONCE].tolist()
+            yield [self._positions[k] for k in batch]
 
-    def nearest_to(self, x: float, z: float) -> list[Position]:
-        """The positions, those nearest to a point first."""
-        distance = np.hypot(self.xz[:, 0] - x, self.xz[:, 1] - z).round(6)
-        order = np.lexsort((self.xz[:, 1], self.xz[:, 0], distance))
-        return [self.positions[k] for k in order.tolist()]
+    def best_view(self, centre: Mapping[str, float]) -> Mapping[str, float]:
+        """The pose near a point from which to look at it most comfortably, were nothing in the way.
+
+        It is the one that :func:`navigate` would choose, were it among those to choose from.
+        """
+        key = (centre["x"], centre["y"], centre["z"])
+        if key not in self._best_views:
+            poses = [
+                {**position, "rotation": rotation, "horizon": horizon}
+                for position in next(self.nearest_to(centre["x"], centre["z"]))
+                for rotation in _ROTATIONS
+                for horizon in _HORIZONS
+            ]
+            self._best_views[key] = min(poses, key=lambda pose: _discomfort(pose, centre))
+        return self._best_views[key]
 
 
 @dataclass(frozen=True)
@@ -97,7 +112,7 @@ def start_pose(metadata: Mapping[str, Any], reachable: Reachable) -> AgentPose:
         (cx + hx, cz + hz, 225.0),
         (cx + hx, cz - hz, 315.0),
     )
-    nearest = [(reachable.nearest_to(x, z)[0], x, z, rotation) for x, z, rotation in corners]
+    nearest = [(next(reachable.nearest_to(x, z))[0], x, z, r) for x, z, r in corners]
     spot, _, _, rotation = min(nearest, key=lambda n: hypot(n[0]["x"] - n[1], n[0]["z"] - n[2]))
     return AgentPose(spot["x"], spot["y"], spot["z"], rotation)
 
@@ -110,23 +125,42 @@ def navigate(controller: Any, goal: Mapping[str, Any], reachable: Reachable) -> 
     the picture is taken.
     """
     centre = goal["axisAlignedBoundingBox"]["center"]
-    by_distance = reachable.nearest_to(centre["x"], centre["z"])
-    for first in range(0, len(by_distance), _POSITIONS_AT_ONCE):
-        event = controller.step(
-            action="GetInteractablePoses",
-            objectId=goal["objectId"],
-            positions=by_distance[first : first + _POSITIONS_AT_ONCE],
-            rotations=[0, 90, 180, 270],
-            horizons=[-30, 0, 30, 60],
-            standings=[True],
-            renderImage=False,
-        )
-        poses = event.metadata["actionReturn"]
-        if poses:
-            best = min(poses, key=lambda pose: _discomfort(pose, centre))
-            x, y, z = best["x"], best["y"], best["z"]
-            return place(controller, AgentPose(x, y, z, best["rotation"], best["horizon"]))
-    return Outcome(event, False, f"no way was found to where {goal['objectType']} can be seen")
+    # The pose that one would choose is mostly possible, and cheaper to ask for than all.
+    wanted = reachable.best_view(centre)
+    if _interactable_poses(controller, goal, [wanted], [wanted["rotation"]], [wanted["horizon"]]):
+        return place(controller, _agent_pose(wanted))
+    for positions in reachable.nearest_to(centre["x"], centre["z"]):
+        found = _interactable_poses(controller, goal, positions, _ROTATIONS, _HORIZONS)
+        if found:
+            return place(
+                controller, _agent_pose(min(found, key=lambda pose: _discomfort(pose, centre)))
+            )
+    problem = f"no way was found to where {goal['objectType']} can be seen"
+    return Outcome(controller.last_event, False, problem)
+
+
+def _agent_pose(pose: Mapping[str, float]) -> AgentPose:
+    return AgentPose(pose["x"], pose["y"], pose["z"], pose["rotation"], pose["horizon"])
+
+
+def _interactable_poses(
+    controller: Any,
+    goal: Mapping[str, Any],
+    positions: Sequence[Position],
+    rotations: Sequence[float],
+    horizons: Sequence[float],
+) -> list[dict[str, Any]]:
+    event = controller.step(
+        action="GetInteractablePoses",
+        objectId=goal["objectId"],
+        positions=[{axis: position[axis] for axis in "xyz"} for position in positions],
+        rotations=list(rotations),
+        horizons=list(horizons),
+        standings=[True],
+        renderImage=False,
+    )
+    poses: list[dict[str, Any]] = event.metadata["actionReturn"]
+    return poses
 
 
 def _discomfort(pose: Mapping[str, Any], centre: Mapping[str, float]) -> float:

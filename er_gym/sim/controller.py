@@ -6,15 +6,49 @@ from typing import Any
 
 import ai2thor.controller
 import ai2thor.server
-import numpy as np
+from numpy.typing import NDArray
 
 from er_gym.sim.engine import Engine
+from er_gym.sim.errors import CLIENT_ERRORS
+from er_gym.sim.lazy import LazyMetadata
+from er_gym.sim.protocol import rgba
 from er_gym.sim.render.view import View
 
 _TAKEN = frozenset(
     {"server_class", "start_unity", "local_executable_path", "local_build", "platform", "host"}
 )
 """Arguments of the official controller that choose a Unity build; they mean nothing here."""
+
+
+_READ_BY_EVENT = ("screenWidth", "screenHeight", "colors")
+_RENAMED = {
+    "renderClassImage": "renderSemanticSegmentation",
+    "renderObjectImage": "renderInstanceSegmentation",
+}
+"""Old names of arguments, which the client goes on accepting for any action."""
+
+
+class EventMetadata(LazyMetadata, ai2thor.server.MetadataWrapper):  # type: ignore[misc]  # untyped
+    """Lazy, and with the client's aliases for old keys."""
+
+
+class EmbeddedEvent(ai2thor.server.Event):  # type: ignore[misc]  # untyped
+    """An event that keeps lazy metadata lazy, and is gone as soon as nobody keeps it."""
+
+    def __init__(self, metadata: LazyMetadata) -> None:
+        # Event copies the metadata it is given, and a copy has to have everything worked out.
+        super().__init__({name: metadata[name] for name in _READ_BY_EVENT})
+        self.metadata = metadata
+
+    @property
+    def events(self) -> list[EmbeddedEvent]:
+        """Itself, as if there were several agents."""
+        return [self]
+
+    @events.setter
+    def events(self, events: object) -> None:
+        # The official class keeps [self], a cycle that only the garbage collector would break.
+        pass
 
 
 class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is untyped
@@ -24,7 +58,7 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
 
     def __init__(self, width: int, height: int, **kwargs: Any) -> None:
         super().__init__(width, height, **kwargs)
-        self._engine = Engine(width, height)
+        self._engine = Engine(width, height, EventMetadata)
         self._event: ai2thor.server.Event | None = None
         # The client adjusts the resolution only if it believes that a player process is there.
         self.unity_proc = self
@@ -44,26 +78,42 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
             # The client drops this event for that of the Initialize which it sends next.
             action = {**action, "renderImage": False}
         metadata, frames = self._engine.step(action)
-        event = ai2thor.server.Event(metadata)
+        event = EmbeddedEvent(metadata)
         if frames is not None:
-            _attach(event, frames)
+            self._attach(event, frames)
         self._event = event
 
     def receive(self, timeout: float | None = None) -> ai2thor.server.Event:
         """The event of the action last sent."""
-        self.last_event = self._event
-        return self._event
+        event, self._event = self._event, None
+        return event
+
+    def _attach(self, event: ai2thor.server.Event, view: View) -> None:
+        """Give an event its pictures, as it would have read them off the wire."""
+        depth = {
+            "depth_format": self.depth_format,
+            "camera_near_plane": self.camera_near_plane,
+            "camera_far_plane": self.camera_far_plane,
+        }
+        noise = {"add_noise": self.add_depth_noise, "noise_indices": self.noise_indices}
+        event.frame = view.rgb.copy()  # the view is handed out again while nothing changes
+        if view.depth is not None:
+            event.add_image_depth(_upside_down(view.depth), **depth, **noise)
+        if view.instances is not None:
+            event.add_image_ids(_upside_down(rgba(view.instances)))
+        event.semantic_segmentation_frame = view.classes
+        for other in view.third_party:
+            event.third_party_camera_frames.append(other.rgb)
+            if other.depth is not None:
+                event.add_third_party_image_depth(_upside_down(other.depth), **depth)
+            if other.instances is not None:
+                event.add_third_party_image_ids(_upside_down(rgba(other.instances)))
+            if other.classes is not None:
+                event.third_party_semantic_segmentation_frames.append(other.classes)
 
 
-def _attach(event: ai2thor.server.Event, frames: View) -> None:
-    """Give an event its pictures, as it would have read them off the wire."""
-    event.frame = frames.rgb
-    if frames.depth is not None:
-        event.depth_frame = frames.depth
-    if frames.instances is not None:
-        alpha = np.full((*frames.instances.shape[:2], 1), 255, np.uint8)
-        rgba = np.concatenate([frames.instances, alpha], axis=2)
-        event.add_image_ids(np.ascontiguousarray(rgba[::-1]).tobytes())
+def _upside_down(picture: NDArray[Any]) -> bytes:
+    return picture[::-1].tobytes()
 
 
 class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  # untyped
@@ -89,6 +139,39 @@ class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  
         super().__init__(server_class=EmbeddedServer, start_unity=False, **arguments)
 
     server: EmbeddedServer | None
+
+    def step(
+        self, action: str | dict[str, Any] | None = None, **arguments: Any
+    ) -> ai2thor.server.Event:
+        """Do an action, as the official ``step`` does, less its deep copies for the wire.
+
+        Raises:
+            ValueError: the call is wrong in itself: no such action, or wrong arguments.
+            RuntimeError: it failed and ``raise_for_failure`` is set.
+        """
+        request: dict[str, Any] = dict(action) if isinstance(action, dict) else {"action": action}
+        raise_for_failure = arguments.pop("raise_for_failure", False)
+        request.update(arguments)
+        if self.headless:
+            request["renderImage"] = False
+        rotation = request.get("rotation")
+        if rotation is not None and not isinstance(rotation, dict):
+            request["rotation"] = {"y": rotation}
+        for old in _RENAMED.keys() & request.keys():
+            request[_RENAMED[old]] = request[old]
+        self.last_action = request
+        # An event that nobody else keeps need not have its objects worked out.
+        self.last_event = None
+        assert self.server is not None
+        self.server.send(request)
+        event = self.last_event = self.server.receive()
+        if not event.metadata["lastActionSuccess"]:
+            message = event.metadata["errorMessage"]
+            if event.metadata["errorCode"] in CLIENT_ERRORS:
+                raise ValueError(message)
+            if raise_for_failure:
+                raise RuntimeError(message)
+        return event
 
     def _build_server(self, host: str, port: int, width: int, height: int) -> None:
         if self.server is None:

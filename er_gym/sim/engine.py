@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
+from weakref import ReferenceType, ref
 
 from er_gym.sim.actions import perform
 from er_gym.sim.errors import INVALID_ARGUMENT, MISSING_ARGUMENTS, ActionFailed
+from er_gym.sim.lazy import LazyMetadata
 from er_gym.sim.metadata import metadata
-from er_gym.sim.render.view import View, draw
+from er_gym.sim.render.view import View, draw, with_flags
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError, load_scene
 from er_gym.sim.world import Settings, World
 
@@ -19,12 +21,20 @@ class Engine:
 
     Args:
         width, height: size of frames, pixels.
+        metadata_kind: the class of the metadata that :meth:`step` returns.
     """
 
-    def __init__(self, width: int = 300, height: int = 300) -> None:
+    def __init__(
+        self,
+        width: int = 300,
+        height: int = 300,
+        metadata_kind: type[LazyMetadata] = LazyMetadata,
+    ) -> None:
+        self._kind = metadata_kind
+        self._last: ReferenceType[LazyMetadata] | None = None
         self.world = World.load(load_scene(SCENE_NAMES[0]), Settings(width=width, height=height))
 
-    def step(self, request: Mapping[str, Any]) -> tuple[dict[str, Any], View | None]:
+    def step(self, request: Mapping[str, Any]) -> tuple[LazyMetadata, View | None]:
         """Do one action, given as the AI2-THOR client sends it.
 
         Whatever goes wrong is said in the metadata (``lastActionSuccess``, ``errorMessage``,
@@ -33,16 +43,24 @@ class Engine:
         Returns:
             The metadata, and the frames unless ``renderImage`` is False.
         """
+        last = None if self._last is None else self._last()
+        if last is not None:
+            last.settle()  # somebody keeps it: it must not speak of what comes now
         name = str(request.get("action"))
+        reply, error, code = None, "", ""
         try:
             if name == "Reset":
                 self._reset(request)
-                report = metadata(self.world, name)
             else:
-                report = metadata(self.world, name, action_return=perform(self.world, request))
+                reply = perform(self.world, request)
         except ActionFailed as failure:
-            report = metadata(self.world, name, str(failure), failure.code)
+            error, code = str(failure), failure.code
+        settings = self.world.settings
+        self.world.settings = with_flags(settings, request)
+        report = metadata(self.world, name, error, code, reply, self._kind)
+        self._last = ref(report)
         frames = draw(self.world) if request.get("renderImage", True) else None
+        self.world.settings = settings
         return report, frames
 
     def _reset(self, request: Mapping[str, Any]) -> None:

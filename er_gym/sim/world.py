@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.scene import PROPERTIES, STATES, Scene
 from er_gym.sim.space.rotation import unity_rotation
-from er_gym.sim.space.shapes import Solid, solid_boxes, solid_part, surface_fractions
+from er_gym.sim.space.shapes import Shape, shape_of
+from er_gym.sim.space.shapes.samples import surface_fractions
 from er_gym.sim.space.walk import WalkableFloor, walkable_floor
 
 AGENT_HEIGHT = 0.900999128818512
@@ -25,6 +27,8 @@ CAMERA_STANDING, CAMERA_CROUCHING = 0.675, 0.0
 """Height of the camera above the agent's centre, metres."""
 HAND_OFFSET = np.array([0.0, -0.16, 0.38])
 """Where the hand is in the camera's frame (right, up, forward), metres."""
+_USED_UP = ("PaperTowelRoll", "SoapBottle", "TissueBox", "ToiletPaper")
+"""Types that ProcTHOR's asset database says can be used up."""
 _PROPERTY = {name: column for column, name in enumerate(PROPERTIES)}
 _STATE = {name: column for column, name in enumerate(STATES)}
 
@@ -35,7 +39,15 @@ def settled(rotation: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
     return np.array([x, yaw % 360.0, z])
 
 
-def _plausible_parents(scene: Scene) -> list[tuple[int, ...]]:
+def _properties(scene: Scene) -> NDArray[np.bool_]:
+    """The recorded properties, and ``canBeUsedUp``, which the record leaves out."""
+    properties = scene.properties.copy()
+    properties[:, _PROPERTY["canBeUsedUp"]] |= np.isin(scene.types, _USED_UP)
+    return properties
+
+
+@lru_cache(maxsize=128)
+def _plausible_parents(scene: Scene) -> tuple[tuple[int, ...], ...]:
     """The recorded containments, less the 20 that cannot be.
 
     AI2-THOR's trigger boxes overlap: a few records put a fridge into the cabinet beside it, a
@@ -44,10 +56,16 @@ def _plausible_parents(scene: Scene) -> list[tuple[int, ...]]:
     """
     carried = scene.properties[:, _PROPERTY["pickupable"]]
     no_place = carried | scene.properties[:, _PROPERTY["openable"]]
-    return [
+    return tuple(
         () if kind == "Floor" else tuple(p for p in parents if carried[i] or not no_place[p])
         for i, (kind, parents) in enumerate(zip(scene.types, scene.parents, strict=True))
-    ]
+    )
+
+
+@lru_cache(maxsize=128)
+def _recorded_shapes(scene: Scene) -> dict[int, Shape]:
+    """The shapes of a scene's objects as recorded, filled by :meth:`World.shape`."""
+    return {}
 
 
 @dataclass(frozen=True)
@@ -79,6 +97,16 @@ class Settings:
     height: int = 300
     render_depth: bool = False
     render_instances: bool = False
+    render_classes: bool = False
+
+
+@dataclass(frozen=True)
+class ThirdPartyCamera:
+    """A camera that nobody carries: (3,) metres, (3,) Unity angles and vertical degrees."""
+
+    position: tuple[float, float, float]
+    rotation: tuple[float, float, float]
+    field_of_view: float
 
 
 @dataclass
@@ -88,10 +116,10 @@ class World:
     Attributes mirror AI2-THOR's object metadata, one row an object: ``position``, ``rotation``,
     ``low`` and ``high`` (corners of the axis-aligned box) are (N, 3), metres and degrees;
     ``properties`` and ``states`` are (N, P) and (N, S) bool, see :meth:`has` and :meth:`state`.
+    ``untouched`` is True until something has been changed.
     ``parents[i]`` are the receptacles that object i is in, innermost first as recorded.
     ``entries`` is where :mod:`er_gym.sim.metadata` keeps what it said of objects that have not
-    changed since, ``sights`` where :mod:`er_gym.sim.space.visibility` keeps what can be seen from
-    where while nothing has.
+    changed since; ``derived`` holds what is worked out from the whole state, until it changes.
     """
 
     scene: Scene
@@ -117,13 +145,14 @@ class World:
     controlled: list[tuple[int, ...] | None]
     salient_materials: list[tuple[str, ...] | None]
     held: int = -1
+    untouched: bool = True
+    cameras: tuple[ThirdPartyCamera, ...] = ()
     index: dict[str, int] = field(default_factory=dict)
-    _derived: dict[str, object] = field(default_factory=dict)
+    derived: dict[str, object] = field(default_factory=dict)
+    _touched: set[int] = field(default_factory=set)
+    _shapes: dict[int, Shape] = field(default_factory=dict)
     _samples: dict[int, NDArray[np.float64]] = field(default_factory=dict)
     entries: dict[int, dict[str, object]] = field(default_factory=dict)
-    sights: dict[tuple[float, ...], tuple[NDArray[np.float64], NDArray[np.int64]]] = field(
-        default_factory=dict
-    )
 
     @staticmethod
     def load(scene: Scene, settings: Settings) -> World:
@@ -145,14 +174,14 @@ class World:
             low=scene.aabb_center - half,
             high=scene.aabb_center + half,
             obb=scene.obb.copy(),
-            properties=scene.properties.copy(),
+            properties=_properties(scene),
             states=scene.states.copy(),
             openness=scene.openness.copy(),
             mass=scene.mass.copy(),
             exists=np.ones(len(scene.object_ids), dtype=bool),
             temperature=list(scene.temperature),
             fill_liquid=[None] * len(scene.object_ids),
-            parents=_plausible_parents(scene),
+            parents=list(_plausible_parents(scene)),
             controlled=list(scene.controlled),
             salient_materials=list(scene.salient_materials),
         )
@@ -197,14 +226,14 @@ class World:
     @property
     def contents(self) -> list[list[int]]:
         """For each object, the rows of what lies in or on it."""
-        found = self._derived.get("contents")
+        found = self.derived.get("contents")
         if found is None:
             lists: list[list[int]] = [[] for _ in range(len(self))]
             for i, parents in enumerate(self.parents):
                 if self.exists[i]:
                     for parent in parents:
                         lists[parent].append(i)
-            found = self._derived["contents"] = lists
+            found = self.derived["contents"] = lists
         return found  # type: ignore[return-value]  # the only writer is above
 
     def ancestors(self, i: int) -> set[int]:
@@ -230,19 +259,27 @@ class World:
         return found
 
     def is_shut(self, i: int) -> bool:
-        """Whether i is a receptacle that opens and is closed now."""
-        return self.has(i, "receptacle") and self.has(i, "openable") and not self.state(i, "isOpen")
+        """Whether i is a receptacle that opens and is closed now.
+
+        A toilet never is: things stand on its cistern, not under its lid.
+        """
+        return (
+            self.has(i, "receptacle")
+            and self.has(i, "openable")
+            and not self.state(i, "isOpen")
+            and self.types[i] != "Toilet"
+        )
 
     @property
     def hidden(self) -> NDArray[np.bool_]:
         """(N,) which objects lie in something shut, or are no more."""
-        found = self._derived.get("hidden")
+        found = self.derived.get("hidden")
         if not isinstance(found, np.ndarray):
             found = ~self.exists
             for i in range(len(self)):
                 if self.parents[i] and any(self.is_shut(a) for a in self.ancestors(i)):
                     found[i] = True
-            self._derived["hidden"] = found
+            self.derived["hidden"] = found
         return found
 
     @property
@@ -254,20 +291,25 @@ class World:
         self,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
         """Boxes that block lines of sight: (M, 3) corners, and (M,) whose they are."""
-        found = self._derived.get("solids")
+        found = self.derived.get("solids")
         if found is None:
-            rows: list[int] = []
-            parts: list[Solid] = []
             skip = set(self.in_hand)
-            for i in np.flatnonzero(~self.hidden).tolist():
-                part = solid_part(self.types[i], self.has(i, "pickupable"))
-                if part is not None and i not in skip:
-                    rows.append(i)
-                    parts.append(part)
-            owners = np.array(rows, dtype=np.int64)
-            found = (*solid_boxes(self.low[owners], self.high[owners], parts), owners)
-            self._derived["solids"] = found
+            rows = [i for i in np.flatnonzero(~self.hidden).tolist() if i not in skip]
+            hiding = [self.shape(i).hiding for i in rows]
+            boxes = np.concatenate(hiding).astype(np.float32)
+            owners = np.repeat(np.array(rows, dtype=np.int64), [len(part) for part in hiding])
+            found = boxes[:, 0], boxes[:, 1], owners
+            self.derived["solids"] = found
         return found  # type: ignore[return-value]  # the only writer is above
+
+    def shape(self, i: int) -> Shape:
+        """What object i is made of, where it is now."""
+        as_recorded = i < len(self.scene) and i not in self._touched
+        kept = _recorded_shapes(self.scene) if as_recorded else self._shapes
+        found = kept.get(i)
+        if found is None:
+            found = kept[i] = shape_of(self, i)
+        return found
 
     def obb_corners(self, i: int) -> NDArray[np.float64] | None:
         """(8, 3) corners of object i's oriented box in AI2-THOR's order, None where none is."""
@@ -284,8 +326,12 @@ class World:
         points = self._samples.get(i)
         if points is None:
             if np.isnan(self.obb[i, 0, 0]):
-                size = self.high[i] - self.low[i]
-                points = self.low[i] + surface_fractions(size) * size
+                # A counter that bends is looked for where it is; the rest on their boxes.
+                bends = self.types[i] == "CounterTop"
+                boxes = self.shape(i).boxes if bends else [(self.low[i], self.high[i])]
+                points = np.concatenate(
+                    [low + surface_fractions(high - low) * (high - low) for low, high in boxes]
+                )
             else:
                 corner, edges = self.obb[i, 0], self.obb[i, 1:]
                 size = np.linalg.norm(edges, axis=1)
@@ -302,16 +348,19 @@ class World:
 
     def _touch(self, rows: Iterable[int]) -> None:
         """Forget what was derived for some objects one by one."""
+        rows = list(rows)
+        self._touched.update(rows)
         for i in rows:
             self._samples.pop(i, None)
+            self._shapes.pop(i, None)
             self.entries.pop(i, None)
 
     # -- changing --------------------------------------------------------------------------------
 
     def changed(self) -> None:
         """Say that something that can be seen has changed."""
-        self._derived.clear()
-        self.sights.clear()
+        self.untouched = False
+        self.derived.clear()
 
     def set_state(self, i: int, name: str, value: bool) -> None:
         """Put object i into a state of :data:`er_gym.sim.scene.STATES`, or out of it."""
@@ -341,6 +390,12 @@ class World:
             self.parents[child] = (*own, *(p for p in parents if p not in own))
         self.changed()
 
+    def relocate_alone(self, i: int, parents: Sequence[int]) -> None:
+        """Say in which receptacles object i lies; what lies in it does not change."""
+        self._touch([i, *self.parents[i], *parents])
+        self.parents[i] = tuple(parents)
+        self.changed()
+
     def turn(self, i: int, yaw: float) -> None:
         """Turn object i about the vertical to a heading in degrees, its box following.
 
@@ -356,6 +411,44 @@ class World:
     def move_by(self, i: int, offset: NDArray[np.float64]) -> None:
         """Shift object i by (3,) metres, and what lies in it with it."""
         self._shift([i, *self.inside(i)], offset)
+        self.changed()
+
+    def set_pose(
+        self, i: int, position: NDArray[np.float64], rotation: NDArray[np.float64]
+    ) -> None:
+        """Put object i, alone, at (3,) metres and degrees, its box following.
+
+        A box that is recorded without its orientation moves and does not turn.
+        """
+        offset = position - self.position[i]
+        self.position[i], self.rotation[i] = position, rotation
+        corners = self.obb_corners(i)
+        if corners is None:
+            self.low[i] += offset
+            self.high[i] += offset
+        else:
+            self.low[i], self.high[i] = corners.min(axis=0), corners.max(axis=0)
+        self._touch([i])
+        self.changed()
+
+    def rename(self, i: int, object_id: str) -> None:
+        """Give object i another id, which nothing else has."""
+        del self.index[self.object_ids[i]]
+        self.object_ids[i] = object_id
+        self.index[object_id] = i
+        self._touch([i, *self.parents[i], *self.contents[i]])
+        self.changed()
+
+    def remove(self, i: int) -> None:
+        """Take object i out of the scene; what lies in it stays where it is."""
+        if i == self.held:
+            self.held = -1
+        for child in self.contents[i]:
+            self.parents[child] = tuple(p for p in self.parents[child] if p != i)
+            self._touch([child])
+        self._touch([i, *self.parents[i]])
+        self.parents[i] = ()
+        self.exists[i] = False
         self.changed()
 
     def place_agent(self, agent: Agent) -> None:

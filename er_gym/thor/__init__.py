@@ -4,6 +4,7 @@ from er_gym.sim.compatibility import accepts, placement_table
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError
 from er_gym.thor.backends import BACKENDS, BackendError, make_controller
 from er_gym.thor.object_types import OBJECT_TYPES, ObjectType
+from er_gym.thor.player import thor_executable
 
 __all__ = [
     "BACKENDS",
@@ -15,4 +16,5 @@ __all__ = [
     "accepts",
     "make_controller",
     "placement_table",
+    "thor_executable",
 ]

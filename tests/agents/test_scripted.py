@@ -1,4 +1,4 @@
-"""The ceiling and the floor: the oracle solves what can be solved, the random agent next to nothing."""
+"""The ceiling and the floor: the oracle solves what can be solved, the random agent very little."""
 
 from __future__ import annotations
 

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from math import atan2, hypot, radians, remainder, tau
 from typing import Any
 
 import pytest
 
 from er_gym.sim.controller import EmbeddedController
+
+
+def discomfort(pose: dict[str, Any], point: dict[str, float]) -> float:
+    """How badly a pose is suited to look at a point: metres away plus radians amiss."""
+    away = hypot(point["x"] - pose["x"], point["z"] - pose["z"])
+    heading = atan2(point["x"] - pose["x"], point["z"] - pose["z"]) - radians(pose["rotation"])
+    below = atan2(pose["y"] + 0.675 - point["y"], away) - radians(pose["horizon"])
+    return away + abs(remainder(heading, tau)) + abs(below)
 
 
 class Room:
@@ -64,14 +73,11 @@ class Room:
         return metadata["errorMessage"]
 
     def go_to(self, object_id: str, **filters: Any) -> None:
-        """Go to the pose, among those from which an object can be handled, that is nearest to it."""
+        """Go to where an object can be handled, is near and in the middle of the picture."""
         centre = self[object_id]["axisAlignedBoundingBox"]["center"]
         poses = self.do("GetInteractablePoses", object_id, standings=[True], **filters)
         assert poses, f"{object_id} can be handled from nowhere"
-        pose = min(
-            poses, key=lambda p: (p["x"] - centre["x"]) ** 2 + (p["z"] - centre["z"]) ** 2
-        )
-        self.do("TeleportFull", **pose)
+        self.do("TeleportFull", **min(poses, key=lambda pose: discomfort(pose, centre)))
         assert self[object_id]["visible"]
 
     def take(self, object_id: str) -> None:

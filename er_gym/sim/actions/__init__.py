@@ -1,6 +1,8 @@
 """AI2-THOR's actions, one small file a family. Importing this package registers them all."""
 
 from er_gym.sim.actions import (  # noqa: F401  (imported for their registrations)
+    arrange,
+    cameras,
     look,
     move,
     open_toggle,

@@ -1,10 +1,25 @@
-"""Conditions that several actions share; each returns the object's row or says what is wrong."""
+"""Conditions that several actions share; each says what is wrong."""
 
 from __future__ import annotations
 
-from er_gym.sim.errors import ActionFailed
+from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
 from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
+
+FIELDS_OF_VIEW = (1.0, 179.0)
+"""The smallest and the largest vertical field of view of a camera, degrees."""
+
+
+FARTHEST = 1000.0
+"""How far from the origin anything may be put along each axis, metres."""
+
+
+def within(name: str, value: float | None, low: float, high: float) -> None:
+    """Refuse an argument that is given and out of its range."""
+    if value is not None and not low <= value <= high:
+        raise ActionFailed(
+            f"{name} must be within {low:g} and {high:g}, not {value:g}.", INVALID_ARGUMENT
+        )
 
 
 def target(world: World, object_id: str, force: bool) -> int:

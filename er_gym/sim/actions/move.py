@@ -10,6 +10,8 @@ from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
 from er_gym.sim.world import World
 
+_FARTHEST = 1000.0
+"""No scene is larger than this, metres."""
 _HEIGHT_TOLERANCE = 0.3
 """A position whose height is farther off than this is not on the floor, metres."""
 
@@ -97,6 +99,10 @@ def teleport(
     there = np.array(
         [here[0] if x is None else x, here[1] if y is None else y, here[2] if z is None else z]
     )
+    if forceAction and np.abs(there).max() > _FARTHEST:
+        raise ActionFailed(
+            f"({there[0]:g}, {there[1]:g}, {there[2]:g}) is farther than {_FARTHEST:g} m away."
+        )
     if abs(there[1] - here[1]) > _HEIGHT_TOLERANCE and not forceAction:
         raise ActionFailed(
             f"Cannot teleport to height {there[1]:.3f}: the agent's centre is at {here[1]:.3f}."

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from er_gym.sim import consequences
 from er_gym.sim.actions.checks import require, target
 from er_gym.sim.actions.registry import action
@@ -10,6 +12,17 @@ from er_gym.sim.world import World
 
 _ONLY_SHUT = frozenset({"Microwave"})
 """Types that run only when shut, and open only when off."""
+
+
+def _slide(world: World, i: int, openness: float) -> None:
+    """Slide a drawer, with what lies in it, to an openness: by its depth at 1."""
+    if world.types[i] != "Drawer":
+        return
+    shape = world.shape(i)
+    depth = np.ptp(shape.upright[:, :, 2])
+    heading = np.radians(shape.yaw)
+    ahead = np.array([np.sin(heading), 0.0, np.cos(heading)])
+    world.move_by(i, ahead * depth * (openness - world.openness[i]))
 
 
 @action("OpenObject")
@@ -25,6 +38,7 @@ def open_object(
         raise ActionFailed(f"{objectId} is open already.")
     if world.types[i] in _ONLY_SHUT and world.state(i, "isToggled"):
         raise ActionFailed(f"{objectId} is on; switch it off before opening it.")
+    _slide(world, i, openness)
     world.openness[i] = openness
     world.set_state(i, "isOpen", openness > 0.0)
 
@@ -36,6 +50,7 @@ def close_object(world: World, *, objectId: str, forceAction: bool = False) -> N
     require(world, i, "openable", "an openable object")
     if not world.state(i, "isOpen"):
         raise ActionFailed(f"{objectId} is closed already.")
+    _slide(world, i, 0.0)
     world.openness[i] = 0.0
     world.set_state(i, "isOpen", False)
 

@@ -5,12 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from er_gym.sim import consequences
-from er_gym.sim.actions.checks import require, target
+from er_gym.sim.actions.checks import require, target, within
 from er_gym.sim.actions.registry import action
 from er_gym.sim.compatibility import accepts
 from er_gym.sim.errors import ActionFailed
-from er_gym.sim.space.placement import free_spots, surface_height
+from er_gym.sim.space.placement import free_spots
+from er_gym.sim.space.resting import landing
 from er_gym.sim.world import AGENT_HEIGHT, World
+
+_NEWTONS_PER_METRE = 100.0
+_FARTHEST_THROW = 2.0
+_FLIGHT_STEP = 0.05
 
 
 def _held(world: World) -> int:
@@ -36,13 +41,14 @@ def pickup_object(
     world.carry()
 
 
-def _put_down(world: World, i: int, yaw: float, foot: np.ndarray, parents: list[int]) -> None:
+def put_down(world: World, i: int, yaw: float, foot: np.ndarray, parents: list[int]) -> None:
     """Stand object i at a heading with the middle of its underside at a (3,) point."""
     world.turn(i, yaw)
     underside = (world.low[i] + world.high[i]) / 2
     underside[1] = world.low[i, 1]
     world.move_by(i, foot - underside)
-    world.held = -1
+    if i == world.held:
+        world.held = -1
     world.relocate(i, parents)
     consequences.apply(world)
 
@@ -70,13 +76,13 @@ def put_object(
     if not forceAction and not accepts(held, kind):
         raise ActionFailed(f"A {kind} does not take a {held}.")
     near = world.agent.position[[0, 2]]
-    spot = next(free_spots(world, i, receptacle, near), None)
+    spot = next(free_spots(world, i, receptacle, near, seen_by=world.agent), None)
     if spot is None:
         raise ActionFailed(f"No valid positions to place {held}: {objectId} has no free space.")
     yaw, foot = spot
     # What is on a plate on a table is on the table too; what is in the fridge is not on the floor.
     around = world.parents[receptacle] if world.has(receptacle, "pickupable") else ()
-    _put_down(world, i, yaw, foot, [receptacle, *around])
+    put_down(world, i, yaw, foot, [receptacle, *around])
 
 
 @action("DropHandObject")
@@ -85,27 +91,42 @@ def drop_hand_object(
 ) -> None:
     """Let go of what is held: it falls onto whatever is under the hand."""
     i = _held(world)
-    centre = (world.low[i] + world.high[i]) / 2
-    agent = world.agent.position
-    if not world.floor.contains(centre[[0, 2]]):
-        # Over furniture: it lands on the highest surface there; over a wall it slides to the feet.
-        under = [
-            r
-            for r in np.flatnonzero(~world.hidden)
-            if world.has(int(r), "receptacle")
-            and not world.has(int(r), "openable")
-            and r not in world.in_hand
-            and world.types[r] != "Floor"
-            and (world.low[r, [0, 2]] <= centre[[0, 2]]).all()
-            and (world.high[r, [0, 2]] >= centre[[0, 2]]).all()
-            and surface_height(world, int(r)) <= centre[1]
-        ]
-        if under:
-            best = max(under, key=lambda r: surface_height(world, int(r)))
-            foot = np.array([centre[0], surface_height(world, int(best)), centre[2]])
-            _put_down(world, i, world.rotation[i, 1], foot, [int(best)])
-            return
+    fall(world, i, (world.low[i] + world.high[i]) / 2)
+
+
+@action("ThrowObject")
+def throw_object(
+    world: World,
+    *,
+    moveMagnitude: float = 0.0,
+    forceAction: bool = False,
+    autoSimulation: bool = True,
+) -> None:
+    """Throw what is held: it falls ahead of the hand, a metre for every 100 N, two at most.
+
+    It flies level until something is in its way, and neither breaks nor rolls.
+    """
+    within("moveMagnitude", moveMagnitude, 0.0, 1e6)
+    i = _held(world)
+    heading = np.radians(world.agent.rotation)
+    ahead = np.array([np.sin(heading), 0.0, np.cos(heading)])
+    reach = min(moveMagnitude / _NEWTONS_PER_METRE, _FARTHEST_THROW)
+    point = start = (world.low[i] + world.high[i]) / 2
+    for way in np.arange(_FLIGHT_STEP, reach + _FLIGHT_STEP / 2, _FLIGHT_STEP):
+        farther = start + way * ahead
+        if landing(world, i, farther) is None:
+            break
+        point = farther
+    fall(world, i, point)
+
+
+def fall(world: World, i: int, centre: np.ndarray) -> None:
+    """Let object i fall from where its middle is at a (3,) point; inside a wall, at the feet."""
+    found = landing(world, i, centre)
+    if found is None:
+        agent = world.agent.position
         centre = agent + (centre - agent) * 0.5
-    floors = list(world.of_type("Floor"))
-    foot = np.array([centre[0], agent[1] - AGENT_HEIGHT, centre[2]])
-    _put_down(world, i, world.rotation[i, 1], foot, floors[:1])
+        found = agent[1] - AGENT_HEIGHT, list(world.of_type("Floor"))[:1]
+    height, receptacles = found
+    foot = np.array([centre[0], height, centre[2]])
+    put_down(world, i, world.rotation[i, 1], foot, receptacles)

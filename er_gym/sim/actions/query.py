@@ -6,17 +6,30 @@ from typing import Any
 
 import numpy as np
 
+from er_gym.sim.actions.checks import target
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.render.view import object_at
 from er_gym.sim.scene import SCENE_NAMES
 from er_gym.sim.space.poses import HORIZONS, interactable_poses
-from er_gym.sim.space.walk import walkable_grid
+from er_gym.sim.space.standing import standing_places
 from er_gym.sim.world import World
 
 
-@action("Pass", "Done", "AdvancePhysicsStep", "PausePhysicsAutoSim", "UnpausePhysicsAutoSim")
+@action("Pass", "Done", "PausePhysicsAutoSim", "UnpausePhysicsAutoSim")
 def do_nothing(world: World) -> None:
     """Answer with the state of the world as it is."""
+
+
+@action("AdvancePhysicsStep")
+def advance_physics_step(
+    world: World,
+    *,
+    timeStep: float | None = None,
+    simSeconds: float | None = None,
+    allowAutoSimulation: bool = True,
+) -> None:
+    """Nothing moves by itself here, so that however long one waits nothing changes."""
 
 
 @action("GetScenesInBuild")
@@ -31,7 +44,22 @@ def _grid(world: World, step: float | None) -> np.ndarray:
         raise ActionFailed(
             f"A grid needs a step of 0.01 m or more, not {size:g}.", INVALID_ARGUMENT
         )
-    return walkable_grid(world.scene.name, float(size))
+    return standing_places(world.scene.name, float(size))
+
+
+@action("GetObjectInFrame")
+def get_object_in_frame(world: World, *, x: float, y: float, checkVisible: bool = False) -> str:
+    """The id of the object at a point of the agent's picture, 0 to 1 from its upper left corner."""
+    if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
+        raise ActionFailed(
+            f"x and y must be within 0 and 1, not {x:g} and {y:g}.", INVALID_ARGUMENT
+        )
+    object_id = object_at(world, x, y)
+    if object_id is None:
+        raise ActionFailed(f"There is no object at ({x:g}, {y:g}), only the room.")
+    if checkVisible:
+        target(world, object_id, force=False)
+    return object_id
 
 
 @action("GetReachablePositions")

@@ -48,6 +48,10 @@ class Handler:
 
 
 ACTIONS: dict[str, Handler] = {}
+REFUSED = {
+    "CreateHouse": "it has the recorded iTHOR rooms and no procedural houses; backend='unity' has"
+}
+"""Actions of AI2-THOR that are known, not there, and worth a reason."""
 
 
 def action(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -97,6 +101,8 @@ def perform(world: World, request: Mapping[str, Any]) -> Any:
 
 
 def _unknown(name: object) -> str:
+    if isinstance(name, str) and name in REFUSED:
+        return f"The embedded engine has no action {name!r}: {REFUSED[name]}."
     close = get_close_matches(str(name), ACTIONS, n=3)
     hint = f" Did you mean {' or '.join(close)}?" if close else ""
     return f"The embedded engine has no action {name!r}.{hint}"

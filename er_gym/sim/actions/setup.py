@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from er_gym.sim.actions.checks import FIELDS_OF_VIEW, within
 from er_gym.sim.actions.registry import action
 from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
 from er_gym.sim.space.visibility import NEAR_PLANE
@@ -12,11 +13,9 @@ from er_gym.sim.world import World
 _FAR_PLANE = 20.0
 
 
-def _check(name: str, value: float | None, low: float, high: float) -> None:
-    if value is not None and not low <= value <= high:
-        raise ActionFailed(
-            f"{name} must be within {low:g} and {high:g}, not {value:g}.", INVALID_ARGUMENT
-        )
+def _either(flag: bool | None, old_name: bool | None) -> bool | None:
+    """A flag that may come under its new name, its old one, both or neither."""
+    return old_name if flag is None else flag
 
 
 @action("Initialize")
@@ -58,10 +57,10 @@ def initialize(
         raise ActionFailed(
             f"The embedded engine has one agent, not {agentCount}.", INVALID_ARGUMENT
         )
-    _check("gridSize", gridSize, 0.01, 10.0)
-    _check("visibilityDistance", visibilityDistance, 0.0, 1000.0)
-    _check("fieldOfView", fieldOfView, 1.0, 179.0)
-    _check("rotateStepDegrees", rotateStepDegrees, 1.0, 360.0)
+    within("gridSize", gridSize, 0.01, 10.0)
+    within("visibilityDistance", visibilityDistance, 0.0, 1000.0)
+    within("fieldOfView", fieldOfView, *FIELDS_OF_VIEW)
+    within("rotateStepDegrees", rotateStepDegrees, 1.0, 360.0)
     if continuous is not None and snapToGrid is None:
         snapToGrid = not continuous
     chosen = {
@@ -71,7 +70,8 @@ def initialize(
         "field_of_view": fieldOfView,
         "rotate_step": rotateStepDegrees,
         "render_depth": renderDepthImage,
-        "render_instances": renderInstanceSegmentation or renderObjectImage,
+        "render_instances": _either(renderInstanceSegmentation, renderObjectImage),
+        "render_classes": _either(renderSemanticSegmentation, renderClassImage),
     }
     world.configure(**{name: value for name, value in chosen.items() if value is not None})
     return {"cameraNearPlane": NEAR_PLANE, "cameraFarPlane": _FAR_PLANE}
@@ -80,8 +80,8 @@ def initialize(
 @action("ChangeResolution")
 def change_resolution(world: World, *, x: int, y: int) -> None:
     """Set the width and height of frames in pixels."""
-    _check("x", x, 1, 8192)
-    _check("y", y, 1, 8192)
+    within("x", x, 1, 8192)
+    within("y", y, 1, 8192)
     world.configure(width=x, height=y)
 
 

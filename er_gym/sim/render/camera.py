@@ -21,6 +21,7 @@ class Camera:
         horizon: downwards is positive, as AI2-THOR's ``cameraHorizon``.
         fov: the vertical field of view, over 0 and under 180.
         width, height: of the picture, in pixels.
+        roll: about the view axis, Unity's angle about z.
     """
 
     position: Sequence[float] | NDArray[np.float64]
@@ -29,11 +30,12 @@ class Camera:
     fov: float
     width: int
     height: int
+    roll: float = 0.0
 
     @property
     def axes(self) -> NDArray[np.float64]:
         """(3, 3): the unit vectors to the camera's right, up and along its view, as rows."""
-        return unity_rotation((self.horizon, self.yaw, 0.0)).T
+        return unity_rotation((self.horizon, self.yaw, self.roll)).T
 
     @property
     def focal(self) -> float:

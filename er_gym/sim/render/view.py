@@ -1,66 +1,149 @@
-"""What the agent's camera shows: plain boxes, coloured by object type.
+"""What the cameras show: plain boxes, coloured by object type.
 
 A stand-in that is honest about what it is: every object is drawn as the box that the record gives
-it. Depth and instance ids are exact for those boxes.
+it. Depth, instance and class colours are exact for those boxes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.metadata import instance_color
-from er_gym.sim.render.boxes import render_boxes, type_color
+from er_gym.sim.render.boxes import NO_BOX, Frames, render_boxes, type_color
 from er_gym.sim.render.camera import Camera
-from er_gym.sim.space.shapes import solid_part
-from er_gym.sim.world import World
+from er_gym.sim.world import Agent, Settings, ThirdPartyCamera, World
 
 _NOT_DRAWN = frozenset({"Floor", "Shelf", "ShelvingUnit", "SinkBasin", "BathtubBasin"})
 """The room shell shows the floor; the others' boxes are the air above or inside something."""
 _MIN_THICKNESS = 0.01
+_FLAGS = {
+    "renderDepthImage": "render_depth",
+    "renderInstanceSegmentation": "render_instances",
+    "renderSemanticSegmentation": "render_classes",
+}
+"""Arguments that any action may carry, and the settings that they switch on for that one step."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class View:
-    """Pictures from the agent's camera, top row first.
+    """Pictures from a camera, top row first; read-only, for they may be handed out again.
 
     Attributes:
         rgb: (H, W, 3) uint8.
         depth: (H, W) float32 metres along the line of view, None unless asked for.
         instances: (H, W, 3) uint8 colours as in the metadata's ``colors``, None unless asked for.
+        classes: the same with one colour for each object type.
+        third_party: what the cameras show that are not the agent's, in the order of their numbers.
     """
 
     rgb: NDArray[np.uint8]
     depth: NDArray[np.float32] | None = None
     instances: NDArray[np.uint8] | None = None
+    classes: NDArray[np.uint8] | None = None
+    third_party: tuple[View, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A view, and what it was drawn from besides what ``World.changed`` speaks of."""
+
+    agent: Agent
+    settings: Settings
+    cameras: tuple[ThirdPartyCamera, ...]
+    view: View
+
+    def shows(self, world: World) -> bool:
+        # An agent is replaced as a whole when it moves, and what it holds moves only with it.
+        same = self.agent is world.agent and self.settings == world.settings
+        return same and self.cameras == world.cameras
+
+
+def with_flags(settings: Settings, request: Mapping[str, Any]) -> Settings:
+    """The settings, with the pictures that one action asks for besides those of ``Initialize``."""
+    wanted = {name: True for flag, name in _FLAGS.items() if request.get(flag) is True}
+    return replace(settings, **wanted) if wanted else settings
 
 
 def draw(world: World) -> View:
-    """Draw the world as the agent sees it now."""
+    """Draw the world as the agent and the third-party cameras see it now.
+
+    What was drawn last is handed out again while nothing has changed.
+    """
+    kept = world.derived.get("view")
+    if isinstance(kept, _Kept) and kept.shows(world):
+        return kept.view
+    first, *others = (_draw(world, camera) for camera in _cameras(world))
+    view = replace(first, third_party=tuple(others))
+    world.derived["view"] = _Kept(world.agent, world.settings, world.cameras, view)
+    return view
+
+
+def object_at(world: World, x: float, y: float) -> str | None:
+    """The id of the object that the agent sees at a point of its picture, None for the room.
+
+    Args:
+        x, y: 0 to 1, from the left and from the top.
+    """
+    settings = world.settings
+    rows, frames = _render(world, next(_cameras(world)))
+    column = min(int(x * settings.width), settings.width - 1)
+    row = min(int(y * settings.height), settings.height - 1)
+    seen = int(frames.ids[row, column])
+    return None if seen == NO_BOX else world.object_ids[rows[seen]]
+
+
+def _cameras(world: World) -> Iterator[Camera]:
     settings, agent = world.settings, world.agent
+    size = settings.width, settings.height
+    yield Camera(agent.camera, agent.rotation, agent.horizon, settings.field_of_view, *size)
+    for camera in world.cameras:
+        pitch, yaw, roll = camera.rotation
+        yield Camera(camera.position, yaw, pitch, camera.field_of_view, *size, roll=roll)
+
+
+def _draw(world: World, camera: Camera) -> View:
+    settings = world.settings
+    rows, frames = _render(world, camera)
+    ids, types = world.object_ids, world.types
+    view = View(
+        frames.rgb,
+        frames.depth if settings.render_depth else None,
+        _colored(frames, [ids[i] for i in rows]) if settings.render_instances else None,
+        _colored(frames, [types[i] for i in rows]) if settings.render_classes else None,
+    )
+    for picture in (view.rgb, view.depth, view.instances, view.classes):
+        if picture is not None:
+            picture.setflags(write=False)
+    return view
+
+
+def _colored(frames: Frames, names: Sequence[str]) -> NDArray[np.uint8]:
+    """(H, W, 3) the colour that stands for the name of what is seen, black for the room."""
+    palette = np.array([*map(instance_color, names), (0, 0, 0)], dtype=np.uint8)
+    return palette[frames.ids]
+
+
+def _render(world: World, camera: Camera) -> tuple[list[int], Frames]:
+    """The objects drawn, and the picture, whose ids are positions in that list."""
     rows = [i for i in np.flatnonzero(~world.hidden).tolist() if world.types[i] not in _NOT_DRAWN]
     low, high = world.low[rows].copy(), world.high[rows].copy()
     hollow = np.zeros(len(rows), dtype=bool)
     for k, i in enumerate(rows):
-        part = solid_part(world.types[i], world.has(i, "pickupable"))
-        if part is not None and part.bottom > 0:
-            low[k, 1] += (high[k, 1] - low[k, 1]) * part.bottom
+        solid = world.shape(i).hiding
+        if len(solid):
+            low[k, 1] = solid[:, 0, 1].min()
         if world.has(i, "receptacle") and world.has(i, "openable") and world.state(i, "isOpen"):
             hollow[k] = True
     thin = high - low < _MIN_THICKNESS
     high[thin] = low[thin] + _MIN_THICKNESS
     half = world.scene.aabb_size / 2
     frames = render_boxes(
-        Camera(
-            agent.camera,
-            agent.rotation,
-            agent.horizon,
-            settings.field_of_view,
-            settings.width,
-            settings.height,
-        ),
+        camera,
         low,
         high,
         np.array([type_color(world.types[i]) for i in rows], dtype=np.uint8),
@@ -68,8 +151,4 @@ def draw(world: World) -> View:
         room_min=(world.scene.aabb_center - half).min(axis=0),
         room_max=(world.scene.aabb_center + half).max(axis=0),
     )
-    instances = None
-    if settings.render_instances:
-        palette = np.array([instance_color(world.object_ids[i]) for i in rows] + [(0, 0, 0)])
-        instances = palette.astype(np.uint8)[frames.ids]
-    return View(frames.rgb, frames.depth if settings.render_depth else None, instances)
+    return rows, frames

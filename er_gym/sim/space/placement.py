@@ -4,64 +4,54 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.scene import PROPERTIES, load_scene
 from er_gym.sim.space.rotation import unity_rotation
-from er_gym.sim.world import World, settled
+from er_gym.sim.space.shapes.families import family
+from er_gym.sim.space.surfaces import recorded_surfaces
+from er_gym.sim.space.visibility import in_frustum
+from er_gym.sim.world import Agent, World, settled
 
 
 @dataclass(frozen=True)
-class _Room:
-    """How a type of receptacle takes things.
+class _Manner:
+    """How a type of receptacle takes things, where that is not side by side.
 
     Attributes:
-        surface: where things stand, as a fraction of the box's height; None for near its floor.
         vessel: it is made for one thing, which may stick out over its rim.
         heaps: when it is full, things lie on top of each other.
     """
 
-    surface: float | None = None
     vessel: bool = False
     heaps: bool = False
 
 
-_ROOMS_BY_TYPES = {
-    "Shelf Drawer Cabinet Fridge Microwave Safe Cart": _Room(),
-    "Box GarbageCan LaundryHamper Sink SinkBasin Bathtub BathtubBasin": _Room(heaps=True),
-    "Pot Pan Bowl Plate": _Room(vessel=True, heaps=True),
-    "Cup Mug Toaster CoffeeMachine": _Room(vessel=True),
-    "StoveBurner ToiletPaperHanger HandTowelHolder TowelHolder": _Room(surface=1.0, vessel=True),
-    # Backs and rims rise above these.
-    "Sofa ArmChair Chair": _Room(surface=0.5),
-    "Bed": _Room(surface=0.55),
-    "Toilet": _Room(surface=0.95),
+_MANNERS_BY_TYPES = {
+    "Box GarbageCan LaundryHamper Sink SinkBasin Bathtub BathtubBasin": _Manner(heaps=True),
+    "Pot Pan Bowl Plate": _Manner(vessel=True, heaps=True),
+    "Cup Mug Toaster CoffeeMachine StoveBurner ToiletPaperHanger HandTowelHolder "
+    "TowelHolder": _Manner(vessel=True),
 }
-_ROOMS = {name: room for names, room in _ROOMS_BY_TYPES.items() for name in names.split()}
-_ON_TOP = _Room(surface=1.0)
+_MANNERS = {name: manner for names, manner in _MANNERS_BY_TYPES.items() for name in names.split()}
+_SIDE_BY_SIDE = _Manner()
 _STEP = 0.05
 """Spacing of the spots that are tried, metres."""
+_FINE_STEP = 0.02
+"""The same in what is made for one thing, metres."""
 _SKIN = 0.005
 """Gap that is left between things, metres."""
 _GIVE = 0.02
 """How much a thing may be too large, metres: recorded boxes are generous."""
-_AGENT_RADIUS = 0.2
-
-
-@lru_cache(maxsize=128)
-def _recorded_surfaces(scene_name: str) -> dict[int, float]:
-    """Receptacle row to how far above its box's floor the record shows things to stand, metres."""
-    scene = load_scene(scene_name)
-    bottoms = scene.aabb_center[:, 1] - scene.aabb_size[:, 1] / 2
-    lies_in: dict[int, list[float]] = {}
-    carried = scene.properties[:, PROPERTIES.index("pickupable")]
-    for i in np.flatnonzero(carried):
-        for receptacle in scene.parents[i]:
-            lies_in.setdefault(receptacle, []).append(bottoms[i] - bottoms[receptacle])
-    return {receptacle: float(np.median(heights)) for receptacle, heights in lies_in.items()}
+_RISES = 0.03
+"""A fixed thing is in the way on a surface that it rises above by more than this, metres."""
+_OVERHANG = 1.0
+"""Farther from a receptacle than this nothing is in the way of what is put there, metres."""
+_HOLES = frozenset({"Sink", "SinkBasin", "StoveBurner"})
+"""What is let into a counter, where nothing else can stand."""
+_INTO = 0.15
+"""How far under a surface the top of what is let into it may lie, metres."""
 
 
 def surface_height(world: World, receptacle: int) -> float:
@@ -70,16 +60,108 @@ def surface_height(world: World, receptacle: int) -> float:
     Taken from what the record shows standing there, where it shows anything, else from the type.
     """
     low, high = world.low[receptacle, 1], world.high[receptacle, 1]
-    recorded = _recorded_surfaces(world.scene.name).get(receptacle)
+    recorded = recorded_surfaces(world.scene.name).get(receptacle)
     if recorded is not None:
         return float(low + recorded)
-    share = _room(world, receptacle).surface
+    share = _stand(world, receptacle)
     lift = min(0.02, 0.2 * (high - low)) if share is None else share * (high - low)
     return float(low + lift)
 
 
-def _room(world: World, receptacle: int) -> _Room:
-    return _ROOMS.get(world.types[receptacle], _ON_TOP)
+def _stand(world: World, receptacle: int) -> float | None:
+    return family(world.types[receptacle], world.has(receptacle, "pickupable")).stand
+
+
+def is_vessel(world: World, receptacle: int) -> bool:
+    """Whether a receptacle is made for one thing, as a cup or a stove burner is."""
+    return _manner(world, receptacle).vessel
+
+
+def _manner(world: World, receptacle: int) -> _Manner:
+    return _MANNERS.get(world.types[receptacle], _SIDE_BY_SIDE)
+
+
+def _places(world: World, receptacle: int) -> NDArray[np.float64]:
+    """(R, 2, 2) corners x, z of the rectangles in or on a receptacle that things stand in."""
+    if world.types[receptacle] == "CounterTop":
+        return world.shape(receptacle).boxes[:, :, [0, 2]]
+    if _stand(world, receptacle) is None:
+        return np.array([[world.low[receptacle], world.high[receptacle]]])[:, :, [0, 2]]
+    return world.shape(receptacle).boxes[:1, :, [0, 2]]
+
+
+def free_spots(
+    world: World,
+    i: int,
+    receptacle: int,
+    near: NDArray[np.float64],
+    seen_by: Agent | None = None,
+) -> Iterator[tuple[float, NDArray[np.float64]]]:
+    """Spots for object i in or on a receptacle, nearest to a (2,) x, z point first.
+
+    With ``seen_by``, spots in that agent's picture come before all others.
+
+    Yields:
+        The heading in degrees at which it fits, and the (3,) centre of its box's underside.
+    """
+    if is_vessel(world, receptacle):
+        yield from _in_vessel(world, i, receptacle)
+        return
+    height, tall = surface_height(world, receptacle), _height(world, i)
+    obstacles = _obstacles(world, receptacle, i, height)
+    free: list[NDArray[np.float64]] = [np.empty((0, 3))]  # heading, x, z
+    heaps: list[tuple[float, float, NDArray[np.float64]]] = []
+    for yaw, half in _headings(world, i):
+        spots = _spots(_places(world, receptacle), half)
+        spots = spots[np.argsort(np.linalg.norm(spots - near, axis=1), kind="stable")]
+        clear = spots[_free(spots, half, height, tall, obstacles)]
+        free.append(np.column_stack([np.full(len(clear), yaw), clear]))
+        if _manner(world, receptacle).heaps and len(spots):
+            tops = _tops(spots, half, height, world.high[receptacle, 1], obstacles)
+            k = int(tops.argmin())
+            heaps.append((float(tops[k]), yaw, spots[k]))
+    found = np.concatenate(free)
+    order = [np.linalg.norm(found[:, 1:] - near, axis=1)]
+    if seen_by is not None:
+        order.append(~_in_picture(world, seen_by, found[:, 1:], height))
+    for k in np.lexsort(order):
+        yield float(found[k, 0]), np.array([found[k, 1], height, found[k, 2]])
+    for top, yaw, (x, z) in sorted(heaps, key=lambda heap: heap[0]):
+        if top < world.high[receptacle, 1]:
+            yield yaw, np.array([x, top + _SKIN, z])
+
+
+def _in_picture(
+    world: World, agent: Agent, spots: NDArray[np.float64], height: float
+) -> NDArray[np.bool_]:
+    """(S,) which spots, (S, 2) x and z at one height, an agent's camera has in its picture."""
+    settings = world.settings
+    points = np.column_stack([spots[:, 0], np.full(len(spots), height), spots[:, 1]])
+    aspect = settings.width / settings.height
+    return in_frustum(
+        points - agent.camera, agent.rotation, agent.horizon, settings.field_of_view, aspect
+    )
+
+
+def _in_vessel(
+    world: World, i: int, receptacle: int
+) -> Iterator[tuple[float, NDArray[np.float64]]]:
+    """Places in a vessel, or on top of what is in it already: its middle first."""
+    inside = world.contents[receptacle]
+    if inside and not _manner(world, receptacle).heaps:
+        return
+    base = max([surface_height(world, receptacle), *(float(world.high[c, 1]) for c in inside)])
+    obstacles, tall = _obstacles(world, receptacle, i, base), _height(world, i)
+    places = np.array([[world.low[receptacle], world.high[receptacle]]])[:, :, [0, 2]]
+    offcentre = _spots(places, np.zeros(2), _FINE_STEP)
+    offcentre = offcentre[np.argsort(np.linalg.norm(offcentre - places.mean(axis=1), axis=1))]
+    for spot in offcentre:
+        for yaw, half in _headings(world, i):
+            if _free(spot[None], half, base, tall, obstacles)[0]:
+                yield yaw, np.array([spot[0], base, spot[1]])
+
+
+# -- the thing -------------------------------------------------------------------------------------
 
 
 def _headings(world: World, i: int) -> list[tuple[float, NDArray[np.float64]]]:
@@ -97,68 +179,6 @@ def _headings(world: World, i: int) -> list[tuple[float, NDArray[np.float64]]]:
     return found
 
 
-def _spots(world: World, receptacle: int, half: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(S, 2) x, z centres on the receptacle where a thing of half-size (2,) does not overhang."""
-    low = world.low[receptacle, [0, 2]] + half + _SKIN
-    high = world.high[receptacle, [0, 2]] - half - _SKIN
-    middle = (low + high) / 2
-    axes = []
-    for axis in (0, 1):
-        reach = max(0.0, high[axis] - middle[axis])
-        count = int(reach / _STEP)
-        axes.append(middle[axis] + _STEP * np.arange(-count, count + 1))
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-def _obstacles(world: World, receptacle: int, moving: list[int]) -> NDArray[np.int64]:
-    """What stands in the way there: what lies in it already and, on open surfaces, loose things."""
-    inside = set(world.contents[receptacle])
-    if _room(world, receptacle).surface is not None:
-        inside.update(
-            int(i)
-            for i in np.flatnonzero(world.exists)
-            if world.has(int(i), "pickupable") or world.has(int(i), "moveable")
-        )
-    inside -= {receptacle, *moving, *world.ancestors(receptacle)}
-    return np.array(sorted(inside), dtype=np.int64)
-
-
-def free_spots(
-    world: World, i: int, receptacle: int, near: NDArray[np.float64]
-) -> Iterator[tuple[float, NDArray[np.float64]]]:
-    """Spots for object i in or on a receptacle, nearest to a (2,) x, z point first.
-
-    Yields:
-        The heading in degrees at which it fits, and the (3,) centre of its box's underside.
-    """
-    room = _room(world, receptacle)
-    if room.vessel:
-        yield from _in_vessel(world, i, receptacle)
-        return
-    height = surface_height(world, receptacle)
-    obstacles = _obstacles(world, receptacle, [i, *world.inside(i)])
-    tall = _height(world, i)
-    heap: list[tuple[float, float, NDArray[np.float64]]] = []
-    for yaw, half in _headings(world, i):
-        size = world.high[receptacle, [0, 2]] - world.low[receptacle, [0, 2]]
-        if (2 * half > size + _GIVE).any():
-            continue
-        spots = _spots(world, receptacle, half)
-        spots = spots[np.argsort(np.linalg.norm(spots - near, axis=1), kind="stable")]
-        free = _free(world, spots, half, height, tall, obstacles)
-        if world.types[receptacle] == "CounterTop":
-            free &= _off_the_floor(world, spots)
-        for x, z in spots[free]:
-            yield yaw, np.array([x, height, z])
-        if room.heaps:
-            tops = _tops(world, spots, half, height, obstacles)
-            k = int(tops.argmin())
-            heap.append((float(tops[k]), yaw, spots[k]))
-    for top, yaw, (x, z) in sorted(heap, key=lambda found: found[0]):
-        if top < world.high[receptacle, 1]:
-            yield yaw, np.array([x, top + _SKIN, z])
-
-
 def _height(world: World, i: int) -> float:
     """How high object i stands once it is set straight, metres."""
     edges = world.obb[i, 1:] @ unity_rotation(settled(world.rotation[i], 0.0)).T
@@ -167,42 +187,72 @@ def _height(world: World, i: int) -> float:
     return float(np.abs(edges[:, 1]).sum())
 
 
-def _in_vessel(
-    world: World, i: int, receptacle: int
-) -> Iterator[tuple[float, NDArray[np.float64]]]:
-    """The one place in a thing that is made for one thing, or on top of what is in it already."""
-    inside = world.contents[receptacle]
-    if inside and not _room(world, receptacle).heaps:
-        return
-    base = max([surface_height(world, receptacle), *(float(world.high[c, 1]) for c in inside)])
-    middle = (world.low[receptacle] + world.high[receptacle]) / 2
-    for yaw, _ in _headings(world, i):
-        yield yaw, np.array([middle[0], base, middle[2]])
+# -- the spots -------------------------------------------------------------------------------------
 
 
-def _tops(
-    world: World,
-    spots: NDArray[np.float64],
-    half: NDArray[np.float64],
-    height: float,
-    obstacles: NDArray[np.int64],
+def _spots(
+    places: NDArray[np.float64], half: NDArray[np.float64], step: float = _STEP
 ) -> NDArray[np.float64]:
-    """(S,) height of the top of the heap under a thing of half-size (2,) at each spot, metres."""
-    low, high = world.low[obstacles][:, [0, 2]], world.high[obstacles][:, [0, 2]]
-    under = ((spots[:, None] + half > low[None]) & (spots[:, None] - half < high[None])).all(axis=2)
-    return np.asarray(np.where(under, world.high[obstacles, 1], height).max(axis=1, initial=height))
+    """(S, 2) x, z centres in rectangles (R, 2, 2) where a thing of half-size (2,) fits."""
+    found = [np.empty((0, 2))]
+    for low, high in places:
+        if (2 * half > high - low + _GIVE).any():
+            continue
+        middle = (low + high) / 2
+        counts = (np.maximum(0.0, (high - low) / 2 - half - _SKIN) / step).astype(int)
+        axes = [middle[axis] + step * np.arange(-counts[axis], counts[axis] + 1) for axis in (0, 1)]
+        found.append(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2))
+    return np.concatenate(found)
+
+
+def _obstacles(world: World, receptacle: int, i: int, height: float) -> NDArray[np.float64]:
+    """(Q, 2, 3) boxes that may be in the way of object i there: loose things and fixed parts.
+
+    Loose things count wherever they are, for they could be anywhere; fixed ones only on top of
+    things, for the boxes of what holds a room overlap with those of its neighbours.
+    """
+    aside = {receptacle, i, *world.inside(i), *world.ancestors(receptacle)}
+    on_top = _stand(world, receptacle) is not None and not is_vessel(world, receptacle)
+    aside.update(world.of_type("Floor"))
+    low, high = world.low[receptacle] - _OVERHANG, world.high[receptacle] + _OVERHANG
+    low[1] = height - _INTO
+    close = world.exists & (world.high > low).all(axis=1) & (world.low < high).all(axis=1)
+    boxes = [np.empty((0, 2, 3))]
+    for k in np.flatnonzero(close).tolist():
+        if k in aside or _surrounds(world, k, receptacle):
+            continue
+        if world.has(k, "pickupable"):
+            boxes.append(np.array([[world.low[k], world.high[k]]]))
+        elif on_top and world.types[k] in _HOLES:
+            hole = np.array([[world.low[k], world.high[k]]])
+            hole[0, 1, 1] = max(world.high[k, 1], height + 2 * _SKIN)
+            boxes.append(hole)
+        elif on_top or world.has(k, "moveable"):
+            parts = world.shape(k).boxes
+            rises = _SKIN if world.has(k, "moveable") else _RISES
+            boxes.append(parts[parts[:, 1, 1] > height + rises])
+    return np.concatenate(boxes)
+
+
+def _surrounds(world: World, k: int, receptacle: int) -> bool:
+    """Whether a receptacle is part of object k, as a drawer is of a dresser."""
+    middle = (world.low[receptacle] + world.high[receptacle]) / 2
+    return (
+        not world.has(k, "pickupable")
+        and bool((world.low[k] <= middle).all())
+        and bool((middle <= world.high[k]).all())
+    )
 
 
 def _free(
-    world: World,
     spots: NDArray[np.float64],
     half: NDArray[np.float64],
     height: float,
     tall: float,
-    obstacles: NDArray[np.int64],
+    obstacles: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
     """(S,) which spots overlap none of the obstacles' boxes."""
-    low, high = world.low[obstacles], world.high[obstacles]
+    low, high = obstacles[:, 0], obstacles[:, 1]
     same_height = (low[:, 1] < height + tall) & (high[:, 1] > height + _SKIN)
     low, high = low[same_height][:, [0, 2]], high[same_height][:, [0, 2]]
     clear = half + _SKIN
@@ -211,11 +261,18 @@ def _free(
     return np.asarray(~np.any(np.all(overlap, axis=2), axis=1))
 
 
-def _off_the_floor(world: World, spots: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(S,) which spots are not above floor that the agent's body sweeps.
+def _tops(
+    spots: NDArray[np.float64],
+    half: NDArray[np.float64],
+    height: float,
+    rim: float,
+    obstacles: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(S,) height of the heap under a thing of half-size (2,) at each spot, below the rim, metres.
 
-    The box of a counter that bends covers free floor too; the recorded positions tell where.
+    What begins over the rim is not in the heap.
     """
-    reachable = world.scene.reachable
-    gaps = np.linalg.norm(spots[:, None] - reachable[None], axis=2).min(axis=1)
-    return np.asarray(gaps > _AGENT_RADIUS)
+    heaped = obstacles[(obstacles[:, 0, 1] < rim) & (obstacles[:, 1, 1] > height)]
+    low, high = heaped[:, 0][:, [0, 2]], heaped[:, 1][:, [0, 2]]
+    under = ((spots[:, None] + half > low[None]) & (spots[:, None] - half < high[None])).all(axis=2)
+    return np.asarray(np.where(under, heaped[:, 1, 1], height).max(axis=1, initial=height))

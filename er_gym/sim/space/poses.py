@@ -8,16 +8,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.space.visibility import (
-    in_frustum,
-    lines_of_sight,
-    sample_points,
-    within_reach,
-)
+from er_gym.sim.space.reach import Outlines
+from er_gym.sim.space.visibility import in_frustum, sights
 from er_gym.sim.world import Agent, World
 
 HORIZONS = (-30.0, 0.0, 30.0, 60.0)
 """Camera tilts that AI2-THOR tries when none are asked for, degrees, down positive."""
+_REMEMBERED = 64
+"""Answers over more positions than these are not kept."""
 _BATCH = 32
 """Positions that one call of the ray kernel looks from."""
 
@@ -30,7 +28,7 @@ def interactable_poses(
     horizons: Sequence[float],
     standings: Sequence[bool],
     max_poses: int | None = None,
-) -> list[Agent]:
+) -> tuple[Agent, ...]:
     """Poses from which object i is visible, hence can be interacted with.
 
     Args:
@@ -39,17 +37,41 @@ def interactable_poses(
         max_poses: stop after so many.
     """
     settings = world.settings
-    points, owners = sample_points(world, [i])
+    lens = (settings.field_of_view, settings.width / settings.height, settings.visibility_distance)
+    filters = (tuple(rotations), tuple(horizons), tuple(standings), max_poses)
+    question = (i, positions.tobytes(), filters, lens, world.agent.position[1])
+
+    def search() -> tuple[Agent, ...]:
+        return tuple(_search(world, i, positions, *filters))
+
+    # Where the hand is, is no part of an arrangement; and the poses of a whole room take megabytes.
+    if i in world.in_hand or len(positions) > _REMEMBERED:
+        return search()
+    return sights(world).remembered(question, search)
+
+
+def _search(
+    world: World,
+    i: int,
+    positions: NDArray[np.float64],
+    rotations: Sequence[float],
+    horizons: Sequence[float],
+    standings: Sequence[bool],
+    max_poses: int | None,
+) -> list[Agent]:
+    settings, known = world.settings, sights(world)
+    points = world.sample_points(i).astype(np.float32)
+    of = np.full(len(points), i, dtype=np.int16)
     directions = np.array([(r % 360.0, h) for r in rotations for h in horizons])
     found: list[Agent] = []
-    for batch in range(0, len(positions), _BATCH):
-        places = _standing_at(world, positions[batch : batch + _BATCH], standings)
-        places = [p for p in places if _reaches(world, i, p)]
+    gaps = Outlines.of([world.shape(i)]).gaps(positions)[:, 0]
+    near = positions[gaps <= settings.visibility_distance]
+    for batch in range(0, len(near), _BATCH):
+        places = _standing_at(world, near[batch : batch + _BATCH], standings)
         if not places or not len(directions):
             continue
         eyes = np.array([place.camera for place in places])
-        clear = lines_of_sight(world, eyes, [i], points, owners)
-        clear &= within_reach(points, eyes[:, None], settings.visibility_distance)
+        clear = known.clear(eyes, points, of)
         in_picture = in_frustum(
             (points - eyes[:, None])[:, None],
             directions[:, 0, None],
@@ -74,11 +96,3 @@ def _standing_at(
         for x, z in positions
         for standing in standings
     ]
-
-
-def _reaches(world: World, i: int, agent: Agent) -> bool:
-    """Whether any part of object i's box is within the visibility distance; cheap."""
-    axes = [0, 2]
-    here = agent.position[axes]
-    gap = here - np.clip(here, world.low[i, axes], world.high[i, axes])
-    return float(np.hypot(*gap)) <= world.settings.visibility_distance

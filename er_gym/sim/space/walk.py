@@ -19,8 +19,9 @@ from er_gym.sim.scene import load_scene
 
 RECORDED_STEP = 0.25
 """Spacing of the recorded positions, metres."""
-_FINE = 0.05
-_PER_STEP = round(RECORDED_STEP / _FINE)
+CELL = 0.05
+"""Side of the cells that the floor is cut into, metres."""
+_PER_STEP = round(RECORDED_STEP / CELL)
 
 
 @dataclass(frozen=True)
@@ -65,15 +66,31 @@ class WalkableFloor:
 
     def contains(self, points: NDArray[np.float64], *, tolerant: bool = True) -> NDArray[np.bool_]:
         """Which of (..., 2) x, z points can be stood on, to within 2.5 cm (tolerant: 7.5 cm)."""
-        cells = np.round((points - self.origin) / _FINE)
+        cells = np.round((points - self.origin) / CELL)
         bitmap = self.near if tolerant else self.exact
         inside = np.all((cells >= 0) & (cells < bitmap.shape), axis=-1)
         cells = np.where(inside[..., None], cells, 0).astype(int)
         return np.asarray(inside & bitmap[cells[..., 0], cells[..., 1]])
 
+    def swept(self, radius: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """The cells that a disc of ``radius`` metres sweeps as its middle walks the floor.
+
+        Returns:
+            (2,) x and z of the centre of cell [0, 0], metres, and the bitmap of :data:`CELL` cells.
+        """
+        reach = int(radius / CELL)
+        grown = np.zeros(np.array(self.exact.shape) + 2 * reach, dtype=bool)
+        x_cells, z_cells = self.exact.shape
+        for dx in range(-reach, reach + 1):
+            for dz in range(-reach, reach + 1):
+                if np.hypot(dx, dz) * CELL <= radius:
+                    x, z = reach + dx, reach + dz
+                    grown[x : x + x_cells, z : z + z_cells] |= self.exact
+        return self.origin - reach * CELL, grown
+
     def path_is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
         """Whether the straight way between two (2,) x, z points stays on the walkable floor."""
-        count = max(2, int(np.ceil(np.linalg.norm(end - start) / _FINE)) + 1)
+        count = max(2, int(np.ceil(np.linalg.norm(end - start) / CELL)) + 1)
         way = start + np.linspace(0.0, 1.0, count)[1:, None] * (end - start)
         return bool(self.contains(way).all())
 
@@ -83,7 +100,7 @@ class WalkableFloor:
         At 0.25 m these are the recorded positions themselves.
         """
         low = self.origin
-        high = low + np.array(self.exact.shape) * _FINE
+        high = low + np.array(self.exact.shape) * CELL
         xs, zs = (
             np.arange(np.ceil(low[axis] / step), np.floor(high[axis] / step) + 1) * step
             for axis in (0, 1)

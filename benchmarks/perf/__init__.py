@@ -1,0 +1,1 @@
+"""Speed and soundness of the engine and the environment: scripts, not tests."""

@@ -1,0 +1,1 @@
+"""The embedded engine beside what AI2-THOR recorded: one comparison a file, no verdicts."""

@@ -1,0 +1,114 @@
+"""Random placements: whether what is put down runs into what is there, and where it is put."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from er_gym.sim.actions.pick_place import put_down
+from er_gym.sim.compatibility import accepts
+from er_gym.sim.scene import SCENE_NAMES, load_scene
+from er_gym.sim.space.placement import free_spots, is_vessel, surface_height
+from er_gym.sim.world import Agent, Settings, World
+
+_TOUCH = 0.005
+
+
+@dataclass
+class Placements:
+    """What came of putting random things into random receptacles that take them.
+
+    Attributes:
+        tried, placed: how many; a receptacle may be full.
+        clashes: (scene, thing, receptacle, what it runs into) for overlaps of more than 5 mm.
+        out_of_order: (scene, thing, receptacle) where a spot in the agent's picture came after one
+            that is not, or a nearer one after a farther one, vessels aside.
+    """
+
+    tried: int = 0
+    placed: int = 0
+    clashes: list[tuple[str, str, str, str]] = field(default_factory=list)
+    out_of_order: list[tuple[str, str, str]] = field(default_factory=list)
+
+
+def random_placements(each: int, seed: int = 0) -> Placements:
+    """Put ``each`` things in each of the 120 scenes, one after the other, by a seed."""
+    random, found = np.random.default_rng(seed), Placements()
+    for name in SCENE_NAMES:
+        world = World.load(load_scene(name), Settings())
+        things = [i for i in range(len(world)) if world.has(i, "pickupable")]
+        receptacles = [r for r in range(len(world)) if world.has(r, "receptacle")]
+        for _ in range(each):
+            i = int(random.choice(things))
+            taking = [
+                r
+                for r in receptacles
+                if r != i
+                and accepts(world.types[i], world.types[r])
+                and i not in world.ancestors(r)
+            ]
+            if taking:
+                x, z = random.choice(world.scene.reachable)
+                agent = Agent(np.array([x, world.agent.position[1], z]), 90.0 * random.integers(4))
+                _put(world, i, int(random.choice(taking)), agent, found)
+    return found
+
+
+def _put(world: World, i: int, receptacle: int, agent: Agent, found: Placements) -> None:
+    names = world.scene.name, world.object_ids[i], world.object_ids[receptacle]
+    near = agent.position[[0, 2]]
+    spots = list(free_spots(world, i, receptacle, near, seen_by=agent))
+    found.tried += 1
+    if not spots:
+        return
+    found.placed += 1
+    put_down(world, i, *spots[0], [receptacle])
+    found.clashes += [(*names, world.object_ids[k]) for k in clashes(world, i, receptacle)]
+    # Higher than where things stand are spots on top of a heap, which come last.
+    base = surface_height(world, receptacle)
+    feet = np.array([foot for _, foot in spots if abs(foot[1] - base) < 1e-9]).reshape(-1, 3)
+    if not is_vessel(world, receptacle) and not _in_order(world, agent, feet):
+        found.out_of_order.append(names)
+
+
+def _in_order(world: World, agent: Agent, feet: np.ndarray) -> bool:
+    """Whether spots in the picture come before the others, and the nearer ones first in each."""
+    unseen = ~_in_view(world, agent, feet)
+    gaps = np.hypot(*(feet - agent.position)[:, [0, 2]].T)
+    return bool((np.diff(unseen + 1e-3 * gaps) > -1e-9).all())
+
+
+def clashes(world: World, i: int, receptacle: int) -> list[int]:
+    """What object i overlaps by more than a touch, in all three axes.
+
+    Loose and moveable things count, less those that it lies in and the furniture that its
+    receptacle is part of, as a drawer is of a dresser.
+    """
+    middle = (world.low[receptacle] + world.high[receptacle]) / 2
+    aside = {i, *world.inside(i), *world.ancestors(i)}
+    found = []
+    for k in np.flatnonzero(world.exists).tolist():
+        around = (world.low[k] <= middle).all() and (middle <= world.high[k]).all()
+        if k in aside or (around and not world.has(k, "pickupable")):
+            continue
+        if world.has(k, "pickupable"):
+            boxes = np.array([[world.low[k], world.high[k]]])
+        elif world.has(k, "moveable"):
+            boxes = world.shape(k).boxes
+        else:
+            continue
+        depth = np.minimum(boxes[:, 1], world.high[i]) - np.maximum(boxes[:, 0], world.low[i])
+        if (depth > _TOUCH).all(axis=1).any():
+            found.append(k)
+    return found
+
+
+def _in_view(world: World, agent: Agent, points: np.ndarray) -> np.ndarray:
+    """Which points are in the agent's picture, worked out here from the angles to them."""
+    right, up, ahead = (points - agent.camera).T
+    yaw = np.radians(agent.rotation)
+    forward = right * np.sin(yaw) + ahead * np.cos(yaw)
+    aside = right * np.cos(yaw) - ahead * np.sin(yaw)
+    half = np.tan(np.radians(world.settings.field_of_view) / 2)
+    return (forward > 0.1) & (abs(aside) <= forward * half) & (abs(up) <= forward * half)

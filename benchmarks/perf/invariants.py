@@ -1,0 +1,202 @@
+"""What must hold of AI2-THOR metadata after any action, as pure functions.
+
+Each takes the metadata of one event and yields a sentence for whatever is wrong; an empty answer
+means that it holds. They look at the metadata alone, so they fit either engine.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from math import isfinite
+from typing import Any
+
+import msgpack  # type: ignore[import-untyped]  # what ai2thor sends metadata with
+import numpy as np
+from numpy.typing import NDArray
+
+Metadata = Mapping[str, Any]
+
+_PART = re.compile(r"(.+)\|(?:\w+Sliced_\d+|EggCracked)")
+"""The id of a slice or a cracked egg begins with that of the whole."""
+_OPENS_ELSEWHERE = frozenset({"Toilet"})
+"""Receptacles whose lid is not over their contents: things stand on a toilet's cistern."""
+_TOLERANCE = 0.08
+"""How far the agent may be from the nearest point of a 5 cm grid of the floor, metres."""
+
+
+def _by_id(metadata: Metadata) -> dict[str, Metadata]:
+    return {entry["objectId"]: entry for entry in metadata["objects"]}
+
+
+def ids_are_unique(metadata: Metadata) -> Iterator[str]:
+    """No two objects share an id."""
+    counts = Counter(entry["objectId"] for entry in metadata["objects"])
+    for object_id, count in counts.items():
+        if count > 1:
+            yield f"{object_id} is listed {count} times"
+
+
+def contents_agree(metadata: Metadata) -> Iterator[str]:
+    """parentReceptacles and receptacleObjectIds say the same, and only of what is there."""
+    objects = _by_id(metadata)
+    up = {(i, p) for i, entry in objects.items() for p in entry["parentReceptacles"] or ()}
+    down = {(c, i) for i, entry in objects.items() for c in entry["receptacleObjectIds"] or ()}
+    for thing, receptacle in sorted(up - down):
+        yield f"{thing} says it is in {receptacle}, which does not list it"
+    for thing, receptacle in sorted(down - up):
+        yield f"{receptacle} lists {thing}, which does not say so"
+    for thing, receptacle in sorted(up | down):
+        if thing not in objects or receptacle not in objects:
+            yield f"{thing} is in {receptacle}, and one of them is no more"
+
+
+def nothing_contains_itself(metadata: Metadata) -> Iterator[str]:
+    """No receptacle is in itself, directly or through others."""
+    parents = {i: entry["parentReceptacles"] or () for i, entry in _by_id(metadata).items()}
+    done: set[str] = set()
+    for start in parents:
+        path: list[str] = []
+        todo = [(start, 0)]
+        while todo:
+            at, depth = todo.pop()
+            del path[depth:]
+            if at in path:
+                yield f"{at} is in itself by way of {' in '.join(path[path.index(at) :])}"
+                break
+            path.append(at)
+            if at not in done:
+                todo.extend((parent, depth + 1) for parent in parents.get(at, ()))
+        done.add(start)
+
+
+def hand_agrees(metadata: Metadata) -> Iterator[str]:
+    """The hand holds one thing or none, isPickedUp says which, and it lies nowhere else."""
+    held = [entry["objectId"] for entry in metadata["inventoryObjects"]]
+    marked = [entry["objectId"] for entry in metadata["objects"] if entry["isPickedUp"]]
+    if len(held) > 1:
+        yield f"the hand holds {' and '.join(held)}"
+    if sorted(held) != sorted(marked):
+        yield f"the hand holds {held}, and isPickedUp says {marked}"
+    objects = _by_id(metadata)
+    for object_id in held:
+        if object_id in objects and objects[object_id]["parentReceptacles"]:
+            yield f"{object_id} is in hand and in {objects[object_id]['parentReceptacles'][0]}"
+
+
+def closed_things_hide_their_contents(metadata: Metadata) -> Iterator[str]:
+    """What lies in a receptacle that opens and is shut is neither visible nor interactable."""
+    objects = _by_id(metadata)
+    for object_id, entry in objects.items():
+        if not (entry["visible"] or entry["isInteractable"]):
+            continue
+        seen: set[str] = set()
+        todo = list(entry["parentReceptacles"] or ())
+        while todo:
+            parent = todo.pop()
+            if parent in seen or parent not in objects:
+                continue
+            seen.add(parent)
+            around = objects[parent]
+            opens = around["openable"] and around["objectType"] not in _OPENS_ELSEWHERE
+            if opens and not around["isOpen"]:
+                yield f"{object_id} can be seen in {parent}, which is closed"
+            todo.extend(around["parentReceptacles"] or ())
+
+
+def wholes_are_gone(metadata: Metadata) -> Iterator[str]:
+    """Where there are slices there is no whole any more."""
+    objects = _by_id(metadata)
+    for object_id in objects:
+        part = _PART.fullmatch(object_id)
+        if part and part.group(1) in objects:
+            yield f"{part.group(1)} is still there beside {object_id}"
+
+
+def values_are_plain(metadata: Metadata) -> Iterator[str]:
+    """Everything is a plain value that goes over a wire: no array, no NumPy number, no tuple."""
+    try:
+        msgpack.packb(dict(metadata), strict_types=True)
+    except TypeError as error:
+        yield f"the metadata hold what is no plain value: {error}"
+
+
+def _numbers(entry: Metadata) -> Iterator[float]:
+    yield from (entry["distance"], entry["openness"], entry["mass"])
+    box = entry["axisAlignedBoundingBox"]
+    for vector in (entry["position"], entry["rotation"], box["center"], box["size"]):
+        yield from vector.values()
+    oriented = entry["objectOrientedBoundingBox"]
+    for boxes in (box, oriented) if oriented else (box,):
+        for corner in boxes["cornerPoints"]:
+            yield from corner
+
+
+def numbers_are_finite(metadata: Metadata) -> Iterator[str]:
+    """No number is NaN or infinite."""
+    for entry in metadata["objects"]:
+        # A sum is finite when, and unless they are absurdly large only when, all its parts are.
+        if not isfinite(sum(_numbers(entry))):
+            yield f"{entry['objectId']} has a number that is NaN or infinite"
+    agent = metadata["agent"]
+    numbers = [agent["cameraHorizon"], *agent["position"].values(), *agent["rotation"].values()]
+    if not isfinite(sum(numbers)):
+        yield f"the agent's pose is {numbers}"
+
+
+def failures_say_why(metadata: Metadata) -> Iterator[str]:
+    """errorMessage is empty when, and only when, the last action succeeded."""
+    if metadata["lastActionSuccess"] is not (metadata["errorMessage"] == ""):
+        yield (
+            f"lastActionSuccess is {metadata['lastActionSuccess']} and errorMessage is "
+            f"{metadata['errorMessage']!r}"
+        )
+
+
+INVARIANTS: tuple[Callable[[Metadata], Iterator[str]], ...] = (
+    ids_are_unique,
+    contents_agree,
+    nothing_contains_itself,
+    hand_agrees,
+    closed_things_hide_their_contents,
+    wholes_are_gone,
+    values_are_plain,
+    numbers_are_finite,
+    failures_say_why,
+)
+"""Those that need no more than one event."""
+
+
+def stands_on_the_floor(metadata: Metadata, floor: NDArray[np.float64]) -> Iterator[str]:
+    """The agent stands where it can stand.
+
+    Args:
+        floor: (P, 2) x and z in metres, the scene's reachable positions on a 5 cm grid.
+    """
+    here = metadata["agent"]["position"]
+    away = float(np.hypot(floor[:, 0] - here["x"], floor[:, 1] - here["z"]).min())
+    if not away <= _TOLERANCE:
+        yield f"the agent is {away:.3f} m off the floor, at ({here['x']:.3f}, {here['z']:.3f})"
+
+
+def a_refusal_changed_nothing(before: Metadata, after: Metadata) -> Iterator[str]:
+    """Whatever failed has left every object and the agent as they were."""
+    if after["lastActionSuccess"]:
+        return
+    if before["agent"] != after["agent"]:
+        yield "a refused action moved the agent"
+    if before["objects"] != after["objects"]:
+        old = _by_id(before)
+        changed = [i for i, entry in _by_id(after).items() if old.get(i) != entry]
+        yield f"a refused action changed {', '.join(changed) or 'which objects there are'}"
+
+
+def broken(metadata: Metadata) -> list[str]:
+    """Everything that :data:`INVARIANTS` find wrong; nothing when all is well."""
+    return [problem for invariant in INVARIANTS for problem in invariant(metadata)]
+
+
+def floor_of(positions: list[dict[str, float]]) -> NDArray[np.float64]:
+    """(P, 2) x and z of the ``actionReturn`` of GetReachablePositions."""
+    return np.array([(p["x"], p["z"]) for p in positions]).reshape(-1, 2)

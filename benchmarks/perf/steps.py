@@ -1,0 +1,256 @@
+"""How fast the environment steps, resets and starts, beside MiniGrid's in the same run.
+
+    python -m benchmarks.perf.steps [--seconds 4] [--rounds 3] [--json FILE]
+
+Random legal actions, over all registered environments. What is compared is timed in turns, round
+after round, and the median of the rounds is printed: a busy machine then slows all of it alike.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+import gymnasium
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+import er_gym  # noqa: F401  (registers the environments)
+from er_gym.tasks.types import TASK_TYPES
+from er_gym.thor import make_controller
+
+MINIGRID = "MiniGrid-DoorKey-8x8-v0"
+KITCHEN = "FloorPlan1"
+VARIANTS: dict[str, dict[str, Any]] = {
+    "no images (state)": {"obs_mode": "state"},
+    "rgb 300×300": {"obs_mode": "rgb", "width": 300, "height": 300},
+    "rgb 800×450": {"obs_mode": "rgb", "width": 800, "height": 450},
+}
+_FRESH = """
+import time
+start = time.perf_counter()
+import gymnasium, er_gym
+imported = time.perf_counter()
+env = gymnasium.make("ER-SingleSearch-v0", obs_mode={obs_mode!r})
+env.reset(seed=0)
+print(imported - start, time.perf_counter() - start)
+"""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One row of the table.
+
+    Attributes:
+        name: what was measured.
+        value: the median of ``rounds``, or the one value.
+        unit: of the values.
+        rounds: what each round gave.
+    """
+
+    name: str
+    value: float
+    unit: str
+    rounds: tuple[float, ...] = ()
+
+    @staticmethod
+    def of(name: str, rounds: list[float], unit: str) -> Figure:
+        return Figure(name, statistics.median(rounds), unit, tuple(rounds))
+
+
+class Walker:
+    """Random legal actions in some environments, an episode of each in turn."""
+
+    def __init__(self, envs: list[gymnasium.Env[Any, Any]], seed: int) -> None:
+        self._envs = envs
+        self._random = np.random.default_rng(seed)
+        self._turn = 0
+        self._legal: np.ndarray | None = None
+        self.resets: list[float] = []
+        self._over = True
+
+    @property
+    def _env(self) -> gymnasium.Env[Any, Any]:
+        return self._envs[self._turn % len(self._envs)]
+
+    def steps_per_second(self, seconds: float) -> float:
+        """Play for so long; time spent in ``reset`` is kept apart."""
+        steps, stepping = 0, 0.0
+        while stepping < seconds:
+            if self._over:
+                self._begin()
+            action = int(self._random.choice(self._actions()))
+            start = time.perf_counter()
+            _, _, terminated, truncated, info = self._env.step(action)
+            stepping += time.perf_counter() - start
+            steps += 1
+            self._legal = info.get("action_mask")
+            self._over = terminated or truncated
+        return steps / stepping
+
+    def _begin(self) -> None:
+        self._turn += 1
+        start = time.perf_counter()
+        _, info = self._env.reset(seed=int(self._random.integers(2**31)))
+        self.resets.append(time.perf_counter() - start)
+        self._legal = info.get("action_mask")
+
+    def _actions(self) -> np.ndarray:
+        """Legal actions; all of them where the environment does not say which are."""
+        if self._legal is None:
+            return np.arange(self._env.action_space.n)  # type: ignore[attr-defined]
+        return np.flatnonzero(self._legal)
+
+
+@contextmanager
+def environments(**arguments: Any) -> Iterator[list[gymnasium.Env[Any, Any]]]:
+    """One environment for each registered id."""
+    with ExitStack() as stack:
+        envs = []
+        for kind in TASK_TYPES:
+            env = gymnasium.make(kind.env_id, **arguments)
+            stack.callback(env.close)
+            if env.unwrapped.tasks:  # type: ignore[attr-defined]  # the suite may lack a type
+                envs.append(env)
+        yield envs
+
+
+def step_rates(rounds: int, seconds: float, console: Console) -> list[Figure]:
+    """Steps per second of each variant and of MiniGrid, and reset times, timed in turns."""
+    with ExitStack() as stack:
+        # Each plays other episodes: the engine remembers what it has seen, for all in the process.
+        walkers = {
+            name: Walker(stack.enter_context(environments(**arguments)), seed)
+            for seed, (name, arguments) in enumerate(VARIANTS.items())
+        }
+        if importlib.util.find_spec("minigrid") is not None:
+            import minigrid  # noqa: F401  (registers its environments)
+
+            env = gymnasium.make(MINIGRID)
+            stack.callback(env.close)
+            walkers[MINIGRID] = Walker([env], seed=0)
+        rates: dict[str, list[float]] = {name: [] for name in walkers}
+        for walker in walkers.values():
+            walker.steps_per_second(min(0.3, seconds))  # what is loaded once is loaded now
+            walker.resets.clear()
+        turns = [(name, walker) for _ in range(rounds) for name, walker in walkers.items()]
+        for name, walker in track(turns, "steps", console=console, disable=not console.is_terminal):
+            rates[name].append(walker.steps_per_second(seconds))
+    figures = [Figure.of(f"steps, {name}", found, "steps/s") for name, found in rates.items()]
+    for name in VARIANTS:
+        times = 1000 * np.array(walkers[name].resets)
+        if len(times):
+            figures.append(Figure(f"reset p50, {name}", float(np.percentile(times, 50)), "ms"))
+            figures.append(Figure(f"reset p95, {name}", float(np.percentile(times, 95)), "ms"))
+    return figures
+
+
+def interactable_poses() -> Figure:
+    """Mean time of GetInteractablePoses over every object of a kitchen, on the 0.1 m grid."""
+    controller = make_controller(
+        scene=KITCHEN, headless=True, gridSize=0.1, visibilityDistance=20, snapToGrid=False
+    )
+    times = []
+    for entry in controller.last_event.metadata["objects"]:
+        start = time.perf_counter()
+        controller.step(action="GetInteractablePoses", objectId=entry["objectId"])
+        times.append(1000 * (time.perf_counter() - start))
+    controller.stop()
+    return Figure(f"GetInteractablePoses, mean of {KITCHEN}'s objects", float(np.mean(times)), "ms")
+
+
+def fresh_start(rounds: int) -> list[Figure]:
+    """Seconds to the first observation in a new process, import included."""
+    figures = []
+    for obs_mode in ("state", "rgb"):
+        found = []
+        for _ in range(rounds):
+            result = subprocess.run(
+                [sys.executable, "-c", _FRESH.format(obs_mode=obs_mode)],
+                check=True, capture_output=True, text=True,
+            )  # fmt: skip
+            found.append([float(word) for word in result.stdout.split()])
+        imported, ready = zip(*found, strict=True)
+        if obs_mode == "state":
+            figures.append(Figure.of("fresh process: import", list(imported), "s"))
+        name = f"fresh process: import, make, reset, first observation ({obs_mode})"
+        figures.append(Figure.of(name, list(ready), "s"))
+    return figures
+
+
+def resident_memory() -> Figure:
+    """What a new process with one environment, after 50 steps, keeps in memory."""
+    program = f"""
+import gymnasium, numpy, er_gym
+env = gymnasium.make("ER-PickupAndPut-v0", obs_mode="rgb")
+_, info = env.reset(seed=0)
+random = numpy.random.default_rng(0)
+for _ in range(50):
+    _, _, ended, cut, info = env.step(int(random.choice(numpy.flatnonzero(info["action_mask"]))))
+    if ended or cut:
+        _, info = env.reset()
+pages = int(open("/proc/self/statm").read().split()[1])
+print(pages * {os.sysconf("SC_PAGE_SIZE")} / 2**20)
+"""
+    result = subprocess.run(
+        [sys.executable, "-c", program], check=True, capture_output=True, text=True
+    )
+    return Figure("resident memory, one environment (rgb)", float(result.stdout), "MiB")
+
+
+def show(figures: list[Figure], console: Console) -> None:
+    """Print the one table."""
+    table = Table(title=f"er-gym, {os.cpu_count()} cores, Python {sys.version.split()[0]}")
+    table.add_column("what")
+    table.add_column("median", justify="right")
+    table.add_column("unit")
+    table.add_column("rounds", justify="right", style="dim")
+    for figure in figures:
+        digits = 0 if figure.value >= 100 else 2
+        rounds = "  ".join(f"{value:.{digits}f}" for value in figure.rounds)
+        table.add_row(figure.name, f"{figure.value:.{digits}f}", figure.unit, rounds)
+    console.print(table)
+
+
+@click.command()
+@click.option("--seconds", default=4.0, show_default=True, type=click.FloatRange(0.01))
+@click.option("--rounds", default=3, show_default=True, type=click.IntRange(1))
+@click.option("--json", "file", type=click.Path(dir_okay=False, path_type=Path))
+def main(seconds: float, rounds: int, file: Path | None) -> None:
+    """Measure, and print one table."""
+    console = Console(width=None if sys.stdout.isatty() else 140)
+    figures = step_rates(rounds, seconds, Console(stderr=True))
+    parts: list[Callable[[], list[Figure]]] = [
+        lambda: [interactable_poses()],
+        lambda: fresh_start(rounds),
+        lambda: [resident_memory()],
+    ]
+    for part in parts:
+        figures.extend(part())
+    show(figures, console)
+    if not any(MINIGRID in figure.name for figure in figures):
+        console.print(
+            "MiniGrid is not installed, so there is nothing to compare with: "
+            "pip install -e '.[dev]'",
+            markup=False,
+            style="yellow",
+        )
+    if file is not None:
+        file.write_text(json.dumps([asdict(figure) for figure in figures], indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

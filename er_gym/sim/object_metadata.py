@@ -1,0 +1,136 @@
+"""The objects of the world as AI2-THOR 5 metadata.
+
+All but ``visible``, ``isInteractable`` and ``distance`` says nothing of the agent; it is made for
+many objects at once and kept in ``World.entries`` until the object changes.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from itertools import product
+from math import isnan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.scene import PROPERTIES, STATES
+from er_gym.sim.space.rotation import unity_rotation
+from er_gym.sim.space.visibility import visible
+from er_gym.sim.world import World
+
+Entry = dict[str, Any]
+
+_AABB_CORNERS = np.array(list(product((1.0, 0.0), repeat=3)))
+"""Corners of an axis-aligned box in AI2-THOR's order, as fractions of its size."""
+_OBB_CORNERS = np.array(
+    [[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1], [0, 1, 0], [1, 1, 0], [1, 1, 1], [0, 1, 1]],
+    dtype=float,
+)
+"""Corners of an oriented box in AI2-THOR's order, in edges from corner 0."""
+_SCENES_KEPT = 64
+_RECEPTACLE = PROPERTIES.index("receptacle")
+
+
+def vector(values: Sequence[float] | NDArray[np.float64]) -> dict[str, float]:
+    """Three numbers as AI2-THOR writes a point or a rotation."""
+    x, y, z = (float(v) for v in values)
+    return {"x": x, "y": y, "z": z}
+
+
+def box(low: NDArray[np.float64], high: NDArray[np.float64]) -> dict[str, Any]:
+    """A box between two (3,) corners as AI2-THOR writes it."""
+    return {
+        "center": vector((low + high) / 2),
+        "size": vector(high - low),
+        "cornerPoints": (low + _AABB_CORNERS * (high - low)).tolist(),
+    }
+
+
+def objects(world: World) -> list[Entry]:
+    """The metadata of every object, in scene order."""
+    entries = world.entries
+    rows = np.flatnonzero(world.exists).tolist()
+    stale = [i for i in rows if i not in entries]
+    if world.untouched and len(stale) == len(rows):
+        entries.update(_as_recorded(world))
+    elif stale:
+        entries.update(zip(stale, _entries(world, stale), strict=True))
+    seen = visible(world).tolist()
+    distance = np.linalg.norm(world.position - world.agent.position, axis=1).tolist()
+    return [
+        {**entries[i], "visible": seen[i], "isInteractable": seen[i], "distance": distance[i]}
+        for i in rows
+    ]
+
+
+_recorded: OrderedDict[str, dict[int, Entry]] = OrderedDict()
+
+
+def _as_recorded(world: World) -> dict[int, Entry]:
+    """The entries of a scene in which nothing has happened yet, kept for the scenes last used."""
+    name = world.scene.name
+    if name not in _recorded:
+        rows = list(range(len(world)))
+        _recorded[name] = dict(zip(rows, _entries(world, rows), strict=True))
+        if len(_recorded) > _SCENES_KEPT:
+            _recorded.popitem(last=False)
+    return _recorded[name]
+
+
+def _entries(world: World, rows: list[int]) -> list[Entry]:
+    """What does not change with where the agent is, for some objects."""
+    low, high = world.low[rows], world.high[rows]
+    turned = world.obb[rows] @ np.swapaxes(unity_rotation(world.rotation[rows]), 1, 2)
+    oriented = turned[:, :1] + _OBB_CORNERS @ turned[:, 1:] + world.position[rows, None]
+    columns = zip(
+        rows,
+        world.position[rows].tolist(),
+        world.rotation[rows].tolist(),
+        ((low + high) / 2).tolist(),
+        (high - low).tolist(),
+        (low[:, None] + _AABB_CORNERS * (high - low)[:, None]).tolist(),
+        oriented.tolist(),
+        world.properties[rows].tolist(),
+        world.states[rows].tolist(),
+        world.openness[rows].tolist(),
+        world.mass[rows].tolist(),
+        strict=True,
+    )
+    ids, contents = world.object_ids, world.contents
+    made = []
+    for i, at, turn, centre, size, corners, obb, has, states, openness, mass in columns:
+        controlled, materials = world.controlled[i], world.salient_materials[i]
+        made.append(
+            {
+                "name": world.names[i],
+                "position": dict(zip("xyz", at, strict=True)),
+                "rotation": dict(zip("xyz", turn, strict=True)),
+                "visible": False,
+                "isInteractable": False,
+                **dict(zip(PROPERTIES, has, strict=True)),
+                **dict(zip(STATES, states, strict=True)),
+                "openness": openness,
+                "fillLiquid": world.fill_liquid[i],
+                "temperature": world.temperature[i],
+                "mass": mass,
+                "salientMaterials": None if materials is None else list(materials),
+                "receptacleObjectIds": [ids[c] for c in contents[i]] if has[_RECEPTACLE] else None,
+                "parentReceptacles": [ids[p] for p in world.parents[i]] or None,
+                "controlledObjects": None if controlled is None else [ids[c] for c in controlled],
+                "distance": 0.0,
+                "objectType": world.types[i],
+                "objectId": ids[i],
+                "assetId": world.asset_ids[i],
+                "isPickedUp": i == world.held,
+                "isMoving": False,
+                "axisAlignedBoundingBox": {
+                    "center": dict(zip("xyz", centre, strict=True)),
+                    "size": dict(zip("xyz", size, strict=True)),
+                    "cornerPoints": corners,
+                },
+                "objectOrientedBoundingBox": (None if isnan(obb[0][0]) else {"cornerPoints": obb}),
+            }
+        )
+    return made

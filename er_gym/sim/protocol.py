@@ -1,0 +1,149 @@
+"""The framing of AI2-THOR's FIFO protocol, as the official client ``ai2thor==5.0.0`` reads it.
+
+A message is a row of fields, each a header (one byte of type, four bytes of big-endian length) and
+its body, and ends with an empty field of type 255. The client sends one JSON field; the player
+answers with metadata in msgpack and then images, bottom row first. Facts measured with a stub.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from collections.abc import Iterator, Sequence
+from enum import IntEnum
+from typing import IO, Any
+
+import msgpack  # type: ignore[import-untyped]  # what the client reads metadata with
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.render.view import View
+
+_HEADER = struct.Struct("!BI")
+
+
+class Field(IntEnum):
+    """Types of fields; those of pictures that nobody draws here are left out."""
+
+    METADATA = 1
+    ACTION = 2
+    RGB = 4
+    DEPTH = 5
+    CLASSES = 8
+    INSTANCES = 9
+    THIRD_PARTY_RGB = 10
+    PATCH = 11
+    THIRD_PARTY_DEPTH = 12
+    THIRD_PARTY_INSTANCES = 14
+    THIRD_PARTY_CLASSES = 15
+    END = 255
+
+
+_END = _HEADER.pack(Field.END, 0)
+_FIELDS = {
+    "rgb": (Field.RGB, Field.THIRD_PARTY_RGB),
+    "depth": (Field.DEPTH, Field.THIRD_PARTY_DEPTH),
+    "classes": (Field.CLASSES, Field.THIRD_PARTY_CLASSES),
+    "instances": (Field.INSTANCES, Field.THIRD_PARTY_INSTANCES),
+}
+"""Attribute of a view to the field that its pixels are sent in: the agent's, third parties'."""
+
+
+def read_request(pipe: IO[bytes]) -> dict[str, Any] | None:
+    """The next action of the client, None when it has closed its end."""
+    request: dict[str, Any] | None = None
+    while True:
+        header = pipe.read(_HEADER.size)
+        if len(header) < _HEADER.size:
+            return None
+        kind, length = _HEADER.unpack(header)
+        if kind == Field.END:
+            return request
+        body = pipe.read(length)
+        if len(body) < length:
+            return None
+        if kind == Field.ACTION:
+            request = json.loads(body)
+
+
+def send(pipe: int, fields: Sequence[tuple[Field, bytes]]) -> None:
+    """Write one message to a file descriptor."""
+    parts: list[bytes] = []
+    for kind, body in fields:
+        parts += [_HEADER.pack(kind, len(body)), body]
+    parts.append(_END)
+    written = os.writev(pipe, parts)
+    if written < sum(map(len, parts)):
+        rest = memoryview(b"".join(parts))[written:]
+        while rest:
+            rest = rest[os.write(pipe, rest) :]
+
+
+def images(view: View) -> Iterator[tuple[Field, bytes]]:
+    """The pictures of a view as fields, the agent's and then each third-party camera's."""
+    for name, (own, third_party) in _FIELDS.items():
+        for kind, shown in ((own, view), *((third_party, other) for other in view.third_party)):
+            picture = getattr(shown, name)
+            if picture is not None:
+                colours_of_ids = name in ("classes", "instances")
+                pixels = rgba(picture) if colours_of_ids else picture
+                yield kind, pixels[::-1].tobytes()
+
+
+def rgba(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(H, W, 3) colours with the opaque alpha that the client expects of segmentations."""
+    return np.pad(colours, ((0, 0), (0, 0), (0, 1)), constant_values=255)
+
+
+class MetadataPacker:
+    """Metadata as msgpack; objects that say the same as last time are not packed again."""
+
+    def __init__(self) -> None:
+        # A lone surrogate in a string cannot be sent, and must not end the player.
+        self._packer = msgpack.Packer(unicode_errors="replace")
+        self._kept: dict[str, tuple[dict[str, Any], bytes]] = {}
+
+    def __call__(self, metadata: dict[str, Any], sequence_id: int) -> bytes:
+        """The message's metadata: that of the one agent, and what the client keeps beside it."""
+        pack = self._packer.pack
+        return b"".join(
+            (
+                self._packer.pack_map_header(4),
+                pack("sequenceId"),
+                pack(sequence_id),
+                pack("activeAgentId"),
+                pack(0),
+                pack("thirdPartyCameras"),
+                pack(metadata["thirdPartyCameras"]),
+                pack("agents"),
+                self._packer.pack_array_header(1),
+                self._packer.pack_map_header(len(metadata)),
+                *self._agent(metadata),
+            )
+        )
+
+    def patch(self, changes: dict[str, Any]) -> bytes:
+        """What has changed since the last message, whose pictures the client keeps too."""
+        packed: bytes = self._packer.pack({"agentId": 0, **changes})
+        return packed
+
+    def _agent(self, metadata: dict[str, Any]) -> Iterator[bytes]:
+        pack = self._packer.pack
+        for name, value in metadata.items():
+            yield pack(name)
+            if name == "objects":
+                yield self._packer.pack_array_header(len(value))
+                yield from map(self._object, value)
+            else:
+                yield pack(value)
+
+    def _object(self, entry: dict[str, Any]) -> bytes:
+        kept = self._kept.get(entry["objectId"])
+        if kept is None or kept[0] != entry:
+            kept = self._kept[entry["objectId"]] = entry, self._packer.pack(entry)
+        return kept[1]
+
+    def forget(self) -> None:
+        """Drop what is kept: another scene comes."""
+        self._kept.clear()

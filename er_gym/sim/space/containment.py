@@ -1,0 +1,78 @@
+"""In which receptacles a thing lies, worked out from where it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er_gym.sim.space.shapes.families import family
+from er_gym.sim.world import World
+
+_FLOOR = [0, 2]
+_BESIDE = 0.02
+"""How far the middle of a thing may be off what it lies on, metres: recorded boxes are rough."""
+_SLACK = 0.06
+"""How far the underside of a thing may be off the height at which things stand, metres."""
+_LOW = 0.3
+"""Nothing stands on a table or bed under this share of its height."""
+_HANGERS = frozenset({"TowelHolder", "HandTowelHolder", "ToiletPaperHanger"})
+_CASES = frozenset({"Cabinet", "Drawer", "Fridge", "Microwave", "Safe"})
+"""What is on top of these, or sticks out of them, is not in them."""
+
+
+def receptacles_of(world: World, i: int) -> tuple[int, ...]:
+    """The receptacles that object i is in where it stands now, the innermost first.
+
+    That is the smallest of those at whose height things stand that it stands at, and what that lies
+    in if it can be carried, as a plate can. For 97 % of the things that can be carried the first is
+    one that AI2-THOR's own record names (see docs/fidelity.md).
+    """
+    within = {i, *world.inside(i)}
+    found = []
+    for r in np.flatnonzero(world.exists).tolist():
+        if r not in within and world.has(r, "receptacle"):
+            fit = _fit(world, r, i)
+            if fit is not None:
+                area = float(np.prod((world.high[r] - world.low[r])[_FLOOR]))
+                found.append((fit, world.types[r] == "Floor", area, r))
+    if not found:
+        return ()
+    innermost = min(found)[-1]
+    around = world.parents[innermost] if world.has(innermost, "pickupable") else ()
+    return (innermost, *(r for r in around if r not in within))
+
+
+def _fit(world: World, r: int, i: int) -> int | None:
+    """How well object i stands in or on receptacle r: 0 well, 1 perhaps, None not."""
+    kind = world.types[r]
+    low, high = world.low[r], world.high[r]
+    underside, top = world.low[i, 1], world.high[i, 1]
+    if kind in _HANGERS:
+        near = (world.low[i] <= high + _SLACK).all() and (world.high[i] >= low - _SLACK).all()
+        return 0 if near else None
+    if not _over(world, r, i):
+        return None
+    if kind == "Floor":
+        return 0 if abs(underside - high[1]) <= _SLACK else None
+    stand = family(kind, world.has(r, "pickupable")).stand
+    tall = high[1] - low[1]
+    if stand is None:
+        ceiling = high[1] + _SLACK
+        if kind in _CASES:
+            ceiling = high[1] - _BESIDE if top <= high[1] + _SLACK else -np.inf
+        elif kind == "Shelf":
+            # A board with the air over it, up to the next board, which is another's.
+            ceiling = low[1] + max(_SLACK, tall / 2)
+        return 0 if low[1] - _SLACK <= underside <= ceiling else None
+    if abs(underside - (low[1] + stand * tall)) <= _SLACK:
+        return 0
+    return 1 if low[1] + _LOW * tall <= underside <= high[1] + _SLACK else None
+
+
+def _over(world: World, r: int, i: int) -> bool:
+    """Whether the middle of object i is over receptacle r; a counter may bend around it."""
+    middle = ((world.low[i] + world.high[i]) / 2)[_FLOOR]
+    if world.types[r] == "CounterTop":
+        low, high = world.shape(r).boxes[:, :, _FLOOR].swapaxes(0, 1)
+    else:
+        low, high = world.low[None, r, _FLOOR], world.high[None, r, _FLOOR]
+    return bool(((low - _BESIDE <= middle) & (middle <= high + _BESIDE)).all(axis=1).any())

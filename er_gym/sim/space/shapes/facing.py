@@ -1,0 +1,75 @@
+"""Which way the front of a fixed thing points.
+
+For most types AI2-THOR's own +z is the front: from all recorded fridges, microwaves, sofas,
+dressers and desks the room lies there. Drawers and cabinets are not authored so; their front is
+the side that the room is on, and a drawer's that of the furniture it is part of.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.scene import load_scene
+
+_BY_THE_ROOM = frozenset({"Drawer", "Cabinet"})
+_HOSTS = frozenset({"Dresser", "SideTable", "Desk", "TVStand", "CoffeeTable"})
+_MARGIN = 0.1
+"""How far a drawer may stick out of the furniture that it is part of, metres."""
+_DOUBT = 0.3
+"""Sides whose distances to the floor differ by less could each be the front, metres."""
+_ASIDE = 3.0
+"""What a metre to the side counts, against a metre ahead."""
+_SIDES = ((1, 1), (0, 1), (1, -1), (0, -1))
+"""World axis (0 x, 1 z) and sign of each side, by quarter turns of its heading from +z."""
+
+
+@lru_cache(maxsize=128)
+def facings(scene_name: str) -> NDArray[np.float64]:
+    """(N,) heading of each object's front as recorded, degrees; quarter turns for fixed things."""
+    scene = load_scene(scene_name)
+    found = scene.rotation[:, 1].copy()
+    for i in np.flatnonzero(np.isnan(scene.obb[:, 0, 0])).tolist():
+        quarters = round(scene.rotation[i, 1] / 90.0) % 4
+        if scene.types[i] in _BY_THE_ROOM:
+            quarters = _towards_the_room(scene_name, i, quarters)
+        found[i] = quarters * 90.0
+    found.setflags(write=False)
+    return found
+
+
+def _towards_the_room(scene_name: str, i: int, quarters: int) -> int:
+    """The quarter turns of a drawer's or cabinet's front; ``quarters``: of its own rotation."""
+    scene = load_scene(scene_name)
+    half = scene.aabb_size / 2
+    low, high = scene.aabb_center - half, scene.aabb_center + half
+    for j, kind in enumerate(scene.types):
+        here = scene.aabb_center[i]
+        inside = (low[j] - _MARGIN <= here).all() and (here <= high[j] + _MARGIN).all()
+        if kind in _HOSTS and inside:
+            return round(float(scene.rotation[j, 1]) / 90.0) % 4
+    gaps = np.array([_gap(scene.reachable, low[i], high[i], *side) for side in _SIDES])
+    likely = np.flatnonzero(gaps < gaps.min() + _DOUBT).tolist()
+    pose = scene.openable_poses.get(i)
+    hints = [quarters] if pose is None else [round(pose.rotation / 90.0 + 2) % 4, quarters]
+    return next((hint for hint in hints if hint in likely), int(gaps.argmin()))
+
+
+def _gap(
+    reachable: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    axis: int,
+    sign: int,
+) -> float:
+    """How far from one side of a box the agent can stand, metres; to the side counts more."""
+    across, ahead = reachable[:, 1 - axis], reachable[:, axis]
+    face = high[2 * axis] if sign > 0 else low[2 * axis]
+    beyond = (ahead - face) * sign
+    other = 2 * (1 - axis)
+    aside = np.maximum(np.maximum(low[other] - across, across - high[other]), 0.0)
+    there = beyond > 0.0
+    gaps = np.hypot(beyond[there], _ASIDE * aside[there])
+    return float(gaps.min(initial=np.inf))

@@ -1,0 +1,82 @@
+"""The shape of one object where it is now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.space.rotation import unity_rotation
+from er_gym.sim.space.shapes.counters import rectangles
+from er_gym.sim.space.shapes.facing import facings
+from er_gym.sim.space.shapes.families import parts
+from er_gym.sim.space.shapes.frame import trimmed, turned
+from er_gym.sim.space.surfaces import recorded_surfaces
+
+if TYPE_CHECKING:
+    from er_gym.sim.world import World
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What an object is made of; metres.
+
+    Attributes:
+        middle: (3,) of its box, world frame.
+        yaw: heading of its front, degrees.
+        upright: (K, 2, 3) corners of its parts about ``middle``, before the turn by ``yaw``.
+        boxes: (K, 2, 3) the same as axis-aligned boxes of the world (see
+            :func:`er_gym.sim.space.shapes.frame.turned`).
+        hiding: (H, 2, 3) boxes of the world that hide what is behind them.
+    """
+
+    middle: NDArray[np.float64]
+    yaw: float
+    upright: NDArray[np.float64]
+    boxes: NDArray[np.float64]
+    hiding: NDArray[np.float64]
+
+
+def shape_of(world: World, i: int) -> Shape:
+    """The shape of object i as it stands now; :meth:`World.shape` keeps it."""
+    if world.types[i] == "CounterTop" and i < len(world.scene):
+        return _counter(world, i)
+    middle, size, yaw = _upright_box(world, i)
+    standing = recorded_surfaces(world.scene.name).get(i)
+    made_of, hiding = parts(
+        world.types[i],
+        world.has(i, "pickupable"),
+        tuple(size.round(3).tolist()),
+        None if standing is None else round(min(max(standing, 0.0), size[1]), 3),
+    )
+    upright = made_of - size / 2
+    boxes = turned(np.concatenate([upright, hiding - size / 2]), yaw) + middle
+    return Shape(middle, yaw, upright, boxes[: len(upright)], trimmed(boxes[len(upright) :]))
+
+
+def _upright_box(world: World, i: int) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Middle (3,), size (3,) and heading of object i's box before it is turned to that heading."""
+    if np.isnan(world.obb[i, 0, 0]):
+        fronts = facings(world.scene.name)
+        yaw = float(fronts[i]) if i < len(fronts) else 0.0
+        size = world.high[i] - world.low[i]
+        size = size[[2, 1, 0]] if round(yaw / 90.0) % 2 else size
+        return (world.low[i] + world.high[i]) / 2, size, yaw
+    yaw = float(world.rotation[i, 1])
+    tilted = world.rotation[i] * (1.0, 0.0, 1.0)
+    tilt, turn = unity_rotation(np.array([tilted, world.rotation[i] - tilted]))
+    corner, *edges = world.obb[i] @ tilt.T
+    middle = world.position[i] + turn @ (corner + sum(edges) / 2)
+    return middle, np.abs(edges).sum(axis=0), yaw
+
+
+def _counter(world: World, i: int) -> Shape:
+    """A counter, less what the agent walks through; it hides nothing, for it is thin."""
+    middle = (world.low[i] + world.high[i]) / 2
+    tops = rectangles(world.scene.name, i)
+    boxes = np.empty((len(tops), 2, 3))
+    boxes[:, :, [0, 2]] = tops
+    boxes[:, 0, 1], boxes[:, 1, 1] = world.low[i, 1], world.high[i, 1]
+    return Shape(middle, 0.0, boxes - middle, boxes, boxes[:0])

@@ -1,0 +1,20 @@
+"""Starts the player: what the launcher that ``er_gym.thor.player`` writes runs, by its path.
+
+It is no module to import. Importing ``er_gym`` would register the environments, which takes as long
+as all else; so a bare package of that name goes first, in which only the engine is looked up.
+"""
+
+import sys
+from pathlib import Path
+from types import ModuleType
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+sys.path[0] = str(_PACKAGE.parent)  # not this folder, whose modules are nobody's top level
+_bare = ModuleType("er_gym")
+_bare.__path__ = [str(_PACKAGE)]
+sys.modules["er_gym"] = _bare
+
+if __name__ == "__main__":
+    from er_gym.sim.player import main
+
+    sys.exit(main())

@@ -1,0 +1,23 @@
+"""From where things can be handled, beside poses from which AI2-THOR opened them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.perf.comparisons.poses import openable_poses
+
+
+def share(found: dict[str, tuple[int, int]]) -> float:
+    agreed, entries = np.sum([*found.values()], axis=0)
+    return float(agreed / entries)
+
+
+def test_recorded_poses_are_interactable() -> None:
+    found = openable_poses()
+    assert sum(entries for _, entries in found.values()) > 1400
+    assert share(found) >= 0.90  # 1.00 when this was written
+    assert {kind: n for kind, n in found.items() if n[0] < 0.8 * n[1]} == {}
+
+
+def test_the_comparison_notices_an_agent_that_looks_away() -> None:
+    assert share(openable_poses(turn=180.0)) < 0.1

@@ -1,0 +1,190 @@
+"""The agent's lens, third-party cameras, and pictures asked for one step at a time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er_gym.sim.controller import EmbeddedController
+
+FRIDGE = "Fridge|-02.10|+00.00|+01.07"
+ACROSS = {"x": 1.0, "z": 1.25, "rotation": 270, "horizon": 0}
+"""From here one faces the fridge, whose front is at x = -1.653."""
+EYE = {"position": {"x": 1.0, "y": 1.576, "z": 1.25}, "rotation": {"x": 0, "y": 270, "z": 0}}
+"""Where the agent's camera is when it stands there, to the millimetre."""
+FLAGS = ("renderDepthImage", "renderInstanceSegmentation", "renderSemanticSegmentation")
+
+
+@pytest.fixture
+def drawing():
+    controller = EmbeddedController(scene="FloorPlan1", width=160, height=90)
+    controller.step("TeleportFull", **ACROSS)
+    yield controller
+    controller.stop()
+
+
+def test_change_fov(drawing):
+    wide = drawing.step("Pass", renderInstanceSegmentation=True)
+    event = drawing.step("ChangeFOV", fieldOfView=40, renderInstanceSegmentation=True)
+    assert event.metadata["fov"] == 40
+    narrow = event.instance_masks[FRIDGE].sum()
+    # Twice as large on each side: tan 45° is 2.75 times tan 20°, and the picture ends before that.
+    assert narrow > 2 * wide.instance_masks[FRIDGE].sum()
+    assert drawing.reset().metadata["fov"] == 90
+
+
+@pytest.mark.parametrize("degrees", [0, 180, -10, float("nan"), None, "wide"])
+def test_a_field_of_view_out_of_range_is_a_value_error(drawing, degrees):
+    with pytest.raises(ValueError, match="fieldOfView"):
+        drawing.step("ChangeFOV", fieldOfView=degrees)
+    assert drawing.step("Pass").metadata["fov"] == 90
+
+
+@pytest.mark.parametrize("degrees", [0, 180, float("inf")])
+def test_so_it_is_of_third_party_cameras(drawing, degrees):
+    with pytest.raises(ValueError, match="fieldOfView"):
+        drawing.step("AddThirdPartyCamera", **EYE, fieldOfView=degrees)
+    drawing.step("AddThirdPartyCamera", **EYE)
+    with pytest.raises(ValueError, match="fieldOfView"):
+        drawing.step("UpdateThirdPartyCamera", fieldOfView=degrees)
+    assert drawing.step("Pass").metadata["thirdPartyCameras"][0]["fieldOfView"] == 90
+
+
+def test_a_camera_in_the_agents_place_sees_what_the_agent_sees(drawing):
+    event = drawing.step("AddThirdPartyCamera", **EYE)
+    (frame,) = event.third_party_camera_frames
+    assert frame.shape == event.frame.shape
+    assert (frame == event.frame).all(axis=2).mean() > 0.98
+
+
+def test_cameras_are_told_of_in_order_and_stay_until_reset(drawing):
+    drawing.step("AddThirdPartyCamera", **EYE)
+    above = {"position": {"x": 0, "y": 2.4, "z": 0}, "rotation": {"x": 90, "y": 0, "z": 0}}
+    drawing.step("AddThirdPartyCamera", **above, fieldOfView=60, skyboxColor="white")
+    event = drawing.step("MoveBack")
+    first, second = event.metadata["thirdPartyCameras"]
+    assert (first["thirdPartyCameraId"], second["thirdPartyCameraId"]) == (0, 1)
+    assert first["fieldOfView"] == 90
+    assert second == {"thirdPartyCameraId": 1, "fieldOfView": 60, **above}
+    assert len(event.third_party_camera_frames) == 2
+    assert (event.third_party_camera_frames[0] != event.third_party_camera_frames[1]).any()
+    event = drawing.reset()
+    assert event.metadata["thirdPartyCameras"] == []
+    assert event.third_party_camera_frames == []
+
+
+def test_a_camera_sees_what_changes(drawing):
+    def look(action, **arguments):
+        return drawing.step(action, **arguments).third_party_camera_frames[0]
+
+    before = look("AddThirdPartyCamera", **EYE)
+    assert (look("RotateRight") == before).all()
+    assert (look("OpenObject", objectId=FRIDGE, forceAction=True) != before).any()
+
+
+def test_all_sorts_of_pictures_come_from_each_camera():
+    flags = dict.fromkeys(FLAGS, True)
+    controller = EmbeddedController(scene="FloorPlan1", width=160, height=90, **flags)
+    controller.step("TeleportFull", **ACROSS)
+    event = controller.step("AddThirdPartyCamera", **EYE)
+    assert event.third_party_depth_frames[0][45, 80] == pytest.approx(2.65283, abs=0.01)
+    assert event.third_party_instance_masks[0][FRIDGE][45, 80]
+    shown = event.third_party_semantic_segmentation_frames[0]
+    assert tuple(shown[45, 80]) == event.object_id_to_color["Fridge"]
+    np.testing.assert_array_equal(
+        event.third_party_depth_frames[0].round(2), event.depth_frame.round(2)
+    )
+    controller.stop()
+
+
+def test_update_changes_what_it_is_given_and_nothing_else(drawing):
+    drawing.step("AddThirdPartyCamera", **EYE)
+    event = drawing.step("UpdateThirdPartyCamera", thirdPartyCameraId=0, position={"y": 2.0})
+    (camera,) = event.metadata["thirdPartyCameras"]
+    assert camera["position"] == {"x": 1.0, "y": 2.0, "z": 1.25}
+    assert camera["rotation"] == EYE["rotation"]
+    event = drawing.step("UpdateThirdPartyCamera", rotation={"x": 20.0}, fieldOfView=50)
+    (camera,) = event.metadata["thirdPartyCameras"]
+    assert camera["position"]["y"] == 2.0
+    assert camera["rotation"] == {"x": 20.0, "y": 270, "z": 0}
+    assert camera["fieldOfView"] == 50
+
+
+def test_roll_turns_the_picture(drawing):
+    level = drawing.step("AddThirdPartyCamera", **EYE, renderInstanceSegmentation=True)
+    over = drawing.step(
+        "UpdateThirdPartyCamera", rotation={"z": 180}, renderInstanceSegmentation=True
+    )
+    upright, upended = (event.third_party_instance_masks[0][FRIDGE] for event in (level, over))
+    assert (upright[::-1, ::-1] == upended).mean() > 0.98
+    assert (upright == upended).mean() < 0.95
+
+
+@pytest.mark.parametrize(
+    ("action", "arguments", "named"),
+    [
+        ("AddThirdPartyCamera", {"position": EYE["position"]}, "rotation"),
+        ("AddThirdPartyCamera", {**EYE, "orthographic": True}, "perspective only"),
+        ("AddThirdPartyCamera", {**EYE, "antiAliasing": "much"}, "antiAliasing"),
+        ("UpdateThirdPartyCamera", {}, "AddThirdPartyCamera makes one"),
+        ("UpdateThirdPartyCamera", {"thirdPartyCameraId": -1}, "camera -1"),
+    ],
+)
+def test_wrong_calls_raise_value_error(drawing, action, arguments, named):
+    with pytest.raises(ValueError, match=named):
+        drawing.step(action, **arguments)
+    assert drawing.step("Pass").metadata["thirdPartyCameras"] == []
+
+
+# -- pictures for one step -------------------------------------------------------------------------
+
+
+ATTRIBUTES = ("depth_frame", "instance_segmentation_frame", "semantic_segmentation_frame")
+
+
+@pytest.mark.parametrize(("flag", "attribute"), list(zip(FLAGS, ATTRIBUTES, strict=True)))
+def test_a_flag_holds_for_one_step(drawing, flag, attribute):
+    assert getattr(drawing.step("Pass"), attribute) is None
+    assert getattr(drawing.step("Pass", **{flag: True}), attribute) is not None
+    after = drawing.step("Pass")
+    assert getattr(after, attribute) is None
+    assert after.metadata["colors"] is None
+
+
+OLD_NAMES = {FLAGS[1]: "renderObjectImage", FLAGS[2]: "renderClassImage"}
+
+
+@pytest.mark.parametrize(("flag", "old"), list(OLD_NAMES.items()))
+def test_initialize_switches_a_flag_on_and_off_under_either_name(drawing, flag, old):
+    assert drawing.reset(**{old: True}).metadata["colors"]
+    drawing.initialization_parameters = {}
+    assert drawing.reset(**{flag: True}).metadata["colors"]
+    assert drawing.reset(**{flag: False}).metadata["colors"] is None
+
+
+def test_semantic_segmentation_has_one_colour_a_type(drawing):
+    event = drawing.step("Pass", **dict.fromkeys(FLAGS, True))
+    colours = event.object_id_to_color
+    fridge = event.instance_masks[FRIDGE]
+    assert fridge.any()
+    assert (event.semantic_segmentation_frame[fridge] == colours["Fridge"]).all()
+    types = {entry["objectType"] for entry in event.metadata["objects"]}
+    assert types <= set(colours)
+    shown = {tuple(colour) for colour in event.semantic_segmentation_frame.reshape(-1, 3).tolist()}
+    assert shown - {(0, 0, 0)} <= {colours[name] for name in types}
+
+
+def test_one_frame_is_not_another_events(drawing):
+    one, other = drawing.step("Pass"), drawing.step("Pass")
+    one.frame[:] = 0
+    assert other.frame.any()
+    assert drawing.step("Pass").frame.any()
+
+
+def test_object_in_frame(drawing):
+    event = drawing.step("GetObjectInFrame", x=0.5, y=0.5)
+    assert event.metadata["actionReturn"] == FRIDGE
+    assert not drawing.step("GetObjectInFrame", x=0.5, y=0.5, checkVisible=True)  # 2.65 m away
+    assert not drawing.step("GetObjectInFrame", x=0.5, y=0.0)  # the ceiling
+    with pytest.raises(ValueError, match="within 0 and 1"):
+        drawing.step("GetObjectInFrame", x=0.5, y=1.5)

@@ -1,0 +1,143 @@
+"""Steps and teleports, on FloorPlan1's floor."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+ISLAND = "CounterTop|-00.08|+01.15|00.00"
+APPLE = "Apple|-00.47|+01.15|+00.48"
+HEIGHT = 0.900999
+"""Of the agent's centre in FloorPlan1, whose floor is at 0."""
+CLEAR = {"x": 0.5, "y": HEIGHT, "z": 1.5}
+"""A recorded position with recorded positions all round it."""
+
+
+def position(room: Any) -> tuple[float, float]:
+    here = room.agent["position"]
+    return here["x"], here["z"]
+
+
+@pytest.mark.parametrize(
+    ("action", "heading", "change"),
+    [
+        ("MoveAhead", 0, (0, 0.25)),
+        ("MoveBack", 0, (0, -0.25)),
+        ("MoveLeft", 0, (-0.25, 0)),
+        ("MoveRight", 0, (0.25, 0)),
+        ("MoveAhead", 90, (0.25, 0)),
+        ("MoveRight", 90, (0, -0.25)),
+        ("MoveAhead", 180, (0, -0.25)),
+        ("MoveLeft", 270, (0, -0.25)),
+    ],
+)
+def test_a_step_goes_one_grid_size_that_way(kitchen, action, heading, change):
+    kitchen.do("TeleportFull", position=CLEAR, rotation=heading)
+    kitchen.do(action)
+    x, z = position(kitchen)
+    assert (x - CLEAR["x"], z - CLEAR["z"]) == pytest.approx(change, abs=1e-9)
+    assert kitchen.agent["rotation"]["y"] == heading
+    assert kitchen.agent["position"]["y"] == pytest.approx(HEIGHT, abs=1e-6)
+
+
+def test_a_step_is_as_long_as_asked(kitchen):
+    kitchen.do("TeleportFull", position=CLEAR, rotation=90)
+    kitchen.do("MoveAhead", moveMagnitude=0.5)
+    assert position(kitchen) == pytest.approx((1.0, 1.5))
+    kitchen.do("MoveAhead", moveMagnitude=0)
+    assert position(kitchen) == pytest.approx((1.0, 1.5))
+
+
+@pytest.mark.parametrize(
+    ("snap", "end"),
+    [
+        (True, (0.75, 1.75)),  # the nearest point of the grid
+        (False, (0.5 + 0.25 * 0.5**0.5, 1.5 + 0.25 * 0.5**0.5)),
+    ],
+)
+def test_a_diagonal_step_ends_on_the_grid_only_if_it_snaps(enter, snap, end):
+    room = enter("FloorPlan1", snapToGrid=snap)
+    room.do("TeleportFull", position=CLEAR, rotation=45)
+    room.do("MoveAhead")
+    assert position(room) == pytest.approx(end)
+
+
+def test_furniture_blocks_and_is_named(kitchen):
+    kitchen.do("TeleportFull", x=-1.0, z=0.0, rotation=90)
+    assert ISLAND in kitchen.refused("MoveAhead")
+    assert position(kitchen) == (-1.0, 0.0)
+
+
+def test_a_wall_blocks(kitchen):
+    kitchen.do("TeleportFull", x=0.0, z=2.0, rotation=0)
+    assert "wall" in kitchen.refused("MoveAhead", moveMagnitude=1.0)
+
+
+def test_one_long_step_does_not_jump_over_the_island(kitchen):
+    kitchen.do("TeleportFull", x=0.75, z=0.0)  # its far side can be stood on
+    kitchen.do("TeleportFull", x=-1.0, z=0.0, rotation=90)
+    kitchen.refused("MoveAhead", moveMagnitude=1.75)
+
+
+def test_negative_magnitude_is_a_wrong_argument(kitchen):
+    with pytest.raises(ValueError, match="moveMagnitude"):
+        kitchen.step("MoveAhead", moveMagnitude=-0.25)
+
+
+@pytest.mark.parametrize("action", ["Teleport", "TeleportFull"])
+def test_teleport_sets_the_whole_pose(kitchen, action):
+    kitchen.do(action, position=CLEAR, rotation={"y": 270}, horizon=30, standing=False)
+    assert kitchen.agent["position"] == pytest.approx(CLEAR, abs=1e-6)
+    assert kitchen.agent["rotation"] == {"x": 0, "y": 270, "z": 0}
+    assert kitchen.agent["cameraHorizon"] == 30
+    assert kitchen.agent["isStanding"] is False
+
+
+def test_what_a_teleport_does_not_name_stays(kitchen):
+    kitchen.do("TeleportFull", position=CLEAR, rotation=90, horizon=30, standing=False)
+    kitchen.do("Teleport", x=0.75)
+    assert position(kitchen) == (0.75, 1.5)
+    assert kitchen.agent["rotation"]["y"] == 90
+    assert kitchen.agent["cameraHorizon"] == 30
+    assert kitchen.agent["isStanding"] is False
+
+
+def test_a_recorded_pose_is_taken_as_it_is_written(kitchen):
+    pose = {**CLEAR, "rotation": 90, "standing": True, "horizon": 0}  # as GetInteractablePoses says
+    kitchen.do("Teleport", position=pose, rotation=450, horizon=60.00001526)
+    assert kitchen.agent["rotation"]["y"] == 90
+    assert kitchen.agent["cameraHorizon"] == 60.00001526
+
+
+@pytest.mark.parametrize(
+    ("where", "why"),
+    [
+        ({"x": 0.0, "z": 0.0}, ISLAND),
+        ({"x": 50.0, "z": 0.0}, "wall"),
+        ({"x": 1e30, "z": 0.0}, "wall"),
+        ({"x": -1.0, "y": 2.0, "z": 1.5}, "height"),
+    ],
+)
+def test_teleport_off_the_floor_is_refused(kitchen, where, why):
+    assert why in kitchen.refused("TeleportFull", **where)
+
+
+def test_force_teleports_into_furniture(kitchen):
+    kitchen.do("TeleportFull", x=0.0, z=0.0, forceAction=True)
+    assert position(kitchen) == (0.0, 0.0)
+
+
+def test_a_horizon_beyond_the_vertical_is_a_wrong_argument(kitchen):
+    with pytest.raises(ValueError, match="horizon"):
+        kitchen.step("TeleportFull", horizon=91)
+
+
+def test_what_is_held_goes_along(kitchen):
+    kitchen.do("TeleportFull", position=CLEAR, rotation=0)
+    kitchen.take(APPLE)
+    before = kitchen[APPLE]["position"]
+    kitchen.do("MoveRight", moveMagnitude=0.5)
+    after = kitchen[APPLE]["position"]
+    assert after["x"] - before["x"] == pytest.approx(0.5)
+    assert (after["y"], after["z"]) == pytest.approx((before["y"], before["z"]))

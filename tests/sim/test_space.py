@@ -1,0 +1,313 @@
+"""Where one can stand, what hides what, what is in the picture, and from where a thing is seen."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from math import hypot, sqrt, tan
+
+import numpy as np
+import pytest
+
+from er_gym.sim.scene import SCENE_NAMES, load_scene
+from er_gym.sim.space.rays import blocked_by
+from er_gym.sim.space.reach import Outlines
+from er_gym.sim.space.shapes import Shape
+from er_gym.sim.space.visibility import NEAR_PLANE, in_frustum, visible
+from er_gym.sim.world import Agent, Settings, World
+
+APPLE = "Apple|-00.47|+01.15|+00.48"
+EGG = "Egg|-02.04|+00.81|+01.24"
+FAUCET = "Faucet|-02.15|+00.91|-01.50"
+FRIDGE = "Fridge|-02.10|+00.00|+01.07"
+WINDOW = "Window|-02.23|+01.43|-01.20"
+
+# -- the floor -------------------------------------------------------------------------------------
+
+
+def reachable(room, step):
+    positions = room.do("GetReachablePositions", gridSize=step)
+    return np.array([(p["x"], p["z"]) for p in positions])
+
+
+def pieces(points, step):
+    """How many parts a grid falls into when one walks between 4-neighbours only."""
+    left = {tuple(node) for node in np.round(points / step).astype(int).tolist()}
+    count = 0
+    while left:
+        count += 1
+        todo = [left.pop()]
+        while todo:
+            x, z = todo.pop()
+            for neighbour in ((x + 1, z), (x - 1, z), (x, z + 1), (x, z - 1)):
+                if neighbour in left:
+                    left.remove(neighbour)
+                    todo.append(neighbour)
+    return count
+
+
+def distance_to_walkable(points, recorded):
+    """(P,) metres from points to the complex that recorded positions span.
+
+    The complex is made of the recorded positions, the segments between neighbours and the squares
+    whose four corners are all recorded; computed here from the definition, cell by cell.
+    """
+    nodes = {tuple(node) for node in np.round(recorded / 0.25).astype(int).tolist()}
+    nearest = np.full(len(points), np.inf)
+    for x, z in nodes:
+        for dx, dz in itertools.product((0, 1), (0, 1)):
+            if all((x + i, z + k) in nodes for i in (0, dx) for k in (0, dz)):
+                low, high = np.array([x, z]) * 0.25, np.array([x + dx, z + dz]) * 0.25
+                gaps = np.linalg.norm(points - np.clip(points, low, high), axis=1)
+                nearest = np.minimum(nearest, gaps)
+    return nearest
+
+
+@pytest.mark.parametrize("scene", SCENE_NAMES)
+def test_at_the_recorded_step_one_can_stand_where_the_record_says(enter, scene):
+    found = reachable(enter(scene), 0.25)
+    assert sorted(found.tolist()) == sorted(load_scene(scene).reachable.tolist())
+
+
+@pytest.mark.parametrize("scene", SCENE_NAMES)
+def test_a_finer_grid_fills_in_between(enter, scene):
+    """At 0.1 m no point is more than 7.5 cm off, and what was joined stays joined.
+
+    The record itself is in several pieces in ten scenes (the floor behind a closed door, say);
+    there the fine grid is in as many.
+    """
+    recorded = load_scene(scene).reachable
+    found = reachable(enter(scene), 0.1)
+    assert len(found) > 4 * len(recorded)
+    assert np.allclose(found, np.round(found / 0.1) * 0.1)
+    # The tolerance is along each axis; over a corner it is its diagonal.
+    assert distance_to_walkable(found, recorded).max() <= 0.075 * sqrt(2)
+    assert pieces(found, 0.1) == pieces(recorded, 0.25)
+
+
+def test_positions_are_on_the_floor(kitchen):
+    heights = {position["y"] for position in kitchen.do("GetReachablePositions")}
+    assert heights == {kitchen.agent["position"]["y"]}
+
+
+# -- rays ------------------------------------------------------------------------------------------
+
+UNIT_BOX = ([-0.5, -0.5, -0.5], [0.5, 0.5, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("origin", "target", "blocked"),
+    [
+        ((-2, 0, 0), (2, 0, 0), True),  # through the middle
+        ((2, 0, 0), (-2, 0, 0), True),
+        ((0, 3, 0), (0, -3, 0), True),
+        ((-2, 0.49, 0), (2, 0.49, 0), True),  # just under its top
+        ((-2, 0.51, 0), (2, 0.51, 0), False),  # just over it
+        ((-2, 0, 0), (-0.6, 0, 0), False),  # ends before it
+        ((0.6, 0, 0), (2, 0, 0), False),  # begins behind it
+        ((0, 0, 0), (2, 0, 0), False),  # the eye is in it
+        ((-2, 0, 0), (0, 0, 0), False),  # what is looked at is in it
+        ((-2, -2, -2), (2, 2, 2), True),  # along the diagonal
+        ((-2, 0, 1.2), (2, 0, -0.2), True),  # crosses x = 0 at z = 0.5
+        ((-2, 0, 1.8), (2, 0, 0.2), False),  # leaves x = 0.5 at z = 0.8
+    ],
+)
+def test_a_box_blocks_a_line(origin, target, blocked):
+    args = (np.array([v], dtype=np.float32) for v in (origin, target, *UNIT_BOX))
+    assert blocked_by(*args).tolist() == [[blocked]]
+
+
+def test_each_line_is_tested_against_each_box():
+    lines = np.array([[2, 0, 0], [0, 0, 2], [-2, 0, 0]], dtype=np.float32)
+    lows = np.array([[1, -1, -1], [-1, -1, 1]], dtype=np.float32)
+    highs = lows + np.array([[0.5, 2, 2], [2, 2, 0.5]], dtype=np.float32)
+    blocked = blocked_by(np.zeros((1, 3), dtype=np.float32), lines, lows, highs)
+    assert blocked.tolist() == [[True, False], [False, True], [False, False]]
+
+
+# -- the picture -----------------------------------------------------------------------------------
+
+
+def seen(x, y, z, rotation=0.0, horizon=0.0, field_of_view=90.0, aspect=1.0):
+    offset = np.array([[x, y, z]], dtype=float)
+    return bool(in_frustum(offset, rotation, horizon, field_of_view, aspect)[0])
+
+
+@pytest.mark.parametrize(
+    ("point", "camera", "expected"),
+    [
+        ((0, 0, 2), {}, True),
+        ((0, 0, -2), {}, False),
+        ((1.99, 0, 2), {}, True),  # 90 degrees: as far aside as ahead
+        ((2.01, 0, 2), {}, False),
+        ((0, 1.99, 2), {}, True),
+        ((0, -2.01, 2), {}, False),
+        ((2, 0, 0.01), {"rotation": 90}, True),  # 90 looks along +x
+        ((-2, 0, 0), {"rotation": 270}, True),
+        ((0, 0, 2), {"rotation": 90}, False),
+        ((0, -2, 0.9), {"horizon": 30}, True),  # 65.8 degrees down; the picture ends at 75
+        ((0, -2, 0.5), {"horizon": 30}, False),  # 76.0 degrees down
+        ((0, 2, 7.3), {"horizon": 30}, False),  # 15.3 degrees up; it ends at 15
+        ((0, 2, 7.6), {"horizon": 30}, True),
+        ((3.5, 0, 2), {"aspect": 16 / 9}, True),  # the field of view is the vertical one
+        ((3.6, 0, 2), {"aspect": 16 / 9}, False),
+        ((0, 1.1, 2), {"field_of_view": 60}, True),  # tan 30 = 0.577
+        ((0, 1.2, 2), {"field_of_view": 60}, False),
+        ((0, 0, NEAR_PLANE * 0.9), {}, False),  # nearer than the near plane
+        ((0, 0, NEAR_PLANE * 1.1), {}, True),
+    ],
+)
+def test_the_edges_of_the_picture(point, camera, expected):
+    assert seen(*point, **camera) is expected
+
+
+def outline(middle, yaw, *boxes):
+    parts = np.array(boxes, dtype=float)
+    return Shape(np.array(middle, dtype=float), yaw, parts, parts, parts)
+
+
+def test_distance_is_measured_along_the_floor_to_the_nearest_part():
+    high_up = outline((1.0, 5.0, 0.0), 0.0, [(-0.1, -1, -0.1), (0.1, 1, 0.1)])
+    parts = [(-2, 0, 1), (-1, 1, 2)], [(3, 0, -1), (4, 1, 1)]
+    two_parts = outline((0.0, 0.0, 0.0), 0.0, *parts)
+    turned = outline((0.0, 0.0, 0.0), 90.0, *parts)  # its right is the world's -z, its front +x
+    here = np.array([[0.0, 0.0], [3.0, 2.0], [0.0, -5.0]])
+    gaps = Outlines.of([high_up, two_parts, turned]).gaps(here)
+    expected = [
+        [0.9, sqrt(2), sqrt(2)],
+        [hypot(1.9, 1.9), 1.0, 1.0],
+        [hypot(0.9, 4.9), hypot(3, 4), 1.0],
+    ]
+    assert np.allclose(gaps, expected)
+
+
+# -- what the agent sees ---------------------------------------------------------------------------
+
+
+def test_things_come_into_view_as_one_comes_near(kitchen):
+    """The fridge's front is at x = -1.653; the nearest recorded points before it are these."""
+    for x, expected in ((0.5, False), (0.0, False), (-0.25, True), (-1.0, True)):
+        kitchen.do("TeleportFull", x=x, z=1.25, rotation=270, horizon=0)
+        assert kitchen[FRIDGE]["visible"] is expected, x
+        assert kitchen[FRIDGE]["isInteractable"] is expected
+
+
+def test_visibility_distance_reaches_farther(enter):
+    room = enter("FloorPlan1", visibilityDistance=20)
+    room.do("TeleportFull", x=1.75, z=1.5, rotation=270, horizon=0)
+    assert room[FRIDGE]["visible"]
+
+
+def test_nothing_is_seen_behind_the_agent(kitchen):
+    for rotation, expected in ((270, True), (90, False)):
+        kitchen.do("TeleportFull", x=-1.0, z=1.0, rotation=rotation, horizon=0)
+        assert kitchen[FRIDGE]["visible"] is expected
+
+
+@pytest.mark.parametrize(
+    ("where", "expected"),
+    [
+        (None, True),  # where it is, at the wall
+        ((-1.0, 0.0, 1.5), True),  # beside the line of sight
+        ((0.3, 0.0, 0.4), False),  # between the eye, at x = 1, and the apple, at x = -0.47
+        ((0.3, 2.5, 0.4), True),  # high over it
+        ((-1.5, 0.0, 0.4), True),  # beyond the apple
+    ],
+)
+def test_a_fridge_hides_what_is_behind_it(where, expected):
+    world = World.load(load_scene("FloorPlan1"), Settings(visibility_distance=20))
+    world.place_agent(Agent(np.array([1.0, 0.901, 0.25]), rotation=270.0, horizon=30.0))
+    fridge, apple = world.index[FRIDGE], world.index[APPLE]
+    if where is not None:
+        middle = (world.low[fridge] + world.high[fridge]) / 2
+        middle[1] = world.low[fridge, 1]
+        world.move_by(fridge, np.array(where) - middle)
+    assert bool(visible(world)[apple]) is expected
+
+
+# -- poses -----------------------------------------------------------------------------------------
+
+QUARTERS = [0.0, 90.0, 180.0, 270.0]
+TILTS = [-30.0, 0.0, 30.0, 60.0]
+
+
+@pytest.mark.parametrize("thing", [APPLE, FRIDGE, FAUCET, WINDOW])
+def test_every_pose_shows_the_object(kitchen, thing):
+    poses = kitchen.do("GetInteractablePoses", thing)
+    assert len(poses) > 30
+    for pose in poses[:: max(1, len(poses) // 40)]:
+        kitchen.do("TeleportFull", **pose)
+        assert kitchen[thing]["visible"], pose
+        assert kitchen[thing]["isInteractable"]
+
+
+@pytest.mark.parametrize("thing", [APPLE, FAUCET])
+def test_no_pose_is_left_out(kitchen, thing):
+    """Every pose at the nearest recorded positions, tried one by one."""
+    at = kitchen[thing]["position"]
+    places = sorted(
+        kitchen.do("GetReachablePositions"),
+        key=lambda p: hypot(p["x"] - at["x"], p["z"] - at["z"]),
+    )[:12]
+    found = kitchen.do("GetInteractablePoses", thing, positions=places)
+    listed = {json.dumps(pose, sort_keys=True) for pose in found}
+    assert len(listed) == len(found)
+    for place, rotation, tilt, standing in itertools.product(
+        places, QUARTERS, TILTS, (True, False)
+    ):
+        pose = {**place, "rotation": rotation, "horizon": tilt, "standing": standing}
+        kitchen.do("TeleportFull", **pose)
+        assert kitchen[thing]["visible"] is (json.dumps(pose, sort_keys=True) in listed), pose
+
+
+def test_filters_narrow_the_search(kitchen):
+    everything = kitchen.do("GetInteractablePoses", APPLE)
+    place = {key: everything[0][key] for key in "xyz"}
+    assert {pose["rotation"] for pose in everything} <= set(QUARTERS)
+    assert {pose["horizon"] for pose in everything} == set(TILTS)
+    assert {pose["standing"] for pose in everything} == {True, False}
+
+    def poses(**filters):
+        return kitchen.do("GetInteractablePoses", APPLE, **filters)
+
+    assert poses(rotations=[90]) == [p for p in everything if p["rotation"] == 90]
+    assert poses(horizons=[30]) == [p for p in everything if p["horizon"] == 30]
+    assert poses(standings=[False]) == [p for p in everything if not p["standing"]]
+    assert poses(positions=[place]) == [p for p in everything if {k: p[k] for k in "xyz"} == place]
+    assert poses(positions=[{**place, "x": 0.0, "z": 0.0}]) == []  # inside the island
+    assert poses(positions=[]) == poses(rotations=[]) == poses(horizons=[]) == []
+    assert poses(maxPoses=7) == everything[:7]
+    assert {p["rotation"] for p in poses(rotations=[33.0, 33.0 + 360])} <= {33.0}
+
+
+def test_poses_go_by_rotate_step_degrees(enter):
+    room = enter("FloorPlan1", rotateStepDegrees=45)
+    headings = {pose["rotation"] for pose in room.do("GetInteractablePoses", FRIDGE)}
+    assert headings <= {45.0 * k for k in range(8)}
+    assert headings & {45.0, 135.0, 225.0, 315.0}
+
+
+def test_what_is_shut_away_is_handled_from_nowhere(kitchen):
+    assert kitchen.do("GetInteractablePoses", EGG) == []
+
+
+def test_poses_for_what_is_in_hand_are_where_the_hand_is_now(kitchen):
+    """Not where it was when that was last asked; else answers would depend on what went before."""
+    kitchen.take(APPLE)
+    for x, z in ((0.5, 1.5), (1.0, -1.5)):
+        kitchen.do("TeleportFull", x=x, z=z, rotation=0)
+        poses = kitchen.do("GetInteractablePoses", APPLE)
+        assert poses
+        assert max(hypot(pose["x"] - x, pose["z"] - z) for pose in poses) < 2.0
+
+
+def test_an_unknown_object_has_no_poses(kitchen):
+    assert "Sofa|0" in kitchen.refused("GetInteractablePoses", "Sofa|0")
+
+
+def test_tangent_of_the_field_of_view_is_halved():
+    """The table above is for humans; this is the rule: |up| <= ahead * tan(fov / 2)."""
+    for fov in (40.0, 75.0, 110.0):
+        edge = 3 * tan(np.radians(fov) / 2)
+        assert seen(0, edge * 0.999, 3, field_of_view=fov)
+        assert not seen(0, edge * 1.001, 3, field_of_view=fov)
