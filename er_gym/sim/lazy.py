@@ -1,42 +1,48 @@
-"""Metadata whose list of objects is made when it is first read.
+"""Metadata whose parts are made when they are first read.
 
-Most steps of most programs never look at it, and it is nine tenths of the work.
+Most steps of most programs look at few of them, and the objects are nine tenths of the work.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, ItemsView, Iterator, ValuesView
+from collections.abc import Callable, ItemsView, Iterator, Mapping, ValuesView
 from typing import Any
-
-LATER = "objects"
-"""The key whose value is made on demand."""
 
 
 class LazyMetadata(dict[str, Any]):
-    """A dict in every respect, but that ``["objects"]`` is worked out when somebody asks.
+    """A dict in every respect, but that some values are worked out when somebody asks.
 
-    Whoever is about to change the world that it describes calls :meth:`settle` first.
+    Whoever is about to change the source that it describes calls :meth:`settle` first.
+
+    Args:
+        ready: the values that are known.
+        later: for each other key, what makes its value out of the source.
+        source: what they are made from.
     """
 
-    def __init__(self, ready: dict[str, Any], objects: Callable[[], list[dict[str, Any]]]) -> None:
+    def __init__(
+        self, ready: dict[str, Any], later: Mapping[str, Callable[[Any], Any]], source: object
+    ) -> None:
         super().__init__(ready)
-        super().__setitem__(LATER, None)
-        self._objects: Callable[[], list[dict[str, Any]]] | None = objects
+        for key in later:
+            super().__setitem__(key, None)
+        self._later = dict(later)
+        self._source = source
 
     def settle(self) -> None:
-        """Work the objects out now, if that has not been done."""
-        if self._objects is not None:
-            objects, self._objects = self._objects, None
-            super().__setitem__(LATER, objects())
+        """Work out all that has not been."""
+        while self._later:
+            key, make = self._later.popitem()
+            super().__setitem__(key, make(self._source))
 
     def __getitem__(self, key: str) -> Any:
-        if key == LATER:
-            self.settle()
+        make = self._later.pop(key, None)
+        if make is not None:
+            super().__setitem__(key, make(self._source))
         return super().__getitem__(key)
 
     def __setitem__(self, key: str, value: Any) -> None:
-        if key == LATER:
-            self._objects = None
+        self._later.pop(key, None)
         super().__setitem__(key, value)
 
     def get(self, key: str, default: Any = None) -> Any:

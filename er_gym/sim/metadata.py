@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -57,13 +58,15 @@ def instance_color(object_id: str) -> tuple[int, int, int]:
 
 def _colors(world: World) -> list[dict[str, Any]] | None:
     """Which colour means what in the segmentations that are drawn, None while none is."""
+    if not world.settings.render_instances and not world.settings.render_classes:
+        return None
     there = np.flatnonzero(world.exists).tolist()
     names: list[str] = []
     if world.settings.render_instances:
         names += [world.object_ids[i] for i in there]
     if world.settings.render_classes:
         names += sorted({world.types[i] for i in there})
-    return [{"name": name, "color": list(instance_color(name))} for name in names] or None
+    return [{"name": name, "color": list(instance_color(name))} for name in names]
 
 
 def _third_party_cameras(world: World) -> list[dict[str, Any]]:
@@ -78,6 +81,24 @@ def _third_party_cameras(world: World) -> list[dict[str, Any]]:
     ]
 
 
+def _inventory(world: World) -> list[dict[str, str]]:
+    if world.held < 0:
+        return []
+    return [{"objectId": world.object_ids[world.held], "objectType": world.types[world.held]}]
+
+
+_LATER: dict[str, Callable[[World], Any]] = {
+    "objects": objects,
+    "agent": _agent,
+    "heldObjectPose": _held_pose,
+    "cameraPosition": lambda world: vector(world.agent.camera),
+    "thirdPartyCameras": _third_party_cameras,
+    "inventoryObjects": _inventory,
+    "sceneBounds": scene_bounds,
+}
+"""What of an event is worked out when it is read."""
+
+
 def metadata(
     world: World,
     action: str,
@@ -88,26 +109,16 @@ def metadata(
 ) -> LazyMetadata:
     """Everything that an AI2-THOR event says about the world, after an action.
 
-    The objects are worked out when they are read; before the world changes, ``settle`` it.
+    Most of it is worked out when it is read; before the world changes, ``settle`` it.
     """
     settings = world.settings
-    held = world.held
     report = {
         "isSceneAtRest": True,
-        "agent": _agent(world),
-        "heldObjectPose": _held_pose(world),
         "arm": None,
         "fov": settings.field_of_view,
-        "cameraPosition": vector(world.agent.camera),
         "cameraOrthSize": 0.0,
-        "thirdPartyCameras": _third_party_cameras(world),
         "collided": False,
         "collidedObjects": [],
-        "inventoryObjects": (
-            [{"objectId": world.object_ids[held], "objectType": world.types[held]}]
-            if held >= 0
-            else []
-        ),
         "sceneName": f"{world.scene.name}_physics",
         "lastAction": action,
         "errorMessage": error,
@@ -116,8 +127,7 @@ def metadata(
         "screenWidth": settings.width,
         "screenHeight": settings.height,
         "agentId": 0,
-        "colors": _colors(world),
-        "sceneBounds": scene_bounds(world),
+        "colors": _colors(world),  # now: a step may ask for segmentation for itself alone
         "updateCount": 0,
         "fixedUpdateCount": 0,
         "currentTime": 0.0,
@@ -125,4 +135,4 @@ def metadata(
         "actionReturn": action_return,
         "depthFormat": "Meters",
     }
-    return kind(report, lambda: objects(world))
+    return kind(report, _LATER, world)

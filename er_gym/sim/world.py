@@ -18,7 +18,7 @@ from er_gym.sim.errors import ActionFailed
 from er_gym.sim.scene import PROPERTIES, STATES, Scene
 from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.shapes import Shape, shape_of
-from er_gym.sim.space.shapes.samples import surface_fractions
+from er_gym.sim.space.shapes.samples import points_on, points_on_top, surface_fractions
 from er_gym.sim.space.walk import WalkableFloor, walkable_floor
 
 AGENT_HEIGHT = 0.900999128818512
@@ -326,12 +326,13 @@ class World:
         points = self._samples.get(i)
         if points is None:
             if np.isnan(self.obb[i, 0, 0]):
-                # A counter that bends is looked for where it is; the rest on their boxes.
-                bends = self.types[i] == "CounterTop"
-                boxes = self.shape(i).boxes if bends else [(self.low[i], self.high[i])]
-                points = np.concatenate(
-                    [low + surface_fractions(high - low) * (high - low) for low, high in boxes]
-                )
+                box = np.array([[self.low[i], self.high[i]]])
+                if self.types[i] == "Floor":
+                    points = points_on_top(box[0])
+                else:  # a counter that bends is looked for where it is
+                    points = points_on(
+                        self.shape(i).boxes if self.types[i] == "CounterTop" else box
+                    )
             else:
                 corner, edges = self.obb[i, 0], self.obb[i, 1:]
                 size = np.linalg.norm(edges, axis=1)

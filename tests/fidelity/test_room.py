@@ -19,9 +19,9 @@ def test_the_agent_and_its_camera_are_at_the_recorded_height(compared) -> None:
 
 
 OUT_OF_BOUNDS = {
-    # Ceilings that nothing reaches up to.
+    # The ceiling only: it is not where the highest object suggests.
     *(f"FloorPlan{n}" for n in (13, 210, 213, 219, 228, 304, 319, 422)),
-    # Parts of the building that are beyond the floor, or floor that ends behind what is in the way.
+    # Sides: the recorded floor ends elsewhere than the bounds.
     *(f"FloorPlan{n}" for n in (4, 19, 201, 204, 310, 401, 410, 419, 428)),
 }
 """Where the record of objects does not tell how far the room reaches: docs/fidelity.md."""

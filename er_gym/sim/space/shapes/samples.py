@@ -29,3 +29,20 @@ def _surface_grid(*counts: int) -> NDArray[np.float64]:
         for face in (0, -1):
             on_surface[(slice(None),) * axis + (face,)] = True
     return grid[on_surface]
+
+
+def points_on(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(P, 3) points on the surfaces of (K, 2, 3) boxes, in the boxes' frame, metres."""
+    sizes = boxes[:, 1] - boxes[:, 0]
+    found = [
+        low + surface_fractions(size) * size for (low, _), size in zip(boxes, sizes, strict=True)
+    ]
+    return np.concatenate(found)
+
+
+def points_on_top(box: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(P, 3) points on the upper face of a (2, 3) box: of a floor one sees nothing else; metres."""
+    points: NDArray[np.float64] = points_on(box[None])
+    points = points[points[:, 1] == points[:, 1].max()]
+    points[:, 1] = box[1, 1]
+    return points
