@@ -6,15 +6,15 @@ user got wrong ends the command with exit code 2 and one line on stderr.
 
 from __future__ import annotations
 
-import contextlib
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from benchmarks.cli_errors import BadInput, bad_input
 from benchmarks.cli_player import doctor, player
 
 if TYPE_CHECKING:
@@ -38,12 +38,6 @@ _scorer = click.option(
     show_default=True,
     help="Which scorer the table shows; both: each where they differ.",
 )
-
-
-class BadInput(click.ClickException):
-    """Something that the user gave; the message says what, what is allowed and what to do."""
-
-    exit_code = 2
 
 
 def main(args: Sequence[str] | None = None) -> NoReturn:
@@ -128,7 +122,7 @@ def bench(
     from er_gym.thor import BackendError
 
     terminal = Console(stderr=True)
-    with _bad_input(BackendError):
+    with bad_input(BackendError):
         part = Shard.parse(shard) if shard else None
         asked = _load_suite(suite, tasks_file, poses)
         env = _env_kwargs(asked, agent, seed, backend=backend, instances=instances)
@@ -198,7 +192,7 @@ def report(runs: tuple[Path, ...], layout: str, scorer: str, by_type: bool, miss
         raise BadInput(
             "--misses does not go with --format csv, which holds means; choose json, md or table"
         )
-    with _bad_input():
+    with bad_input():
         loaded = [reports.load_run(path) for path in runs]
     if layout == "json":
         click.echo(reports.as_json(loaded))
@@ -221,7 +215,7 @@ def suites() -> None:
     from er_gym.tasks.types import GROUPS
 
     for name in suite_names():
-        with _bad_input():
+        with bad_input():
             tasks = load_suite(name).tasks
         counts = Counter(task.type.group for task in tasks)
         groups = ", ".join(f"{group} {counts[group]}" for group in GROUPS if counts[group])
@@ -286,16 +280,6 @@ def _stdout() -> Console:
     from rich.console import Console
 
     return Console(width=None if sys.stdout.isatty() else 240)
-
-
-@contextlib.contextmanager
-def _bad_input(*more: type[Exception]) -> Iterator[None]:
-    """What the code within raises of these, ValueError and OSError is the user's to mend."""
-    known: tuple[type[Exception], ...] = (ValueError, OSError, *more)
-    try:
-        yield
-    except known as error:
-        raise BadInput(str(error)) from error
 
 
 def _complain(message: str) -> None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
-
 import click
+
+from benchmarks.cli_errors import bad_input
 
 
 @click.group()
@@ -27,7 +26,7 @@ def install(force: bool) -> None:
     """Put the player where Controller(platform=CloudRendering) finds it, offline."""
     from er_gym.thor import player as players
 
-    with _bad_input():
+    with bad_input(players.PlayerError):
         release = players.install(force=force)
     click.echo(f"installed in {release.folder}")
     if not players.vulkan_is_there():
@@ -42,7 +41,7 @@ def uninstall() -> None:
     """Remove what install has put there, and nothing else."""
     from er_gym.thor import player as players
 
-    with _bad_input():
+    with bad_input(players.PlayerError):
         release = players.uninstall()
     restored = "; Unity's build is there again" if release.is_unity else ""
     click.echo(f"removed from {release.folder}{restored}")
@@ -60,15 +59,3 @@ def doctor() -> int:
         mend = f"; {finding.mend}" if finding.mend else ""
         click.echo(f"{mark}  {finding.what:{widest}}  {finding.says}{mend}")
     return 0 if all(finding.works for finding in findings if finding.needed) else 1
-
-
-@contextlib.contextmanager
-def _bad_input() -> Iterator[None]:
-    """What stands in the way is the user's to mend."""
-    from benchmarks.cli import BadInput
-    from er_gym.thor.player import PlayerError
-
-    try:
-        yield
-    except (PlayerError, OSError) as error:
-        raise BadInput(str(error)) from error

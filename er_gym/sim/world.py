@@ -68,6 +68,12 @@ def _recorded_shapes(scene: Scene) -> dict[int, Shape]:
     return {}
 
 
+@lru_cache(maxsize=128)
+def _recorded_samples(scene: Scene) -> dict[int, NDArray[np.float64]]:
+    """Their sample points as recorded, filled by :meth:`World.sample_points`."""
+    return {}
+
+
 @dataclass(frozen=True)
 class Agent:
     """The agent's pose: position (3,) of its centre in metres, degrees, AI2-THOR's frame."""
@@ -287,6 +293,10 @@ class World:
         """The held object and all that lies in it; empty when the hand is."""
         return [] if self.held < 0 else [self.held, *self.inside(self.held)]
 
+    def touched(self) -> list[int]:
+        """Objects that something may have happened to since the scene was loaded."""
+        return sorted(self._touched | set(self.in_hand))
+
     def solids(
         self,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
@@ -302,10 +312,12 @@ class World:
             self.derived["solids"] = found
         return found  # type: ignore[return-value]  # the only writer is above
 
+    def _as_recorded(self, i: int) -> bool:
+        return i < len(self.scene) and i not in self._touched
+
     def shape(self, i: int) -> Shape:
         """What object i is made of, where it is now."""
-        as_recorded = i < len(self.scene) and i not in self._touched
-        kept = _recorded_shapes(self.scene) if as_recorded else self._shapes
+        kept = _recorded_shapes(self.scene) if self._as_recorded(i) else self._shapes
         found = kept.get(i)
         if found is None:
             found = kept[i] = shape_of(self, i)
@@ -323,7 +335,8 @@ class World:
 
     def sample_points(self, i: int) -> NDArray[np.float64]:
         """(P, 3) points over the surface of object i's box: the oriented one, where recorded."""
-        points = self._samples.get(i)
+        kept = _recorded_samples(self.scene) if self._as_recorded(i) else self._samples
+        points = kept.get(i)
         if points is None:
             if np.isnan(self.obb[i, 0, 0]):
                 box = np.array([[self.low[i], self.high[i]]])
@@ -338,7 +351,7 @@ class World:
                 size = np.linalg.norm(edges, axis=1)
                 points = corner + surface_fractions(size) @ edges
                 points = points @ unity_rotation(self.rotation[i]).T + self.position[i]
-            self._samples[i] = points
+            kept[i] = points
         return points
 
     def _shift(self, rows: list[int], offset: NDArray[np.float64]) -> None:

@@ -9,6 +9,7 @@ from math import hypot, sqrt, tan
 import numpy as np
 import pytest
 
+from benchmarks.perf.comparisons.reachable import pieces
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.space.rays import blocked_by
 from er_gym.sim.space.reach import Outlines
@@ -28,22 +29,6 @@ WINDOW = "Window|-02.23|+01.43|-01.20"
 def reachable(room, step):
     positions = room.do("GetReachablePositions", gridSize=step)
     return np.array([(p["x"], p["z"]) for p in positions])
-
-
-def pieces(points, step):
-    """How many parts a grid falls into when one walks between 4-neighbours only."""
-    left = {tuple(node) for node in np.round(points / step).astype(int).tolist()}
-    count = 0
-    while left:
-        count += 1
-        todo = [left.pop()]
-        while todo:
-            x, z = todo.pop()
-            for neighbour in ((x + 1, z), (x - 1, z), (x, z + 1), (x, z - 1)):
-                if neighbour in left:
-                    left.remove(neighbour)
-                    todo.append(neighbour)
-    return count
 
 
 def distance_to_walkable(points, recorded):

@@ -62,6 +62,7 @@ def _search(
     settings, known = world.settings, sights(world)
     points = world.sample_points(i).astype(np.float32)
     of = np.full(len(points), i, dtype=np.int16)
+    held = world.in_hand
     directions = np.array([(r % 360.0, h) for r in rotations for h in horizons])
     found: list[Agent] = []
     gaps = Outlines.of([world.shape(i)]).gaps(positions)[:, 0]
@@ -71,7 +72,12 @@ def _search(
         if not places or not len(directions):
             continue
         eyes = np.array([place.camera for place in places])
-        clear = known.clear(eyes, points, of)
+        if len(eyes) == 1 and i not in held:
+            # Whoever asks for one position will look about from there next: keep what is found.
+            mine = known.of == i
+            clear = known.clear_from(eyes[0], mine)[mine][None]
+        else:
+            clear = known.clear(eyes, points, of)
         in_picture = in_frustum(
             (points - eyes[:, None])[:, None],
             directions[:, 0, None],
