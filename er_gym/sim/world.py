@@ -363,6 +363,7 @@ class World:
     def _touch(self, rows: Iterable[int]) -> None:
         """Forget what was derived for some objects one by one."""
         rows = list(rows)
+        self.untouched = False
         self._touched.update(rows)
         for i in rows:
             self._samples.pop(i, None)
