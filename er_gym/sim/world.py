@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim import recorded
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.scene import PROPERTIES, STATES, Scene
 from er_gym.sim.space.rotation import unity_rotation
@@ -27,8 +27,6 @@ CAMERA_STANDING, CAMERA_CROUCHING = 0.675, 0.0
 """Height of the camera above the agent's centre, metres."""
 HAND_OFFSET = np.array([0.0, -0.16, 0.38])
 """Where the hand is in the camera's frame (right, up, forward), metres."""
-_USED_UP = ("PaperTowelRoll", "SoapBottle", "TissueBox", "ToiletPaper")
-"""Types that ProcTHOR's asset database says can be used up."""
 _PROPERTY = {name: column for column, name in enumerate(PROPERTIES)}
 _STATE = {name: column for column, name in enumerate(STATES)}
 
@@ -37,41 +35,6 @@ def settled(rotation: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
     """(3,) degrees: a rotation with its tilts rounded to quarter turns, and another heading."""
     x, _, z = np.round(rotation / 90.0) * 90.0 % 360.0
     return np.array([x, yaw % 360.0, z])
-
-
-def _properties(scene: Scene) -> NDArray[np.bool_]:
-    """The recorded properties, and ``canBeUsedUp``, which the record leaves out."""
-    properties = scene.properties.copy()
-    properties[:, _PROPERTY["canBeUsedUp"]] |= np.isin(scene.types, _USED_UP)
-    return properties
-
-
-@lru_cache(maxsize=128)
-def _plausible_parents(scene: Scene) -> tuple[tuple[int, ...], ...]:
-    """The recorded containments, less the 20 that cannot be.
-
-    AI2-THOR's trigger boxes overlap: a few records put a fridge into the cabinet beside it, a
-    counter onto a plate, the floor into a bin. What cannot be carried is in nothing that opens or
-    can be carried, and the floor is in nothing.
-    """
-    carried = scene.properties[:, _PROPERTY["pickupable"]]
-    no_place = carried | scene.properties[:, _PROPERTY["openable"]]
-    return tuple(
-        () if kind == "Floor" else tuple(p for p in parents if carried[i] or not no_place[p])
-        for i, (kind, parents) in enumerate(zip(scene.types, scene.parents, strict=True))
-    )
-
-
-@lru_cache(maxsize=128)
-def _recorded_shapes(scene: Scene) -> dict[int, Shape]:
-    """The shapes of a scene's objects as recorded, filled by :meth:`World.shape`."""
-    return {}
-
-
-@lru_cache(maxsize=128)
-def _recorded_samples(scene: Scene) -> dict[int, NDArray[np.float64]]:
-    """Their sample points as recorded, filled by :meth:`World.sample_points`."""
-    return {}
 
 
 @dataclass(frozen=True)
@@ -180,14 +143,14 @@ class World:
             low=scene.aabb_center - half,
             high=scene.aabb_center + half,
             obb=scene.obb.copy(),
-            properties=_properties(scene),
+            properties=recorded.properties(scene),
             states=scene.states.copy(),
             openness=scene.openness.copy(),
             mass=scene.mass.copy(),
             exists=np.ones(len(scene.object_ids), dtype=bool),
             temperature=list(scene.temperature),
             fill_liquid=[None] * len(scene.object_ids),
-            parents=list(_plausible_parents(scene)),
+            parents=list(recorded.parents(scene)),
             controlled=list(scene.controlled),
             salient_materials=list(scene.salient_materials),
         )
@@ -317,7 +280,7 @@ class World:
 
     def shape(self, i: int) -> Shape:
         """What object i is made of, where it is now."""
-        kept = _recorded_shapes(self.scene) if self._as_recorded(i) else self._shapes
+        kept = recorded.shapes(self.scene) if self._as_recorded(i) else self._shapes
         found = kept.get(i)
         if found is None:
             found = kept[i] = shape_of(self, i)
@@ -335,7 +298,7 @@ class World:
 
     def sample_points(self, i: int) -> NDArray[np.float64]:
         """(P, 3) points over the surface of object i's box: the oriented one, where recorded."""
-        kept = _recorded_samples(self.scene) if self._as_recorded(i) else self._samples
+        kept = recorded.samples(self.scene) if self._as_recorded(i) else self._samples
         points = kept.get(i)
         if points is None:
             if np.isnan(self.obb[i, 0, 0]):

@@ -1,0 +1,49 @@
+"""What every world of a scene begins with, made of the record and kept for the scenes last used."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.scene import PROPERTIES, Scene
+from er_gym.sim.space.shapes import Shape
+
+_USED_UP = ("PaperTowelRoll", "SoapBottle", "TissueBox", "ToiletPaper")
+"""Types that ProcTHOR's asset database says can be used up."""
+
+
+def properties(scene: Scene) -> NDArray[np.bool_]:
+    """The recorded properties, and ``canBeUsedUp``, which the record leaves out."""
+    found = scene.properties.copy()
+    found[:, PROPERTIES.index("canBeUsedUp")] |= np.isin(scene.types, _USED_UP)
+    return found
+
+
+@lru_cache(maxsize=128)
+def parents(scene: Scene) -> tuple[tuple[int, ...], ...]:
+    """The recorded containments, less the 20 that cannot be.
+
+    AI2-THOR's trigger boxes overlap: a few records put a fridge into the cabinet beside it, a
+    counter onto a plate, the floor into a bin. What cannot be carried is in nothing that opens or
+    can be carried, and the floor is in nothing.
+    """
+    carried = scene.properties[:, PROPERTIES.index("pickupable")]
+    no_place = carried | scene.properties[:, PROPERTIES.index("openable")]
+    return tuple(
+        () if kind == "Floor" else tuple(p for p in lies_in if carried[i] or not no_place[p])
+        for i, (kind, lies_in) in enumerate(zip(scene.types, scene.parents, strict=True))
+    )
+
+
+@lru_cache(maxsize=128)
+def shapes(scene: Scene) -> dict[int, Shape]:
+    """The shapes of a scene's objects as recorded, filled by ``World.shape``."""
+    return {}
+
+
+@lru_cache(maxsize=128)
+def samples(scene: Scene) -> dict[int, NDArray[np.float64]]:
+    """Their sample points as recorded, filled by ``World.sample_points``."""
+    return {}
