@@ -29,7 +29,7 @@ _OBB_CORNERS = np.array(
     dtype=float,
 )
 """Corners of an oriented box in AI2-THOR's order, in edges from corner 0."""
-_SCENES_KEPT = 64
+_SCENES_KEPT = 128
 _RECEPTACLE = PROPERTIES.index("receptacle")
 
 
