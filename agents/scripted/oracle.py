@@ -15,9 +15,10 @@ from er_gym.tasks.task import KeyAction, Task
 class OracleAgent:
     """Does the task's key actions in their order, and what it takes to be able to.
 
-    It goes where a key action leads; if the place is not in sight it looks round, then walks from
-    one big thing to the next until it is. It opens what is closed before it puts something in. What
-    it knows beforehand are the key actions; all else it reads from ``info`` as any agent may.
+    It goes where a key action leads; if the place is not in sight it looks round, then walks to one
+    thing after another that is, until the place is too. It opens what is closed before it puts
+    something in. What it knows beforehand are the key actions; all else it reads from ``info`` as
+    any agent may.
     """
 
     obs_mode = "text"
