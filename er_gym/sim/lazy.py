@@ -27,13 +27,19 @@ class LazyMetadata(dict[str, Any]):
         for key in later:
             super().__setitem__(key, None)
         self._later = dict(later)
-        self._source = source
+        self._source: object | None = source
+
+    @property
+    def source(self) -> object | None:
+        """What this describes; None once that may have become something else."""
+        return self._source
 
     def settle(self) -> None:
-        """Work out all that has not been."""
+        """Work out all that has not been, and keep nothing but the values."""
         while self._later:
             key, make = self._later.popitem()
             super().__setitem__(key, make(self._source))
+        self._source = None
 
     def __getitem__(self, key: str) -> Any:
         make = self._later.pop(key, None)

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.nesting import Nesting
 from er_gym.sim.scene import PROPERTIES, Scene
 from er_gym.sim.space.shapes import Shape
 
@@ -35,6 +36,12 @@ def parents(scene: Scene) -> tuple[tuple[int, ...], ...]:
         () if kind == "Floor" else tuple(p for p in lies_in if carried[i] or not no_place[p])
         for i, (kind, lies_in) in enumerate(zip(scene.types, scene.parents, strict=True))
     )
+
+
+@lru_cache(maxsize=128)
+def nesting(scene: Scene) -> Nesting:
+    """What lies in what, as recorded."""
+    return Nesting.of(parents(scene), np.ones(len(scene), dtype=bool))
 
 
 @lru_cache(maxsize=128)

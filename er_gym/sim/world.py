@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from er_gym.sim import recorded
 from er_gym.sim.errors import ActionFailed
+from er_gym.sim.nesting import Nesting
 from er_gym.sim.scene import PROPERTIES, STATES, Scene
 from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.shapes import Shape, shape_of
@@ -122,6 +123,7 @@ class World:
     _shapes: dict[int, Shape] = field(default_factory=dict)
     _samples: dict[int, NDArray[np.float64]] = field(default_factory=dict)
     entries: dict[int, dict[str, object]] = field(default_factory=dict)
+    _nesting: Nesting | None = None
 
     @staticmethod
     def load(scene: Scene, settings: Settings) -> World:
@@ -155,6 +157,7 @@ class World:
             salient_materials=list(scene.salient_materials),
         )
         world.index = {object_id: i for i, object_id in enumerate(world.object_ids)}
+        world._nesting = recorded.nesting(scene)
         return world
 
     # -- reading ---------------------------------------------------------------------------------
@@ -193,28 +196,20 @@ class World:
         return walkable_floor(self.scene.name)
 
     @property
+    def nesting(self) -> Nesting:
+        """What lies in what."""
+        if self._nesting is None:
+            self._nesting = Nesting.of(self.parents, self.exists)
+        return self._nesting
+
+    @property
     def contents(self) -> list[list[int]]:
         """For each object, the rows of what lies in or on it."""
-        found = self.derived.get("contents")
-        if found is None:
-            lists: list[list[int]] = [[] for _ in range(len(self))]
-            for i, parents in enumerate(self.parents):
-                if self.exists[i]:
-                    for parent in parents:
-                        lists[parent].append(i)
-            found = self.derived["contents"] = lists
-        return found  # type: ignore[return-value]  # the only writer is above
+        return self.nesting.contents
 
     def ancestors(self, i: int) -> set[int]:
         """Every receptacle that object i is in, directly or through others."""
-        seen: set[int] = set()
-        todo = list(self.parents[i])
-        while todo:
-            parent = todo.pop()
-            if parent not in seen:
-                seen.add(parent)
-                todo.extend(self.parents[parent])
-        return seen
+        return set(np.flatnonzero(self.nesting.within[i]).tolist())
 
     def inside(self, i: int) -> list[int]:
         """Everything in or on object i, directly or through others, nearest first."""
@@ -244,10 +239,13 @@ class World:
         """(N,) which objects lie in something shut, or are no more."""
         found = self.derived.get("hidden")
         if not isinstance(found, np.ndarray):
-            found = ~self.exists
-            for i in range(len(self)):
-                if self.parents[i] and any(self.is_shut(a) for a in self.ancestors(i)):
-                    found[i] = True
+            shut = (
+                self.properties[:, _PROPERTY["receptacle"]]
+                & self.properties[:, _PROPERTY["openable"]]
+            )
+            shut &= ~self.states[:, _STATE["isOpen"]]
+            shut[[i for i, kind in enumerate(self.types) if kind == "Toilet"]] = False
+            found = ~self.exists | self.nesting.within[:, shut].any(axis=1)
             self.derived["hidden"] = found
         return found
 
@@ -259,21 +257,6 @@ class World:
     def touched(self) -> list[int]:
         """Objects that something may have happened to since the scene was loaded."""
         return sorted(self._touched | set(self.in_hand))
-
-    def solids(
-        self,
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
-        """Boxes that block lines of sight: (M, 3) corners, and (M,) whose they are."""
-        found = self.derived.get("solids")
-        if found is None:
-            skip = set(self.in_hand)
-            rows = [i for i in np.flatnonzero(~self.hidden).tolist() if i not in skip]
-            hiding = [self.shape(i).hiding for i in rows]
-            boxes = np.concatenate(hiding).astype(np.float32)
-            owners = np.repeat(np.array(rows, dtype=np.int64), [len(part) for part in hiding])
-            found = boxes[:, 0], boxes[:, 1], owners
-            self.derived["solids"] = found
-        return found  # type: ignore[return-value]  # the only writer is above
 
     def _as_recorded(self, i: int) -> bool:
         return i < len(self.scene) and i not in self._touched
@@ -340,6 +323,11 @@ class World:
         self.untouched = False
         self.derived.clear()
 
+    def _renested(self) -> None:
+        """Say that something lies elsewhere than it did."""
+        self._nesting = None
+        self.changed()
+
     def set_state(self, i: int, name: str, value: bool) -> None:
         """Put object i into a state of :data:`er_gym.sim.scene.STATES`, or out of it."""
         self.states[i, _STATE[name]] = value
@@ -366,13 +354,13 @@ class World:
         for child in within:
             own = tuple(p for p in self.parents[child] if p in moving)
             self.parents[child] = (*own, *(p for p in parents if p not in own))
-        self.changed()
+        self._renested()
 
     def relocate_alone(self, i: int, parents: Sequence[int]) -> None:
         """Say in which receptacles object i lies; what lies in it does not change."""
         self._touch([i, *self.parents[i], *parents])
         self.parents[i] = tuple(parents)
-        self.changed()
+        self._renested()
 
     def turn(self, i: int, yaw: float) -> None:
         """Turn object i about the vertical to a heading in degrees, its box following.
@@ -427,7 +415,7 @@ class World:
         self._touch([i, *self.parents[i]])
         self.parents[i] = ()
         self.exists[i] = False
-        self.changed()
+        self._renested()
 
     def place_agent(self, agent: Agent) -> None:
         """Put the agent somewhere; what it holds goes along."""
@@ -463,7 +451,7 @@ class World:
         self.salient_materials.append(self.salient_materials[like])
         self.index[object_id] = row
         self._touch(self.parents[row])
-        self.changed()
+        self._renested()
         return row
 
     def configure(self, **changes: object) -> None:

@@ -4,6 +4,7 @@ from er_gym.sim.compatibility import accepts, placement_table
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError
 from er_gym.thor.backends import BACKENDS, BackendError, make_controller
 from er_gym.thor.object_types import OBJECT_TYPES, ObjectType
+from er_gym.thor.objects import ObjectTable, objects_of
 from er_gym.thor.player import thor_executable
 
 __all__ = [
@@ -11,10 +12,12 @@ __all__ = [
     "OBJECT_TYPES",
     "SCENE_NAMES",
     "BackendError",
+    "ObjectTable",
     "ObjectType",
     "UnknownSceneError",
     "accepts",
     "make_controller",
+    "objects_of",
     "placement_table",
     "thor_executable",
 ]

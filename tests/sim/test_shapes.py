@@ -10,6 +10,7 @@ from er_gym.sim.space.shapes.counters import _largest_rectangle, rectangles
 from er_gym.sim.space.shapes.facing import facings
 from er_gym.sim.space.shapes.families import parts
 from er_gym.sim.space.shapes.frame import trimmed, turned
+from er_gym.sim.space.sights import sights
 from er_gym.sim.world import Settings, World
 
 # -- parts -----------------------------------------------------------------------------------------
@@ -47,7 +48,7 @@ def test_glass_and_lattices_hide_nothing():
 def test_few_boxes_hide_things():
     """Each costs time in every line of sight: there are fewer than objects."""
     worlds = [World.load(load_scene(name), Settings()) for name in SCENE_NAMES[::10]]
-    assert sum(len(w.solids()[2]) for w in worlds) < sum(len(w) for w in worlds)
+    assert sum(len(sights(w).low) for w in worlds) < sum(len(w) for w in worlds)
 
 
 # -- in the world ----------------------------------------------------------------------------------

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from er_gym.sim.controller import EmbeddedController
-from er_gym.sim.space.visibility import Sights, sights, visible
-
-CUT_UP = {"Apple": "SliceObject", "Egg": "BreakObject"}
+from er_gym.sim.scene import load_scene
+from er_gym.sim.space.rays import blocked_by
+from er_gym.sim.space.sights import sights, sights_anew
+from er_gym.sim.space.visibility import in_frustum, visible
+from er_gym.sim.world import Settings, World
 
 
 def random_changes(controller, random, count):
@@ -29,17 +31,86 @@ def test_the_difference_from_the_record_gives_what_all_boxes_give(scene: str) ->
     random = np.random.default_rng(len(scene))
     with EmbeddedController(scene=scene, headless=True, visibilityDistance=20) as controller:
         world = controller.server._engine.world
-        seen_changed = False
+        changed = moved = 0
         for _ in range(25):
             random_changes(controller, random, 6)
-            known = sights(world)
-            seen_changed |= known.change is not None and len(known.change.come) > 0
+            known, anew = sights(world), sights_anew(world)
+            changed += known.before is not None
+            moved += known.anew is not None
             camera = world.agent.camera
-            asked = random.random(len(known.of)) < 0.7
-            whole = known.clear(camera[None], known.points, known.of)[0]
-            assert (known.clear_from(camera, asked) == (whole & asked)).all()
-            # And the whole is that of a world without any memory.
-            anew = Sights.of_world(world)
-            assert (anew.clear(camera[None], anew.points, anew.of)[0] == whole).all()
+            there = ~anew.away[anew.of]
+            whole = {i: [] for i in range(len(world))}
+            for i, point in zip(anew.of, anew.points, strict=True):
+                whole[int(i)].append(point)
+            mine, theirs = known.viewpoint(camera), anew.viewpoint(camera)
+            for i in np.unique(anew.of[there]).tolist():
+                span = slice(known.first[i], known.first[i] + known.count[i])
+                assert (known.points[span] == np.array(whole[i])).all()
+                expected = theirs.blocking[anew.first[i] : anew.first[i] + anew.count[i]]
+                assert (mine.blocking[span] == expected).all()
+                clear = known.clear(camera[None], known.points[span], i)
+                assert (clear[0] == (expected == 0)).all()
+            assert set(known.of[mine.clear]) == set(anew.of[theirs.clear])
             assert (visible(world) == visible(world)).all()
-        assert seen_changed
+        assert changed
+        assert moved
+
+
+@pytest.mark.parametrize("scene", ["FloorPlan1", "FloorPlan216", "FloorPlan303", "FloorPlan420"])
+def test_the_kernel_that_leaves_out_what_cannot_be_leaves_out_nothing_else(scene: str) -> None:
+    world = World.load(load_scene(scene), Settings())
+    known = sights_anew(world)
+    for x, z in world.scene.reachable[::15]:
+        eye = np.array([x, world.agent.camera[1], z])
+        blocked = blocked_by(eye[None].astype(np.float32), known.points, known.low, known.high)
+        expected = (blocked & ~known.own[known.of]).sum(axis=1)
+        assert expected.any()
+        assert (known.viewpoint(eye).blocking == expected).all()
+
+
+def test_what_looks_as_recorded_again_is_known_as_such() -> None:
+    with EmbeddedController(scene="FloorPlan1", headless=True) as controller:
+        world = controller.server._engine.world
+        before = sights(world)
+        fridge = next(world.of_type("Fridge"))
+        for _ in range(2):
+            controller.step("OpenObject", objectId=world.object_ids[fridge], forceAction=True)
+            opened = sights(world)
+            assert opened is not before
+            controller.step("CloseObject", objectId=world.object_ids[fridge], forceAction=True)
+            assert sights(world) is before
+        controller.step("OpenObject", objectId=world.object_ids[fridge], forceAction=True)
+        assert sights(world) is opened
+
+
+def test_what_is_cut_up_behind_a_closed_door_is_hidden_and_then_seen() -> None:
+    with EmbeddedController(scene="FloorPlan1", headless=True, visibilityDistance=20) as controller:
+        world = controller.server._engine.world
+        tomato, fridge = (world.object_ids[next(world.of_type(t))] for t in ("Tomato", "Fridge"))
+        pose = {"x": -1.0, "z": 1.0, "rotation": 270, "horizon": 30, "standing": True}
+        controller.step("TeleportFull", **pose)
+        for action, thing in (
+            ("PickupObject", tomato),
+            ("OpenObject", fridge),
+            ("PutObject", fridge),
+            ("CloseObject", fridge),
+            ("SliceObject", tomato),
+        ):
+            assert controller.step(action, objectId=thing, forceAction=True)
+        slices = list(world.of_type("TomatoSliced"))
+        assert slices
+        assert not visible(world)[slices].any()
+        controller.step("OpenObject", objectId=fridge, forceAction=True)
+        assert (visible(world) == _seen_by_all(world)).all()
+        assert visible(world)[slices].any()
+
+
+def _seen_by_all(world):
+    """What is seen, by way of sights that know no other arrangement."""
+    anew = sights_anew(world)
+    seen = np.zeros(len(world), dtype=bool)
+    camera = world.agent.camera
+    clear = anew.viewpoint(camera).clear
+    lens = (world.agent.rotation, world.agent.horizon, 90.0, 1.0)
+    seen[anew.of[clear[in_frustum(anew.points[clear] - camera, *lens)]]] = True
+    return seen

@@ -33,7 +33,7 @@ def openable_poses(turn: float = 0.0) -> dict[str, tuple[int, int]]:
                 gaps = np.linalg.norm(world.scene.reachable - here[[0, 2]], axis=1)
                 near = world.scene.reachable[gaps <= RECORDED_STEP + 1e-6]
                 agrees = bool(
-                    interactable_poses(world, i, near, [rotation], [pose.horizon], [True], 1)
+                    interactable_poses(world, i, near, [rotation], [pose.horizon], [True], 1).size
                 )
             agreed, entries = found.get(world.types[i], (0, 0))
             found[world.types[i]] = agreed + agrees, entries + 1

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from er_gym.sim.actions.checks import target
+from er_gym.sim.actions.checks import FARTHEST, target
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
 from er_gym.sim.render.view import object_at
@@ -71,6 +71,11 @@ def get_reachable_positions(
     return [{"x": x, "y": y, "z": z} for x, z in _grid(world, gridSize).tolist()]
 
 
+def _is_near(point: Vector) -> bool:
+    """Whether a point may be in a room at all: of numbers much larger nothing can be worked out."""
+    return max(abs(point.x), abs(point.z)) <= FARTHEST
+
+
 @action("GetInteractablePoses")
 def get_interactable_poses(
     world: World,
@@ -89,7 +94,7 @@ def get_interactable_poses(
     places = (
         _grid(world, None)
         if positions is None
-        else np.array([(p.x, p.z) for p in positions]).reshape(-1, 2)
+        else np.array([(p.x, p.z) for p in positions if _is_near(p)]).reshape(-1, 2)
     )
     places = places[world.floor.contains(places)] if len(places) else places
     if rotations is None:
@@ -105,13 +110,6 @@ def get_interactable_poses(
         maxPoses,
     )
     return [
-        {
-            "x": float(pose.position[0]),
-            "y": float(pose.position[1]),
-            "z": float(pose.position[2]),
-            "rotation": pose.rotation,
-            "standing": pose.standing,
-            "horizon": pose.horizon,
-        }
-        for pose in poses
+        {"x": x, "y": y, "z": z, "rotation": yaw, "standing": standing > 0.0, "horizon": tilt}
+        for x, y, z, yaw, tilt, standing in poses.tolist()
     ]

@@ -11,6 +11,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cached_property
 from typing import Any, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
@@ -46,12 +47,19 @@ class Handler:
     run: Callable[..., Any]
     parameters: type[BaseModel]
 
+    @cached_property
+    def fields(self) -> frozenset[str]:
+        """The names of its parameters."""
+        return frozenset(self.parameters.model_fields)
+
 
 ACTIONS: dict[str, Handler] = {}
 REFUSED = {
     "CreateHouse": "it has the recorded iTHOR rooms and no procedural houses; backend='unity' has"
 }
 """Actions of AI2-THOR that are known, not there, and worth a reason."""
+_LONGEST_QUOTE = 200
+"""Characters of what was given that an error message repeats."""
 
 
 def action(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -90,14 +98,19 @@ def perform(world: World, request: Mapping[str, Any]) -> Any:
     given = {
         key: value
         for key, value in request.items()
-        if value is not None
-        and (key in handler.parameters.model_fields or key not in GLOBAL_PARAMETERS)
+        if value is not None and (key in handler.fields or key not in GLOBAL_PARAMETERS)
     }
     try:
         checked = handler.parameters(**given)
     except ValidationError as error:
         raise _wrongly_called(handler, error) from None
-    return handler.run(world, **{key: getattr(checked, key) for key in type(checked).model_fields})
+    return handler.run(world, **vars(checked))
+
+
+def quoted(value: object) -> str:
+    """What was given, as an error message repeats it: on one line, and only its beginning."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
 
 
 def _unknown(name: object) -> str:
@@ -105,7 +118,7 @@ def _unknown(name: object) -> str:
         return f"The embedded engine has no action {name!r}: {REFUSED[name]}."
     close = get_close_matches(str(name), ACTIONS, n=3)
     hint = f" Did you mean {' or '.join(close)}?" if close else ""
-    return f"The embedded engine has no action {name!r}.{hint}"
+    return f"The embedded engine has no action {quoted(name)}.{hint}"
 
 
 def _wrongly_called(handler: Handler, error: ValidationError) -> ActionFailed:
@@ -119,9 +132,11 @@ def _wrongly_called(handler: Handler, error: ValidationError) -> ActionFailed:
         )
     first = problems[0]
     where = ".".join(str(part) for part in first["loc"])
+    if len(where) > _LONGEST_QUOTE or not where.isprintable():
+        where = quoted(where)
     said = "is not an argument" if first["type"] == "extra_forbidden" else first["msg"]
     return ActionFailed(
-        f"{handler.name} was called with {where}={first['input']!r}: {said}; "
+        f"{handler.name} was called with {where}={quoted(first['input'])}: {said}; "
         f"its arguments are: {allowed}.",
         INVALID_ARGUMENT,
     )

@@ -255,10 +255,21 @@ def _free(
     low, high = obstacles[:, 0], obstacles[:, 1]
     same_height = (low[:, 1] < height + tall) & (high[:, 1] > height + _SKIN)
     low, high = low[same_height][:, [0, 2]], high[same_height][:, [0, 2]]
-    clear = half + _SKIN
-    centres = spots[:, None]
-    overlap = (centres + clear > low[None]) & (centres - clear < high[None])
-    return np.asarray(~np.any(np.all(overlap, axis=2), axis=1))
+    return np.asarray(~_overlap(spots, half + _SKIN, low, high).any(axis=1))
+
+
+def _overlap(
+    spots: NDArray[np.float64],
+    half: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """(S, Q) which rectangles (Q, 2), (Q, 2) a thing of half-size (2,) covers at which spots."""
+    x, z = spots[:, 0, None], spots[:, 1, None]
+    found = (x > low[:, 0] - half[0]) & (x < high[:, 0] + half[0])
+    found &= z > low[:, 1] - half[1]
+    found &= z < high[:, 1] + half[1]
+    return np.asarray(found)
 
 
 def _tops(
@@ -274,5 +285,5 @@ def _tops(
     """
     heaped = obstacles[(obstacles[:, 0, 1] < rim) & (obstacles[:, 1, 1] > height)]
     low, high = heaped[:, 0][:, [0, 2]], heaped[:, 1][:, [0, 2]]
-    under = ((spots[:, None] + half > low[None]) & (spots[:, None] - half < high[None])).all(axis=2)
+    under = _overlap(spots, half, low, high)
     return np.asarray(np.where(under, heaped[:, 1, 1], height).max(axis=1, initial=height))

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.space.reach import Outlines
-from er_gym.sim.space.visibility import in_frustum, sights
-from er_gym.sim.world import Agent, World
+from er_gym.sim.space.sights import sights
+from er_gym.sim.space.visibility import in_frustum
+from er_gym.sim.world import CAMERA_CROUCHING, CAMERA_STANDING, World
 
 HORIZONS = (-30.0, 0.0, 30.0, 60.0)
 """Camera tilts that AI2-THOR tries when none are asked for, degrees, down positive."""
 _REMEMBERED = 64
 """Answers over more positions than these are not kept."""
-_BATCH = 32
-"""Positions that one call of the ray kernel looks from."""
+_BATCH = 64
+"""Camera positions that one call of the ray kernel looks from."""
+
+Poses = NDArray[np.float64]
+"""(K, 6): x, y and z in metres, rotation and horizon in degrees, 1 for standing or 0."""
 
 
 def interactable_poses(
@@ -28,7 +31,7 @@ def interactable_poses(
     horizons: Sequence[float],
     standings: Sequence[bool],
     max_poses: int | None = None,
-) -> tuple[Agent, ...]:
+) -> Poses:
     """Poses from which object i is visible, hence can be interacted with.
 
     Args:
@@ -36,17 +39,19 @@ def interactable_poses(
         rotations, horizons: degrees. standings: whether to stand or crouch.
         max_poses: stop after so many.
     """
-    settings = world.settings
-    lens = (settings.field_of_view, settings.width / settings.height, settings.visibility_distance)
     filters = (tuple(rotations), tuple(horizons), tuple(standings), max_poses)
-    question = (i, positions.tobytes(), filters, lens, world.agent.position[1])
 
-    def search() -> tuple[Agent, ...]:
-        return tuple(_search(world, i, positions, *filters))
+    def search() -> Poses:
+        found = _search(world, i, positions, *filters)
+        found.setflags(write=False)
+        return found
 
     # Where the hand is, is no part of an arrangement; and the poses of a whole room take megabytes.
     if i in world.in_hand or len(positions) > _REMEMBERED:
         return search()
+    settings = world.settings
+    lens = (settings.field_of_view, settings.width / settings.height, settings.visibility_distance)
+    question = (i, positions.tobytes(), filters, lens, world.agent.position[1])
     return sights(world).remembered(question, search)
 
 
@@ -58,47 +63,62 @@ def _search(
     horizons: Sequence[float],
     standings: Sequence[bool],
     max_poses: int | None,
-) -> list[Agent]:
-    settings, known = world.settings, sights(world)
-    points = world.sample_points(i).astype(np.float32)
-    of = np.full(len(points), i, dtype=np.int16)
-    held = world.in_hand
-    directions = np.array([(r % 360.0, h) for r in rotations for h in horizons])
-    found: list[Agent] = []
-    gaps = Outlines.of([world.shape(i)]).gaps(positions)[:, 0]
-    near = positions[gaps <= settings.visibility_distance]
-    for batch in range(0, len(near), _BATCH):
-        places = _standing_at(world, near[batch : batch + _BATCH], standings)
-        if not places or not len(directions):
+) -> Poses:
+    found = [np.empty((0, 6))]
+    if world.hidden[i]:
+        return found[0]
+    settings = world.settings
+    near = _within_reach(world, i, positions)
+    yaws, tilts = np.array(rotations) % 360.0, np.array(horizons)
+    upright = np.array(standings, dtype=bool)
+    lifts = np.where(upright, CAMERA_STANDING, CAMERA_CROUCHING)
+    eyes, count = np.empty((len(near) * len(lifts), 3)), 0
+    eyes[:, [0, 2]] = np.repeat(near, len(lifts), axis=0)
+    eyes[:, 1] = world.agent.position[1] + np.tile(lifts, len(near))
+    for first in range(0, len(eyes), _BATCH):
+        batch = eyes[first : first + _BATCH]
+        points, clear = _lines_to(world, i, batch)
+        eye, point = clear.nonzero()
+        if not len(eye):
             continue
-        eyes = np.array([place.camera for place in places])
-        if len(eyes) == 1 and i not in held:
-            # Whoever asks for one position will look about from there next: keep what is found.
-            mine = known.of == i
-            clear = known.clear_from(eyes[0], mine)[mine][None]
-        else:
-            clear = known.clear(eyes, points, of)
         in_picture = in_frustum(
-            (points - eyes[:, None])[:, None],
-            directions[:, 0, None],
-            directions[:, 1, None],
+            (points[point] - batch[eye])[:, None, None],
+            yaws[:, None],
+            tilts,
             settings.field_of_view,
             settings.width / settings.height,
         )
-        for place, direction in np.argwhere((clear[:, None] & in_picture).any(axis=2)).tolist():
-            rotation, horizon = directions[direction].tolist()
-            found.append(replace(places[place], rotation=rotation, horizon=horizon))
-            if max_poses is not None and len(found) >= max_poses:
-                return found
-    return found
+        some, where = np.unique(eye, return_index=True)
+        eye, yaw, tilt = np.logical_or.reduceat(in_picture, where).nonzero()
+        place, body = np.divmod(first + some[eye], len(lifts))
+        poses = np.empty((len(eye), 6))
+        poses[:, [0, 2]], poses[:, 1] = near[place], world.agent.position[1]
+        poses[:, 3], poses[:, 4], poses[:, 5] = yaws[yaw], tilts[tilt], upright[body]
+        found.append(poses)
+        count += len(poses)
+        if max_poses is not None and count >= max_poses:
+            break
+    return np.concatenate(found)[:max_poses]
 
 
-def _standing_at(
-    world: World, positions: NDArray[np.float64], standings: Sequence[bool]
-) -> list[Agent]:
-    y = world.agent.position[1]
-    return [
-        Agent(np.array([x, y, z]), standing=standing)
-        for x, z in positions
-        for standing in standings
-    ]
+def _within_reach(world: World, i: int, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Those of (P, 2) positions that object i is within the visibility distance of."""
+    distance = world.settings.visibility_distance
+    away = np.abs(sights(world).reach[:, None] - positions).max(axis=0, initial=0.0)
+    if i not in world.in_hand and (np.hypot(away[:, 0], away[:, 1]) <= distance).all():
+        return positions  # all that there is, is
+    return positions[Outlines.of([world.shape(i)]).gaps(positions)[:, 0] <= distance]
+
+
+def _lines_to(
+    world: World, i: int, eyes: NDArray[np.float64]
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Object i's sample points (Q, 3), and (E, Q) from which eyes (E, 3) nothing hides which."""
+    known = sights(world)
+    if len(eyes) == 1 and i not in world.in_hand:
+        # Whoever asks for one position will look about from there next: keep what is found.
+        first, count = known.first[i], known.count[i]
+        points = known.points[first : first + count]
+        return points, known.viewpoint(eyes[0]).blocking[None, first : first + count] == 0
+    points = world.sample_points(i).astype(np.float32)
+    return points, known.clear(eyes, points, i)

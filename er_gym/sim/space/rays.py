@@ -1,23 +1,31 @@
-"""Lines of sight against axis-aligned boxes: one vectorised kernel."""
+"""Lines of sight against axis-aligned boxes.
+
+A box in which the eye or the point looked at itself lies does not count: recorded boxes of concave
+things (a chair, an L-shaped counter) contain air. Slab method, in single precision throughout.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-_EPSILON = 1e-3
+_EPSILON = np.float32(1e-3)
+_ALMOST_ONE = np.float32(1.0) - _EPSILON
+_TINY = np.float32(1e-9)
+
+Floats = NDArray[np.float32]
+
+
+def _inverse(direction: Floats) -> Floats:
+    return np.asarray(np.float32(1.0) / np.where(np.abs(direction) < _TINY, _TINY, direction))
 
 
 def blocked_by(
-    origins: NDArray[np.float32],
-    targets: NDArray[np.float32],
-    box_min: NDArray[np.float32],
-    box_max: NDArray[np.float32],
+    origins: Floats, targets: Floats, box_min: Floats, box_max: Floats
 ) -> NDArray[np.bool_]:
-    """Which boxes stand between each origin and its target (slab method).
-
-    A box in which the origin or the target itself lies does not count: recorded boxes of concave
-    things (a chair, an L-shaped counter) contain air.
+    """Which boxes stand between each origin and its target, every one against every one.
 
     Args:
         origins: (R, 3) or (1, 3), metres, world frame.
@@ -27,9 +35,7 @@ def blocked_by(
     Returns:
         (R, M) bool.
     """
-    direction = targets - origins
-    direction = np.where(np.abs(direction) < 1e-9, np.float32(1e-9), direction)
-    inverse = 1.0 / direction
+    inverse = _inverse(targets - origins)
     enter = np.full((len(targets), len(box_min)), -np.inf, dtype=np.float32)
     leave = np.full_like(enter, np.inf)
     for axis in range(3):
@@ -38,4 +44,68 @@ def blocked_by(
         second = (box_max[None, :, axis] - origins[:, axis, None]) * scale
         np.maximum(enter, np.minimum(first, second), out=enter)
         np.minimum(leave, np.maximum(first, second), out=leave)
-    return (enter > _EPSILON) & (enter <= leave) & (leave < 1.0 - _EPSILON)
+    return (enter > _EPSILON) & (enter <= leave) & (leave < _ALMOST_ONE)
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Points to look at, in K groups that each lie together.
+
+    Attributes:
+        points: (3, P) metres, world frame.
+        first, count: (K,) where each group begins in ``points`` and how many it has.
+        low, high: (3, K) corners of the box around each group.
+    """
+
+    points: Floats
+    first: NDArray[np.intp]
+    count: NDArray[np.intp]
+    low: Floats
+    high: Floats
+
+
+def crossings(
+    eye: Floats, targets: Targets, box_min: Floats, box_max: Floats, pairs: NDArray[np.bool_]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Which boxes stand between one eye and which points, for the pairs that are asked for.
+
+    As :func:`blocked_by`, of which it leaves out what cannot be: a box that does not reach between
+    the eye and a group of points hides none of it.
+
+    Args:
+        eye: (3,).
+        box_min, box_max: (3, M) corners.
+        pairs: (K, M) bool, which boxes are asked about for which groups.
+
+    Returns:
+        (H,) points and (H,) boxes, one pair for each line of sight that a box crosses.
+    """
+    between = pairs
+    for axis in range(3):
+        nearest = np.minimum(targets.low[axis], eye[axis])
+        farthest = np.maximum(targets.high[axis], eye[axis])
+        between = (
+            between & (box_max[axis] >= nearest[:, None]) & (box_min[axis] <= farthest[:, None])
+        )
+    group, box = between.nonzero()
+    count = targets.count[group]
+    ends = count.cumsum()
+    point = np.arange(ends[-1] if len(ends) else 0)
+    point += np.repeat(targets.first[group] - ends + count, count)
+    boxes = np.repeat(box, count)
+    inverse = _inverse(targets.points - eye[:, None])
+    near, far = box_min - eye[:, None], box_max - eye[:, None]
+    enter, leave = _slab(inverse[0][point], near[0][boxes], far[0][boxes])
+    for axis in (1, 2):
+        first, last = _slab(inverse[axis][point], near[axis][boxes], far[axis][boxes])
+        np.maximum(enter, first, out=enter)
+        np.minimum(leave, last, out=leave)
+    crossed = (enter > _EPSILON) & (enter <= leave) & (leave < _ALMOST_ONE)
+    return point[crossed], boxes[crossed]
+
+
+def _slab(scale: Floats, near: Floats, far: Floats) -> tuple[Floats, Floats]:
+    """Where lines enter and leave the space between two planes, as shares of their length."""
+    near *= scale
+    far *= scale
+    return np.minimum(near, far), np.maximum(near, far)

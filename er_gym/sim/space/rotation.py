@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from math import cos, radians, sin
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,18 +23,19 @@ def unity_rotation(rotation: ArrayLike) -> NDArray[np.float64]:
         (..., 3, 3) matrices that take a vector of the object's own frame to the world's:
         ``world = position + R @ local``.
     """
-    angles = np.radians(np.asarray(rotation, dtype=np.float64))
-    turn_x, turn_y, turn_z = (
-        _turn(angles[..., axis], (axis + 1) % 3, (axis + 2) % 3) for axis in range(3)
-    )
-    return turn_y @ turn_x @ turn_z
+    angles = np.asarray(rotation, dtype=np.float64)
+    if angles.ndim == 1:  # plain numbers, ten times as fast as arrays of one
+        turns = [radians(angle) for angle in angles.tolist()]
+        return np.array(_matrix([sin(a) for a in turns], [cos(a) for a in turns]))
+    turned = np.moveaxis(np.radians(angles), -1, 0)
+    return np.moveaxis(np.array(_matrix(np.sin(turned), np.cos(turned))), (0, 1), (-2, -1))
 
 
-def _turn(angle: NDArray[np.float64], a: int, b: int) -> NDArray[np.float64]:
-    """The turn by ``angle`` (radians) in the plane of axes ``a`` and ``b``, from a towards b."""
-    matrix = np.zeros((*angle.shape, 3, 3))
-    matrix[..., range(3), range(3)] = 1.0
-    matrix[..., a, a] = matrix[..., b, b] = np.cos(angle)
-    matrix[..., b, a] = np.sin(angle)
-    matrix[..., a, b] = -matrix[..., b, a]
-    return matrix
+def _matrix(sines: Iterable[Any], cosines: Iterable[Any]) -> list[list[Any]]:
+    """Ry @ Rx @ Rz, written out."""
+    (sx, sy, sz), (cx, cy, cz) = sines, cosines
+    return [
+        [cy * cz + sy * sx * sz, sy * sx * cz - cy * sz, sy * cx],
+        [cx * sz, cx * cz, -sx],
+        [cy * sx * sz - sy * cz, sy * sz + cy * sx * cz, cy * cx],
+    ]

@@ -10,7 +10,7 @@ free floor, the record does not.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,11 +66,20 @@ class WalkableFloor:
 
     def contains(self, points: NDArray[np.float64], *, tolerant: bool = True) -> NDArray[np.bool_]:
         """Which of (..., 2) x, z points can be stood on, to within 2.5 cm (tolerant: 7.5 cm)."""
+        bitmap = self._near_framed if tolerant else self._exact_framed
         cells = np.round((points - self.origin) / CELL)
-        bitmap = self.near if tolerant else self.exact
-        inside = np.all((cells >= 0) & (cells < bitmap.shape), axis=-1)
-        cells = np.where(inside[..., None], cells, 0).astype(int)
-        return np.asarray(inside & bitmap[cells[..., 0], cells[..., 1]])
+        cells = np.minimum(np.maximum(cells, -1.0), self.exact.shape).astype(int)
+        return np.asarray(bitmap[cells[..., 0], cells[..., 1]])
+
+    # With a frame of cells that are no floor: at the far ends, which index -1 finds too.
+
+    @cached_property
+    def _near_framed(self) -> NDArray[np.bool_]:
+        return np.pad(self.near, (0, 1))
+
+    @cached_property
+    def _exact_framed(self) -> NDArray[np.bool_]:
+        return np.pad(self.exact, (0, 1))
 
     def swept(self, radius: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """The cells that a disc of ``radius`` metres sweeps as its middle walks the floor.

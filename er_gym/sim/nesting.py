@@ -1,0 +1,42 @@
+"""What lies in what, directly and through other things."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Nesting:
+    """The containments of N objects.
+
+    Attributes:
+        contents: for each object, the rows of what lies in or on it, in scene order.
+        within: (N, N) bool, row i: the receptacles that object i is in, directly or through others.
+    """
+
+    contents: list[list[int]]
+    within: NDArray[np.bool_]
+
+    @staticmethod
+    def of(parents: Sequence[Sequence[int]], exists: NDArray[np.bool_]) -> Nesting:
+        """From each object's receptacles; objects that are no more lie in nothing."""
+        count = len(parents)
+        contents: list[list[int]] = [[] for _ in range(count)]
+        there = exists.tolist()
+        for i, lies_in in enumerate(parents):
+            if there[i]:
+                for parent in lies_in:
+                    contents[parent].append(i)
+        within = np.zeros((count, count), dtype=bool)
+        for i, lies_in in enumerate(parents):
+            if lies_in:
+                within[i, lies_in] = True
+        while True:  # a few rounds: a fork in a pan on a burner is as deep as it gets
+            through = within | (within.astype(np.float32) @ within.astype(np.float32) > 0.0)
+            if (through == within).all():
+                return Nesting(contents, within)
+            within = through

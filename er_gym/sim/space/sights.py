@@ -1,0 +1,400 @@
+"""What can be seen from where, in one arrangement of a scene's objects.
+
+Episodes begin alike and return to the same states, so what was found out is kept (:func:`sights`).
+An arrangement differs from the recorded one in a few objects: what was found out about that holds
+but for those, so only lines of sight to them, and through where they were and are, are looked at.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim import recorded
+from er_gym.sim.scene import load_scene
+from er_gym.sim.space.rays import Targets, blocked_by, crossings
+from er_gym.sim.space.reach import Outlines
+from er_gym.sim.world import Settings, World
+
+_ARRANGEMENTS = 512
+_VIEWPOINTS = 128
+_ANSWERS = 512
+
+Found = TypeVar("Found")
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Viewpoint:
+    """What is in the way of what, seen from one camera position.
+
+    Attributes:
+        blocking: (P,) how many boxes hide each sample point.
+        clear: (C,) the points that nothing hides and that are not shut away.
+    """
+
+    blocking: NDArray[np.int8]
+    clear: NDArray[np.uint16]
+
+
+@dataclass(frozen=True, eq=False)
+class Sights:
+    """The lines of sight of one arrangement.
+
+    What is in the agent's hand hides nothing here and is not looked for: it is always seen.
+
+    Attributes:
+        points: (P, 3) sample points of all objects, metres; those of one object lie together.
+        of: (P,) whose each is. first, count: (N,) where each object's points begin, how many.
+        low, high: (M, 3) corners of boxes that hide things; whose: (M,) whose they are.
+        own: (N, M) the boxes of each object and of what it lies in or on, which do not hide it.
+        sign: (M,) -1 for boxes of the recorded arrangement that are gone, else 1.
+        pairs: (N, M) which boxes are to be asked about for whose points.
+        away: (N,) which objects are shut away, in the hand or no more.
+        reach: (2, 2) corners x, z of a rectangle around everything, metres.
+        before: the recorded arrangement, None if this is that one.
+        anew: (P,) the points about which that one says nothing, None if there are none.
+        moved: (K,) rows of the objects that are not where they were recorded.
+        moved_outlines: theirs, from above; those of all objects in the recorded arrangement.
+    """
+
+    points: Floats
+    of: NDArray[np.intp]
+    first: NDArray[np.intp]
+    count: NDArray[np.intp]
+    low: Floats
+    high: Floats
+    whose: NDArray[np.intp]
+    own: NDArray[np.bool_]
+    sign: NDArray[np.int8]
+    pairs: NDArray[np.bool_]
+    away: NDArray[np.bool_]
+    reach: NDArray[np.float64]
+    before: Sights | None
+    anew: NDArray[np.bool_] | None
+    moved: NDArray[np.intp]
+    moved_outlines: Outlines | None
+    _viewpoints: OrderedDict[tuple[float, ...], Viewpoint] = field(default_factory=OrderedDict)
+    _answers: OrderedDict[Any, Any] = field(default_factory=OrderedDict)
+
+    # -- asking ----------------------------------------------------------------------------------
+
+    def viewpoint(self, camera: NDArray[np.float64]) -> Viewpoint:
+        """From a (3,) camera position."""
+        return _kept(
+            self._viewpoints, tuple(camera.tolist()), _VIEWPOINTS, lambda: self._look_from(camera)
+        )
+
+    def _look_from(self, camera: NDArray[np.float64]) -> Viewpoint:
+        blocking = np.zeros(len(self.of), dtype=np.int8)
+        if self.before is not None:
+            recorded = self.before.viewpoint(camera).blocking
+            blocking[: len(recorded)] = recorded
+            if self.anew is not None:
+                blocking[self.anew] = 0
+        if self._questions is not None:
+            targets, low, high, sign, pairs = self._questions
+            point, box = crossings(camera.astype(np.float32), targets, low, high, pairs)
+            count = np.bincount(point, weights=sign[box], minlength=len(blocking))
+            blocking += count.astype(np.int8)
+        clear = np.flatnonzero((blocking == 0) & ~self.away[self.of])
+        return Viewpoint(blocking, clear.astype(np.uint16))
+
+    @cached_property
+    def _spans(self) -> tuple[Floats, Floats, Floats]:
+        """The points as (3, P), and (3, N) corners of the box around each object's."""
+        if self.before is not None and self.points is self.before.points:
+            return self.before._spans
+        axes = np.ascontiguousarray(self.points.T)
+        there = np.flatnonzero(self.count)
+        low, high = np.zeros((2, 3, len(self.count)), dtype=np.float32)
+        low[:, there] = np.minimum.reduceat(axes, self.first[there], axis=1)
+        high[:, there] = np.maximum.reduceat(axes, self.first[there], axis=1)
+        return axes, low, high
+
+    @cached_property
+    def _questions(
+        self,
+    ) -> tuple[Targets, Floats, Floats, NDArray[np.int8], NDArray[np.bool_]] | None:
+        """The objects, and the boxes, that are in any of the pairs; None if there are none."""
+        asked = np.flatnonzero(self.pairs.any(axis=1) & (self.count > 0))
+        if not len(asked):
+            return None
+        boxes = np.flatnonzero(self.pairs[asked].any(axis=0))
+        axes, low, high = self._spans
+        first, count = self.first[asked], self.count[asked]
+        return (
+            Targets(axes, first, count, low[:, asked], high[:, asked]),
+            np.ascontiguousarray(self.low[boxes].T),
+            np.ascontiguousarray(self.high[boxes].T),
+            self.sign[boxes],
+            self.pairs[np.ix_(asked, boxes)],
+        )
+
+    def clear(self, eyes: NDArray[np.float64], points: Floats, i: int) -> NDArray[np.bool_]:
+        """(E, Q) which (Q, 3) points of object i nothing hides from which (E, 3) positions."""
+        origins = eyes.astype(np.float32)
+        # What does not reach into the space between them all hides nothing.
+        nearest = np.minimum(origins.min(axis=0), points.min(axis=0))
+        farthest = np.maximum(origins.max(axis=0), points.max(axis=0))
+        between = (self.sign > 0) & ~self.own[i]
+        between &= ((self.high >= nearest) & (self.low <= farthest)).all(axis=1)
+        blocked = blocked_by(
+            np.repeat(origins, len(points), axis=0),
+            np.tile(points, (len(eyes), 1)),
+            self.low[between],
+            self.high[between],
+        )
+        return np.asarray(~blocked.any(axis=1).reshape(len(eyes), -1))
+
+    def within(self, position: NDArray[np.float64], distance: float) -> NDArray[np.bool_] | None:
+        """(N,) which objects are no farther than a distance from a (3,) position; metres.
+
+        None when all are.
+        """
+        here = position[[0, 2]]
+        if np.hypot(*np.abs(self.reach - here).max(axis=0)) <= distance:
+            return None
+        return np.asarray(self._gaps(here) <= distance)
+
+    def _gaps(self, here: NDArray[np.float64]) -> NDArray[np.float64]:
+        found = np.zeros(len(self.count))
+        if self.before is not None:
+            before = self.before
+            gaps = before.remembered(("gaps", *here.tolist()), lambda: before._gaps(here))
+            found[: len(gaps)] = gaps
+        if self.moved_outlines is not None:
+            found[self.moved] = self.moved_outlines.gaps(here[None])[0]
+        return found
+
+    def remembered(self, question: Any, answer: Callable[[], Found]) -> Found:
+        """The answer to a question about this arrangement, worked out once."""
+        found: Found = _kept(self._answers, question, _ANSWERS, answer)
+        return found
+
+
+def _kept(
+    memory: OrderedDict[Any, Found], question: Any, limit: int, answer: Callable[[], Found]
+) -> Found:
+    """What is remembered, or worked out and remembered now; the longest unused is forgotten."""
+    if question in memory:
+        memory.move_to_end(question)
+        known: Found = memory[question]
+        return known
+    memory[question] = found = answer()
+    if len(memory) > limit:
+        memory.popitem(last=False)
+    return found
+
+
+# -- arrangements ----------------------------------------------------------------------------------
+
+
+def _boxes(world: World, rows: Iterable[int]) -> tuple[Floats, Floats, NDArray[np.intp]]:
+    """(M, 3) corners of what some objects hide things with, and (M,) whose they are."""
+    rows = list(rows)
+    hiding = [np.empty((0, 2, 3)), *(world.shape(i).hiding for i in rows)]
+    boxes = np.concatenate(hiding).astype(np.float32)
+    return boxes[:, 0], boxes[:, 1], np.repeat(rows, [len(h) for h in hiding[1:]]).astype(np.intp)
+
+
+def _own(world: World, whose: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """(N, M) which boxes belong to each object, or to something that it lies in or on."""
+    return np.asarray((np.arange(len(world))[:, None] == whose) | world.nesting.within[:, whose])
+
+
+def _rectangle(outlines: Outlines) -> NDArray[np.float64]:
+    """(2, 2) corners x, z of a rectangle that holds all parts, however they are turned; metres."""
+    radius = np.hypot(*np.maximum(np.abs(outlines.low), np.abs(outlines.high)).T)[:, None]
+    return np.array(
+        [(outlines.middle - radius).min(axis=0), (outlines.middle + radius).max(axis=0)]
+    )
+
+
+def sights_anew(world: World) -> Sights:
+    """The sights of the world as it is now, whatever is known of other arrangements."""
+    rows = range(len(world))
+    points = [world.sample_points(i) for i in rows]
+    count = np.array([len(p) for p in points])
+    of = np.repeat(np.arange(len(world)), count)
+    away = world.hidden.copy()
+    away[world.in_hand] = True
+    low, high, whose = _boxes(world, np.flatnonzero(~away).tolist())
+    own = _own(world, whose)
+    outlines = Outlines.of([world.shape(i) for i in rows])
+    return Sights(
+        points=np.concatenate(points).astype(np.float32),
+        of=of,
+        first=count.cumsum() - count,
+        count=count,
+        low=low,
+        high=high,
+        whose=whose,
+        own=own,
+        sign=np.ones(len(whose), dtype=np.int8),
+        pairs=~own,
+        away=away,
+        reach=_rectangle(outlines),
+        before=None,
+        anew=None,
+        moved=np.arange(len(world)),
+        moved_outlines=outlines,
+    )
+
+
+@lru_cache(maxsize=128)
+def _as_recorded(scene_name: str) -> Sights:
+    return sights_anew(World.load(load_scene(scene_name), Settings()))
+
+
+_SAME = 1e-6
+"""What has moved by less than this is where it was, metres."""
+
+
+@dataclass(frozen=True)
+class _Difference:
+    """How the world differs from the recorded arrangement, in what lines of sight depend on.
+
+    Attributes:
+        away: (N,) which objects are shut away, in the hand or no more.
+        elsewhere: rows of the others that are not where they were, or lie in something else.
+    """
+
+    away: NDArray[np.bool_]
+    elsewhere: NDArray[np.intp]
+
+    @staticmethod
+    def of(world: World) -> _Difference:
+        scene, count = world.scene, len(world.scene)
+        away = world.hidden.copy()
+        away[world.in_hand] = True
+        touched = np.array(world.touched(), dtype=np.intp)
+        rows = touched[~away[touched]]
+        new, rows = rows[rows >= count], rows[rows < count]
+        half = scene.aabb_size[rows] / 2
+        apart = np.abs(
+            [
+                world.low[rows] - (scene.aabb_center[rows] - half),
+                world.high[rows] - (scene.aabb_center[rows] + half),
+                world.rotation[rows] - scene.rotation[rows],
+            ]
+        )
+        moved = (apart > _SAME).any(axis=(0, 2))
+        within = world.nesting.within[rows]
+        moved |= (within[:, :count] != recorded.nesting(scene).within[rows]).any(axis=1)
+        moved |= within[:, count:].any(axis=1)
+        return _Difference(away, np.concatenate([rows[moved], new]))
+
+    def key(self, world: World) -> tuple[Any, ...]:
+        """What the arrangement can be known again by."""
+        rows = self.elsewhere
+        return (
+            world.scene.name,
+            self.away.tobytes(),
+            rows.tobytes(),
+            world.low[rows].tobytes(),
+            world.high[rows].tobytes(),
+            world.rotation[rows].tobytes(),
+            world.nesting.within[rows].tobytes(),
+        )
+
+
+def _changed(world: World, before: Sights, difference: _Difference) -> Sights:
+    """The sights of the world as it is now, by what is different from the recorded arrangement."""
+    away, elsewhere = difference.away, difference.elsewhere
+    count, old = len(world), len(before.count)
+    was_away = np.ones(count, dtype=bool)
+    was_away[:old] = before.away
+    moved = np.zeros(count, dtype=bool)
+    moved[elsewhere] = True
+    come = _boxes(world, np.flatnonzero(moved | (was_away & ~away)).tolist())
+    low = np.concatenate([before.low, come[0]])
+    high = np.concatenate([before.high, come[1]])
+    whose = np.concatenate([before.whose, come[2]])
+    is_new = np.arange(len(whose)) >= len(before.whose)
+    gone = ~is_new & (moved | away)[whose]
+    own = _own(world, whose)
+    # Of what stays, only what has come and gone has to be asked about; of what moved, all there is.
+    pairs = ~own & np.where(moved[:, None], ~gone, gone | is_new)
+    points, of, first, number = before.points, before.of, before.first, before.count
+    if len(elsewhere) or count > old:
+        points, of, first, number = _with_points(world, before, elsewhere)
+    anew, outlines, reach = None, None, before.reach
+    if len(elsewhere):
+        anew = moved[of]
+        outlines = Outlines.of([world.shape(i) for i in elsewhere.tolist()])
+        low_end, high_end = _rectangle(outlines)
+        reach = np.array([np.minimum(reach[0], low_end), np.maximum(reach[1], high_end)])
+    return Sights(
+        points=points,
+        of=of,
+        first=first,
+        count=number,
+        low=low,
+        high=high,
+        whose=whose,
+        own=own,
+        sign=np.where(gone, -1, 1).astype(np.int8),
+        pairs=pairs,
+        away=away,
+        reach=reach,
+        before=before,
+        anew=anew,
+        moved=elsewhere,
+        moved_outlines=outlines,
+    )
+
+
+_Points = tuple[Floats, NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]
+
+
+def _with_points(world: World, before: Sights, elsewhere: NDArray[np.intp]) -> _Points:
+    """The recorded points, with those of what moved where they are now; new objects' at the end.
+
+    Returns:
+        ``points``, ``of``, ``first`` and ``count`` of the :class:`Sights` to be.
+    """
+    old = len(before.count)
+    points, number = [before.points.copy()], np.zeros(len(world), dtype=np.intp)
+    number[:old] = before.count
+    for i in elsewhere.tolist():
+        own = world.sample_points(i).astype(np.float32)
+        if i < old:  # as many as it had: they are spread over a box of the same size
+            points[0][before.first[i] : before.first[i] + before.count[i]] = own
+        else:
+            points.append(own)
+            number[i] = len(own)
+    of = np.repeat(np.arange(len(world)), number)
+    return np.concatenate(points), of, number.cumsum() - number, number
+
+
+_known: OrderedDict[Any, Sights] = OrderedDict()
+
+
+def sights(world: World) -> Sights:
+    """The sights of the world as it is now: those found before, if it was like this before."""
+    found = world.derived.get("sights")
+    if found is None:
+        found = world.derived["sights"] = _found(world)
+    return found  # type: ignore[return-value]  # the only writer is above
+
+
+def _found(world: World) -> Sights:
+    before = _as_recorded(world.scene.name)
+    if world.untouched:
+        return before
+    difference = _Difference.of(world)
+    if not len(difference.elsewhere) and np.array_equal(difference.away, before.away):
+        return before
+    return _kept(
+        _known,
+        difference.key(world),
+        _ARRANGEMENTS,
+        lambda: _changed(world, before, difference),
+    )

@@ -1,0 +1,190 @@
+"""The objects of an AI2-THOR event as columns.
+
+What asks about all objects at every step (what may be navigated to, what is seen) asks arrays, not
+a dictionary for each object. Events of the embedded engine hand over the engine's own arrays, and
+their metadata need not be made at all; those of Unity are read entry by entry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.lazy import LazyMetadata
+from er_gym.sim.scene import PROPERTIES, STATES, Scene
+from er_gym.sim.space.visibility import visible
+from er_gym.sim.world import World
+from er_gym.thor.object_types import OBJECT_TYPES
+
+TYPES = tuple(OBJECT_TYPES)
+"""Object types by number."""
+KIND_OF = {name: number for number, name in enumerate(TYPES)}
+_FLAGS = ("pickupable", "receptacle", "openable", "toggleable", "isOpen", "isToggled")
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectTable:
+    """The N objects of a scene in one state, in scene order; where the agent is does not matter.
+
+    The engine hands out the same table as long as nothing but the agent has changed. Arrays are
+    read-only by agreement. Objects of types that are not in :data:`OBJECT_TYPES` are left out.
+
+    Attributes:
+        ids: ``objectId`` of each. row: the row of each id.
+        kinds: (N,) index of each one's type in :data:`TYPES`.
+        pickupable, receptacle, openable, toggleable, is_open, is_toggled: (N,) bool.
+        centre, size: (N, 3) of each one's axis-aligned box, world frame, metres.
+        parents: rows of the receptacles that each lies in, innermost first.
+        contents: rows of what lies in each.
+        controlled: rows of what each controls, as a stove knob does its burner.
+        held: row of what is in the agent's hand, -1 when that is empty.
+        derived: what has been worked out from all but ``centre``. Tables that differ in nothing but
+            where the hand has carried things share it.
+    """
+
+    ids: tuple[str, ...]
+    row: Mapping[str, int]
+    kinds: NDArray[np.intp]
+    pickupable: NDArray[np.bool_]
+    receptacle: NDArray[np.bool_]
+    openable: NDArray[np.bool_]
+    toggleable: NDArray[np.bool_]
+    is_open: NDArray[np.bool_]
+    is_toggled: NDArray[np.bool_]
+    centre: NDArray[np.float64]
+    size: NDArray[np.float64]
+    parents: Sequence[Sequence[int]]
+    contents: Sequence[Sequence[int]]
+    controlled: Sequence[Sequence[int]]
+    held: int
+    derived: dict[str, object] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def type_of(self, k: int) -> str:
+        """The type of object k."""
+        return TYPES[int(self.kinds[k])]
+
+    def of_type(self, object_type: str) -> list[int]:
+        """The rows of all objects of a type, in scene order."""
+        return self._by_kind.get(KIND_OF.get(object_type, -1), [])
+
+    @cached_property
+    def _by_kind(self) -> dict[int, list[int]]:
+        found: dict[int, list[int]] = {}
+        for k, kind in enumerate(self.kinds.tolist()):
+            found.setdefault(kind, []).append(k)
+        return found
+
+    @cached_property
+    def volume(self) -> NDArray[np.float64]:
+        """(N,) volume of each one's axis-aligned box, m³."""
+        return np.asarray(self.size[:, 0] * self.size[:, 1] * self.size[:, 2])
+
+    @cached_property
+    def face(self) -> NDArray[np.float64]:
+        """(N,) area of the largest face of each one's axis-aligned box, m²."""
+        x, y, z = self.size.T
+        return np.asarray(np.maximum(np.maximum(x * y, y * z), x * z))
+
+
+def objects_of(event: Any) -> tuple[ObjectTable, NDArray[np.bool_]]:
+    """The objects of an event, and (N,) which of them are visible to the agent."""
+    metadata = event.metadata
+    if isinstance(metadata, LazyMetadata):
+        world = metadata.source
+        if isinstance(world, World) and world.exists.all():
+            return _of_world(world), visible(world)
+    return _of_entries(metadata)
+
+
+def _of_entries(metadata: Mapping[str, Any]) -> tuple[ObjectTable, NDArray[np.bool_]]:
+    entries = [e for e in metadata["objects"] if e["objectType"] in KIND_OF]
+    ids = tuple(e["objectId"] for e in entries)
+    row = {object_id: k for k, object_id in enumerate(ids)}
+
+    def rows(name: str) -> list[tuple[int, ...]]:
+        return [tuple(row[i] for i in entry[name] or () if i in row) for entry in entries]
+
+    def box(name: str) -> NDArray[np.float64]:
+        boxes = [entry["axisAlignedBoundingBox"][name] for entry in entries]
+        return np.array([(b["x"], b["y"], b["z"]) for b in boxes]).reshape(-1, 3)
+
+    flags = {name: np.array([bool(e[name]) for e in entries], dtype=bool) for name in _FLAGS}
+    held = metadata["inventoryObjects"]
+    table = ObjectTable(
+        ids=ids,
+        row=row,
+        kinds=np.array([KIND_OF[e["objectType"]] for e in entries], dtype=np.intp),
+        pickupable=flags["pickupable"],
+        receptacle=flags["receptacle"],
+        openable=flags["openable"],
+        toggleable=flags["toggleable"],
+        is_open=flags["isOpen"],
+        is_toggled=flags["isToggled"],
+        centre=box("center"),
+        size=box("size"),
+        parents=rows("parentReceptacles"),
+        contents=rows("receptacleObjectIds"),
+        controlled=rows("controlledObjects"),
+        held=row.get(held[0]["objectId"], -1) if held else -1,
+    )
+    return table, np.array([bool(e["visible"]) for e in entries], dtype=bool)
+
+
+_Names = tuple[tuple[str, ...], Mapping[str, int], NDArray[np.intp]]
+
+
+def _named(ids: Sequence[str], types: Sequence[str]) -> _Names:
+    kinds = np.array([KIND_OF[name] for name in types], dtype=np.intp)
+    return tuple(ids), {object_id: k for k, object_id in enumerate(ids)}, kinds
+
+
+@lru_cache(maxsize=128)
+def _recorded_names(scene: Scene) -> _Names:
+    return _named(scene.object_ids, scene.types)
+
+
+def _names(world: World) -> _Names:
+    recorded = _recorded_names(world.scene)
+    # Equal tuples of the same strings are compared by identity: this costs next to nothing.
+    if tuple(world.object_ids) == recorded[0]:
+        return recorded
+    return _named(world.object_ids, world.types)
+
+
+def _of_world(world: World) -> ObjectTable:
+    """The table of the world as it is; kept until the world changes."""
+    found = world.derived.get("table")
+    if isinstance(found, ObjectTable):
+        if world.held >= 0:  # what is carried moves with the agent
+            found = replace(found, centre=(world.low + world.high) / 2)
+    else:
+        ids, row, kinds = _names(world)
+        properties, states = world.properties.copy(), world.states.copy()
+        has = dict(zip(PROPERTIES, properties.T, strict=True))
+        state = dict(zip(STATES, states.T, strict=True))
+        found = world.derived["table"] = ObjectTable(
+            ids=ids,
+            row=row,
+            kinds=kinds,
+            pickupable=has["pickupable"],
+            receptacle=has["receptacle"],
+            openable=has["openable"],
+            toggleable=has["toggleable"],
+            is_open=state["isOpen"],
+            is_toggled=state["isToggled"],
+            centre=(world.low + world.high) / 2,
+            size=world.high - world.low,
+            parents=tuple(world.parents),
+            contents=world.contents,
+            controlled=tuple(rows or () for rows in world.controlled),
+            held=world.held,
+        )
+    return found
