@@ -20,7 +20,6 @@ from typing import Any
 import click
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from benchmarks.perf.invariants import (
     Metadata,
@@ -29,7 +28,8 @@ from benchmarks.perf.invariants import (
     floor_of,
     stands_on_the_floor,
 )
-from benchmarks.pool import Lost, do_jobs
+from benchmarks.perf.jobs import bar, choose_scenes, do_all
+from benchmarks.pool import Lost
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks import verbs
 from er_gym.tasks.task import KeyAction, Task
@@ -261,35 +261,10 @@ def soak(
     scenes: Sequence[str], *, level: str, actions: int, seed: int, workers: int
 ) -> Iterator[Report]:
     """Play in all scenes, each whole in one of so many processes (1: in this one)."""
-    make = partial(_player, level, actions, seed)
-    if workers == 1:
-        yield from map(make(), scenes)
-        return
-    for scene, report in do_jobs(make, scenes, workers=workers, tries=1):
+    for scene, report in do_all(partial(_player, level, actions, seed), scenes, workers):
         if isinstance(report, Lost):
             report = Report(scene, 0, 0, 0.0, f"the process died, exit code {report.exitcode}")
         yield report
-
-
-def choose_scenes(asked: str) -> list[str]:
-    """Scenes by number, spread over the room kinds; "all"; or names with commas between them.
-
-    Raises:
-        ValueError: it is none of these.
-    """
-    if asked == "all":
-        return list(SCENE_NAMES)
-    if asked.isdecimal() and 1 <= int(asked) <= len(SCENE_NAMES):
-        chosen = np.linspace(0, len(SCENE_NAMES), int(asked), endpoint=False).astype(int)
-        return [SCENE_NAMES[k] for k in chosen]
-    names = asked.split(",")
-    unknown = [name for name in names if name not in SCENE_NAMES]
-    if unknown:
-        raise ValueError(
-            f"--scenes takes all, a number from 1 to {len(SCENE_NAMES)} or names such as "
-            f"FloorPlan1,FloorPlan201; not {unknown[0]!r}"
-        )
-    return names
 
 
 @click.command()
@@ -307,18 +282,14 @@ def main(scenes: str, actions: int, seed: int, workers: int, level: str) -> None
     console = Console(stderr=True)
     reports: list[Report] = []
     start = time.perf_counter()
-    columns = (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-        TextColumn("{task.fields[status]}"), TimeRemainingColumn(),
-    )  # fmt: skip
-    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
-        bar = progress.add_task(f"soak, {level}", total=len(chosen), status="starting")
+    with bar(console) as progress:
+        task = progress.add_task(f"soak, {level}", total=len(chosen), status="starting")
         for report in soak(chosen, level=level, actions=actions, seed=seed, workers=workers):
             reports.append(report)
             speed = sum(r.actions for r in reports) / (time.perf_counter() - start)
             bad = sum(bool(r.problem) for r in reports)
             progress.update(
-                bar, advance=1, status=f"{speed:.0f} actions/s, {bad} scenes with problems"
+                task, advance=1, status=f"{speed:.0f} actions/s, {bad} scenes with problems"
             )
     raise SystemExit(verdict(reports, level=level, actions=actions, seed=seed))
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
 
@@ -37,14 +40,14 @@ STANDS_FOR = {"Sink": "SinkBasin", "Bathtub": "BathtubBasin"}
 """Types that one puts things into by way of a part of theirs."""
 _ALSO = {verbs.TOGGLE: {"StoveBurner"}, verbs.PUT: set(STANDS_FOR)}
 """Types that lack the property but take the verb: a burner is toggled by its knob."""
-_NOWHERE = {"Floor"}
+NOWHERE = frozenset({"Floor"})
 """Types that cannot be navigated to: one is there already."""
 
 
 def applies(verb: str, object_type: str) -> bool:
     """Whether a verb makes sense for a type at all, in some scene and some state."""
     if verb == verbs.NAVIGATE:
-        return object_type not in _NOWHERE
+        return object_type not in NOWHERE
     needed = _PROPERTY_FOR[verb]
     return needed in OBJECT_TYPES[object_type].properties or object_type in _ALSO.get(verb, ())
 
@@ -58,8 +61,11 @@ def _all_actions() -> Iterator[Action]:
 ACTIONS: tuple[Action, ...] = tuple(_all_actions())
 """Every action; a discrete action is an index into this."""
 INDEX: dict[Action, int] = {action: index for index, action in enumerate(ACTIONS)}
-INDEX_OF = {(action.verb, action.object_type): index for index, action in enumerate(ACTIONS)}
-"""The same by verb and object type; pairs that make no sense in any scene are not in it."""
+INDICES: dict[str, NDArray[np.intp]] = {
+    verb: np.array([INDEX.get(Action(verb, name), -1) for name in OBJECT_TYPES])
+    for verb in verbs.OBJECT_VERBS
+}
+"""The same by verb: (T,) an index for each type, -1 where the verb makes no sense in any scene."""
 _BY_TEXT = {str(action).lower(): action for action in ACTIONS}
 _VERBS_LONGEST_FIRST = sorted(
     {*verbs.OBJECT_VERBS, *verbs.ALIASES}, key=len, reverse=True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -14,8 +15,9 @@ from numpy.typing import NDArray
 from er_gym.envs import instances as which
 from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS, Action, parse
-from er_gym.envs.legality import Surroundings, legal_indices, objection, suited, surroundings
+from er_gym.envs.legality import Known, legal_actions, objection, suited, surroundings
 from er_gym.envs.observations import OBSERVATIONS, Memory, Situation, parse_obs_mode
+from er_gym.envs.percept import Percept
 from er_gym.envs.reward import Progress, search_targets
 from er_gym.tasks import verbs
 from er_gym.tasks.suites import load_suite
@@ -45,8 +47,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     ``info["action_mask"]`` and :meth:`action_masks` say which are legal now.
 
     - ``navigate to`` goes to where the object can be handled. Legal for what is, or was once in
-      this episode, plain to see (:func:`er_gym.envs.legality.is_navigable`), and for the task's own
-      ``navigable_objects``.
+      this episode, plain to see (:func:`er_gym.envs.legality.navigable_within`), and for the task's
+      own ``navigable_objects``.
     - ``pickup``, ``put in``, ``open``, ``close``, ``toggle`` need the object to be plain to see
       now, or visible and of a type that lies in the receptacle last navigated to.
     - ``observe`` looks right, behind and left; ``info["views"]`` has the pictures.
@@ -144,8 +146,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             "headless": not self._draws,
         }
         self._controller: Any = None
-        self._event: Any = None
-        self._reachables: dict[str, skills.Reachable] = {}
+        self._percept: Percept  # what was taken in last; nothing before the first reset
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = spaces.Dict(
             {name: OBSERVATIONS[name].space(width, height) for name in self._obs}
@@ -160,12 +161,14 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         super().reset(seed=seed)
         self.task = self._choose((options or {}).get("task"))
         controller = self._started_controller(self.task.scene)
-        event = controller.reset(self.task.scene)
-        self._reachable = self._reachable_in(self.task.scene)
-        pose = skills.start_pose(event.metadata, self._reachable)
+        bounds = controller.reset(self.task.scene).metadata["sceneBounds"]
+        self._floor = skills.reachable(
+            controller, (self._backend, self.task.scene, self._grid_size)
+        )
+        pose = skills.start_pose(bounds, self._floor)
         self._memory = Memory(pose)
         self._progress = Progress.start(self.task)
-        self._known = {name for name in self.task.navigable_objects if name != "Floor"}
+        self._known = Known(self.task.navigable_objects)
         self._at = ""  # id of the object last navigated to
         self._visited: dict[str, list[str]] = {}
         self._steps = 1
@@ -175,7 +178,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._end_reason = ""
         self._success = False
         placed = skills.place(controller, pose)
-        self._take_in(placed.event)
+        self._take_in(placed)
         return self._observation("You look around the room.", True), self._info(
             None, "", placed.success, "", "You look around the room."
         )
@@ -205,10 +208,10 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._steps += 1
         refused = objection(understood, self._around, self._known)
         if refused:
-            object_id, outcome = "", skills.Outcome(self._event, False, refused)
+            object_id, outcome = "", skills.Outcome(None, False, refused)
         else:
             object_id, outcome = self._do(understood)
-        self._take_in(outcome.event, outcome.views)
+        self._take_in(outcome)
         reward = self._judge(understood, outcome) - self._step_penalty
         if refused:
             reward -= self._illegal_penalty
@@ -223,19 +226,18 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     def action_masks(self) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
-        mask = np.zeros(len(ACTIONS), dtype=np.int8)
-        mask[legal_indices(self._around, self._known)] = 1
-        return mask
+        return legal_actions(self._around, self._known)
 
     def render(self) -> NDArray[np.uint8] | None:
         """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``."""
         if self.render_mode is None or self._controller is None:
             return None
-        if self._event.frame is None:
+        if self._percept.frame is None:
             headless, self._controller.headless = self._controller.headless, False
-            self._event = self._controller.step(action="Pass")
+            frame = self._controller.step(action="Pass").frame
             self._controller.headless = headless
-        return np.ascontiguousarray(self._event.frame)
+            self._percept = replace(self._percept, frame=frame)
+        return np.ascontiguousarray(self._percept.frame)
 
     def close(self) -> None:
         """Stop the controller."""
@@ -252,13 +254,6 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             )
         return self._controller
 
-    def _reachable_in(self, scene: str) -> skills.Reachable:
-        """Where the agent can stand: asked for once a scene, since it does not change."""
-        if scene not in self._reachables:
-            event = self._controller.step(action="GetReachablePositions", renderImage=False)
-            self._reachables[scene] = skills.Reachable(event.metadata["actionReturn"])
-        return self._reachables[scene]
-
     def _choose(self, wanted: Task | str | None) -> Task:
         if isinstance(wanted, Task):
             return wanted
@@ -271,24 +266,14 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             raise ValueError("this environment has no tasks; pass tasks=… or options={'task': …}")
         return self.tasks[int(self.np_random.integers(len(self.tasks)))]
 
-    def _take_in(self, event: Any, views: Mapping[str, Any] | None = None) -> None:
+    def _take_in(self, outcome: skills.Outcome) -> None:
         """Remember what can be seen after a step, and in the views of an "observe"."""
-        for seen in (*(views or {}).values(), event):
-            self._event = seen
-            self._around = surroundings(seen.metadata, self._types_nearby(seen))
-            self._known |= self._around.types(self._around.navigable)
-            self._memory.look(self._around)
-
-    def _types_nearby(self, event: Any) -> frozenset[str]:
-        """The types of what lies in the receptacle last navigated to."""
-        for entry in event.metadata["objects"]:
-            if entry["objectId"] == self._at:
-                return frozenset(
-                    other["objectType"]
-                    for other in event.metadata["objects"]
-                    if other["objectId"] in set(entry["receptacleObjectIds"] or ())
-                )
-        return frozenset()
+        for percept in (*outcome.views.values(), outcome.percept):
+            if percept is not None:
+                self._percept = percept
+                self._around = surroundings(percept, self._at)
+                self._known.add(percept.objects.kinds[self._around.navigable])
+                self._memory.look(percept)
 
     def _do(self, action: Action) -> tuple[str, skills.Outcome]:
         if action.verb == verbs.OBSERVE:
@@ -296,48 +281,43 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         if action.verb == verbs.MOVE_FORWARD:
             return "", skills.move_forward(self._controller, self._grid_size)
         if action.verb == verbs.END:
-            return "", skills.Outcome(self._event, True)
+            return "", skills.Outcome(None, True)
         if action.verb == verbs.NAVIGATE:
             return self._navigate(action.object_type)
-        around = self._around
-        able = [i for i in suited(action.verb, around) if _is(around, i, action.object_type)]
+        objects = self._percept.objects
+        able = suited(action, self._around)
         if self._instances == which.TARGET:
-            chosen = which.by_task(self.task, self._progress.left, action.verb, able)
+            chosen = which.by_task(self.task, self._progress.left, action.verb, able, objects)
         else:
-            chosen = which.nearest(able, around.objects, self._agent_position)
-        done = skills.interact(
-            self._controller, action.verb, around.objects[chosen], around.objects
-        )
-        return chosen, done
+            chosen = which.nearest(able, objects, self._percept.pose)
+        done = skills.interact(self._controller, action.verb, objects, chosen)
+        return objects.ids[chosen], done
 
     def _navigate(self, object_type: str) -> tuple[str, skills.Outcome]:
-        objects = self._around.objects
-        able = [i for i in objects if _is(self._around, i, object_type)]
+        objects = self._percept.objects
+        able = objects.of_type(object_type)
         if not able:
-            return "", skills.Outcome(self._event, False, f"there is no {object_type} any more")
+            return "", skills.Outcome(None, False, f"there is no {object_type} any more")
         if self._instances == which.TARGET:
-            goal = which.by_task(self.task, self._progress.left, verbs.NAVIGATE, able)
+            goal = which.by_task(self.task, self._progress.left, verbs.NAVIGATE, able, objects)
             aim = which.redirected(self.task, goal, objects)
         else:
             visited = self._visited.setdefault(object_type, [])
             if len(visited) >= len(able):
                 visited.clear()
-            aim = goal = which.nearest(able, objects, self._agent_position, visited)
-            visited.append(goal)
-        pose = self.task.poses.get(goal)
+            aim = goal = which.nearest(able, objects, self._percept.pose, visited)
+            visited.append(objects.ids[goal])
+        goal_id = objects.ids[goal]
+        pose = self.task.poses.get(goal_id)
         if pose is not None:
             outcome = skills.place(self._controller, pose)
         else:
-            aim = which.container_in_the_way(aim, objects) or aim
-            outcome = skills.navigate(self._controller, objects[aim], self._reachable)
+            container = which.container_in_the_way(aim, objects)
+            aim = aim if container is None else container
+            outcome = skills.navigate(self._controller, objects, aim, self._floor)
         if outcome.success:
-            self._at = goal
-        return goal, outcome
-
-    @property
-    def _agent_position(self) -> Mapping[str, float]:
-        position: Mapping[str, float] = self._event.metadata["agent"]["position"]
-        return position
+            self._at = goal_id
+        return goal_id, outcome
 
     def _judge(self, action: Action, outcome: skills.Outcome) -> float:
         """The reward that an action earned; decides success at ``end``."""
@@ -345,8 +325,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             return 0.0
         if action.verb == verbs.END:
             targets = search_targets(self.task) if self.task.type.search else frozenset()
-            in_reach = self._around.types(self._around.interactable)
-            if not self._progress.only_end_left or not targets <= in_reach:
+            in_reach = self._around.in_reach
+            if not self._progress.only_end_left or not targets.issubset(in_reach):
                 return 0.0
             self._success = True
         self._progress, reward = self._progress.after(action)
@@ -374,7 +354,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         object_id: str,
         feedback: str,
         reward: float,
-        views: Mapping[str, Any] | None = None,
+        views: Mapping[str, Percept] | None = None,
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         truncated = self._end_reason == "step limit"
         terminated = bool(self._end_reason) and not truncated
@@ -384,15 +364,16 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         return self._observation(feedback, success), reward, terminated, truncated, info
 
     def _observation(self, feedback: str, success: bool) -> dict[str, Any]:
-        at = self._around.objects.get(self._at)
+        objects = self._percept.objects
+        at = objects.row.get(self._at)
         situation = Situation(
-            event=self._event,
+            percept=self._percept,
             around=self._around,
             memory=self._memory,
-            known=frozenset(self._known),
+            known=self._known,
             instruction=self.task.instruction,
             feedback=feedback,
-            at="" if at is None else str(at["objectType"]),
+            at=None if at is None else int(objects.kinds[at]),
             success=success,
             steps=self._steps,
             max_steps=self._limit,
@@ -402,7 +383,6 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _info(
         self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
     ) -> dict[str, Any]:
-        around = self._around
         return {
             "task": self.task,
             "action": action,
@@ -413,8 +393,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             "success": self._success,
             "key_actions_done": self._progress.done,
             "key_actions_left": self._progress.left,
-            "navigable": tuple(sorted(self._known)),
-            "interactable": tuple(sorted(around.types(around.interactable))),
+            "navigable": self._known.names,
+            "interactable": self._around.in_reach,
             "steps": self._steps,
             "end_reason": self._end_reason,
             "action_mask": self.action_masks(),
@@ -441,10 +421,6 @@ def _understand(action: Action | str | int | np.integer[Any]) -> tuple[Action | 
         f"{action!r} is no action: give an index from 0 to {len(ACTIONS) - 1}, an Action, or text "
         "such as 'navigate to Fridge'"
     )
-
-
-def _is(around: Surroundings, object_id: str, object_type: str) -> bool:
-    return bool(around.objects[object_id]["objectType"] == object_type)
 
 
 def _feedback(action: Action, outcome: skills.Outcome) -> str:

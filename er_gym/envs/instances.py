@@ -1,13 +1,12 @@
-"""Which object a type name stands for."""
+"""Which object a type name stands for. Objects are given by their rows in a table."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from math import hypot
-from typing import Any
 
-from er_gym.envs.legality import Objects
-from er_gym.tasks.task import KeyAction, Task
+from er_gym.tasks.task import AgentPose, KeyAction, Task
+from er_gym.thor import ObjectTable
 
 TARGET, EXPLORE = "target", "explore"
 POLICIES = (TARGET, EXPLORE)
@@ -18,17 +17,18 @@ def by_task(
     task: Task,
     pending: Sequence[KeyAction],
     verb: str,
-    candidates: Sequence[str],
-) -> str:
+    candidates: Sequence[int],
+    objects: ObjectTable,
+) -> int:
     """The candidate that the task is about, else the first in scene order.
 
     Objects of key actions still to be done with this verb come first, then those of any key action
     to come, then the task's other objects.
     """
-    allowed = set(candidates)
+    allowed = {objects.ids[row]: row for row in candidates}
     for object_id in _of_interest(task, pending, verb):
         if object_id in allowed:
-            return object_id
+            return allowed[object_id]
     return candidates[0]
 
 
@@ -43,42 +43,45 @@ def _of_interest(task: Task, pending: Sequence[KeyAction], verb: str) -> Iterabl
 
 
 def nearest(
-    candidates: Sequence[str],
-    objects: Objects,
-    agent: Mapping[str, float],
+    candidates: Sequence[int],
+    objects: ObjectTable,
+    agent: AgentPose,
     visited: Collection[str] = (),
-) -> str:
-    """The nearest candidate that has not been visited, the nearest of all when all have been."""
-    fresh = [c for c in candidates if c not in visited] or list(candidates)
-    return min(fresh, key=lambda c: distance(objects[c], agent))
+) -> int:
+    """The nearest candidate that has not been visited, the nearest of all when all have been.
+
+    Args:
+        visited: ids of objects.
+    """
+    fresh = [row for row in candidates if objects.ids[row] not in visited] or candidates
+    return min(fresh, key=lambda row: distance(objects, row, agent))
 
 
-def distance(entry: Mapping[str, Any], agent: Mapping[str, float]) -> float:
+def distance(objects: ObjectTable, row: int, agent: AgentPose) -> float:
     """Horizontal distance from the agent to the middle of an object's box, metres."""
-    centre = entry["axisAlignedBoundingBox"]["center"]
-    return hypot(centre["x"] - agent["x"], centre["z"] - agent["z"])
+    x, _, z = objects.centre[row].tolist()
+    return hypot(x - agent.x, z - agent.z)
 
 
-def redirected(task: Task, goal: str, objects: Objects) -> str:
+def redirected(task: Task, goal: int, objects: ObjectTable) -> int:
     """Where going to an object leads.
 
     Going to a receptacle that does not open and holds one of the task's related objects means going
     to that object.
     """
-    entry = objects[goal]
-    if entry["receptacle"] and not entry["openable"]:
-        held = set(entry["receptacleObjectIds"] or ())
+    if objects.receptacle[goal] and not objects.openable[goal]:
         for object_id in task.related_objects:
-            if object_id in held:
-                return object_id
+            row = objects.row.get(object_id)
+            if row is not None and row in objects.contents[goal]:
+                return row
     return goal
 
 
-def container_in_the_way(goal: str, objects: Objects) -> str:
-    """The outermost closed receptacle that an object is in, "" if it is in none."""
+def container_in_the_way(goal: int, objects: ObjectTable) -> int | None:
+    """The outermost closed receptacle that an object is in, None if it is in none."""
     shut = [
         parent
-        for parent in objects[goal]["parentReceptacles"] or ()
-        if objects[parent]["openable"] and not objects[parent]["isOpen"]
+        for parent in objects.parents[goal]
+        if objects.openable[parent] and not objects.is_open[parent]
     ]
-    return shut[-1] if shut else ""
+    return shut[-1] if shut else None

@@ -1,146 +1,221 @@
-"""What may be navigated to and interacted with now: the paper's rules, as pure functions.
+"""What may be navigated to and interacted with now: the paper's rules.
 
-Objects are AI2-THOR object metadata; positions are metres in AI2-THOR's world frame.
+Whole columns of objects are judged at once (:class:`~er_gym.thor.objects.ObjectTable`); objects are
+given by their rows there. Positions are metres in AI2-THOR's world frame.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
-from math import hypot
-from typing import Any
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
 
-from er_gym.envs.actions import INDEX_OF, STANDS_FOR, Action, applies
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.envs.actions import ACTIONS, INDEX, INDICES, NOWHERE, STANDS_FOR, Action, applies
+from er_gym.envs.percept import Percept, marked, names
 from er_gym.tasks import verbs
+from er_gym.thor.objects import KIND_OF, ObjectTable
 
-Objects = Mapping[str, Mapping[str, Any]]
-"""Object metadata by object id, in scene order."""
-
-
-def by_id(metadata: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """The objects of an event's metadata by their ids."""
-    return {entry["objectId"]: entry for entry in metadata["objects"]}
+_FACES, _WITHIN_BY_FACE = (0.08, 0.15, 0.5), np.array([1.0, 2.5, 4.0, 10.0])
+_VOLUMES, _WITHIN_BY_VOLUME = (0.001, 0.005), np.array([1.0, 1.5, 2.0])
+_VOLUME_PER_METRE = 0.02
 
 
-def is_navigable(entry: Mapping[str, Any], agent: Mapping[str, float]) -> bool:
-    """Whether an object is plain enough to see that one could walk to it.
+def navigable_within(volume: NDArray[np.float64], face: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N,) how near the agent must be to visible objects, metres, to walk to them: nearer than so.
 
-    Args:
-        entry: the object's metadata.
-        agent: the agent's position, metres.
-
-    The paper's rule: with V the volume of the object's axis-aligned box (m³), S its largest face
-    (m²) and d the horizontal distance from the agent to the box's centre (m).
-    """
-    if not entry["visible"] or entry["isPickedUp"] or entry["objectType"] == "Floor":
-        return False
-    box = entry["axisAlignedBoundingBox"]
-    size, centre = box["size"], box["center"]
-    x, y, z = size["x"], size["y"], size["z"]
-    volume = x * y * z
-    face = max(x * y, y * z, x * z)
-    distance = hypot(centre["x"] - agent["x"], centre["z"] - agent["z"])
-    return (
-        distance < 1
-        or (face > 0.5 and distance < 10)
-        or (face > 0.15 and distance < 4)
-        or (face > 0.08 and distance < 2.5)
-        or (volume > 0.005 and distance < 2)
-        or (volume > 0.001 and distance < 1.5)
-        or (volume >= 0.01 and volume / distance > 0.02)
-    )
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """What the agent can do things to, now.
-
-    Attributes:
-        objects: all of the scene.
-        navigable: ids of objects that satisfy :func:`is_navigable` now.
-        interactable: ids of objects that may be interacted with now.
-        holding: id of the object in hand, "" when there is none.
-    """
-
-    objects: Objects
-    navigable: tuple[str, ...]
-    interactable: tuple[str, ...]
-    holding: str
-
-    def types(self, ids: Iterable[str]) -> frozenset[str]:
-        """The types of some objects."""
-        return frozenset(self.objects[i]["objectType"] for i in ids)
-
-
-def surroundings(metadata: Mapping[str, Any], nearby_types: Collection[str]) -> Surroundings:
-    """Judge an event's metadata.
+    The paper's rule: an object is plain enough to see if d < 1, or S > 0.5 and d < 10, or S > 0.15
+    and d < 4, or S > 0.08 and d < 2.5, or V > 0.005 and d < 2, or V > 0.001 and d < 1.5, or
+    V / d > 0.02 (with V at least 0.01; less than that has d < 1 anyhow).
 
     Args:
-        nearby_types: the types of what lies in the receptacle last navigated to; things of these
-            types can be interacted with wherever they are visible.
+        volume: (N,) V, of each one's axis-aligned box, m³.
+        face: (N,) S, of the box's largest face, m². And d is the horizontal distance from the agent
+            to the box's centre, m.
     """
-    objects = by_id(metadata)
-    agent = metadata["agent"]["position"]
-    navigable = tuple(i for i, entry in objects.items() if is_navigable(entry, agent))
-    plain = set(navigable)
-    interactable = tuple(
-        i
-        for i, entry in objects.items()
-        if i in plain
-        or (entry["visible"] and not entry["isPickedUp"] and entry["objectType"] in nearby_types)
+    # searchsorted counts the bounds that are less than a value.
+    within = np.maximum(
+        _WITHIN_BY_FACE[np.searchsorted(_FACES, face)],
+        _WITHIN_BY_VOLUME[np.searchsorted(_VOLUMES, volume)],
     )
-    held = metadata["inventoryObjects"]
-    return Surroundings(objects, navigable, interactable, held[0]["objectId"] if held else "")
-
-
-def _takes(entry: Mapping[str, Any]) -> bool:
-    return bool(entry["receptacle"]) or entry["objectType"] in STANDS_FOR
+    return np.asarray(np.maximum(within, volume / _VOLUME_PER_METRE))
 
 
 @dataclass(frozen=True)
 class _Condition:
     """Which objects a verb can be done to in their present state, and what to say of others."""
 
-    holds: Callable[[Mapping[str, Any]], bool]
+    holds: Callable[[ObjectTable], NDArray[np.bool_]]
     otherwise: str
 
 
+def _of_type(*object_types: str) -> NDArray[np.bool_]:
+    return marked(np.array([KIND_OF[name] for name in object_types]))
+
+
+_STANDS_FOR_ANOTHER = _of_type(*STANDS_FOR)
+_BURNER = _of_type("StoveBurner")
+_NO_GOAL = _of_type(*NOWHERE)
 _CONDITIONS = {
-    verbs.PICKUP: _Condition(lambda entry: entry["pickupable"], "It cannot be picked up."),
+    verbs.PICKUP: _Condition(lambda table: table.pickupable, "It cannot be picked up."),
     verbs.PUT: _Condition(
-        lambda entry: _takes(entry) and (entry["isOpen"] or not entry["openable"]),
+        lambda table: (
+            (table.receptacle | _STANDS_FOR_ANOTHER[table.kinds])
+            & (table.is_open | ~table.openable)
+        ),
         "It is closed, or nothing can be put into it.",
     ),
     verbs.OPEN: _Condition(
-        lambda entry: entry["openable"] and not entry["isOpen"],
-        "It is open already, or does not open.",
+        lambda table: table.openable & ~table.is_open, "It is open already, or does not open."
     ),
     verbs.CLOSE: _Condition(
-        lambda entry: entry["openable"] and entry["isOpen"],
-        "It is closed already, or does not close.",
+        lambda table: table.openable & table.is_open, "It is closed already, or does not close."
     ),
     verbs.TOGGLE: _Condition(
-        lambda entry: entry["toggleable"] or entry["objectType"] == "StoveBurner",
-        "It has no switch.",
+        lambda table: table.toggleable | _BURNER[table.kinds], "It has no switch."
     ),
 }
+_BARE = [INDEX[Action(verb)] for verb in verbs.BARE_VERBS]
+_NUMBER = {verb: number for number, verb in enumerate(verbs.INTERACTIONS)}
+_INTERACTION_INDICES = np.stack([INDICES[verb] for verb in verbs.INTERACTIONS], axis=1)
 
 
-def suited(verb: str, around: Surroundings) -> list[str]:
-    """Ids of the interactable objects that the verb can be done to in their present state."""
-    if (verb == verbs.PICKUP and around.holding) or (verb == verbs.PUT and not around.holding):
-        return []
-    holds, objects = _CONDITIONS[verb].holds, around.objects
-    return [i for i in around.interactable if holds(objects[i])]
+@dataclass(frozen=True, eq=False)
+class Affordances:
+    """What could be done with the N objects of a table, wherever the agent is.
+
+    Attributes:
+        within: (N,) how near one must be to walk there, metres, see :func:`navigable_within`; 0 for
+            what is in the hand, and for the floor.
+        actions: (N, len(INTERACTIONS)) index of the action that does each verb to each object; -1
+            where it cannot be done in the object's present state, and that of the hand.
+        alike: row of a receptacle to (N,) bool, which objects are of types that lie in it; less the
+            floor and what is in the hand. Filled as it is asked for.
+    """
+
+    within: NDArray[np.float64]
+    actions: NDArray[np.intp]
+    alike: dict[int, NDArray[np.bool_]] = field(default_factory=dict)
+
+    @staticmethod
+    def of(table: ObjectTable) -> Affordances:
+        """Work them out."""
+        within = navigable_within(table.volume, table.face)
+        within[_NO_GOAL[table.kinds]] = 0.0
+        possible = np.stack([_CONDITIONS[verb].holds(table) for verb in verbs.INTERACTIONS], axis=1)
+        if table.held < 0:
+            possible[:, _NUMBER[verbs.PUT]] = False
+        else:
+            possible[:, _NUMBER[verbs.PICKUP]] = False
+            within[table.held] = 0.0
+        return Affordances(
+            within=within,
+            actions=np.where(possible, _INTERACTION_INDICES[table.kinds], -1),
+        )
 
 
-def objection(action: Action, around: Surroundings, known: Collection[str]) -> str:
-    """Why an action is illegal now, in words for the agent; "" when it is legal.
+def affordances(table: ObjectTable) -> Affordances:
+    """What could be done with a table's objects: worked out once, and kept with the table."""
+    found = table.derived.get("affordances")
+    if not isinstance(found, Affordances):
+        found = table.derived["affordances"] = Affordances.of(table)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What the agent can do things to, now.
+
+    Attributes:
+        objects: all of the scene.
+        navigable: rows of objects that are plain enough to see to be walked to.
+        interactable: rows of objects that may be interacted with; the navigable are among them.
+    """
+
+    objects: ObjectTable
+    navigable: NDArray[np.intp]
+    interactable: NDArray[np.intp]
+
+    @cached_property
+    def interactable_types(self) -> NDArray[np.bool_]:
+        """(T,) bool: the types of the interactable objects."""
+        return marked(self.objects.kinds[self.interactable])
+
+    @cached_property
+    def in_reach(self) -> tuple[str, ...]:
+        """The names of the same types, in alphabetical order."""
+        return names(self.interactable_types)
+
+
+def surroundings(percept: Percept, at: str = "") -> Surroundings:
+    """Judge what is perceived.
 
     Args:
-        known: types that may be navigated to (whatever was navigable before still is).
+        at: id of the receptacle last navigated to. Things of the types that lie in it can be
+            interacted with wherever they are visible.
     """
-    name = action.object_type
+    table, visible = percept.objects, percept.visible
+    can = affordances(table)
+    distance = np.hypot(table.centre[:, 0] - percept.pose.x, table.centre[:, 2] - percept.pose.z)
+    plain = visible & (distance < can.within)
+    navigable = interactable = plain.nonzero()[0]
+    row = table.row.get(at)
+    if row is not None and table.contents[row]:
+        alike = can.alike.get(row)
+        if alike is None:
+            kinds = marked(table.kinds[list(table.contents[row])])
+            alike = can.alike[row] = kinds[table.kinds] & (can.within > 0)
+        interactable = (plain | (visible & alike)).nonzero()[0]
+    return Surroundings(table, navigable, interactable)
+
+
+class Known:
+    """The types that may be navigated to: what was plain to see once in an episode stays so.
+
+    Attributes:
+        names: theirs, in alphabetical order.
+        types: (T,) bool, the same.
+        legal: (len(ACTIONS),) int8, 1 for each action that is legal whatever is in reach: to go to
+            one of these types, and those that name none.
+    """
+
+    def __init__(self, object_types: Iterable[str]) -> None:
+        self._told = {*object_types} - NOWHERE  # tasks name types that no scene has, too
+        self.types = marked(np.array([KIND_OF[t] for t in self._told & KIND_OF.keys()], np.intp))
+        self._update()
+
+    def add(self, kinds: NDArray[np.intp]) -> None:
+        """Some objects are plain to see now, of these kinds."""
+        if not self.types[kinds].all():
+            self.types[kinds] = True
+            self._update()
+
+    def _update(self) -> None:
+        self._names = self._told.union(names(self.types))
+        self.names = tuple(sorted(self._names))
+        self.legal = np.zeros(len(ACTIONS), dtype=np.int8)
+        self.legal[_BARE] = self.legal[INDICES[verbs.NAVIGATE][self.types]] = 1
+
+    def __contains__(self, object_type: str) -> bool:
+        return object_type in self._names
+
+
+def suited(action: Action, around: Surroundings) -> list[int]:
+    """Rows of the interactable objects that an interaction can be done to as things are now."""
+    actions = affordances(around.objects).actions[around.interactable, _NUMBER[action.verb]]
+    index = INDEX.get(action)
+    return [
+        row
+        for row, possible in zip(around.interactable.tolist(), actions.tolist(), strict=True)
+        if possible == index
+    ]
+
+
+def objection(action: Action, around: Surroundings, known: Known) -> str:
+    """Why an action is illegal now, in words for the agent; "" when it is legal."""
+    name, held = action.object_type, around.objects.held
     if action.verb in verbs.BARE_VERBS:
         return ""
     if action.verb == verbs.NAVIGATE:
@@ -148,37 +223,30 @@ def objection(action: Action, around: Surroundings, known: Collection[str]) -> s
             return ""
         return (
             f"You cannot navigate to {name}: none has been close enough to see clearly. "
-            f"You could go to: {_listing(known)}."
+            f"You could go to: {_listing(known.names)}."
         )
-    if not applies(action.verb, name):
-        return f"You cannot {action.verb} {name}. {_CONDITIONS[action.verb].otherwise}"
-    if action.verb == verbs.PICKUP and around.holding:
-        return f"You hold {_type(around, around.holding)} already; put it down first."
-    if action.verb == verbs.PUT and not around.holding:
-        return "Your hand is empty; pick something up first."
-    in_reach = [i for i in around.interactable if _type(around, i) == name]
-    if not in_reach:
-        near = _listing(around.types(around.interactable))
-        return (
-            f"You cannot {action.verb} {name}: none is within reach and in view. There is: {near}."
-        )
-    if not any(_CONDITIONS[action.verb].holds(around.objects[i]) for i in in_reach):
-        return f"You cannot {action.verb} {name}. {_CONDITIONS[action.verb].otherwise}"
-    return ""
+    if suited(action, around):
+        return ""
+    if applies(action.verb, name):
+        if action.verb == verbs.PICKUP and held >= 0:
+            return f"You hold {around.objects.type_of(held)} already; put it down first."
+        if action.verb == verbs.PUT and held < 0:
+            return "Your hand is empty; pick something up first."
+        if not around.interactable_types[KIND_OF[name]]:
+            return (
+                f"You cannot {action.verb} {name}: none is within reach and in view. "
+                f"There is: {_listing(around.in_reach)}."
+            )
+    return f"You cannot {action.verb} {name}. {_CONDITIONS[action.verb].otherwise}"
 
 
-def legal_indices(around: Surroundings, known: Collection[str]) -> list[int]:
-    """The index of every action to which :func:`objection` has none."""
-    pairs = [(verb, "") for verb in verbs.BARE_VERBS]
-    pairs += [(verbs.NAVIGATE, name) for name in known]
-    for verb in verbs.INTERACTIONS:
-        pairs += [(verb, name) for name in around.types(suited(verb, around))]
-    return [INDEX_OF[pair] for pair in pairs if pair in INDEX_OF]
+def legal_actions(around: Surroundings, known: Known) -> NDArray[np.int8]:
+    """(len(ACTIONS),) int8: 1 for each action to which :func:`objection` has none."""
+    legal = known.legal.copy()
+    interactions = affordances(around.objects).actions[around.interactable]
+    legal[interactions[interactions >= 0]] = 1
+    return legal
 
 
-def _type(around: Surroundings, object_id: str) -> str:
-    return str(around.objects[object_id]["objectType"])
-
-
-def _listing(names: Collection[str]) -> str:
-    return ", ".join(sorted(names)) or "nothing"
+def _listing(object_types: Iterable[str]) -> str:
+    return ", ".join(object_types) or "nothing"

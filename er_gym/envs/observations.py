@@ -18,12 +18,11 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from er_gym.envs.legality import Surroundings
+from er_gym.envs.legality import Known, Surroundings
+from er_gym.envs.percept import Percept, names
 from er_gym.tasks.task import AgentPose
-from er_gym.thor import OBJECT_TYPES
+from er_gym.thor.objects import KIND_OF, TYPES
 
-TYPES = tuple(OBJECT_TYPES)
-_COLUMN = {name: k for k, name in enumerate(TYPES)}
 _PER_TYPE = ("visible", "seen", "navigable", "interactable", "open", "on", "held", "at", "goal")
 _POSE = ("right", "ahead", "sin", "cos", "horizon", "standing")
 _EPISODE = ("steps", "success", "holding")
@@ -39,45 +38,51 @@ GOAL_VERBS: Mapping[str, str] = {
 """Words of an instruction that say what to do, by what they say."""
 STATE_LAYOUT = (*_POSE, *_EPISODE, *GOAL_VERBS, *(f"{f}:{t}" for f in _PER_TYPE for t in TYPES))
 """What each entry of the ``state`` vector means, in order."""
+_SCALARS = len(STATE_LAYOUT) - len(_PER_TYPE) * len(TYPES)
+_ROW = {feature: row for row, feature in enumerate(_PER_TYPE)}
 _ROOM_SCALE = 10.0
 """Offsets from the start are divided by so many metres."""
 _TEXT_LENGTH = 20_000
 
 
-@dataclass
+def _no_types() -> NDArray[np.bool_]:
+    return np.zeros(len(TYPES), dtype=bool)
+
+
+@dataclass(eq=False)
 class Memory:
-    """What an agent that pays attention remembers of an episode, by object type."""
+    """What an agent that pays attention remembers of an episode, by object type: (T,) bool."""
 
     start: AgentPose
-    seen: set[str] = field(default_factory=set)
-    is_open: dict[str, bool] = field(default_factory=dict)
-    is_on: dict[str, bool] = field(default_factory=dict)
+    seen: NDArray[np.bool_] = field(default_factory=_no_types)
+    is_open: NDArray[np.bool_] = field(default_factory=_no_types)
+    is_on: NDArray[np.bool_] = field(default_factory=_no_types)
 
-    def look(self, around: Surroundings) -> None:
+    def look(self, percept: Percept) -> None:
         """Take in what is visible now."""
-        opened: dict[str, bool] = {}
-        switched: dict[str, bool] = {}
-        for entry in around.objects.values():
-            if entry["visible"]:
-                kind = entry["objectType"]
-                self.seen.add(kind)
-                opened[kind] = opened.get(kind, False) or entry["isOpen"]
-                switched[kind] = switched.get(kind, False) or entry["isToggled"]
-        self.is_open.update(opened)
-        self.is_on.update(switched)
+        objects, visible = percept.objects, percept.visible
+        self.seen |= percept.visible_types
+        out_of_sight = ~percept.visible_types
+        for remembered, now in ((self.is_open, objects.is_open), (self.is_on, objects.is_toggled)):
+            remembered &= out_of_sight
+            remembered[objects.kinds[visible & now]] = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Situation:
-    """Everything that observations are made from."""
+    """Everything that observations are made from.
 
-    event: Any
+    Attributes:
+        at: index of the type of what was last navigated to, None before that.
+    """
+
+    percept: Percept
     around: Surroundings
     memory: Memory
-    known: frozenset[str]
+    known: Known
     instruction: str
     feedback: str
-    at: str
+    at: int | None
     success: bool
     steps: int
     max_steps: int
@@ -109,14 +114,21 @@ def goal(instruction: str) -> tuple[tuple[float, ...], tuple[tuple[str, float], 
     return asked, tuple((name, 1.0 / (rank + 1)) for rank, name in enumerate(order))
 
 
+@lru_cache(maxsize=4096)
+def _goal_row(instruction: str) -> NDArray[np.float32]:
+    """(T,) the weight of each type in what an instruction asks for."""
+    row = np.zeros(len(TYPES), dtype=np.float32)
+    for name, weight in goal(instruction)[1]:
+        row[KIND_OF[name]] = weight
+    return row
+
+
 def _relative_pose(situation: Situation) -> tuple[float, ...]:
     """The agent's pose in the frame of where it began."""
-    agent = situation.event.metadata["agent"]
-    start = situation.memory.start
-    dx = agent["position"]["x"] - start.x
-    dz = agent["position"]["z"] - start.z
+    pose, start = situation.percept.pose, situation.memory.start
+    dx, dz = pose.x - start.x, pose.z - start.z
     heading = radians(start.rotation)
-    turned = radians(agent["rotation"]["y"]) - heading
+    turned = radians(pose.rotation) - heading
     right = dx * cos(heading) - dz * sin(heading)
     ahead = dx * sin(heading) + dz * cos(heading)
     return (
@@ -124,41 +136,35 @@ def _relative_pose(situation: Situation) -> tuple[float, ...]:
         ahead / _ROOM_SCALE,
         sin(turned),
         cos(turned),
-        agent["cameraHorizon"] / 90.0,
-        float(agent["isStanding"]),
+        pose.horizon / 90.0,
+        float(pose.standing),
     )
 
 
 def _state(situation: Situation) -> NDArray[np.float32]:
-    around, memory = situation.around, situation.memory
-    asked, named = goal(situation.instruction)
-    table = np.zeros((len(_PER_TYPE), len(TYPES)), dtype=np.float32)
-    visible = {e["objectType"] for e in around.objects.values() if e["visible"]}
-    holding = around.types([around.holding] if around.holding else [])
-    marked: tuple[tuple[str, Any], ...] = (
-        ("visible", visible),
-        ("seen", memory.seen),
-        ("navigable", situation.known),
-        ("interactable", around.types(around.interactable)),
-        ("open", (name for name, yes in memory.is_open.items() if yes)),
-        ("on", (name for name, yes in memory.is_on.items() if yes)),
-        ("held", holding),
-        ("at", [situation.at] if situation.at else []),
-    )
-    for feature, names in marked:
-        for name in names:
-            table[_PER_TYPE.index(feature), _COLUMN[name]] = 1.0
-    for name, weight in named:
-        table[_PER_TYPE.index("goal"), _COLUMN[name]] = weight
+    memory, objects = situation.memory, situation.percept.objects
     scalars = (
         *_relative_pose(situation),
         situation.steps / situation.max_steps,
         float(situation.success),
-        float(bool(holding)),
-        *asked,
+        float(objects.held >= 0),
+        *goal(situation.instruction)[0],
     )
-    vector = np.concatenate([np.array(scalars, dtype=np.float32), table.ravel()])
-    return np.asarray(np.clip(vector, -1.0, 1.0))
+    vector = np.zeros(len(STATE_LAYOUT), dtype=np.float32)
+    vector[:_SCALARS] = [min(max(scalar, -1.0), 1.0) for scalar in scalars]
+    table = vector[_SCALARS:].reshape(len(_PER_TYPE), len(TYPES))
+    table[_ROW["visible"]] = situation.percept.visible_types
+    table[_ROW["seen"]] = memory.seen
+    table[_ROW["navigable"]] = situation.known.types
+    table[_ROW["interactable"]] = situation.around.interactable_types
+    table[_ROW["open"]] = memory.is_open
+    table[_ROW["on"]] = memory.is_on
+    table[_ROW["goal"]] = _goal_row(situation.instruction)
+    if objects.held >= 0:
+        table[_ROW["held"], objects.kinds[objects.held]] = 1.0
+    if situation.at is not None:
+        table[_ROW["at"], situation.at] = 1.0
+    return vector
 
 
 _CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " \n"
@@ -167,23 +173,24 @@ _LOOKALIKES = str.maketrans(
 )
 
 
+_OTHER = re.compile(f"[^{re.escape(_CHARACTERS)}]")
+
+
 def _plain(text: str) -> str:
     """Text in the characters that the text space has; others become question marks."""
-    known = set(_CHARACTERS)
-    return "".join(c if c in known else "?" for c in text.translate(_LOOKALIKES))[:_TEXT_LENGTH]
+    return _OTHER.sub("?", text.translate(_LOOKALIKES))[:_TEXT_LENGTH]
 
 
 def _text(situation: Situation) -> str:
-    around = situation.around
-    visible = sorted({e["objectType"] for e in around.objects.values() if e["visible"]})
-    held = "".join(around.types([around.holding])) if around.holding else "nothing"
+    objects = situation.percept.objects
+    held = "nothing" if objects.held < 0 else objects.type_of(objects.held)
     lines = (
         f"Task: {situation.instruction}",
         f"Step {situation.steps} of {situation.max_steps}. {situation.feedback}",
-        f"You see: {', '.join(visible) or 'nothing'}.",
+        f"You see: {', '.join(names(situation.percept.visible_types)) or 'nothing'}.",
         f"You hold: {held}.",
-        f"You can navigate to: {', '.join(sorted(situation.known)) or 'nothing'}.",
-        f"Within reach: {', '.join(sorted(around.types(around.interactable))) or 'nothing'}.",
+        f"You can navigate to: {', '.join(situation.known.names) or 'nothing'}.",
+        f"Within reach: {', '.join(situation.around.in_reach) or 'nothing'}.",
     )
     return _plain("\n".join(lines))
 
@@ -199,8 +206,8 @@ class Observation:
 OBSERVATIONS: Mapping[str, Observation] = {
     "rgb": Observation(
         lambda width, height: spaces.Box(0, 255, (height, width, 3), np.uint8),
-        # A copy: after an illegal action the event, and its frame, are those of the step before.
-        lambda situation: np.array(situation.event.frame),
+        # A copy: after an illegal action the percept, and its frame, are those of the step before.
+        lambda situation: np.array(situation.percept.frame),
     ),
     "state": Observation(
         lambda width, height: spaces.Box(-1.0, 1.0, (len(STATE_LAYOUT),), np.float32), _state

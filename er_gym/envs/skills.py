@@ -1,22 +1,28 @@
 """High-level verbs turned into calls of the AI2-THOR controller.
 
-A skill takes the controller and an object's metadata and returns an :class:`Outcome`; whether it
-may be used now is not its business (see :mod:`er_gym.envs.legality`).
+A skill takes the controller and an object's row in a table and returns an :class:`Outcome`; whether
+it may be used now is not its business (see :mod:`er_gym.envs.legality`). No skill keeps an event
+while it calls the controller: see :mod:`er_gym.envs.percept`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import chain
 from math import atan2, degrees, hypot
-from typing import Any
+from operator import itemgetter
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from er_gym.envs.actions import STANDS_FOR
-from er_gym.envs.legality import Objects
+from er_gym.envs.percept import Percept, perceive
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
+from er_gym.thor import ObjectTable
 
 FORWARD_STEP = 0.5
 """How far "move forward" goes when nothing is in the way, metres."""
@@ -25,42 +31,44 @@ _COMFORTABLE = 0.7
 _POSITIONS_AT_ONCE = 12
 _ROTATIONS = (0, 90, 180, 270)
 _HORIZONS = (-30, 0, 30, 60)
+_DIRECTIONS = np.array([(r, h) for r in _ROTATIONS for h in _HORIZONS])
 _VIEWS = ("right", "behind", "left")
+_xyz = itemgetter(*"xyz")
 
-Position = Mapping[str, float]
+Position = Sequence[float]
+"""x, y and z, metres."""
+Angle = TypeVar("Angle", float, NDArray[Any])
 
 
 class Reachable:
     """Where the agent can stand in a scene: the ``actionReturn`` of GetReachablePositions."""
 
-    def __init__(self, positions: Sequence[Position]) -> None:
-        self._positions = [{axis: position[axis] for axis in "xyz"} for position in positions]
-        self._xz = np.array([(p["x"], p["z"]) for p in positions]).reshape(-1, 2)
-        self._best_views: dict[tuple[float, float, float], Mapping[str, float]] = {}
+    def __init__(self, positions: Sequence[Mapping[str, float]]) -> None:
+        flat = chain.from_iterable(map(_xyz, positions))
+        xyz = np.fromiter(flat, np.float64, 3 * len(positions)).reshape(-1, 3)
+        self._xyz = xyz[np.lexsort((xyz[:, 2], xyz[:, 0]))]
 
     def nearest_to(self, x: float, z: float) -> Iterator[list[Position]]:
         """The positions in batches, those nearest to a point first."""
-        distance = np.hypot(self._xz[:, 0] - x, self._xz[:, 1] - z).round(6)
-        order = np.lexsort((self._xz[:, 1], self._xz[:, 0], distance))
-        for first in range(0, len(order), _POSITIONS_AT_ONCE):
-            batch = order[first : first + _POSITIONS_AT_ONCE].tolist()
-            yield [self._positions[k] for k in batch]
+        distance = np.hypot(self._xyz[:, 0] - x, self._xyz[:, 2] - z).round(6)
+        nearest_first = self._xyz[np.argsort(distance, kind="stable")]
+        for first in range(0, len(nearest_first), _POSITIONS_AT_ONCE):
+            yield nearest_first[first : first + _POSITIONS_AT_ONCE].tolist()
 
-    def best_view(self, centre: Mapping[str, float]) -> Mapping[str, float]:
-        """The pose near a point from which to look at it most comfortably, were nothing in the way.
 
-        It is the one that :func:`navigate` would choose, were it among those to choose from.
-        """
-        key = (centre["x"], centre["y"], centre["z"])
-        if key not in self._best_views:
-            poses = [
-                {**position, "rotation": rotation, "horizon": horizon}
-                for position in next(self.nearest_to(centre["x"], centre["z"]))
-                for rotation in _ROTATIONS
-                for horizon in _HORIZONS
-            ]
-            self._best_views[key] = min(poses, key=lambda pose: _discomfort(pose, centre))
-        return self._best_views[key]
+_reachable: dict[Hashable, Reachable] = {}
+
+
+def reachable(controller: Any, scene: Hashable) -> Reachable:
+    """Where the agent can stand: asked for once in a process, since it does not change.
+
+    Args:
+        scene: the scene, and whatever else the answer depends on.
+    """
+    if scene not in _reachable:
+        event = controller.step(action="GetReachablePositions", renderImage=False)
+        _reachable[scene] = Reachable(event.metadata["actionReturn"])
+    return _reachable[scene]
 
 
 @dataclass(frozen=True)
@@ -68,21 +76,21 @@ class Outcome:
     """What came of a skill.
 
     Attributes:
-        event: the AI2-THOR event after it.
+        percept: what the agent perceives after it; None when it perceives what it did before.
         success: whether it was done.
         problem: if not, why not.
-        views: for "observe", direction to event.
+        views: for "observe", direction to what is perceived there.
     """
 
-    event: Any
+    percept: Percept | None
     success: bool
     problem: str = ""
-    views: Mapping[str, Any] = field(default_factory=dict)
+    views: Mapping[str, Percept] = field(default_factory=dict)
 
 
 def _outcome(event: Any) -> Outcome:
     metadata = event.metadata
-    return Outcome(event, metadata["lastActionSuccess"], metadata["errorMessage"])
+    return Outcome(perceive(event), metadata["lastActionSuccess"], metadata["errorMessage"])
 
 
 def place(controller: Any, pose: AgentPose) -> Outcome:
@@ -98,87 +106,131 @@ def place(controller: Any, pose: AgentPose) -> Outcome:
     )
 
 
-def start_pose(metadata: Mapping[str, Any], reachable: Reachable) -> AgentPose:
+def start_pose(bounds: Mapping[str, Any], floor: Reachable) -> AgentPose:
     """Where episodes begin: the reachable position nearest to a corner of the scene's bounds.
 
     The agent looks diagonally into the room from there: 45, 135, 225 or 315 degrees.
+
+    Args:
+        bounds: ``sceneBounds`` of an event's metadata.
     """
-    bounds = metadata["sceneBounds"]
-    cx, cz = bounds["center"]["x"], bounds["center"]["z"]
-    hx, hz = bounds["size"]["x"] / 2, bounds["size"]["z"] / 2
+    return _start_pose(floor, *_xyz(bounds["center"]), *_xyz(bounds["size"]))
+
+
+@lru_cache(maxsize=1024)
+def _start_pose(
+    floor: Reachable, cx: float, _cy: float, cz: float, width: float, _height: float, depth: float
+) -> AgentPose:
+    hx, hz = width / 2, depth / 2
     corners = (
         (cx - hx, cz - hz, 45.0),
         (cx - hx, cz + hz, 135.0),
         (cx + hx, cz + hz, 225.0),
         (cx + hx, cz - hz, 315.0),
     )
-    nearest = [(next(reachable.nearest_to(x, z))[0], x, z, r) for x, z, r in corners]
-    spot, _, _, rotation = min(nearest, key=lambda n: hypot(n[0]["x"] - n[1], n[0]["z"] - n[2]))
-    return AgentPose(spot["x"], spot["y"], spot["z"], rotation)
+    nearest = [(next(floor.nearest_to(x, z))[0], x, z, r) for x, z, r in corners]
+    (x, y, z), _, _, rotation = min(nearest, key=lambda n: hypot(n[0][0] - n[1], n[0][2] - n[2]))
+    return AgentPose(x, y, z, rotation)
 
 
-def navigate(controller: Any, goal: Mapping[str, Any], reachable: Reachable) -> Outcome:
+def navigate(controller: Any, objects: ObjectTable, goal: int, floor: Reachable) -> Outcome:
     """Go to where an object can best be seen and handled, facing it.
 
     Positions are tried from the nearest to the object's middle outwards; among the first from which
     it can be interacted with, the one that is at a comfortable distance and has it in the middle of
     the picture is taken.
     """
-    centre = goal["axisAlignedBoundingBox"]["center"]
+    object_id, centre = objects.ids[goal], tuple(objects.centre[goal].tolist())
     # The pose that one would choose is mostly possible, and cheaper to ask for than all.
-    wanted = reachable.best_view(centre)
-    if _interactable_poses(controller, goal, [wanted], [wanted["rotation"]], [wanted["horizon"]]):
-        return place(controller, _agent_pose(wanted))
-    for positions in reachable.nearest_to(centre["x"], centre["z"]):
-        found = _interactable_poses(controller, goal, positions, _ROTATIONS, _HORIZONS)
+    best = _best_view(floor, *centre)
+    at = [(best.x, best.y, best.z)]
+    if _interactable_poses(controller, object_id, at, [best.rotation], [best.horizon]):
+        return place(controller, best)
+
+    def discomfort(pose: AgentPose) -> float:
+        view = _view((pose.x, pose.y, pose.z), centre)
+        return _discomfort(*view, pose.rotation, pose.horizon)
+
+    for positions in floor.nearest_to(centre[0], centre[2]):
+        found = _interactable_poses(controller, object_id, positions, _ROTATIONS, _HORIZONS)
         if found:
-            return place(
-                controller, _agent_pose(min(found, key=lambda pose: _discomfort(pose, centre)))
-            )
-    problem = f"no way was found to where {goal['objectType']} can be seen"
-    return Outcome(controller.last_event, False, problem)
-
-
-def _agent_pose(pose: Mapping[str, float]) -> AgentPose:
-    return AgentPose(pose["x"], pose["y"], pose["z"], pose["rotation"], pose["horizon"])
+            return place(controller, min(found, key=discomfort))
+    problem = f"no way was found to where {objects.type_of(goal)} can be seen"
+    return Outcome(None, False, problem)
 
 
 def _interactable_poses(
     controller: Any,
-    goal: Mapping[str, Any],
+    object_id: str,
     positions: Sequence[Position],
     rotations: Sequence[float],
     horizons: Sequence[float],
-) -> list[dict[str, Any]]:
+) -> list[AgentPose]:
     event = controller.step(
         action="GetInteractablePoses",
-        objectId=goal["objectId"],
-        positions=[{axis: position[axis] for axis in "xyz"} for position in positions],
+        objectId=object_id,
+        positions=[{"x": x, "y": y, "z": z} for x, y, z in positions],
         rotations=list(rotations),
         horizons=list(horizons),
         standings=[True],
         renderImage=False,
     )
-    poses: list[dict[str, Any]] = event.metadata["actionReturn"]
-    return poses
+    return [
+        AgentPose(pose["x"], pose["y"], pose["z"], pose["rotation"], pose["horizon"])
+        for pose in event.metadata["actionReturn"]
+    ]
 
 
-def _discomfort(pose: Mapping[str, Any], centre: Mapping[str, float]) -> float:
-    """How badly a pose is suited to look at a point: 1 for every 45 degrees or metre amiss."""
-    dx, dz = centre["x"] - pose["x"], centre["z"] - pose["z"]
+def _view(position: Position, centre: Position) -> tuple[float, float, float]:
+    """How a point is seen from a position: metres away, degrees clockwise from +z and down."""
+    dx, dz = centre[0] - position[0], centre[2] - position[2]
     distance = hypot(dx, dz)
-    eye = pose["y"] + 0.675
-    aside: float = abs((degrees(atan2(dx, dz)) - pose["rotation"] + 180) % 360 - 180)
-    below: float = abs(degrees(atan2(eye - centre["y"], max(distance, 0.1))) - pose["horizon"])
-    return aside / 45 + below / 45 + abs(distance - _COMFORTABLE)
+    eye = position[1] + 0.675
+    return (
+        distance,
+        degrees(atan2(dx, dz)),
+        degrees(atan2(eye - centre[1], max(distance, 0.1))),
+    )
+
+
+def _discomfort(
+    distance: Angle, bearing: Angle, below: Angle, rotation: Angle, horizon: Angle
+) -> Angle:
+    """How badly one sees who looks in a direction: 1 for every 45 degrees or metre amiss.
+
+    Args:
+        distance, bearing, below: see :func:`_view`.
+        rotation, horizon: where one looks, degrees.
+    """
+    aside = abs((bearing - rotation + 180) % 360 - 180)
+    amiss: Angle = aside / 45 + abs(below - horizon) / 45 + abs(distance - _COMFORTABLE)
+    return amiss
+
+
+@lru_cache(maxsize=16384)
+def _best_view(floor: Reachable, x: float, y: float, z: float) -> AgentPose:
+    """The pose near a point from which to look at it most comfortably, were nothing in the way.
+
+    It is the one that :func:`navigate` would choose, were it among those to choose from.
+    """
+    positions = next(floor.nearest_to(x, z))
+    # math's functions, not NumPy's, whose last digits differ from machine to machine.
+    views = np.array([_view(position, (x, y, z)) for position in positions])
+    amiss = _discomfort(*views.T[..., None], *_DIRECTIONS.T)
+    position, direction = divmod(int(amiss.argmin()), len(_DIRECTIONS))
+    rotation, horizon = _DIRECTIONS[direction].tolist()
+    there = positions[position]
+    return AgentPose(there[0], there[1], there[2], rotation, horizon)
 
 
 def observe(controller: Any) -> Outcome:
     """Look right, behind and left, and turn back to where one looked before."""
-    views = {}
-    for view in _VIEWS:
-        views[view] = controller.step(action="RotateRight", degrees=90)
-    return Outcome(controller.step(action="RotateRight", degrees=90), True, views=views)
+
+    def turned() -> Percept:
+        return perceive(controller.step(action="RotateRight", degrees=90))
+
+    views = {view: turned() for view in _VIEWS}
+    return Outcome(turned(), True, views=views)
 
 
 def move_forward(controller: Any, grid_size: float) -> Outcome:
@@ -186,48 +238,47 @@ def move_forward(controller: Any, grid_size: float) -> Outcome:
     taken = 0.0
     while taken < FORWARD_STEP - 1e-6:
         step = min(grid_size, FORWARD_STEP - taken)
-        event = controller.step(action="MoveAhead", moveMagnitude=step)
-        if not event.metadata["lastActionSuccess"]:
+        controller.step(action="MoveAhead", moveMagnitude=step)
+        if not controller.last_event.metadata["lastActionSuccess"]:
             break
         taken += step
-    return Outcome(event, taken > 0, "" if taken else event.metadata["errorMessage"])
+    last = _outcome(controller.last_event)
+    return replace(last, success=taken > 0, problem="" if taken else last.problem)
 
 
-def _part_to_put_into(entry: Mapping[str, Any], objects: Objects) -> str:
+def _part_to_put_into(objects: ObjectTable, row: int) -> str:
     """The id of the receptacle proper: a Sink's basin rather than the Sink."""
-    part = f"{entry['objectId']}|{STANDS_FOR.get(entry['objectType'], '')}"
-    return part if part in objects else str(entry["objectId"])
+    part = f"{objects.ids[row]}|{STANDS_FOR.get(objects.type_of(row), '')}"
+    return part if part in objects.row else objects.ids[row]
 
 
-def _put(controller: Any, entry: Mapping[str, Any], objects: Objects) -> Any:
+def _put(controller: Any, objects: ObjectTable, row: int) -> Any:
     # forceAction waives which types AI2-THOR thinks belong there: the paper asks for a Cup in the
     # GarbageCan. Room, reach and a closed door still count.
     return controller.step(
-        action="PutObject", objectId=_part_to_put_into(entry, objects), forceAction=True
+        action="PutObject", objectId=_part_to_put_into(objects, row), forceAction=True
     )
 
 
-def _toggle(controller: Any, entry: Mapping[str, Any], objects: Objects) -> Any:
-    switch = entry
-    if entry["objectType"] == "StoveBurner":
+def _toggle(controller: Any, objects: ObjectTable, row: int) -> Any:
+    switch = row
+    if objects.type_of(row) == "StoveBurner":
         # AI2-THOR's burners have no switch; the knob that names one in controlledObjects is it.
-        for other in objects.values():
-            if entry["objectId"] in (other["controlledObjects"] or ()):
+        for other, controlled in enumerate(objects.controlled):
+            if row in controlled:
                 switch = other
-    action = "ToggleObjectOff" if switch["isToggled"] else "ToggleObjectOn"
+    action = "ToggleObjectOff" if objects.is_toggled[switch] else "ToggleObjectOn"
     # The agent sees the burner; whether its knob is in the picture is no matter.
-    return controller.step(
-        action=action, objectId=switch["objectId"], forceAction=switch is not entry
+    return controller.step(action=action, objectId=objects.ids[switch], forceAction=switch != row)
+
+
+def _simple(action: str) -> Callable[[Any, ObjectTable, int], Any]:
+    return lambda controller, objects, row: controller.step(
+        action=action, objectId=objects.ids[row]
     )
 
 
-def _simple(action: str) -> Callable[[Any, Mapping[str, Any], Objects], Any]:
-    return lambda controller, entry, objects: controller.step(
-        action=action, objectId=entry["objectId"]
-    )
-
-
-_INTERACTIONS: dict[str, Callable[[Any, Mapping[str, Any], Objects], Any]] = {
+_INTERACTIONS: dict[str, Callable[[Any, ObjectTable, int], Any]] = {
     verbs.PICKUP: _simple("PickupObject"),
     verbs.OPEN: _simple("OpenObject"),
     verbs.CLOSE: _simple("CloseObject"),
@@ -236,6 +287,6 @@ _INTERACTIONS: dict[str, Callable[[Any, Mapping[str, Any], Objects], Any]] = {
 }
 
 
-def interact(controller: Any, verb: str, entry: Mapping[str, Any], objects: Objects) -> Outcome:
+def interact(controller: Any, verb: str, objects: ObjectTable, row: int) -> Outcome:
     """Pick up, put into, open, close or toggle an object."""
-    return _outcome(_INTERACTIONS[verb](controller, entry, objects))
+    return _outcome(_INTERACTIONS[verb](controller, objects, row))

@@ -74,7 +74,7 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
 
     def send(self, action: dict[str, Any]) -> None:
         """Do an action at once."""
-        if action["action"] == "Reset":
+        if action.get("action") == "Reset":
             # The client drops this event for that of the Initialize which it sends next.
             action = {**action, "renderImage": False}
         metadata, frames = self._engine.step(action)

@@ -24,8 +24,7 @@ class LazyMetadata(dict[str, Any]):
         self, ready: dict[str, Any], later: Mapping[str, Callable[[Any], Any]], source: object
     ) -> None:
         super().__init__(ready)
-        for key in later:
-            super().__setitem__(key, None)
+        self.update(dict.fromkeys(later))
         self._later = dict(later)
         self._source: object | None = source
 

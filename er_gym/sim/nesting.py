@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,11 +33,11 @@ class Nesting:
                 for parent in lies_in:
                     contents[parent].append(i)
         within = np.zeros((count, count), dtype=bool)
-        for i, lies_in in enumerate(parents):
-            if lies_in:
-                within[i, lies_in] = True
+        depth = [len(lies_in) for lies_in in parents]
+        within[np.repeat(np.arange(count), depth), list(chain.from_iterable(parents))] = True
         while True:  # a few rounds: a fork in a pan on a burner is as deep as it gets
-            through = within | (within.astype(np.float32) @ within.astype(np.float32) > 0.0)
+            steps = within.astype(np.float32)
+            through = within | (steps @ steps > 0.0)
             if (through == within).all():
                 return Nesting(contents, within)
             within = through

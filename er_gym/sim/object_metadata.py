@@ -35,7 +35,7 @@ _RECEPTACLE = PROPERTIES.index("receptacle")
 
 def vector(values: Sequence[float] | NDArray[np.float64]) -> dict[str, float]:
     """Three numbers as AI2-THOR writes a point or a rotation."""
-    x, y, z = (float(v) for v in values)
+    x, y, z = values.tolist() if isinstance(values, np.ndarray) else map(float, values)
     return {"x": x, "y": y, "z": z}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -36,6 +37,15 @@ def parents(scene: Scene) -> tuple[tuple[int, ...], ...]:
         () if kind == "Floor" else tuple(p for p in lies_in if carried[i] or not no_place[p])
         for i, (kind, lies_in) in enumerate(zip(scene.types, scene.parents, strict=True))
     )
+
+
+@lru_cache(maxsize=128)
+def rows_by_type(scene: Scene) -> Mapping[str, tuple[int, ...]]:
+    """The rows of each type that there is, in scene order."""
+    found: dict[str, tuple[int, ...]] = {}
+    for i, kind in enumerate(scene.types):
+        found[kind] = (*found.get(kind, ()), i)
+    return found
 
 
 @lru_cache(maxsize=128)

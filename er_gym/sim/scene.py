@@ -69,7 +69,7 @@ class UnknownSceneError(ValueError):
             f"FloorPlan{numbers[0]}-{numbers[-1]} ({kind.replace('_', ' ')})"
             for kind, numbers in SCENE_NUMBERS.items()
         )
-        super().__init__(f"unknown scene {name!r}: choose one of {kinds}")
+        super().__init__(f"unknown scene {name!r:.200}: choose one of {kinds}")
 
 
 class OpenablePose(NamedTuple):

@@ -1,13 +1,14 @@
 """The mutable state of a scene: what is where, in which state, and where the agent is.
 
 Struct of arrays: row ``i`` of every array is object ``i``. Rows are never removed; an object that
-is no more (a whole apple after slicing) has ``exists[i]`` False. Whoever changes what can be seen
-calls :meth:`World.changed`, and everything derived is computed anew when next asked for.
+is no more (a whole apple after slicing) has ``exists[i]`` False. Whoever changes something says so
+(:meth:`World.changed`, :meth:`World.restated`), and what is derived from it is worked out anew when
+next asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -89,7 +90,8 @@ class World:
     ``untouched`` is True until something has been changed.
     ``parents[i]`` are the receptacles that object i is in, innermost first as recorded.
     ``entries`` is where :mod:`er_gym.sim.metadata` keeps what it said of objects that have not
-    changed since; ``derived`` holds what is worked out from the whole state, until it changes.
+    changed since; ``derived`` holds what is worked out from the whole state, until it changes, and
+    ``arrangement`` what is from where things are and whether they are open.
     """
 
     scene: Scene
@@ -119,11 +121,13 @@ class World:
     cameras: tuple[ThirdPartyCamera, ...] = ()
     index: dict[str, int] = field(default_factory=dict)
     derived: dict[str, object] = field(default_factory=dict)
-    _touched: set[int] = field(default_factory=set)
+    arrangement: dict[str, object] = field(default_factory=dict)
+    _displaced: set[int] = field(default_factory=set)
     _shapes: dict[int, Shape] = field(default_factory=dict)
     _samples: dict[int, NDArray[np.float64]] = field(default_factory=dict)
     entries: dict[int, dict[str, object]] = field(default_factory=dict)
     _nesting: Nesting | None = None
+    _by_type: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     @staticmethod
     def load(scene: Scene, settings: Settings) -> World:
@@ -158,6 +162,7 @@ class World:
         )
         world.index = {object_id: i for i, object_id in enumerate(world.object_ids)}
         world._nesting = recorded.nesting(scene)
+        world._by_type = recorded.rows_by_type(scene)
         return world
 
     # -- reading ---------------------------------------------------------------------------------
@@ -175,7 +180,8 @@ class World:
 
     def of_type(self, *types: str) -> Iterator[int]:
         """The existing objects of some types, in scene order."""
-        return (i for i, t in enumerate(self.types) if t in types and self.exists[i])
+        rows = sorted(i for name in types for i in self._by_type.get(name, ()))
+        return (i for i in rows if self.exists[i])
 
     def find(self, object_id: str) -> int:
         """The row of an object.
@@ -186,7 +192,7 @@ class World:
         i = self.index.get(object_id)
         if i is None or not self.exists[i]:
             raise ActionFailed(
-                f"No object with ID {object_id!r} is in {self.scene.name}.", "ObjectNotFound"
+                f"No object with ID {object_id!r:.200} is in {self.scene.name}.", "ObjectNotFound"
             )
         return i
 
@@ -237,16 +243,16 @@ class World:
     @property
     def hidden(self) -> NDArray[np.bool_]:
         """(N,) which objects lie in something shut, or are no more."""
-        found = self.derived.get("hidden")
+        found = self.arrangement.get("hidden")
         if not isinstance(found, np.ndarray):
             shut = (
                 self.properties[:, _PROPERTY["receptacle"]]
                 & self.properties[:, _PROPERTY["openable"]]
             )
             shut &= ~self.states[:, _STATE["isOpen"]]
-            shut[[i for i, kind in enumerate(self.types) if kind == "Toilet"]] = False
+            shut[list(self._by_type.get("Toilet", ()))] = False
             found = ~self.exists | self.nesting.within[:, shut].any(axis=1)
-            self.derived["hidden"] = found
+            self.arrangement["hidden"] = found
         return found
 
     @property
@@ -254,12 +260,12 @@ class World:
         """The held object and all that lies in it; empty when the hand is."""
         return [] if self.held < 0 else [self.held, *self.inside(self.held)]
 
-    def touched(self) -> list[int]:
-        """Objects that something may have happened to since the scene was loaded."""
-        return sorted(self._touched | set(self.in_hand))
+    def displaced(self) -> list[int]:
+        """Objects that may be elsewhere, or in something else, than when the scene was loaded."""
+        return sorted(self._displaced)
 
     def _as_recorded(self, i: int) -> bool:
-        return i < len(self.scene) and i not in self._touched
+        return i < len(self.scene) and i not in self._displaced
 
     def shape(self, i: int) -> Shape:
         """What object i is made of, where it is now."""
@@ -304,22 +310,32 @@ class World:
         self.position[rows] += offset
         self.low[rows] += offset
         self.high[rows] += offset
-        self._touch(rows)
+        self._displace(rows)
 
     def _touch(self, rows: Iterable[int]) -> None:
-        """Forget what was derived for some objects one by one."""
-        rows = list(rows)
+        """Forget what was said of some objects."""
         self.untouched = False
-        self._touched.update(rows)
+        for i in rows:
+            self.entries.pop(i, None)
+
+    def _displace(self, rows: Iterable[int]) -> None:
+        """Forget that too, and what was worked out from where they are and what they lie in."""
+        rows = list(rows)
+        self._touch(rows)
+        self._displaced.update(rows)
         for i in rows:
             self._samples.pop(i, None)
             self._shapes.pop(i, None)
-            self.entries.pop(i, None)
 
     # -- changing --------------------------------------------------------------------------------
 
     def changed(self) -> None:
-        """Say that something that can be seen has changed."""
+        """Say that something is elsewhere than it was, or has been opened or shut."""
+        self.restated()
+        self.arrangement.clear()
+
+    def restated(self) -> None:
+        """Say that something is in another state than it was, where it is."""
         self.untouched = False
         self.derived.clear()
 
@@ -332,7 +348,10 @@ class World:
         """Put object i into a state of :data:`er_gym.sim.scene.STATES`, or out of it."""
         self.states[i, _STATE[name]] = value
         self._touch([i])
-        self.changed()
+        if name == "isOpen":
+            self.changed()
+        else:
+            self.restated()
 
     def set_temperature(self, i: int, temperature: str) -> None:
         """Make object i "Hot", "Cold" or "RoomTemp"."""
@@ -349,7 +368,8 @@ class World:
         """Say in which receptacles object i lies from now on; what lies in it goes along."""
         within = self.inside(i)
         moving = {i, *within}
-        self._touch([*moving, *self.parents[i], *parents])
+        self._touch([*self.parents[i], *parents])
+        self._displace(moving)
         self.parents[i] = tuple(parents)
         for child in within:
             own = tuple(p for p in self.parents[child] if p in moving)
@@ -358,7 +378,8 @@ class World:
 
     def relocate_alone(self, i: int, parents: Sequence[int]) -> None:
         """Say in which receptacles object i lies; what lies in it does not change."""
-        self._touch([i, *self.parents[i], *parents])
+        self._touch([*self.parents[i], *parents])
+        self._displace([i, *self.inside(i)])
         self.parents[i] = tuple(parents)
         self._renested()
 
@@ -371,7 +392,7 @@ class World:
         corners = self.obb_corners(i)
         if corners is not None:
             self.low[i], self.high[i] = corners.min(axis=0), corners.max(axis=0)
-        self._touch([i])
+        self._displace([i])
         self.changed()
 
     def move_by(self, i: int, offset: NDArray[np.float64]) -> None:
@@ -394,7 +415,7 @@ class World:
             self.high[i] += offset
         else:
             self.low[i], self.high[i] = corners.min(axis=0), corners.max(axis=0)
-        self._touch([i])
+        self._displace([i])
         self.changed()
 
     def rename(self, i: int, object_id: str) -> None:
@@ -403,7 +424,7 @@ class World:
         self.object_ids[i] = object_id
         self.index[object_id] = i
         self._touch([i, *self.parents[i], *self.contents[i]])
-        self.changed()
+        self.restated()
 
     def remove(self, i: int) -> None:
         """Take object i out of the scene; what lies in it stays where it is."""
@@ -411,8 +432,9 @@ class World:
             self.held = -1
         for child in self.contents[i]:
             self.parents[child] = tuple(p for p in self.parents[child] if p != i)
-            self._touch([child])
-        self._touch([i, *self.parents[i]])
+            self._displace([child])
+        self._touch(self.parents[i])
+        self._displace([i])
         self.parents[i] = ()
         self.exists[i] = False
         self._renested()
@@ -450,7 +472,10 @@ class World:
         self.controlled.append(None)
         self.salient_materials.append(self.salient_materials[like])
         self.index[object_id] = row
+        of_type = (*self._by_type.get(object_type, ()), row)
+        self._by_type = {**self._by_type, object_type: of_type}
         self._touch(self.parents[row])
+        self._displace([row])
         self._renested()
         return row
 

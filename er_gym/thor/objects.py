@@ -73,14 +73,8 @@ class ObjectTable:
 
     def of_type(self, object_type: str) -> list[int]:
         """The rows of all objects of a type, in scene order."""
-        return self._by_kind.get(KIND_OF.get(object_type, -1), [])
-
-    @cached_property
-    def _by_kind(self) -> dict[int, list[int]]:
-        found: dict[int, list[int]] = {}
-        for k, kind in enumerate(self.kinds.tolist()):
-            found.setdefault(kind, []).append(k)
-        return found
+        kind = KIND_OF.get(object_type, -1)
+        return np.flatnonzero(self.kinds == kind).tolist()
 
     @cached_property
     def volume(self) -> NDArray[np.float64]:
@@ -138,53 +132,69 @@ def _of_entries(metadata: Mapping[str, Any]) -> tuple[ObjectTable, NDArray[np.bo
     return table, np.array([bool(e["visible"]) for e in entries], dtype=bool)
 
 
-_Names = tuple[tuple[str, ...], Mapping[str, int], NDArray[np.intp]]
+_HAS = [PROPERTIES.index(name) for name in ("pickupable", "receptacle", "openable", "toggleable")]
+_IS = [STATES.index(name) for name in ("isOpen", "isToggled")]
 
 
-def _named(ids: Sequence[str], types: Sequence[str]) -> _Names:
-    kinds = np.array([KIND_OF[name] for name in types], dtype=np.intp)
-    return tuple(ids), {object_id: k for k, object_id in enumerate(ids)}, kinds
+@dataclass(frozen=True, eq=False)
+class _Names:
+    """What in a table is the same however the objects are."""
+
+    ids: tuple[str, ...]
+    row: Mapping[str, int]
+    kinds: NDArray[np.intp]
+    controlled: tuple[tuple[int, ...], ...]
+
+    @staticmethod
+    def of(source: Scene | World) -> _Names:
+        ids = tuple(source.object_ids)
+        return _Names(
+            ids=ids,
+            row={object_id: k for k, object_id in enumerate(ids)},
+            kinds=np.array([KIND_OF[name] for name in source.types], dtype=np.intp),
+            controlled=tuple(tuple(rows or ()) for rows in source.controlled),
+        )
 
 
 @lru_cache(maxsize=128)
 def _recorded_names(scene: Scene) -> _Names:
-    return _named(scene.object_ids, scene.types)
+    return _Names.of(scene)
 
 
 def _names(world: World) -> _Names:
     recorded = _recorded_names(world.scene)
     # Equal tuples of the same strings are compared by identity: this costs next to nothing.
-    if tuple(world.object_ids) == recorded[0]:
-        return recorded
-    return _named(world.object_ids, world.types)
+    return recorded if tuple(world.object_ids) == recorded.ids else _Names.of(world)
 
 
 def _of_world(world: World) -> ObjectTable:
     """The table of the world as it is; kept until the world changes."""
     found = world.derived.get("table")
-    if isinstance(found, ObjectTable):
-        if world.held >= 0:  # what is carried moves with the agent
-            found = replace(found, centre=(world.low + world.high) / 2)
-    else:
-        ids, row, kinds = _names(world)
-        properties, states = world.properties.copy(), world.states.copy()
-        has = dict(zip(PROPERTIES, properties.T, strict=True))
-        state = dict(zip(STATES, states.T, strict=True))
-        found = world.derived["table"] = ObjectTable(
-            ids=ids,
-            row=row,
-            kinds=kinds,
-            pickupable=has["pickupable"],
-            receptacle=has["receptacle"],
-            openable=has["openable"],
-            toggleable=has["toggleable"],
-            is_open=state["isOpen"],
-            is_toggled=state["isToggled"],
-            centre=(world.low + world.high) / 2,
-            size=world.high - world.low,
-            parents=tuple(world.parents),
-            contents=world.contents,
-            controlled=tuple(rows or () for rows in world.controlled),
-            held=world.held,
-        )
+    if not isinstance(found, ObjectTable):
+        found = world.derived["table"] = _table(world)
+    elif world.held >= 0:  # what is carried moves with the agent
+        found = replace(found, centre=(world.low + world.high) / 2)
     return found
+
+
+def _table(world: World) -> ObjectTable:
+    names = _names(world)
+    pickupable, receptacle, openable, toggleable = world.properties[:, _HAS].T.copy()
+    is_open, is_toggled = world.states[:, _IS].T.copy()
+    return ObjectTable(
+        ids=names.ids,
+        row=names.row,
+        kinds=names.kinds,
+        pickupable=pickupable,
+        receptacle=receptacle,
+        openable=openable,
+        toggleable=toggleable,
+        is_open=is_open,
+        is_toggled=is_toggled,
+        centre=(world.low + world.high) / 2,
+        size=world.high - world.low,
+        parents=tuple(world.parents),
+        contents=world.contents,
+        controlled=names.controlled,
+        held=world.held,
+    )

@@ -8,6 +8,7 @@ from support import make_task
 
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.observations import GOAL_VERBS, STATE_LAYOUT, goal, parse_obs_mode
+from er_gym.tasks.task import AgentPose
 
 FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 
@@ -94,6 +95,14 @@ def test_state_is_relative_to_the_start(state_env: EmbodiedEnv) -> None:
     obs, *_ = state_env.step("move forward")
     assert entry(obs, "ahead") == pytest.approx(0.05, abs=1e-6)  # half a metre, by 10 m
     assert entry(obs, "right") == pytest.approx(0.0, abs=1e-6)
+
+
+def test_state_keeps_to_its_bounds(state_env: EmbodiedEnv) -> None:
+    state_env.reset(options={"task": make_task("single_pickup", ("open", FRIDGE))})
+    state_env._memory.start = AgentPose(99.0, 0.9, -99.0, 0.0)
+    obs, *_ = state_env.step("observe")
+    assert [entry(obs, name) for name in ("right", "ahead")] == [-1, 1]
+    assert obs["state"] in state_env.observation_space["state"]
 
 
 def test_text_keeps_to_its_characters(state_env: EmbodiedEnv) -> None:

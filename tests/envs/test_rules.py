@@ -9,7 +9,6 @@ from support import Play, make_task
 
 from er_gym.envs.actions import ACTIONS, INDEX, Action, parse
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.legality import is_navigable
 from er_gym.tasks.task import AgentPose
 
 CABINET = "Cabinet|+00.68|+02.02|-02.46"
@@ -31,49 +30,10 @@ FETCH_CUP = make_task(
 )
 
 
-def box(x: float, y: float, z: float, distance: float, **fields: object) -> dict[str, object]:
-    return {
-        "visible": True,
-        "isPickedUp": False,
-        "objectType": "Thing",
-        "axisAlignedBoundingBox": {
-            "size": {"x": x, "y": y, "z": z},
-            "center": {"x": distance, "y": 5.0, "z": 0.0},
-        },
-        **fields,
-    }
-
-
-@pytest.mark.parametrize(
-    ("entry", "expected"),
-    [
-        (box(0.01, 0.01, 0.01, 0.99), True),
-        (box(0.01, 0.01, 0.01, 1.01), False),
-        (box(0.8, 0.8, 0.0, 9.9), True),  # S = 0.64 > 0.5, d < 10
-        (box(0.8, 0.8, 0.0, 10.1), False),
-        (box(0.4, 0.4, 0.0, 3.9), True),  # S = 0.16 > 0.15, d < 4
-        (box(0.4, 0.4, 0.0, 4.1), False),
-        (box(0.3, 0.3, 0.0, 2.4), True),  # S = 0.09 > 0.08, d < 2.5
-        (box(0.3, 0.3, 0.0, 2.6), False),
-        (box(0.2, 0.2, 0.2, 1.9), True),  # V = 0.008 > 0.005, d < 2
-        (box(0.2, 0.2, 0.2, 2.1), False),
-        (box(0.11, 0.11, 0.11, 1.4), True),  # V = 0.0013 > 0.001, d < 1.5
-        (box(0.11, 0.11, 0.11, 1.6), False),
-        (box(0.27, 0.27, 0.27, 0.9), True),
-        (box(0.39, 0.38, 0.4, 2.9), True),  # V = 0.059, V/d = 0.0204 > 0.02
-        (box(2.0, 2.0, 2.0, 0.5, visible=False), False),
-        (box(2.0, 2.0, 2.0, 0.5, objectType="Floor"), False),
-        (box(0.1, 0.1, 0.1, 0.5, isPickedUp=True), False),
-    ],
-)
-def test_navigable_rule(entry: dict[str, object], expected: bool) -> None:
-    assert is_navigable(entry, {"x": 0.0, "y": 0.9, "z": 0.0}) is expected
-
-
 def test_start_is_a_corner_looking_diagonally_in(env: EmbodiedEnv, play: Play) -> None:
     play(FETCH_CUP)
-    agent = env._event.metadata["agent"]
-    bounds = env._event.metadata["sceneBounds"]
+    agent = env._controller.last_event.metadata["agent"]
+    bounds = env._controller.last_event.metadata["sceneBounds"]
     assert agent["rotation"]["y"] in (45, 135, 225, 315)
     assert agent["cameraHorizon"] == 0
     to_middle = np.array([bounds["center"][a] - agent["position"][a] for a in "xz"])
@@ -232,7 +192,9 @@ def test_the_mask_is_what_is_legal(env: EmbodiedEnv, play: Play) -> None:
 
 def test_what_was_navigable_once_stays_so(env: EmbodiedEnv, play: Play) -> None:
     first, _, last = play(FETCH_CUP, "navigate to Fridge", "navigate to Cabinet")
-    in_view = {o["objectType"] for o in env._event.metadata["objects"] if o["visible"]}
+    in_view = {
+        o["objectType"] for o in env._controller.last_event.metadata["objects"] if o["visible"]
+    }
     assert set(first["navigable"]) <= set(last["navigable"])
     assert "GarbageCan" in first["navigable"]
     assert "GarbageCan" not in in_view
@@ -249,12 +211,18 @@ def test_observe_gives_three_views_and_turns_back(play: Play) -> None:
     env.close()
 
 
+def test_what_is_seen_when_looking_round_is_known_from_then_on(play: Play) -> None:
+    *_, before, after = play(FETCH_CUP, "navigate to Fridge", "observe")
+    assert set(before["navigable"]) < set(after["navigable"])
+    assert before["interactable"] == after["interactable"]  # it looks ahead again
+
+
 def test_going_to_an_open_receptacle_means_going_to_the_related_object_in_it(
     env: EmbodiedEnv, play: Play
 ) -> None:
     def distance_to(object_id: str) -> float:
-        objects = {o["objectId"]: o for o in env._event.metadata["objects"]}
-        at = env._event.metadata["agent"]["position"]
+        objects = {o["objectId"]: o for o in env._controller.last_event.metadata["objects"]}
+        at = env._controller.last_event.metadata["agent"]["position"]
         thing = objects[object_id]["axisAlignedBoundingBox"]["center"]
         return float(np.hypot(thing["x"] - at["x"], thing["z"] - at["z"]))
 
@@ -274,7 +242,7 @@ def test_a_stated_pose_is_taken(env: EmbodiedEnv, play: Play) -> None:
         "single_pickup", ("open", CABINET), navigable_objects=("Cabinet",), poses={CABINET: pose}
     )
     play(task, "navigate to Cabinet")
-    agent = env._event.metadata["agent"]
+    agent = env._controller.last_event.metadata["agent"]
     assert (agent["position"]["x"], agent["position"]["z"]) == (0.25, -1.5)
     assert agent["rotation"]["y"] == 180.0
 
@@ -313,7 +281,7 @@ def test_toggling_a_burner_turns_its_knob(env: EmbodiedEnv, play: Play) -> None:
     assert infos[-1]["reward"] == 1.0
     knobs = [
         o
-        for o in env._event.metadata["objects"]
+        for o in env._controller.last_event.metadata["objects"]
         if "StoveBurner|-00.47|+00.92|-02.37" in (o["controlledObjects"] or ())
     ]
     assert [knob["isToggled"] for knob in knobs] == [True]

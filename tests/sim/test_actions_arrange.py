@@ -230,6 +230,22 @@ def test_exclusions_are_kept(kitchen):
     assert still_there <= on_counters(kitchen)
 
 
+@pytest.mark.parametrize("seed", [3, 5, 7])
+def test_a_bowl_is_not_put_onto_the_table_that_stands_in_it(enter, seed):
+    room = enter("FloorPlan323")
+    table, bowl = room.one("SideTable"), room.one("Bowl")
+    name, wanted = room[table]["name"], poses(room)
+    for pose in wanted:
+        if pose["objectName"] == name:
+            pose["position"] = room[bowl]["axisAlignedBoundingBox"]["center"]
+    room.do("SetObjectPoses", objectPoses=wanted)
+    (table,) = (o["objectId"] for o in room.event.metadata["objects"] if o["name"] == name)
+    assert bowl in room[table]["parentReceptacles"]
+    room.do("InitialRandomSpawn", randomSeed=seed)
+    assert table not in room[table]["parentReceptacles"]
+    check(room)
+
+
 def test_what_is_held_is_put_somewhere_too(kitchen):
     kitchen.take(APPLE)
     kitchen.do("InitialRandomSpawn", randomSeed=1)

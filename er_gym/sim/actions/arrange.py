@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict
 from er_gym.sim import consequences
 from er_gym.sim.actions.checks import FARTHEST, within
 from er_gym.sim.actions.pick_place import fall, put_down
-from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.actions.registry import Vector, action, quoted
 from er_gym.sim.compatibility import accepts
 from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
 from er_gym.sim.space.containment import receptacles_of
@@ -60,8 +60,8 @@ def set_object_poses(
     for pose in objectPoses:
         if pose.objectName not in loose:
             raise ActionFailed(
-                f"No pickupable or moveable object is named {pose.objectName!r} in this scene; "
-                "names are those of the metadata's objects, not their ids.",
+                f"No pickupable or moveable object is named {quoted(pose.objectName)} in this "
+                "scene; names are those of the metadata's objects, not their ids.",
                 "ObjectNotFound",
             )
     if not objectPoses:
@@ -158,7 +158,10 @@ def initial_random_spawn(
     ]
     moved = []
     for i in random.permutation(loose).tolist():
-        taking = [r for r in receptacles if accepts(world.types[i], world.types[r])]
+        inside = world.inside(i)  # SetObjectPoses may have put a table into a bowl
+        taking = [
+            r for r in receptacles if r not in inside and accepts(world.types[i], world.types[r])
+        ]
         choices = random.permutation(taking).tolist()[:numPlacementAttempts]
         if any(_spawn(world, i, r, random) for r in choices):
             moved.append(i)

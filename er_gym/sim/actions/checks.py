@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from er_gym.sim.actions.registry import quoted
 from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
 from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
@@ -17,8 +18,9 @@ FARTHEST = 1000.0
 def within(name: str, value: float | None, low: float, high: float) -> None:
     """Refuse an argument that is given and out of its range."""
     if value is not None and not low <= value <= high:
+        given = quoted(value) if isinstance(value, int) else f"{value:g}"  # no float is that long
         raise ActionFailed(
-            f"{name} must be within {low:g} and {high:g}, not {value:g}.", INVALID_ARGUMENT
+            f"{name} must be within {low:g} and {high:g}, not {given}.", INVALID_ARGUMENT
         )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
-from er_gym.sim.world import World
+from er_gym.sim.world import Agent, World
 
 _FARTHEST = 1000.0
 """No scene is larger than this, metres."""
@@ -20,13 +20,15 @@ def _step(world: World, magnitude: float | None, heading: float) -> None:
     size = world.settings.grid_size if magnitude is None else magnitude
     if size < 0:
         raise ActionFailed(f"moveMagnitude must be 0 or more, not {size:g}.", INVALID_ARGUMENT)
+    if size > _FARTHEST:
+        raise ActionFailed(f"A wall is blocking the agent from moving by {size:g} m.")
     angle = np.radians(world.agent.rotation + heading)
     start = world.agent.position
     end = start + size * np.array([np.sin(angle), 0.0, np.cos(angle)])
     if world.settings.snap_to_grid:
         grid = world.settings.grid_size
         end[[0, 2]] = np.round(end[[0, 2]] / grid) * grid
-    if size > 1e3 or not world.floor.path_is_clear(start[[0, 2]], end[[0, 2]]):
+    if not world.floor.path_is_clear(start[[0, 2]], end[[0, 2]]):
         dx, _, dz = end - start
         raise ActionFailed(
             f"{_obstacle(world, end)} is blocking the agent from moving by ({dx:.4f}, {dz:.4f})."
@@ -99,9 +101,10 @@ def teleport(
     there = np.array(
         [here[0] if x is None else x, here[1] if y is None else y, here[2] if z is None else z]
     )
-    if forceAction and np.abs(there).max() > _FARTHEST:
+    if np.abs(there).max() > _FARTHEST:
         raise ActionFailed(
-            f"({there[0]:g}, {there[1]:g}, {there[2]:g}) is farther than {_FARTHEST:g} m away."
+            f"({there[0]:g}, {there[1]:g}, {there[2]:g}) is farther than {_FARTHEST:g} m away, "
+            "beyond every wall."
         )
     if abs(there[1] - here[1]) > _HEIGHT_TOLERANCE and not forceAction:
         raise ActionFailed(
@@ -118,8 +121,7 @@ def teleport(
         )
     there[1] = here[1]
     world.place_agent(
-        replace(
-            agent,
+        Agent(
             position=there,
             rotation=agent.rotation if rotation is None else rotation.y % 360.0,
             horizon=agent.horizon if horizon is None else horizon,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from er_gym.sim.actions.checks import FIELDS_OF_VIEW, within
-from er_gym.sim.actions.registry import action
+from er_gym.sim.actions.registry import action, quoted
 from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
 from er_gym.sim.space.visibility import NEAR_PLANE
 from er_gym.sim.world import World
@@ -49,7 +49,7 @@ def initialize(
     """
     if agentMode.lower() != "default":
         raise ActionFailed(
-            f"The embedded engine has agentMode 'default' only, not {agentMode!r}; "
+            f"The embedded engine has agentMode 'default' only, not {quoted(agentMode)}; "
             "use backend='unity' for others.",
             INVALID_ARGUMENT,
         )

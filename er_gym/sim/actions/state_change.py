@@ -6,7 +6,7 @@ import numpy as np
 
 from er_gym.sim import consequences
 from er_gym.sim.actions.checks import require, target
-from er_gym.sim.actions.registry import action
+from er_gym.sim.actions.registry import action, quoted
 from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
 from er_gym.sim.world import World
 
@@ -118,7 +118,8 @@ def fill_object(
     """Fill an object with one of :data:`LIQUIDS`."""
     if fillLiquid not in LIQUIDS:
         raise ActionFailed(
-            f"fillLiquid must be one of {', '.join(LIQUIDS)}, not {fillLiquid!r}.", INVALID_ARGUMENT
+            f"fillLiquid must be one of {', '.join(LIQUIDS)}, not {quoted(fillLiquid)}.",
+            INVALID_ARGUMENT,
         )
     i = target(world, objectId, forceAction)
     require(world, i, "canFillWithLiquid", "something that can be filled")

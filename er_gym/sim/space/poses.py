@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from er_gym.sim.space.reach import Outlines
 from er_gym.sim.space.sights import sights
-from er_gym.sim.space.visibility import in_frustum
-from er_gym.sim.world import CAMERA_CROUCHING, CAMERA_STANDING, World
+from er_gym.sim.space.visibility import in_frustum, visible
+from er_gym.sim.world import CAMERA_CROUCHING, CAMERA_STANDING, Agent, World
 
 HORIZONS = (-30.0, 0.0, 30.0, 60.0)
 """Camera tilts that AI2-THOR tries when none are asked for, degrees, down positive."""
@@ -46,8 +46,13 @@ def interactable_poses(
         found.setflags(write=False)
         return found
 
+    in_hand = i in world.in_hand
+    one = len(positions) == len(rotations) == len(horizons) == len(standings) == 1
+    if one and not in_hand:
+        # Whoever asks for one pose will take it next, and look about: that is asked for already.
+        return _one_pose(world, i, positions[0], rotations[0] % 360.0, horizons[0], standings[0])
     # Where the hand is, is no part of an arrangement; and the poses of a whole room take megabytes.
-    if i in world.in_hand or len(positions) > _REMEMBERED:
+    if in_hand or len(positions) > _REMEMBERED:
         return search()
     settings = world.settings
     lens = (settings.field_of_view, settings.width / settings.height, settings.visibility_distance)
@@ -101,10 +106,25 @@ def _search(
     return np.concatenate(found)[:max_poses]
 
 
+def _one_pose(
+    world: World,
+    i: int,
+    position: NDArray[np.float64],
+    rotation: float,
+    horizon: float,
+    standing: bool,
+) -> Poses:
+    x, y, z = float(position[0]), float(world.agent.position[1]), float(position[1])
+    pose = Agent(np.array([x, y, z]), rotation, horizon, standing)
+    if not visible(world, pose)[i]:
+        return np.empty((0, 6))
+    return np.array([[x, y, z, rotation, horizon, standing]])
+
+
 def _within_reach(world: World, i: int, positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Those of (P, 2) positions that object i is within the visibility distance of."""
     distance = world.settings.visibility_distance
-    away = np.abs(sights(world).reach[:, None] - positions).max(axis=0, initial=0.0)
+    away = np.abs(np.array(sights(world).reach)[:, None] - positions).max(axis=0, initial=0.0)
     if i not in world.in_hand and (np.hypot(away[:, 0], away[:, 1]) <= distance).all():
         return positions  # all that there is, is
     return positions[Outlines.of([world.shape(i)]).gaps(positions)[:, 0] <= distance]
@@ -114,11 +134,5 @@ def _lines_to(
     world: World, i: int, eyes: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Object i's sample points (Q, 3), and (E, Q) from which eyes (E, 3) nothing hides which."""
-    known = sights(world)
-    if len(eyes) == 1 and i not in world.in_hand:
-        # Whoever asks for one position will look about from there next: keep what is found.
-        first, count = known.first[i], known.count[i]
-        points = known.points[first : first + count]
-        return points, known.viewpoint(eyes[0]).blocking[None, first : first + count] == 0
     points = world.sample_points(i).astype(np.float32)
-    return points, known.clear(eyes, points, i)
+    return points, sights(world).clear(eyes, points, i)

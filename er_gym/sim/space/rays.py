@@ -19,7 +19,9 @@ Floats = NDArray[np.float32]
 
 
 def _inverse(direction: Floats) -> Floats:
-    return np.asarray(np.float32(1.0) / np.where(np.abs(direction) < _TINY, _TINY, direction))
+    """One over each, in place; what is next to nothing counts as a little."""
+    direction[np.abs(direction) < _TINY] = _TINY
+    return np.asarray(np.divide(np.float32(1.0), direction, out=direction))
 
 
 def blocked_by(
@@ -88,16 +90,22 @@ def crossings(
             between & (box_max[axis] >= nearest[:, None]) & (box_min[axis] <= farthest[:, None])
         )
     group, box = between.nonzero()
+    if not len(group):
+        return group, box
     count = targets.count[group]
     ends = count.cumsum()
-    point = np.arange(ends[-1] if len(ends) else 0)
+    point = np.arange(ends[-1])
     point += np.repeat(targets.first[group] - ends + count, count)
     boxes = np.repeat(box, count)
-    inverse = _inverse(targets.points - eye[:, None])
+    if len(point) < targets.points.shape[1]:
+        inverse = _inverse(targets.points.take(point, axis=1) - eye[:, None])
+    else:
+        inverse = _inverse(targets.points - eye[:, None]).take(point, axis=1)
     near, far = box_min - eye[:, None], box_max - eye[:, None]
-    enter, leave = _slab(inverse[0][point], near[0][boxes], far[0][boxes])
+    near, far = near.take(boxes, axis=1), far.take(boxes, axis=1)
+    enter, leave = _slab(inverse[0], near[0], far[0])
     for axis in (1, 2):
-        first, last = _slab(inverse[axis][point], near[axis][boxes], far[axis][boxes])
+        first, last = _slab(inverse[axis], near[axis], far[axis])
         np.maximum(enter, first, out=enter)
         np.minimum(leave, last, out=leave)
     crossed = (enter > _EPSILON) & (enter <= leave) & (leave < _ALMOST_ONE)

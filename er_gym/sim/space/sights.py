@@ -11,6 +11,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from math import hypot
 from typing import Any, TypeVar
 
 import numpy as np
@@ -22,12 +23,18 @@ from er_gym.sim.space.rays import Targets, blocked_by, crossings
 from er_gym.sim.space.reach import Outlines
 from er_gym.sim.world import Settings, World
 
+_RUN = 26
+"""So many points, those of a small box, are held against a box at once before each is by itself."""
 _ARRANGEMENTS = 512
 _VIEWPOINTS = 128
 _ANSWERS = 512
 
 Found = TypeVar("Found")
 Floats = NDArray[np.float32]
+
+
+_Rectangle = tuple[tuple[float, float], tuple[float, float]]
+"""Corners x, z, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +64,7 @@ class Sights:
         sign: (M,) -1 for boxes of the recorded arrangement that are gone, else 1.
         pairs: (N, M) which boxes are to be asked about for whose points.
         away: (N,) which objects are shut away, in the hand or no more.
-        reach: (2, 2) corners x, z of a rectangle around everything, metres.
+        reach: corners x, z of a rectangle around everything, metres.
         before: the recorded arrangement, None if this is that one.
         anew: (P,) the points about which that one says nothing, None if there are none.
         moved: (K,) rows of the objects that are not where they were recorded.
@@ -75,7 +82,7 @@ class Sights:
     sign: NDArray[np.int8]
     pairs: NDArray[np.bool_]
     away: NDArray[np.bool_]
-    reach: NDArray[np.float64]
+    reach: _Rectangle
     before: Sights | None
     anew: NDArray[np.bool_] | None
     moved: NDArray[np.intp]
@@ -103,38 +110,62 @@ class Sights:
             point, box = crossings(camera.astype(np.float32), targets, low, high, pairs)
             count = np.bincount(point, weights=sign[box], minlength=len(blocking))
             blocking += count.astype(np.int8)
-        clear = np.flatnonzero((blocking == 0) & ~self.away[self.of])
+        clear = ((blocking == 0) & self._showing).nonzero()[0]
         return Viewpoint(blocking, clear.astype(np.uint16))
 
     @cached_property
-    def _spans(self) -> tuple[Floats, Floats, Floats]:
-        """The points as (3, P), and (3, N) corners of the box around each object's."""
+    def _showing(self) -> NDArray[np.bool_]:
+        return np.asarray(~self.away[self.of])
+
+    @cached_property
+    def axes(self) -> Floats:
+        """(3, P) the points' coordinates, each axis by itself."""
         if self.before is not None and self.points is self.before.points:
-            return self.before._spans
-        axes = np.ascontiguousarray(self.points.T)
-        there = np.flatnonzero(self.count)
-        low, high = np.zeros((2, 3, len(self.count)), dtype=np.float32)
-        low[:, there] = np.minimum.reduceat(axes, self.first[there], axis=1)
-        high[:, there] = np.maximum.reduceat(axes, self.first[there], axis=1)
-        return axes, low, high
+            return self.before.axes
+        return np.ascontiguousarray(self.points.T)
+
+    @cached_property
+    def _runs(self) -> tuple[NDArray[np.intp], Targets]:
+        """The points in runs of a few, all of one object each: (K,) which, and the runs."""
+        if self.before is not None and self.points is self.before.points:
+            return self.before._runs
+        number = -(-self.count // _RUN)
+        whose = np.repeat(np.arange(len(number)), number)
+        place = np.arange(len(whose)) - np.repeat(number.cumsum() - number, number)
+        first = place * self.count[whose] // number[whose]
+        count = (place + 1) * self.count[whose] // number[whose] - first
+        first += self.first[whose]
+        low = np.minimum.reduceat(self.axes, first, axis=1)
+        high = np.maximum.reduceat(self.axes, first, axis=1)
+        return whose, Targets(self.axes, first, count, low, high)
 
     @cached_property
     def _questions(
         self,
     ) -> tuple[Targets, Floats, Floats, NDArray[np.int8], NDArray[np.bool_]] | None:
-        """The objects, and the boxes, that are in any of the pairs; None if there are none."""
-        asked = np.flatnonzero(self.pairs.any(axis=1) & (self.count > 0))
+        """The runs of points, and the boxes, that are in any of the pairs; None if there are none.
+
+        Returns:
+            The runs; (3, M) corners of the boxes, and their signs; (K, M) the pairs.
+        """
+        whose, runs = self._runs
+        asked = np.flatnonzero(np.any(self.pairs, axis=1)[whose])
         if not len(asked):
             return None
-        boxes = np.flatnonzero(self.pairs[asked].any(axis=0))
-        axes, low, high = self._spans
-        first, count = self.first[asked], self.count[asked]
+        pairs = self.pairs[whose[asked]]
+        boxes = np.flatnonzero(np.any(pairs, axis=0))
         return (
-            Targets(axes, first, count, low[:, asked], high[:, asked]),
+            Targets(
+                self.axes,
+                runs.first[asked],
+                runs.count[asked],
+                runs.low[:, asked],
+                runs.high[:, asked],
+            ),
             np.ascontiguousarray(self.low[boxes].T),
             np.ascontiguousarray(self.high[boxes].T),
             self.sign[boxes],
-            self.pairs[np.ix_(asked, boxes)],
+            pairs[:, boxes],
         )
 
     def clear(self, eyes: NDArray[np.float64], points: Floats, i: int) -> NDArray[np.bool_]:
@@ -158,10 +189,11 @@ class Sights:
 
         None when all are.
         """
-        here = position[[0, 2]]
-        if np.hypot(*np.abs(self.reach - here).max(axis=0)) <= distance:
+        x, _, z = position.tolist()
+        (west, south), (east, north) = self.reach
+        if hypot(max(x - west, east - x), max(z - south, north - z)) <= distance:
             return None
-        return np.asarray(self._gaps(here) <= distance)
+        return np.asarray(self._gaps(position[[0, 2]]) <= distance)
 
     def _gaps(self, here: NDArray[np.float64]) -> NDArray[np.float64]:
         found = np.zeros(len(self.count))
@@ -209,12 +241,18 @@ def _own(world: World, whose: NDArray[np.intp]) -> NDArray[np.bool_]:
     return np.asarray((np.arange(len(world))[:, None] == whose) | world.nesting.within[:, whose])
 
 
-def _rectangle(outlines: Outlines) -> NDArray[np.float64]:
-    """(2, 2) corners x, z of a rectangle that holds all parts, however they are turned; metres."""
+def _rectangle(outlines: Outlines) -> _Rectangle:
+    """One that holds all parts, however they are turned."""
     radius = np.hypot(*np.maximum(np.abs(outlines.low), np.abs(outlines.high)).T)[:, None]
-    return np.array(
-        [(outlines.middle - radius).min(axis=0), (outlines.middle + radius).max(axis=0)]
-    )
+    west, south = (outlines.middle - radius).min(axis=0).tolist()
+    east, north = (outlines.middle + radius).max(axis=0).tolist()
+    return (west, south), (east, north)
+
+
+def _both(one: _Rectangle, other: _Rectangle) -> _Rectangle:
+    """The rectangle around two."""
+    ((a, b), (c, d)), ((e, f), (g, h)) = one, other
+    return (min(a, e), min(b, f)), (max(c, g), max(d, h))
 
 
 def sights_anew(world: World) -> Sights:
@@ -274,8 +312,10 @@ class _Difference:
         scene, count = world.scene, len(world.scene)
         away = world.hidden.copy()
         away[world.in_hand] = True
-        touched = np.array(world.touched(), dtype=np.intp)
-        rows = touched[~away[touched]]
+        displaced = np.array(world.displaced(), dtype=np.intp)
+        rows = displaced[~away[displaced]]
+        if not len(rows):
+            return _Difference(away, rows)
         new, rows = rows[rows >= count], rows[rows < count]
         half = scene.aabb_size[rows] / 2
         apart = np.abs(
@@ -329,8 +369,7 @@ def _changed(world: World, before: Sights, difference: _Difference) -> Sights:
     if len(elsewhere):
         anew = moved[of]
         outlines = Outlines.of([world.shape(i) for i in elsewhere.tolist()])
-        low_end, high_end = _rectangle(outlines)
-        reach = np.array([np.minimum(reach[0], low_end), np.maximum(reach[1], high_end)])
+        reach = _both(reach, _rectangle(outlines))
     return Sights(
         points=points,
         of=of,
@@ -379,9 +418,9 @@ _known: OrderedDict[Any, Sights] = OrderedDict()
 
 def sights(world: World) -> Sights:
     """The sights of the world as it is now: those found before, if it was like this before."""
-    found = world.derived.get("sights")
+    found = world.arrangement.get("sights")
     if found is None:
-        found = world.derived["sights"] = _found(world)
+        found = world.arrangement["sights"] = _found(world)
     return found  # type: ignore[return-value]  # the only writer is above
 
 

@@ -68,7 +68,7 @@ def _look(known: Sights, agent: Agent, settings: Settings) -> NDArray[np.bool_]:
     camera = agent.camera
     clear = known.viewpoint(camera).clear
     seen = in_frustum(
-        known.points[clear] - camera,
+        (known.axes.take(clear, axis=1) - camera[:, None]).T,  # four times as fast as indexing
         agent.rotation,
         agent.horizon,
         settings.field_of_view,

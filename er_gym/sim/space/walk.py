@@ -67,6 +67,11 @@ class WalkableFloor:
     def contains(self, points: NDArray[np.float64], *, tolerant: bool = True) -> NDArray[np.bool_]:
         """Which of (..., 2) x, z points can be stood on, to within 2.5 cm (tolerant: 7.5 cm)."""
         bitmap = self._near_framed if tolerant else self._exact_framed
+        if points.shape in ((2,), (1, 2)):  # one place, as at every step: ten times as fast
+            (x, z), (west, south) = points.ravel().tolist(), self.origin.tolist()
+            i = min(max(round((x - west) / CELL), -1), self.exact.shape[0])
+            k = min(max(round((z - south) / CELL), -1), self.exact.shape[1])
+            return np.full(points.shape[:-1], bitmap[i, k])
         cells = np.round((points - self.origin) / CELL)
         cells = np.minimum(np.maximum(cells, -1.0), self.exact.shape).astype(int)
         return np.asarray(bitmap[cells[..., 0], cells[..., 1]])

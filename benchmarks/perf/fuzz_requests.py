@@ -1,0 +1,359 @@
+"""Random requests: what a program would ask of the engine, and much that none should.
+
+A request is drawn sane, parameter by parameter from the table :data:`SANE`, so that a good share of
+them can be done. One in four is then bent by :data:`BENDS`, mostly with a value of
+:data:`EXTREMES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field
+from random import Random
+from types import NoneType
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel, create_model
+
+from er_gym.sim.actions.registry import ACTIONS, GLOBAL_PARAMETERS, REFUSED
+from er_gym.sim.actions.state_change import LIQUIDS
+
+Request = dict[str, Any]
+
+PARAMETERS: dict[str, type[BaseModel]] = {
+    **{name: handler.parameters for name, handler in ACTIONS.items()},
+    "Reset": create_model("Reset", sceneName=(str, ...)),  # the one that the engine does itself
+}
+"""Every action there is, and what it takes."""
+NAMES = [
+    *PARAMETERS,
+    # Without them most of the others would be refused.
+    *3 * ("PickupObject", "OpenObject", "TeleportFull", "GetInteractablePoses"),
+]
+ODD_NAMES: tuple[Any, ...] = (
+    *REFUSED, *("Fly", "openobject", "OpenObject ", "", "step", "__init__", "Öffne|☃", "\ud800"),
+    *("a\nb", "MoveAhead" * 500, None, 0, -1, 2.5, float("nan"), True, [], ["Pass"], {}, b"Pass"),
+)  # fmt: skip
+"""What is no action's name."""
+EXTREMES: tuple[Any, ...] = (
+    *(float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 1e-320, -1e-320, 0, -0.0, -1, 0.5),
+    *(10**30, -(10**30), 10**400, -(10**400), True, False, None),
+    *("", "nan", "-inf", "1e400", "1", "0x10", "true", "Äpfel|☃", "\ud800", "a\nb\r\n", "x" * 5000),
+    *("Apple|+00.00|+00.00|+00.00", "FloorPlan1", b"", b"Pass", b"\xff", [], [None], [[]], [-1]),
+    *([float("nan")], ["x"] * 1000, {}, {"x": float("nan")}, {"x": 1e308, "y": -1e308, "z": 0}),
+    *({"x": 0.5, "z": "far"}, {"objectType": "Apple", "count": 10**30}, {"": {"": []}}),
+)  # fmt: skip
+"""Values that are out of any range, of another type, or nearly right."""
+_ODD_PARAMETERS = (
+    *("speed", "objectID", "self", "world", "model_config", "", "a\nb", "\ud800", "ü", "x" * 5000),
+)
+_BENT = 0.25
+_APT = 0.4
+"""How often the last answer decides which action is next."""
+_OPTIONAL = 0.5
+"""How often a parameter is given that need not be."""
+_PICTURES = 0.03
+"""How often pictures are asked for, which take most of the time."""
+_FORGOTTEN = 0.15
+"""How often an object is drawn from all, rather than from those that suit the action."""
+
+
+@dataclass
+class Room:
+    """What requests are drawn from.
+
+    Attributes:
+        random: the only source of chance.
+        scenes: which ones ``Reset`` may ask for.
+        metadata: of the last event.
+        positions: where the agent can stand in this scene.
+        gone: ids of objects that were in this scene once.
+    """
+
+    random: Random
+    scenes: Sequence[str]
+    metadata: Mapping[str, Any]
+    positions: Sequence[dict[str, float]]
+    gone: Sequence[str] = field(default=())
+
+    @property
+    def objects(self) -> list[dict[str, Any]]:
+        objects: list[dict[str, Any]] = self.metadata["objects"]
+        return objects
+
+    @property
+    def poses(self) -> list[dict[str, Any]]:
+        """Those that the last action told, if it was a question for poses."""
+        asked = self.metadata["lastAction"] == "GetInteractablePoses"
+        return (self.metadata["actionReturn"] or []) if asked else []
+
+
+Draw = Callable[[Room], Any]
+
+
+# -- sane values -----------------------------------------------------------------------------------
+
+
+def _among(*values: Any) -> Draw:
+    return lambda room: room.random.choice(values)
+
+
+def _between(low: float, high: float) -> Draw:
+    return lambda room: room.random.uniform(low, high)
+
+
+def _some(draw: Draw, most: int) -> Draw:
+    return lambda room: [draw(room) for _ in range(room.random.randint(0, most))]
+
+
+def _object(has: str = "", lacks: str = "") -> Draw:
+    """The id of an object: mostly one that is in a state and not in another, best in view."""
+
+    def draw(room: Room) -> str:
+        suited = [e for e in room.objects if (not has or e[has]) and not (lacks and e[lacks])]
+        seen = [entry for entry in suited if entry["visible"]]
+        anyhow = room.random.random() < _FORGOTTEN
+        chosen: str = room.random.choice(
+            room.objects if anyhow else seen or suited or room.objects
+        )["objectId"]
+        return chosen
+
+    return draw
+
+
+def _object_type(room: Room) -> str:
+    return str(room.random.choice(room.objects)["objectType"])
+
+
+def _position(room: Room) -> dict[str, float]:
+    """Somewhere on the floor, now and then beside it."""
+    position = dict(room.random.choice(room.positions))
+    if room.random.random() < _FORGOTTEN:
+        position["x"] += room.random.gauss(0.0, 0.5)
+    return position
+
+
+def _coordinate(axis: str) -> Draw:
+    return lambda room: _position(room)[axis]
+
+
+def _rotation(room: Room) -> dict[str, float]:
+    return {"x": 0.0, "y": 15.0 * room.random.randrange(-24, 48), "z": 0.0}
+
+
+def _pose(room: Room) -> Request:
+    """Where the last question for poses said; else anywhere on the floor."""
+    pose = dict(room.random.choice(room.poses)) if room.poses else {}
+    if not pose:
+        return {"position": _position(room), "rotation": _rotation(room), "horizon": 30.0}
+    pose["position"] = {axis: pose.pop(axis) for axis in "xyz"}
+    return {**pose, "rotation": {"x": 0.0, "y": pose["rotation"], "z": 0.0}}
+
+
+def _camera(room: Room) -> int:
+    return room.random.randrange(max(1, len(room.metadata["thirdPartyCameras"])))
+
+
+def _arrangement(room: Room) -> list[Request]:
+    """Poses for what is loose: as they are, but for a few; sometimes some are left out or twice."""
+    random = room.random
+    loose = [entry for entry in room.objects if entry["pickupable"] or entry["moveable"]]
+    if random.random() < _FORGOTTEN:
+        loose = random.choices(loose, k=random.randint(0, len(loose))) if loose else []
+    poses = [
+        {
+            "objectName": entry["name"],
+            "position": dict(entry["position"]),
+            "rotation": dict(entry["rotation"]),
+        }
+        for entry in loose
+    ]
+    for pose in random.sample(poses, min(len(poses), 3)):
+        pose["position"] = dict(random.choice(room.objects)["axisAlignedBoundingBox"]["center"])
+        pose["rotation"] = _rotation(room)
+    return poses
+
+
+SUITED = {
+    "PickupObject": ("pickupable", "isPickedUp"),
+    "PutObject": ("receptacle", "isPickedUp"),
+    "OpenObject": ("openable", "isOpen"),
+    "CloseObject": ("isOpen",),
+    "ToggleObjectOn": ("toggleable", "isToggled"),
+    "ToggleObjectOff": ("isToggled",),
+    "SliceObject": ("sliceable", "isPickedUp"),
+    "BreakObject": ("breakable", "isBroken"),
+    "CookObject": ("cookable", "isCooked"),
+    "DirtyObject": ("dirtyable", "isDirty"),
+    "CleanObject": ("isDirty",),
+    "FillObjectWithLiquid": ("canFillWithLiquid", "isFilledWithLiquid"),
+    "EmptyLiquidFromObject": ("isFilledWithLiquid",),
+    "UseUpObject": ("canBeUsedUp", "isUsedUp"),
+}
+"""What an object must be for an action, and what it must not be yet."""
+SANE: dict[str, Draw] = {
+    **{f"{action}.objectId": _object(*suits) for action, suits in SUITED.items()},
+    "objectId": _object(),
+    "sceneName": lambda room: room.random.choice(room.scenes),
+    "forceAction": _among(False, True, True),
+    "position": _position,
+    "positions": _some(_position, 5),
+    "rotation": _rotation,
+    "rotations": _some(_among(0.0, 45.0, 90.0, 180.0, -90.0, 720.0), 4),
+    "horizon": _among(-30.0, 0.0, 30.0, 60.0),
+    "horizons": _some(_among(-30.0, 0.0, 30.0, 60.0), 3),
+    "x": _coordinate("x"),
+    "y": _coordinate("y"),
+    "z": _coordinate("z"),
+    "ChangeResolution.x": lambda room: room.random.randint(1, 40),
+    "ChangeResolution.y": lambda room: room.random.randint(1, 40),
+    "GetObjectInFrame.x": _between(0.0, 1.0),
+    "GetObjectInFrame.y": _between(0.0, 1.0),
+    "degrees": _among(1.0, 15.0, 30.0, 45.0, 90.0, -90.0, 360.0),
+    "moveMagnitude": _among(0.0, 0.1, 0.25, 0.25, 0.5, 1.0),
+    "ThrowObject.moveMagnitude": _between(0.0, 300.0),
+    "openness": _among(0.1, 0.5, 1.0),
+    "fillLiquid": _among(*LIQUIDS),
+    "gridSize": _among(0.1, 0.25, 0.25, 0.25, 0.5),
+    "fieldOfView": _between(30.0, 120.0),
+    "visibilityDistance": _among(1.0, 1.5, 1.5, 3.0, 20.0),
+    "rotateStepDegrees": _among(30.0, 45.0, 90.0, 90.0),
+    "agentMode": _among("default"),
+    "agentCount": _among(1),
+    "maxPoses": _among(1, 3, 20),
+    "numPlacementAttempts": _among(1, 5),
+    "excludedReceptacles": _some(_object_type, 3),
+    "excludedObjectIds": _some(_object(), 3),
+    "numDuplicatesOfType": _some(_object_type, 0),
+    "allowFloor": _among(False),
+    "allowMoveable": _among(False),
+    "orthographic": _among(False),
+    "thirdPartyCameraId": _camera,
+    "objectPoses": _arrangement,
+}
+"""How a parameter is drawn, by its name or that of its action too; others are drawn by type."""
+
+
+def _of_type(room: Room, kind: Any) -> Any:
+    """Any value of a parameter's type."""
+    random, inner = room.random, [part for part in get_args(kind) if part is not NoneType]
+    if get_origin(kind) is Literal:
+        return random.choice(inner)
+    if get_origin(kind) is list:
+        return [_of_type(room, inner[0]) for _ in range(random.randint(0, 3))]
+    if inner:  # this or that
+        return _of_type(room, random.choice(inner))
+    simple = {bool: random.random() < 0.5, int: random.randint(0, 3), float: random.random() * 2}
+    return simple.get(kind, "word")
+
+
+def _sane(room: Room, name: str) -> Request:
+    """An action with parameters that make sense."""
+    request: Request = {"action": name, "renderImage": False}
+    if name in ("Teleport", "TeleportFull") and (room.poses or room.random.random() < 0.5):
+        return {**request, **_pose(room)}
+    for parameter, about in PARAMETERS[name].model_fields.items():
+        if about.is_required() or room.random.random() < _OPTIONAL:
+            draw = SANE.get(f"{name}.{parameter}") or SANE.get(parameter)
+            request[parameter] = draw(room) if draw else _of_type(room, about.annotation)
+    return request
+
+
+# -- bends -----------------------------------------------------------------------------------------
+
+
+def _extreme(room: Room) -> Any:
+    return deepcopy(room.random.choice(EXTREMES))
+
+
+def _another_value(room: Room, request: Request) -> None:
+    """An extreme value for one of the parameters, given or not."""
+    name = request.get("action")
+    model = PARAMETERS.get(name) if isinstance(name, str) else None
+    names = list(model.model_fields) if model else sorted(_arguments(request))
+    if names:
+        request[room.random.choice(names)] = _extreme(room)
+
+
+def _no_such_thing(room: Room, request: Request) -> None:
+    """Ids of what is no more, or the name of another action's thing."""
+    ids = [*room.gone[-20:], "Apple|+00.00|+00.00|+00.00", "", room.metadata["sceneName"]]
+    request["objectId"] = room.random.choice(ids)
+
+
+def _missing(room: Room, request: Request) -> None:
+    names = sorted(request)
+    if names:
+        del request[room.random.choice(names)]
+
+
+def _one_too_many(room: Room, request: Request) -> None:
+    request[room.random.choice(_ODD_PARAMETERS)] = _extreme(room)
+
+
+def _for_any_action(room: Room, request: Request) -> None:
+    request[room.random.choice(sorted(GLOBAL_PARAMETERS - {"action"}))] = _extreme(room)
+
+
+def _another_action(room: Room, request: Request) -> None:
+    """A name that is none, or the parameters of one action for another."""
+    request["action"] = deepcopy(room.random.choice(room.random.choice((ODD_NAMES, NAMES))))
+
+
+def _inside(room: Room, request: Request) -> None:
+    """Something within a list or a vector: an axis gone, a member that does not belong."""
+    holders = list(_holders([request[name] for name in sorted(_arguments(request))]))
+    if not holders:
+        return _another_value(room, request)
+    holder: Any = room.random.choice(holders)
+    keys: list[Any] = list(holder) if isinstance(holder, dict) else list(range(len(holder)))
+    if not keys or room.random.random() < 0.2:
+        holder.clear()
+    elif room.random.random() < 0.4:
+        del holder[room.random.choice(keys)]
+    else:
+        holder[room.random.choice(keys)] = _extreme(room)
+    return None
+
+
+def _arguments(request: Request) -> set[str]:
+    return {name for name in request if name != "action"}
+
+
+def _holders(values: Sequence[Any]) -> Iterator[dict[str, Any] | list[Any]]:
+    """Every list and dictionary among these values or within them."""
+    for value in values:
+        if isinstance(value, (dict, list)):
+            yield value
+            yield from _holders(list(value.values()) if isinstance(value, dict) else value)
+
+
+BENDS: tuple[Callable[[Room, Request], None], ...] = (
+    *3 * (_another_value,),
+    *2 * (_inside,),
+    *(_no_such_thing, _missing, _one_too_many, _for_any_action, _another_action),
+)
+
+
+def _next(room: Room) -> Sequence[str]:
+    """What a program might do now."""
+    if room.poses:
+        return ("TeleportFull",)
+    if room.metadata["inventoryObjects"]:
+        return ("PutObject", "PutObject", "PutObject", "DropHandObject", "ThrowObject")
+    return NAMES
+
+
+def draw_request(room: Room) -> Request:
+    """The next request; it shares nothing with the metadata or with another request."""
+    random = room.random
+    request = _sane(room, random.choice(_next(room) if random.random() < _APT else NAMES))
+    if random.random() < _PICTURES:
+        request["renderImage"] = True
+        for flag in ("renderDepthImage", "renderInstanceSegmentation"):
+            request[flag] = random.random() < 0.5
+    if random.random() < _BENT:
+        for _ in range(random.choice((1, 1, 2))):
+            random.choice(BENDS)(room, request)
+    return request

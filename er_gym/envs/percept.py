@@ -1,0 +1,67 @@
+"""What the agent perceives, taken out of an event at once.
+
+The event can then be let go. One that somebody keeps has to have all its metadata worked out before
+the world changes, which costs the embedded engine more than the action itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.tasks.task import AgentPose
+from er_gym.thor.objects import TYPES, ObjectTable, objects_of
+
+
+@dataclass(frozen=True, eq=False)
+class Percept:
+    """What an event tells the agent.
+
+    Attributes:
+        objects: the N objects of the scene, as they are then.
+        visible: (N,) bool.
+        pose: the agent's.
+        frame: its view, (height, width, 3) uint8; None when none was drawn.
+    """
+
+    objects: ObjectTable
+    visible: NDArray[np.bool_]
+    pose: AgentPose
+    frame: NDArray[np.uint8] | None
+
+    @cached_property
+    def visible_types(self) -> NDArray[np.bool_]:
+        """(T,) bool: the types of which something is visible."""
+        return marked(self.objects.kinds[self.visible])
+
+
+def perceive(event: Any) -> Percept:
+    """What an AI2-THOR event tells the agent."""
+    objects, visible = objects_of(event)
+    agent = event.metadata["agent"]
+    position = agent["position"]
+    pose = AgentPose(
+        position["x"],
+        position["y"],
+        position["z"],
+        agent["rotation"]["y"],
+        agent["cameraHorizon"],
+        agent["isStanding"],
+    )
+    return Percept(objects, visible, pose, event.frame)
+
+
+def marked(kinds: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """(T,) bool: True for the types that occur among some kinds, indices into ``TYPES``."""
+    mark = np.zeros(len(TYPES), dtype=bool)
+    mark[kinds] = True
+    return mark
+
+
+def names(mark: NDArray[np.bool_]) -> tuple[str, ...]:
+    """The names of the types that are marked in (T,) bool, in alphabetical order."""
+    return tuple([TYPES[kind] for kind in mark.nonzero()[0].tolist()])
