@@ -314,7 +314,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         else:
             container = which.container_in_the_way(aim, objects)
             aim = aim if container is None else container
-            outcome = skills.navigate(self._controller, objects, aim, self._floor)
+            outcome = skills.navigate(self._controller, self._percept, aim, self._floor)
         if outcome.success:
             self._at = goal_id
         return goal_id, outcome

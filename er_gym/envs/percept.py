@@ -23,13 +23,14 @@ class Percept:
 
     Attributes:
         objects: the N objects of the scene, as they are then.
-        visible: (N,) bool.
+        visible, interactable: (N,) bool, as the simulator has them.
         pose: the agent's.
         frame: its view, (height, width, 3) uint8; None when none was drawn.
     """
 
     objects: ObjectTable
     visible: NDArray[np.bool_]
+    interactable: NDArray[np.bool_]
     pose: AgentPose
     frame: NDArray[np.uint8] | None
 
@@ -41,7 +42,7 @@ class Percept:
 
 def perceive(event: Any) -> Percept:
     """What an AI2-THOR event tells the agent."""
-    objects, visible = objects_of(event)
+    objects, visible, interactable = objects_of(event)
     agent = event.metadata["agent"]
     position = agent["position"]
     pose = AgentPose(
@@ -52,7 +53,7 @@ def perceive(event: Any) -> Percept:
         agent["cameraHorizon"],
         agent["isStanding"],
     )
-    return Percept(objects, visible, pose, event.frame)
+    return Percept(objects, visible, interactable, pose, event.frame)
 
 
 def marked(kinds: NDArray[np.intp]) -> NDArray[np.bool_]:

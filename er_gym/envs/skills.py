@@ -133,19 +133,21 @@ def _start_pose(
     return AgentPose(x, y, z, rotation)
 
 
-def navigate(controller: Any, objects: ObjectTable, goal: int, floor: Reachable) -> Outcome:
+def navigate(controller: Any, percept: Percept, goal: int, floor: Reachable) -> Outcome:
     """Go to where an object can best be seen and handled, facing it.
 
     Positions are tried from the nearest to the object's middle outwards; among the first from which
     it can be interacted with, the one that is at a comfortable distance and has it in the middle of
     the picture is taken.
     """
+    objects = percept.objects
     object_id, centre = objects.ids[goal], tuple(objects.centre[goal].tolist())
-    # The pose that one would choose is mostly possible, and cheaper to ask for than all.
-    best = _best_view(floor, *centre)
-    at = [(best.x, best.y, best.z)]
-    if _interactable_poses(controller, object_id, at, [best.rotation], [best.horizon]):
-        return place(controller, best)
+    # The pose that one would choose were nothing in the way is mostly possible, and whether it is,
+    # one sees from there. What is in the hand one sees from everywhere.
+    if goal != objects.held:
+        there = place(controller, _best_view(floor, *centre))
+        if there.success and _can_handle(there.percept, object_id):
+            return there
 
     def discomfort(pose: AgentPose) -> float:
         view = _view((pose.x, pose.y, pose.z), centre)
@@ -156,7 +158,12 @@ def navigate(controller: Any, objects: ObjectTable, goal: int, floor: Reachable)
         if found:
             return place(controller, min(found, key=discomfort))
     problem = f"no way was found to where {objects.type_of(goal)} can be seen"
-    return Outcome(None, False, problem)
+    return replace(place(controller, percept.pose), success=False, problem=problem)
+
+
+def _can_handle(percept: Percept | None, object_id: str) -> bool:
+    row = None if percept is None else percept.objects.row.get(object_id)
+    return percept is not None and row is not None and bool(percept.interactable[row])
 
 
 def _interactable_poses(

@@ -43,10 +43,10 @@ class Engine:
         Returns:
             The metadata, and the frames unless ``renderImage`` is False.
         """
-        last = None if self._last is None else self._last()
-        if last is not None:
-            last.settle()  # somebody keeps it: it must not speak of what comes now
         name = str(request.get("action"))
+        last = None if self._last is None else self._last()
+        if last is not None and name != "Reset":  # after which there is another world
+            last.settle()  # somebody keeps it: it must not speak of what comes now
         reply, error, code = None, "", ""
         try:
             if name == "Reset":

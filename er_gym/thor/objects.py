@@ -88,17 +88,24 @@ class ObjectTable:
         return np.asarray(np.maximum(np.maximum(x * y, y * z), x * z))
 
 
-def objects_of(event: Any) -> tuple[ObjectTable, NDArray[np.bool_]]:
-    """The objects of an event, and (N,) which of them are visible to the agent."""
+_Seen = tuple[ObjectTable, NDArray[np.bool_], NDArray[np.bool_]]
+
+
+def objects_of(event: Any) -> _Seen:
+    """The objects of an event, and (N,) which of them are visible to the agent, and interactable.
+
+    Unity has things that are seen but out of reach, behind glass; the embedded engine has not.
+    """
     metadata = event.metadata
     if isinstance(metadata, LazyMetadata):
         world = metadata.source
         if isinstance(world, World) and world.exists.all():
-            return _of_world(world), visible(world)
+            seen = visible(world)
+            return _of_world(world), seen, seen
     return _of_entries(metadata)
 
 
-def _of_entries(metadata: Mapping[str, Any]) -> tuple[ObjectTable, NDArray[np.bool_]]:
+def _of_entries(metadata: Mapping[str, Any]) -> _Seen:
     entries = [e for e in metadata["objects"] if e["objectType"] in KIND_OF]
     ids = tuple(e["objectId"] for e in entries)
     row = {object_id: k for k, object_id in enumerate(ids)}
@@ -129,7 +136,11 @@ def _of_entries(metadata: Mapping[str, Any]) -> tuple[ObjectTable, NDArray[np.bo
         controlled=rows("controlledObjects"),
         held=row.get(held[0]["objectId"], -1) if held else -1,
     )
-    return table, np.array([bool(e["visible"]) for e in entries], dtype=bool)
+    seen, in_reach = (
+        np.array([bool(entry[name]) for entry in entries], dtype=bool)
+        for name in ("visible", "isInteractable")
+    )
+    return table, seen, in_reach
 
 
 _HAS = [PROPERTIES.index(name) for name in ("pickupable", "receptacle", "openable", "toggleable")]

@@ -39,6 +39,7 @@ def make_entry(
         "objectId": object_id,
         "objectType": object_id.split("|")[0],
         "visible": True,
+        "isInteractable": True,
         **dict.fromkeys((*flags, "isOpen", "isToggled"), False),
         **dict.fromkeys(("parentReceptacles", "receptacleObjectIds", "controlledObjects")),
         "axisAlignedBoundingBox": {

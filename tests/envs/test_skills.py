@@ -87,7 +87,7 @@ def test_verbs_are_done_to_the_part_that_takes_them(
 ) -> None:
     with make_controller(scene="FloorPlan1", headless=True) as controller:
         event = controller.last_event
-        objects, _ = objects_of(event)
+        objects, *_ = objects_of(event)
         sent = []
         monkeypatch.setattr(controller, "step", lambda **request: (sent.append(request), event)[1])
         row = objects.of_type(object_type)[0]
@@ -103,6 +103,7 @@ def test_where_there_is_no_way_everything_stays_as_it_was(monkeypatch: pytest.Mo
     env = EmbodiedEnv(obs_mode="rgb+state", width=96, height=64)
     before, info = env.reset(seed=0)
     monkeypatch.setattr(skills, "_interactable_poses", lambda *arguments: [])
+    monkeypatch.setattr(skills, "_can_handle", lambda *arguments: False)
     after, _, _, _, then = env.step(f"navigate to {info['navigable'][0]}")
     assert "no way was found" in then["feedback"]
     assert not then["action_success"]

@@ -42,11 +42,12 @@ class Viewpoint:
     """What is in the way of what, seen from one camera position.
 
     Attributes:
-        blocking: (P,) how many boxes hide each sample point.
+        point, box: (H,) which boxes are crossed on the way to which sample points.
         clear: (C,) the points that nothing hides and that are not shut away.
     """
 
-    blocking: NDArray[np.int8]
+    point: NDArray[np.uint16]
+    box: NDArray[np.uint16]
     clear: NDArray[np.uint16]
 
 
@@ -61,7 +62,7 @@ class Sights:
         of: (P,) whose each is. first, count: (N,) where each object's points begin, how many.
         low, high: (M, 3) corners of boxes that hide things; whose: (M,) whose they are.
         own: (N, M) the boxes of each object and of what it lies in or on, which do not hide it.
-        sign: (M,) -1 for boxes of the recorded arrangement that are gone, else 1.
+        gone: (M,) boxes of the recorded arrangement that are not there any more.
         pairs: (N, M) which boxes are to be asked about for whose points.
         away: (N,) which objects are shut away, in the hand or no more.
         reach: corners x, z of a rectangle around everything, metres.
@@ -79,7 +80,7 @@ class Sights:
     high: Floats
     whose: NDArray[np.intp]
     own: NDArray[np.bool_]
-    sign: NDArray[np.int8]
+    gone: NDArray[np.bool_]
     pairs: NDArray[np.bool_]
     away: NDArray[np.bool_]
     reach: _Rectangle
@@ -99,19 +100,21 @@ class Sights:
         )
 
     def _look_from(self, camera: NDArray[np.float64]) -> Viewpoint:
-        blocking = np.zeros(len(self.of), dtype=np.int8)
+        point = box = np.empty(0, dtype=np.uint16)
         if self.before is not None:
-            recorded = self.before.viewpoint(camera).blocking
-            blocking[: len(recorded)] = recorded
+            recorded = self.before.viewpoint(camera)
+            stays = ~self.gone.take(recorded.box)
             if self.anew is not None:
-                blocking[self.anew] = 0
+                stays &= ~self.anew.take(recorded.point)
+            point, box = recorded.point[stays], recorded.box[stays]
         if self._questions is not None:
-            targets, low, high, sign, pairs = self._questions
-            point, box = crossings(camera.astype(np.float32), targets, low, high, pairs)
-            count = np.bincount(point, weights=sign[box], minlength=len(blocking))
-            blocking += count.astype(np.int8)
-        clear = ((blocking == 0) & self._showing).nonzero()[0]
-        return Viewpoint(blocking, clear.astype(np.uint16))
+            targets, low, high, number, pairs = self._questions
+            crossed, by = crossings(camera.astype(np.float32), targets, low, high, pairs)
+            point = np.concatenate([point, crossed.astype(np.uint16)])
+            box = np.concatenate([box, number.take(by)])
+        clear = self._showing.copy()
+        clear[point] = False
+        return Viewpoint(point, box, clear.nonzero()[0].astype(np.uint16))
 
     @cached_property
     def _showing(self) -> NDArray[np.bool_]:
@@ -142,11 +145,11 @@ class Sights:
     @cached_property
     def _questions(
         self,
-    ) -> tuple[Targets, Floats, Floats, NDArray[np.int8], NDArray[np.bool_]] | None:
+    ) -> tuple[Targets, Floats, Floats, NDArray[np.uint16], NDArray[np.bool_]] | None:
         """The runs of points, and the boxes, that are in any of the pairs; None if there are none.
 
         Returns:
-            The runs; (3, M) corners of the boxes, and their signs; (K, M) the pairs.
+            The runs; (3, M) corners of the boxes, and their numbers; (K, M) the pairs.
         """
         whose, runs = self._runs
         asked = np.flatnonzero(np.any(self.pairs, axis=1)[whose])
@@ -164,7 +167,7 @@ class Sights:
             ),
             np.ascontiguousarray(self.low[boxes].T),
             np.ascontiguousarray(self.high[boxes].T),
-            self.sign[boxes],
+            boxes.astype(np.uint16),
             pairs[:, boxes],
         )
 
@@ -174,7 +177,7 @@ class Sights:
         # What does not reach into the space between them all hides nothing.
         nearest = np.minimum(origins.min(axis=0), points.min(axis=0))
         farthest = np.maximum(origins.max(axis=0), points.max(axis=0))
-        between = (self.sign > 0) & ~self.own[i]
+        between = ~self.gone & ~self.own[i]
         between &= ((self.high >= nearest) & (self.low <= farthest)).all(axis=1)
         blocked = blocked_by(
             np.repeat(origins, len(points), axis=0),
@@ -275,7 +278,7 @@ def sights_anew(world: World) -> Sights:
         high=high,
         whose=whose,
         own=own,
-        sign=np.ones(len(whose), dtype=np.int8),
+        gone=np.zeros(len(whose), dtype=bool),
         pairs=~own,
         away=away,
         reach=_rectangle(outlines),
@@ -360,8 +363,8 @@ def _changed(world: World, before: Sights, difference: _Difference) -> Sights:
     is_new = np.arange(len(whose)) >= len(before.whose)
     gone = ~is_new & (moved | away)[whose]
     own = _own(world, whose)
-    # Of what stays, only what has come and gone has to be asked about; of what moved, all there is.
-    pairs = ~own & np.where(moved[:, None], ~gone, gone | is_new)
+    # Of what stays, only what has come has to be asked about; of what moved, all that is there.
+    pairs = ~own & np.where(moved[:, None], ~gone, is_new)
     points, of, first, number = before.points, before.of, before.first, before.count
     if len(elsewhere) or count > old:
         points, of, first, number = _with_points(world, before, elsewhere)
@@ -379,7 +382,7 @@ def _changed(world: World, before: Sights, difference: _Difference) -> Sights:
         high=high,
         whose=whose,
         own=own,
-        sign=np.where(gone, -1, 1).astype(np.int8),
+        gone=gone,
         pairs=pairs,
         away=away,
         reach=reach,

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from math import cos as cosine
+from math import radians
+from math import sin as sine
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,20 +21,23 @@ def turned(boxes: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
     Args:
         boxes: (K, 2, 3) corners, metres. yaw: degrees, clockwise from above.
     """
-    angle = np.radians(yaw)
-    cos, sin = np.cos(angle), np.sin(angle)
-    middle, half = boxes.mean(axis=1), (boxes[:, 1] - boxes[:, 0]) / 2
+    cos, sin = cosine(radians(yaw)), sine(radians(yaw))
+    middle, half = (boxes[:, 0] + boxes[:, 1]) / 2, (boxes[:, 1] - boxes[:, 0]) / 2
     x, z = middle[:, 0], middle[:, 2]
-    centre = np.stack([x * cos + z * sin, middle[:, 1], z * cos - x * sin], axis=1)
     across = half[:, 0] * abs(cos) + half[:, 2] * abs(sin)
     along = half[:, 0] * abs(sin) + half[:, 2] * abs(cos)
-    area = np.maximum(across * along, 1e-12)
-    share = np.sqrt(half[:, 0] * half[:, 2] / area)
-    reach = np.stack([across * share, half[:, 1], along * share], axis=1)
-    return np.stack([centre - reach, centre + reach], axis=1)
+    share = np.sqrt(half[:, 0] * half[:, 2] / np.maximum(across * along, 1e-12))
+    middle[:, 0], middle[:, 2] = x * cos + z * sin, z * cos - x * sin
+    half[:, 0], half[:, 2] = across * share, along * share
+    found = np.empty_like(boxes)
+    found[:, 0], found[:, 1] = middle - half, middle + half
+    return found
 
 
 def trimmed(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
     """(K, 2, 3) boxes made a little narrower and less deep."""
     inset = (boxes[:, 1] - boxes[:, 0]) * np.array([_TRIM, 0.0, _TRIM])
-    return np.stack([boxes[:, 0] + inset, boxes[:, 1] - inset], axis=1)
+    found = boxes.copy()
+    found[:, 0] += inset
+    found[:, 1] -= inset
+    return found

@@ -64,9 +64,8 @@ def _upright_box(world: World, i: int) -> tuple[NDArray[np.float64], NDArray[np.
         size = world.high[i] - world.low[i]
         size = size[[2, 1, 0]] if round(yaw / 90.0) % 2 else size
         return (world.low[i] + world.high[i]) / 2, size, yaw
-    yaw = float(world.rotation[i, 1])
-    tilted = world.rotation[i] * (1.0, 0.0, 1.0)
-    tilt, turn = unity_rotation(np.array([tilted, world.rotation[i] - tilted]))
+    x, yaw, z = world.rotation[i].tolist()
+    tilt, turn = unity_rotation((x, 0.0, z)), unity_rotation((0.0, yaw, 0.0))
     corner, *edges = world.obb[i] @ tilt.T
     middle = world.position[i] + turn @ (corner + sum(edges) / 2)
     return middle, np.abs(edges).sum(axis=0), yaw
