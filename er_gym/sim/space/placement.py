@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.scene import PROPERTIES
 from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.shapes.families import family
 from er_gym.sim.space.surfaces import recorded_surfaces
@@ -48,6 +50,7 @@ _RISES = 0.03
 """A fixed thing is in the way on a surface that it rises above by more than this, metres."""
 _OVERHANG = 1.0
 """Farther from a receptacle than this nothing is in the way of what is put there, metres."""
+_PICKUPABLE = PROPERTIES.index("pickupable")
 _HOLES = frozenset({"Sink", "SinkBasin", "StoveBurner"})
 """What is let into a counter, where nothing else can stand."""
 _INTO = 0.15
@@ -111,17 +114,18 @@ def free_spots(
     obstacles = _obstacles(world, receptacle, i, height)
     free: list[NDArray[np.float64]] = [np.empty((0, 3))]  # heading, x, z
     heaps: list[tuple[float, float, NDArray[np.float64]]] = []
+    heaping, places = _manner(world, receptacle).heaps, _places(world, receptacle)
     for yaw, half in _headings(world, i):
-        spots = _spots(_places(world, receptacle), half)
-        spots = spots[np.argsort(np.linalg.norm(spots - near, axis=1), kind="stable")]
-        clear = spots[_free(spots, half, height, tall, obstacles)]
-        free.append(np.column_stack([np.full(len(clear), yaw), clear]))
-        if _manner(world, receptacle).heaps and len(spots):
+        spots = _spots(places, half)
+        if heaping and len(spots):
+            spots = spots[np.argsort(_distance(spots, near), kind="stable")]
             tops = _tops(spots, half, height, world.high[receptacle, 1], obstacles)
             k = int(tops.argmin())
             heaps.append((float(tops[k]), yaw, spots[k]))
+        clear = spots[_free(spots, half, height, tall, obstacles)]
+        free.append(np.column_stack([np.full(len(clear), yaw), clear]))
     found = np.concatenate(free)
-    order = [np.linalg.norm(found[:, 1:] - near, axis=1)]
+    order: list[NDArray[Any]] = [_distance(found[:, 1:], near)]
     if seen_by is not None:
         order.append(~_in_picture(world, seen_by, found[:, 1:], height))
     for k in np.lexsort(order):
@@ -129,6 +133,11 @@ def free_spots(
     for top, yaw, (x, z) in sorted(heaps, key=lambda heap: heap[0]):
         if top < world.high[receptacle, 1]:
             yield yaw, np.array([x, top + _SKIN, z])
+
+
+def _distance(spots: NDArray[np.float64], near: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(S,) from (S, 2) spots to a (2,) point."""
+    return np.asarray(np.hypot(spots[:, 0] - near[0], spots[:, 1] - near[1]))
 
 
 def _in_picture(
@@ -217,13 +226,16 @@ def _obstacles(world: World, receptacle: int, i: int, height: float) -> NDArray[
     low, high = world.low[receptacle] - _OVERHANG, world.high[receptacle] + _OVERHANG
     low[1] = height - _INTO
     close = world.exists & (world.high > low).all(axis=1) & (world.low < high).all(axis=1)
-    boxes = [np.empty((0, 2, 3))]
-    for k in np.flatnonzero(close).tolist():
-        if k in aside or _surrounds(world, k, receptacle):
-            continue
-        if world.has(k, "pickupable"):
-            boxes.append(np.array([[world.low[k], world.high[k]]]))
-        elif on_top and world.types[k] in _HOLES:
+    middle = (world.low[receptacle] + world.high[receptacle]) / 2
+    loose = world.properties[:, _PICKUPABLE]
+    # What a receptacle is part of, as a drawer is of a dresser, is not in its way.
+    around = (world.low <= middle).all(axis=1) & (middle <= world.high).all(axis=1)
+    close &= loose | ~around
+    close[list(aside)] = False
+    things = close & loose
+    boxes = [np.stack([world.low[things], world.high[things]], axis=1)]
+    for k in np.flatnonzero(close & ~loose).tolist():
+        if on_top and world.types[k] in _HOLES:
             hole = np.array([[world.low[k], world.high[k]]])
             hole[0, 1, 1] = max(world.high[k, 1], height + 2 * _SKIN)
             boxes.append(hole)
@@ -232,16 +244,6 @@ def _obstacles(world: World, receptacle: int, i: int, height: float) -> NDArray[
             rises = _SKIN if world.has(k, "moveable") else _RISES
             boxes.append(parts[parts[:, 1, 1] > height + rises])
     return np.concatenate(boxes)
-
-
-def _surrounds(world: World, k: int, receptacle: int) -> bool:
-    """Whether a receptacle is part of object k, as a drawer is of a dresser."""
-    middle = (world.low[receptacle] + world.high[receptacle]) / 2
-    return (
-        not world.has(k, "pickupable")
-        and bool((world.low[k] <= middle).all())
-        and bool((middle <= world.high[k]).all())
-    )
 
 
 def _free(

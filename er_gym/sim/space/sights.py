@@ -130,8 +130,8 @@ class Sights:
     @cached_property
     def _runs(self) -> tuple[NDArray[np.intp], Targets]:
         """The points in runs of a few, all of one object each: (K,) which, and the runs."""
-        if self.before is not None and self.points is self.before.points:
-            return self.before._runs
+        if self.before is not None and self.count is self.before.count:
+            return self._runs_again(self.before)
         number = -(-self.count // _RUN)
         whose = np.repeat(np.arange(len(number)), number)
         place = np.arange(len(whose)) - np.repeat(number.cumsum() - number, number)
@@ -141,6 +141,19 @@ class Sights:
         low = np.minimum.reduceat(self.axes, first, axis=1)
         high = np.maximum.reduceat(self.axes, first, axis=1)
         return whose, Targets(self.axes, first, count, low, high)
+
+    def _runs_again(self, before: Sights) -> tuple[NDArray[np.intp], Targets]:
+        """The same runs as in another arrangement, where the points are now."""
+        whose, runs = before._runs
+        if self.points is before.points:
+            return whose, runs
+        low, high = runs.low.copy(), runs.high.copy()
+        moved = np.zeros(len(self.count), dtype=bool)
+        moved[self.moved] = True
+        for k in moved[whose].nonzero()[0].tolist():
+            run = self.axes[:, runs.first[k] : runs.first[k] + runs.count[k]]
+            low[:, k], high[:, k] = run.min(axis=1), run.max(axis=1)
+        return whose, Targets(self.axes, runs.first, runs.count, low, high)
 
     @cached_property
     def _questions(
@@ -403,15 +416,19 @@ def _with_points(world: World, before: Sights, elsewhere: NDArray[np.intp]) -> _
         ``points``, ``of``, ``first`` and ``count`` of the :class:`Sights` to be.
     """
     old = len(before.count)
-    points, number = [before.points.copy()], np.zeros(len(world), dtype=np.intp)
-    number[:old] = before.count
+    points, new = [before.points.copy()], {}
     for i in elsewhere.tolist():
         own = world.sample_points(i).astype(np.float32)
         if i < old:  # as many as it had: they are spread over a box of the same size
             points[0][before.first[i] : before.first[i] + before.count[i]] = own
         else:
             points.append(own)
-            number[i] = len(own)
+            new[i] = len(own)
+    if len(world) == old:
+        return points[0], before.of, before.first, before.count
+    number = np.zeros(len(world), dtype=np.intp)
+    number[:old] = before.count
+    number[list(new)] = list(new.values())
     of = np.repeat(np.arange(len(world)), number)
     return np.concatenate(points), of, number.cumsum() - number, number
 
