@@ -16,6 +16,7 @@ import click
 
 from benchmarks.cli_errors import BadInput, bad_input
 from benchmarks.cli_player import doctor, player
+from benchmarks.cli_render import play, render
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -73,6 +74,8 @@ def cli(context: click.Context, version: bool) -> None:
 
 cli.add_command(player)
 cli.add_command(doctor)
+cli.add_command(render)
+cli.add_command(play)
 
 
 @cli.command()

@@ -90,6 +90,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
       in the paper; ``"explore"``: for the nearest not yet visited (navigation) or the nearest
       (interaction), whatever the task.
     - ``max_steps``: default: the task type's own.
+    - ``annotate``: write the types of things into the pictures, as set-of-marks prompting does.
 
     ## Version History
     - v0: first.
@@ -113,13 +114,15 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         max_steps: int | None = None,
         step_penalty: float = 0.0,
         illegal_penalty: float = 0.0,
+        annotate: bool = False,
         render_mode: str | None = None,
     ) -> None:
         EzPickle.__init__(
             self, tasks, task_type=task_type, obs_mode=obs_mode, backend=backend, width=width,
             height=height, field_of_view=field_of_view, grid_size=grid_size,
             visibility_distance=visibility_distance, instances=instances, max_steps=max_steps,
-            step_penalty=step_penalty, illegal_penalty=illegal_penalty, render_mode=render_mode,
+            step_penalty=step_penalty, illegal_penalty=illegal_penalty, annotate=annotate,
+            render_mode=render_mode,
         )  # fmt: skip
         if instances not in which.POLICIES:
             raise ValueError(
@@ -144,6 +147,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             "visibilityDistance": visibility_distance,
             "snapToGrid": False,
             "headless": not self._draws,
+            "renderInstanceSegmentation": annotate and self._draws,
         }
         self._controller: Any = None
         self._percept: Percept  # what was taken in last; nothing before the first reset
@@ -237,7 +241,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             frame = self._controller.step(action="Pass").frame
             self._controller.headless = headless
             self._percept = replace(self._percept, frame=frame)
-        return np.ascontiguousarray(self._percept.frame)
+        return np.ascontiguousarray(self._percept.picture)
 
     def close(self) -> None:
         """Stop the controller."""
@@ -360,7 +364,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         terminated = bool(self._end_reason) and not truncated
         info = self._info(action, text, success, object_id, feedback)
         if views:
-            info["views"] = {name: view.frame for name, view in views.items()}
+            info["views"] = {name: view.picture for name, view in views.items()}
         return self._observation(feedback, success), reward, terminated, truncated, info
 
     def _observation(self, feedback: str, success: bool) -> dict[str, Any]:

@@ -207,7 +207,7 @@ OBSERVATIONS: Mapping[str, Observation] = {
     "rgb": Observation(
         lambda width, height: spaces.Box(0, 255, (height, width, 3), np.uint8),
         # A copy: after an illegal action the percept, and its frame, are those of the step before.
-        lambda situation: np.array(situation.percept.frame),
+        lambda situation: np.array(situation.percept.picture),
     ),
     "state": Observation(
         lambda width, height: spaces.Box(-1.0, 1.0, (len(STATE_LAYOUT),), np.float32), _state

@@ -6,6 +6,7 @@ the world changes, which costs the embedded engine more than the action itself.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.envs.annotate import annotated
 from er_gym.tasks.task import AgentPose
 from er_gym.thor.objects import TYPES, ObjectTable, objects_of
 
@@ -26,6 +28,8 @@ class Percept:
         visible, interactable: (N,) bool, as the simulator has them.
         pose: the agent's.
         frame: its view, (height, width, 3) uint8; None when none was drawn.
+        boxes: object id to what is seen of it, in pixels (left, upper, right, lower); None unless
+            the picture is to name things.
     """
 
     objects: ObjectTable
@@ -33,6 +37,14 @@ class Percept:
     interactable: NDArray[np.bool_]
     pose: AgentPose
     frame: NDArray[np.uint8] | None
+    boxes: Mapping[str, tuple[int, int, int, int]] | None = None
+
+    @cached_property
+    def picture(self) -> NDArray[np.uint8] | None:
+        """The frame, with things named in it if they are to be."""
+        if self.frame is None or self.boxes is None:
+            return self.frame
+        return annotated(self.frame, self.boxes)
 
     @cached_property
     def visible_types(self) -> NDArray[np.bool_]:
@@ -53,7 +65,7 @@ def perceive(event: Any) -> Percept:
         agent["cameraHorizon"],
         agent["isStanding"],
     )
-    return Percept(objects, visible, interactable, pose, event.frame)
+    return Percept(objects, visible, interactable, pose, event.frame, event.instance_detections2D)
 
 
 def marked(kinds: NDArray[np.intp]) -> NDArray[np.bool_]:

@@ -62,7 +62,7 @@ def percept_of(*entries: Entry) -> Percept:
         },
         "inventoryObjects": [{"objectId": e["objectId"]} for e in entries if e["isPickedUp"]],
     }
-    return perceive(SimpleNamespace(metadata=metadata, frame=None))
+    return perceive(SimpleNamespace(metadata=metadata, frame=None, instance_detections2D=None))
 
 
 def box(x: float, y: float, z: float, distance: float, **fields: Any) -> Entry:
@@ -208,7 +208,10 @@ class Twin:
 
     def perceive(self, event: Any) -> Percept:
         metadata = dict(event.metadata)
-        ours, plain = perceive(event), perceive(SimpleNamespace(metadata=metadata, frame=None))
+        ours, plain = (
+            perceive(event),
+            perceive(SimpleNamespace(metadata=metadata, frame=None, instance_detections2D=None)),
+        )
         assert ours.pose == plain.pose
         assert np.allclose(ours.objects.centre, plain.objects.centre)  # what is carried moves
         assert (ours.visible_types == plain.visible_types).all()

@@ -1,0 +1,202 @@
+"""``er-gym render`` and ``er-gym play``: look at a room, and play a task in it oneself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from benchmarks.cli_errors import BadInput, bad_input
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+WHAT = ("rgb", "depth", "ids", "map")
+_DEPTH_UNIT = 1000.0
+"""Depth pictures are 16 bit, so many steps a metre."""
+_ABOVE = 60.0
+"""Vertical field of view of the camera that looks down on the whole room, degrees."""
+
+
+@click.command()
+@click.option("--scene", required=True, help="Such as FloorPlan1.")
+@click.option("--pose", metavar="X,Z,ROTATION[,HORIZON]", help="Metres and degrees.")
+@click.option("--what", type=click.Choice(WHAT), default="rgb", show_default=True)
+@click.option("--width", type=click.IntRange(64, 1920), default=800, show_default=True)
+@click.option("--height", type=click.IntRange(64, 1280), default=450, show_default=True)
+@click.option("--fov", type=click.FloatRange(30, 150), default=90, show_default=True)
+@click.option("--annotate", is_flag=True, help="Write the types of things into the picture.")
+@click.option(
+    "--out", default=Path("room.png"), show_default=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+)  # fmt: skip
+def render(
+    scene: str, pose: str | None, what: str, width: int, height: int, fov: float, annotate: bool,
+    out: Path,
+) -> None:  # fmt: skip
+    """Write a picture of a room.
+
+    rgb: what the agent sees; depth: the same in 16 bit, millimetres; ids: a colour for each object;
+    map: the whole room from above.
+    """
+    from PIL import Image
+
+    from er_gym.thor import UnknownSceneError, make_controller
+
+    with bad_input(UnknownSceneError):
+        controller = make_controller(
+            scene=scene,
+            width=width,
+            height=height,
+            fieldOfView=fov,
+            renderDepthImage=what == "depth",
+            renderInstanceSegmentation=what == "ids" or annotate,
+            snapToGrid=False,
+        )
+    if pose is not None:
+        _stand(controller, pose)
+    event = controller.last_event
+    if what == "map":
+        event = _from_above(controller)
+        frame = event.third_party_camera_frames[-1]
+    elif what == "depth":
+        frame = (event.depth_frame * _DEPTH_UNIT).clip(0, 65535).astype("uint16")
+    elif what == "ids":
+        frame = event.instance_segmentation_frame
+    else:
+        frame = event.frame
+    if annotate and what == "rgb":
+        from er_gym.envs.annotate import annotated
+
+        frame = annotated(frame, event.instance_detections2D)
+    Image.fromarray(frame).save(out)
+    agent = event.metadata["agent"]
+    at = agent["position"]
+    click.echo(
+        f"{out}: {what} of {scene} from ({at['x']:.2f}, {at['z']:.2f}), rotation "
+        f"{agent['rotation']['y']:g}, horizon {agent['cameraHorizon']:g}"
+    )
+
+
+def _stand(controller: Any, pose: str) -> None:
+    """Put the agent at a pose given in words."""
+    try:
+        x, z, rotation, *horizon = (float(number) for number in pose.split(","))
+        (tilt,) = horizon or (0.0,)
+    except ValueError:
+        raise BadInput(
+            f"{pose!r} is no pose; say X,Z,ROTATION or X,Z,ROTATION,HORIZON, such as 1.0,-0.5,90"
+        ) from None
+    agent = controller.last_event.metadata["agent"]["position"]
+    event = controller.step(
+        action="TeleportFull", position={"x": x, "y": agent["y"], "z": z},
+        rotation={"x": 0.0, "y": rotation, "z": 0.0}, horizon=tilt, standing=True,
+    )  # fmt: skip
+    if not event.metadata["lastActionSuccess"]:
+        raise BadInput(event.metadata["errorMessage"])
+
+
+def _from_above(controller: Any) -> Any:
+    """An event with a picture of the whole room from above, which has no ceiling from there."""
+    from math import radians, tan
+
+    bounds = controller.last_event.metadata["sceneBounds"]
+    middle, size = bounds["center"], bounds["size"]
+    aspect = controller.last_event.screen_width / controller.last_event.screen_height
+    up = max(size["z"], size["x"] / aspect) / 2 / tan(radians(_ABOVE) / 2)
+    return controller.step(
+        action="AddThirdPartyCamera",
+        position={"x": middle["x"], "y": middle["y"] + size["y"] / 2 + up, "z": middle["z"]},
+        rotation={"x": 90, "y": 0, "z": 0},
+        fieldOfView=_ABOVE,
+    )
+
+
+@click.command()
+@click.option("--suite", default="mini", show_default=True, help="Where the task is from.")
+@click.option("--task", "task_id", help="Its id.  [default: one by chance]")
+@click.option("--scene", help="A task by chance in this scene.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option(
+    "--frames", default=Path("frames"), show_default=True,
+    type=click.Path(file_okay=False, path_type=Path), help="Where each step's picture goes.",
+)  # fmt: skip
+@click.option("--window/--no-window", default=None, help="Show it in a window.  [default: if any]")
+def play(
+    suite: str, task_id: str | None, scene: str | None, seed: int, frames: Path,
+    window: bool | None,
+) -> None:  # fmt: skip
+    """Play a task oneself, in words; each step's picture is written, and shown if it can be."""
+    from er_gym.envs.embodied_env import EmbodiedEnv
+    from er_gym.tasks.suites import load_suite
+
+    with bad_input():
+        tasks = [t for t in load_suite(suite).tasks if scene is None or t.scene == scene]
+    if task_id is not None:
+        tasks = [task for task in tasks if task.id == task_id]
+    if not tasks:
+        raise BadInput(f"the suite {suite} has no such task; `er-gym suites` lists the suites")
+    frames.mkdir(parents=True, exist_ok=True)
+    show = _window(window)
+    env = EmbodiedEnv(tasks, obs_mode="rgb+text", max_steps=None)
+    obs, _ = env.reset(seed=seed)
+    step = 0
+    while True:
+        _keep(obs["rgb"], frames / f"{step:03d}.png", show)
+        click.echo(f"\n{obs['text']}")
+        try:
+            said = click.prompt("What do you do", default="quit", show_default=True)
+        except click.Abort:
+            said = "quit"
+        if said == "quit":
+            break
+        obs, reward, terminated, truncated, info = env.step(said)
+        step += 1
+        if reward:
+            click.echo(f"reward {reward:g}")
+        if terminated or truncated:
+            _keep(obs["rgb"], frames / f"{step:03d}.png", show)
+            outcome = "solved" if info["success"] else f"not solved ({info['end_reason']})"
+            click.echo(f"\n{obs['text']}\n{outcome} after {info['steps']} steps")
+            break
+    env.close()
+    click.echo(f"pictures in {frames}")
+
+
+def _keep(frame: NDArray[np.uint8], file: Path, show: Any) -> None:
+    from PIL import Image
+
+    picture = Image.fromarray(frame)
+    picture.save(file)
+    if show is not None:
+        show(picture)
+
+
+def _window(wanted: bool | None) -> Any:
+    """What shows a picture in a window, None where there is none or none is wanted."""
+    if wanted is False:
+        return None
+    try:
+        import tkinter
+
+        from PIL import ImageTk
+
+        root = tkinter.Tk()
+    except (
+        Exception
+    ) as error:  # no Tk, no display: tkinter.TclError is no class where it is missing
+        if wanted:
+            raise BadInput(f"there is no window here: {error}") from None
+        return None
+    root.title("er-gym")
+    label = tkinter.Label(root)
+    label.pack()
+
+    def show(picture: Any) -> None:
+        label.image = ImageTk.PhotoImage(picture)  # type: ignore[attr-defined]  # keeps it alive
+        label.configure(image=label.image)  # type: ignore[attr-defined]
+        root.update()
+
+    return show
