@@ -22,6 +22,7 @@ ALLOWED = {
     "benchmarks": _BENCHMARKS,
     # Speed and fidelity scripts look at the engine itself.
     "benchmarks.perf": {*_BENCHMARKS, "benchmarks.perf", "er_gym.sim"},
+    "benchmarks.gallery": {*_BENCHMARKS, "benchmarks.gallery", "er_gym.sim"},
 }
 """Layer to the layers that it may import; ``er_gym`` alone is its own top-level modules."""
 

@@ -245,12 +245,14 @@ def move_forward(controller: Any, grid_size: float) -> Outcome:
     taken = 0.0
     while taken < FORWARD_STEP - 1e-6:
         step = min(grid_size, FORWARD_STEP - taken)
-        controller.step(action="MoveAhead", moveMagnitude=step)
+        controller.step(action="MoveAhead", moveMagnitude=step, renderImage=False)
         if not controller.last_event.metadata["lastActionSuccess"]:
             break
         taken += step
-    last = _outcome(controller.last_event)
-    return replace(last, success=taken > 0, problem="" if taken else last.problem)
+    problem = "" if taken else controller.last_event.metadata["errorMessage"]
+    if not controller.headless:
+        controller.step(action="Pass")  # for the one picture that is wanted
+    return replace(_outcome(controller.last_event), success=taken > 0, problem=problem)
 
 
 def _part_to_put_into(objects: ObjectTable, row: int) -> str:

@@ -90,8 +90,10 @@ class World:
     ``untouched`` is True until something has been changed.
     ``parents[i]`` are the receptacles that object i is in, innermost first as recorded.
     ``entries`` is where :mod:`er_gym.sim.metadata` keeps what it said of objects that have not
-    changed since; ``derived`` holds what is worked out from the whole state, until it changes, and
-    ``arrangement`` what is from where things are and whether they are open.
+    changed since, ``looks`` where the renderer does; ``touched`` are the objects that something has
+    happened to since the scene was loaded. ``derived`` holds what is worked out from the whole
+    state, until it changes, and ``arrangement`` what is from where things are and whether they are
+    open.
     """
 
     scene: Scene
@@ -126,6 +128,8 @@ class World:
     _shapes: dict[int, Shape] = field(default_factory=dict)
     _samples: dict[int, NDArray[np.float64]] = field(default_factory=dict)
     entries: dict[int, dict[str, object]] = field(default_factory=dict)
+    looks: dict[int, object] = field(default_factory=dict)
+    touched: set[int] = field(default_factory=set)
     _nesting: Nesting | None = None
     _by_type: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
@@ -316,7 +320,9 @@ class World:
         """Forget what was said of some objects."""
         self.untouched = False
         for i in rows:
+            self.touched.add(i)
             self.entries.pop(i, None)
+            self.looks.pop(i, None)
 
     def _displace(self, rows: Iterable[int]) -> None:
         """Forget that too, and what was worked out from where they are and what they lie in."""
@@ -347,7 +353,7 @@ class World:
     def set_state(self, i: int, name: str, value: bool) -> None:
         """Put object i into a state of :data:`er_gym.sim.scene.STATES`, or out of it."""
         self.states[i, _STATE[name]] = value
-        self._touch([i])
+        self._touch([i, *(self.controlled[i] or ())])  # a burner glows by its knob
         if name == "isOpen":
             self.changed()
         else:

@@ -1,26 +1,21 @@
-"""What the cameras show: plain boxes, coloured by object type.
-
-A stand-in that is honest about what it is: every object is drawn as the box that the record gives
-it. Depth, instance and class colours are exact for those boxes.
-"""
+"""What the cameras show, as an AI2-THOR event has it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.metadata import instance_color
-from er_gym.sim.render.boxes import NO_BOX, Frames, render_boxes, type_color
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.world import Agent, Settings, ThirdPartyCamera, World
 
-_NOT_DRAWN = frozenset({"Floor", "Shelf", "ShelvingUnit", "SinkBasin", "BathtubBasin"})
-"""The room shell shows the floor; the others' boxes are the air above or inside something."""
-_MIN_THICKNESS = 0.01
+if TYPE_CHECKING:
+    from er_gym.sim.render.panda import Frames
+
 _FLAGS = {
     "renderDepthImage": "render_depth",
     "renderInstanceSegmentation": "render_instances",
@@ -90,11 +85,11 @@ def object_at(world: World, x: float, y: float) -> str | None:
         x, y: 0 to 1, from the left and from the top.
     """
     settings = world.settings
-    rows, frames = _render(world, next(_cameras(world)))
+    frames = _frames(world, next(_cameras(world)))
     column = min(int(x * settings.width), settings.width - 1)
     row = min(int(y * settings.height), settings.height - 1)
     seen = int(frames.ids[row, column])
-    return None if seen == NO_BOX else world.object_ids[rows[seen]]
+    return world.object_ids[seen - 1] if seen else None
 
 
 def _cameras(world: World) -> Iterator[Camera]:
@@ -108,13 +103,12 @@ def _cameras(world: World) -> Iterator[Camera]:
 
 def _draw(world: World, camera: Camera) -> View:
     settings = world.settings
-    rows, frames = _render(world, camera)
-    ids, types = world.object_ids, world.types
+    frames = _frames(world, camera, settings.render_depth)
     view = View(
         frames.rgb,
-        frames.depth if settings.render_depth else None,
-        _colored(frames, [ids[i] for i in rows]) if settings.render_instances else None,
-        _colored(frames, [types[i] for i in rows]) if settings.render_classes else None,
+        frames.depth,
+        _colored(frames, world.object_ids) if settings.render_instances else None,
+        _colored(frames, world.types) if settings.render_classes else None,
     )
     for picture in (view.rgb, view.depth, view.instances, view.classes):
         if picture is not None:
@@ -122,33 +116,13 @@ def _draw(world: World, camera: Camera) -> View:
     return view
 
 
+def _frames(world: World, camera: Camera, depth: bool = False) -> Frames:
+    from er_gym.sim.render.stage import stage  # late: most worlds are never drawn
+
+    return stage(world.scene.name).draw(world, camera, depth)
+
+
 def _colored(frames: Frames, names: Sequence[str]) -> NDArray[np.uint8]:
     """(H, W, 3) the colour that stands for the name of what is seen, black for the room."""
-    palette = np.array([*map(instance_color, names), (0, 0, 0)], dtype=np.uint8)
+    palette = np.array([(0, 0, 0), *map(instance_color, names)], dtype=np.uint8)
     return palette[frames.ids]
-
-
-def _render(world: World, camera: Camera) -> tuple[list[int], Frames]:
-    """The objects drawn, and the picture, whose ids are positions in that list."""
-    rows = [i for i in np.flatnonzero(~world.hidden).tolist() if world.types[i] not in _NOT_DRAWN]
-    low, high = world.low[rows].copy(), world.high[rows].copy()
-    hollow = np.zeros(len(rows), dtype=bool)
-    for k, i in enumerate(rows):
-        solid = world.shape(i).hiding
-        if len(solid):
-            low[k, 1] = solid[:, 0, 1].min()
-        if world.has(i, "receptacle") and world.has(i, "openable") and world.state(i, "isOpen"):
-            hollow[k] = True
-    thin = high - low < _MIN_THICKNESS
-    high[thin] = low[thin] + _MIN_THICKNESS
-    half = world.scene.aabb_size / 2
-    frames = render_boxes(
-        camera,
-        low,
-        high,
-        np.array([type_color(world.types[i]) for i in rows], dtype=np.uint8),
-        hollow=hollow,
-        room_min=(world.scene.aabb_center - half).min(axis=0),
-        room_max=(world.scene.aabb_center + half).max(axis=0),
-    )
-    return rows, frames

@@ -1,0 +1,41 @@
+"""Surfaces by name: what texture they carry, and how light treats them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Material:
+    """A surface.
+
+    Attributes:
+        texture: a name of :data:`er_gym.sim.render.textures.TEXTURES`, None for none.
+        glows: it is not shaded: screens, lamps, windows.
+        glass: one sees through it; it hides nothing and has no instance.
+    """
+
+    texture: str | None = None
+    glows: bool = False
+    glass: bool = False
+
+
+MATERIALS: dict[str, Material] = {
+    "plain": Material(),
+    "glowing": Material(glows=True),
+    "glass": Material(glass=True),
+    **{
+        name: Material(name)
+        for name in (
+            "wood", "planks", "tiles", "wall_tiles", "plaster", "fabric", "stripes", "carpet",
+            "stone", "metal", "leaves", "cardboard", "paper", "newspaper", "book", "keys", "label",
+            "basketball", "bread", "crust", "wicker", "marble", "bark", "clock", "card", "disc",
+        )
+    },
+    **{
+        name: Material(name, glows=True)
+        for name in ("sky", "screen", "desktop", "phone", "mirror", "flame", "digits")
+    },
+    **{f"picture{k}": Material(f"picture{k}") for k in range(8)},
+}  # fmt: skip
+"""By name; ``picture0`` to ``picture7`` are paintings and posters."""

@@ -1,0 +1,533 @@
+"""Triangles, put together from simple solids.
+
+A thing's own frame: x to its right, y up, z to its front, as AI2-THOR has it; the origin is in the
+middle of its underside. Lengths are metres, angles degrees, colours red, green and blue within 0
+and 1 (more than 1 glows). Which way round corners go does not matter but for :meth:`Mesh.quad`:
+triangles are turned to where their normals point.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import cos, pi, radians, sin
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Colour = tuple[float, float, float]
+Triple = tuple[float, float, float]
+Axis = Literal["x", "y", "z"]
+_AXES: Mapping[str, tuple[int, int, int]] = {"x": (1, 2, 0), "y": (0, 1, 2), "z": (0, 2, 1)}
+"""For a solid of revolution made about y: where each of its axes comes from."""
+PLAIN = "plain"
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Triangles of one material.
+
+    Attributes:
+        vertices, normals: (V, 3). uv: (V, 2), in turns of the texture. colours: (V, 3).
+        triangles: (F, 3) indices of vertices.
+    """
+
+    vertices: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    uv: NDArray[np.float32]
+    colours: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+
+
+def joined(patches: Sequence[Patch]) -> Patch:
+    """Several patches as one."""
+    starts = np.cumsum([0, *(len(p.vertices) for p in patches[:-1])])
+    return Patch(
+        np.concatenate([p.vertices for p in patches]),
+        np.concatenate([p.normals for p in patches]),
+        np.concatenate([p.uv for p in patches]),
+        np.concatenate([p.colours for p in patches]),
+        np.concatenate([p.triangles + s for p, s in zip(patches, starts, strict=True)]).astype(
+            np.int32
+        ),
+    )
+
+
+def rotation(axis: Axis, degrees: float) -> NDArray[np.float64]:
+    """(3, 3) turn about an axis; about y clockwise seen from above, as headings go."""
+    c, s = cos(radians(degrees)), sin(radians(degrees))
+    return np.array(
+        {
+            "x": [[1, 0, 0], [0, c, -s], [0, s, c]],
+            "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]],
+            "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
+        }[axis]
+    )
+
+
+def _fans(counts: Sequence[int]) -> NDArray[np.int32]:
+    """(F, 3) triangles of convex polygons whose corners lie one after the other."""
+    found, first = [], 0
+    for count in counts:
+        found += [(first, first + k, first + k + 1) for k in range(1, count - 1)]
+        first += count
+    return np.array(found, dtype=np.int32).reshape(-1, 3)
+
+
+_FACES = "xXyYzZ"
+_SQUARE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+
+
+def _box_faces() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Of a box of half-size 1: (6, 4, 3) corners, (6, 3) normals, (6, 2, 3) what its sides span."""
+    corners, normals, spread = np.zeros((6, 4, 3)), np.zeros((6, 3)), np.zeros((6, 2, 3))
+    for k, face in enumerate(_FACES):
+        axis = "xyz".index(face.lower())
+        u, v = ((2, 1), (0, 2), (0, 1))[axis]
+        corners[k, :, axis] = normals[k, axis] = 1.0 if face.isupper() else -1.0
+        corners[k, :, u], corners[k, :, v] = _SQUARE.T
+        spread[k, 0, u] = spread[k, 1, v] = 1.0
+    return corners, normals, spread
+
+
+_BOX_CORNERS, _BOX_NORMALS, _BOX_SPREAD = _box_faces()
+_SIGNS = np.array([(a, b, c) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
+
+
+def _cut_box() -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.intp], list[int]]:
+    """The polygons of a box with its edges cut off.
+
+    Returns:
+        (V, 2) the corner of the box, and the axis of the face, that each vertex is nearest to;
+        (V, 3) normals; (V, 2) the two axes along which each polygon lies flattest; and how many
+        vertices each polygon has.
+    """
+    corners: list[tuple[int, int]] = []
+    normals: list[NDArray[np.float64]] = []
+    counts: list[int] = []
+
+    def corner(values: Mapping[int, int]) -> int:
+        return sum((values[axis] > 0) << (2 - axis) for axis in range(3))
+
+    def polygon(ring: list[tuple[int, int]], out: NDArray[np.float64]) -> None:
+        corners.extend(ring)
+        normals.extend([out] * len(ring))
+        counts.append(len(ring))
+
+    for axis in range(3):
+        u, v = (k for k in range(3) if k != axis)
+        for s in (-1, 1):
+            out = np.zeros(3)
+            out[axis] = s
+            polygon([(corner({axis: s, u: a, v: b}), axis) for a, b in _SQUARE.astype(int)], out)
+        for a in (-1, 1):  # the edges along this axis
+            for b in (-1, 1):
+                low, high = (corner({axis: s, u: a, v: b}) for s in (-1, 1))
+                out = np.zeros(3)
+                out[u], out[v] = a, b
+                polygon([(low, u), (high, u), (high, v), (low, v)], out)
+    for k, sign in enumerate(_SIGNS):
+        polygon([(k, 0), (k, 1), (k, 2)], sign.astype(np.float64))
+    steepest = np.abs(normals).argmax(axis=1)
+    flat = np.array([[k for k in range(3) if k != axis] for axis in steepest.tolist()])
+    return np.array(corners), np.array(normals), flat, counts
+
+
+_CUT_CORNERS, _CUT_NORMALS, _CUT_FLAT, _CUT_COUNTS = _cut_box()
+
+
+class Mesh:
+    """Solids of one thing, by material."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, list[Patch]] = {}
+
+    def patches(self) -> dict[str, Patch]:
+        """The triangles of each material."""
+        return {material: joined(parts) for material, parts in self._parts.items()}
+
+    def __bool__(self) -> bool:
+        return bool(self._parts)
+
+    # -- putting together ------------------------------------------------------------------------
+
+    def add(
+        self,
+        other: Mesh,
+        *,
+        at: ArrayLike = (0.0, 0.0, 0.0),
+        turn: tuple[Axis, float] | None = None,
+        about: ArrayLike = (0.0, 0.0, 0.0),
+        scale: ArrayLike = 1.0,
+    ) -> None:
+        """Add another mesh: scaled, then turned about a point, then shifted.
+
+        A door is ``mesh.add(door, turn=("y", -90 * openness), about=hinge)``.
+        """
+        matrix = np.eye(3) if turn is None else rotation(*turn)
+        factor = np.broadcast_to(np.asarray(scale, dtype=np.float64), 3)
+        pivot = np.asarray(about, dtype=np.float64)
+        for material, parts in other._parts.items():
+            for p in parts:
+                vertices = (p.vertices * factor - pivot) @ matrix.T + pivot + np.asarray(at)
+                normals = p.normals / factor @ matrix.T
+                self.triangles(material, vertices, normals, p.uv, p.colours, p.triangles)
+
+    def triangles(
+        self,
+        material: str,
+        vertices: ArrayLike,
+        normals: ArrayLike,
+        uv: ArrayLike,
+        colour: ArrayLike,
+        triangles: ArrayLike,
+    ) -> None:
+        """Add triangles as they are; a colour for all, or (V, 3) one for each vertex."""
+        points = np.asarray(vertices, dtype=np.float32).reshape(-1, 3)
+        out = np.asarray(normals, dtype=np.float32).reshape(-1, 3)
+        out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+        faces = np.asarray(triangles, dtype=np.int32).reshape(-1, 3)
+        a, b, c = (points[faces[:, k]] for k in range(3))
+        # The frame is left-handed, so that the cross product points the other way.
+        inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), out[faces].sum(axis=1)) > 0
+        faces = np.where(inward[:, None], faces[:, [0, 2, 1]], faces)
+        colours = np.broadcast_to(np.asarray(colour, dtype=np.float32), points.shape)
+        patch = Patch(points, out, np.asarray(uv, np.float32).reshape(-1, 2), colours, faces)
+        self._parts.setdefault(material, []).append(patch)
+
+    # -- flat things -----------------------------------------------------------------------------
+
+    def quad(
+        self,
+        corners: ArrayLike,
+        colour: ArrayLike,
+        material: str = PLAIN,
+        *,
+        uv: ArrayLike = ((0, 0), (1, 0), (1, 1), (0, 1)),
+        both: bool = False,
+    ) -> None:
+        """Four corners, anticlockwise as one looks at the front; ``both``: it has two fronts."""
+        points = np.asarray(corners, dtype=np.float64)
+        normal = np.cross(points[2] - points[0], points[1] - points[0])
+        for out in (normal, -normal) if both else (normal,):
+            self.triangles(
+                material, points, np.tile(out, (4, 1)), uv, colour, [(0, 1, 2), (0, 2, 3)]
+            )
+
+    def panel(
+        self,
+        at: Triple,
+        size: tuple[float, float],
+        colour: ArrayLike,
+        material: str = PLAIN,
+        *,
+        facing: Literal["x", "X", "y", "Y", "z", "Z"] = "Z",
+        turns: float | None = None,
+    ) -> None:
+        """An upright or level rectangle (width, height) about a middle; capital letters: positive.
+
+        A picture on it is upright for who looks at it. ``turns``: metres a turn of the texture;
+        None: the texture once over the whole.
+        """
+        w, h = size[0] / 2, size[1] / 2
+        right, up = {
+            "Z": ((-1, 0, 0), (0, 1, 0)),
+            "z": ((1, 0, 0), (0, 1, 0)),
+            "X": ((0, 0, 1), (0, 1, 0)),
+            "x": ((0, 0, -1), (0, 1, 0)),
+            "Y": ((-1, 0, 0), (0, 0, -1)),
+            "y": ((-1, 0, 0), (0, 0, 1)),
+        }[facing]
+        r, u, middle = np.array(right), np.array(up), np.array(at)
+        corners = [middle + a * w * r + b * h * u for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        repeat = (1.0, 1.0) if turns is None else (size[0] / turns, size[1] / turns)
+        uv = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * repeat
+        out = np.zeros(3)
+        out["xyz".index(facing.lower())] = 1.0 if facing.isupper() else -1.0
+        faces = [(0, 1, 2), (0, 2, 3)]
+        self.triangles(material, corners, np.tile(out, (4, 1)), uv, colour, faces)
+
+    # -- solids ----------------------------------------------------------------------------------
+
+    def box(
+        self,
+        at: Triple,
+        size: Triple,
+        colour: ArrayLike,
+        material: str = PLAIN,
+        *,
+        faces: str = "xXyYzZ",
+        taper: float = 1.0,
+        turns: float = 1.0,
+    ) -> None:
+        """A box about a middle; ``faces``: those that can be seen; ``taper``: its top's share.
+
+        ``turns``: metres a turn of the texture.
+        """
+        half = np.abs(np.asarray(size, dtype=np.float64)) / 2
+        kept = [_FACES.index(face) for face in faces]
+        corners, scale = _BOX_CORNERS[kept] * half, _BOX_SPREAD[kept] @ half
+        uv = _SQUARE * scale[:, None] / turns
+        if taper != 1.0:
+            corners[corners[..., 1] > 0] *= (taper, 1.0, taper)
+        self.triangles(
+            material,
+            corners.reshape(-1, 3) + np.asarray(at),
+            np.repeat(_BOX_NORMALS[kept], 4, axis=0),
+            uv.reshape(-1, 2),
+            colour,
+            _fans([4] * len(kept)),
+        )
+
+    def rounded(
+        self,
+        at: Triple,
+        size: Triple,
+        colour: ArrayLike,
+        radius: float,
+        material: str = PLAIN,
+        *,
+        turns: float = 1.0,
+    ) -> None:
+        """A box whose edges and corners are cut off at ``radius``, which catches the light."""
+        half = np.abs(np.asarray(size, dtype=np.float64)) / 2
+        cut = min(radius, *(0.9 * half))
+        # Three points a corner, one on each of its faces.
+        points = np.repeat((_SIGNS * (half - cut))[:, None], 3, axis=1)
+        for axis in range(3):
+            points[:, axis, axis] = _SIGNS[:, axis] * half[axis]
+
+        found = points[_CUT_CORNERS[:, 0], _CUT_CORNERS[:, 1]]
+        uv = np.take_along_axis(found, _CUT_FLAT, axis=1) / turns
+        self.triangles(
+            material, found + np.asarray(at), _CUT_NORMALS, uv, colour, _fans(_CUT_COUNTS)
+        )
+
+    def lathe(
+        self,
+        profile: Iterable[tuple[float, float]],
+        colour: ArrayLike,
+        material: str = PLAIN,
+        *,
+        at: Triple = (0.0, 0.0, 0.0),
+        axis: Axis = "y",
+        segments: int = 14,
+        squash: tuple[float, float] = (1.0, 1.0),
+        smooth: bool = True,
+        turns: tuple[float, float] = (1.0, 1.0),
+    ) -> None:
+        """What a profile of (radius, height) sweeps about an axis; its left side is outside.
+
+        Going up a profile at the outside, in over the top and down at the inside makes a vessel.
+
+        Args:
+            squash: factors of the radius along the two other axes.
+            turns: times that the texture goes round, and metres of height that it takes.
+        """
+        line = np.asarray(list(profile), dtype=np.float64)
+        step = np.diff(line, axis=0)
+        out = np.stack([step[:, 1], -step[:, 0]], axis=1)
+        out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+        angle = np.arange(segments + 1) / segments * 2 * pi
+        c, s = np.cos(angle), np.sin(angle)
+        for k, (low, high) in enumerate(itertools.pairwise(line)):
+            below = above = out[k]
+            if smooth and k > 0 and out[k - 1] @ out[k] > 0.5:
+                below = out[k - 1] + out[k]
+            if smooth and k < len(out) - 1 and out[k + 1] @ out[k] > 0.5:
+                above = out[k] + out[k + 1]
+            rings, normals, uv = [], [], []
+            for (radius, height), n in ((low, below), (high, above)):
+                full = np.full_like(c, height)
+                rings.append(np.stack([radius * c * squash[0], full, radius * s * squash[1]], 1))
+                across = n[0] * c / squash[0], np.full_like(c, n[1]), n[0] * s / squash[1]
+                normals.append(np.stack(across, axis=1))
+                uv.append(np.stack([angle / (2 * pi) * turns[0], full / turns[1]], axis=1))
+            first = np.arange(segments)
+            second = first + segments + 1
+            faces = [np.empty((0, 3), dtype=int)]
+            if low[0] > 1e-6:
+                faces.append(np.stack([first, first + 1, second], axis=1))
+            if high[0] > 1e-6:
+                faces.append(np.stack([first + 1, second + 1, second], axis=1))
+            order = list(_AXES[axis])
+            self.triangles(
+                material,
+                np.concatenate(rings)[:, order] + np.asarray(at),
+                np.concatenate(normals)[:, order],
+                np.concatenate(uv),
+                colour,
+                np.concatenate(faces),
+            )
+
+    def cylinder(
+        self,
+        at: Triple,
+        radius: float,
+        height: float,
+        colour: ArrayLike,
+        material: str = PLAIN,
+        *,
+        top: float | None = None,
+        axis: Axis = "y",
+        segments: int = 12,
+    ) -> None:
+        """A cylinder about a middle; ``top``: the radius at its upper end, for cones."""
+        upper, half = radius if top is None else top, height / 2
+        profile = [(0.0, -half), (radius, -half), (upper, half), (0.0, half)]
+        self.lathe(profile, colour, material, at=at, axis=axis, segments=segments)
+
+    def ball(
+        self,
+        at: Triple,
+        size: Triple,
+        colour: ArrayLike,
+        material: str = PLAIN,
+        *,
+        segments: int = 12,
+        rings: int = 8,
+    ) -> None:
+        """An ellipsoid about a middle."""
+        t = np.linspace(-pi / 2, pi / 2, rings + 1)
+        radius = np.cos(t) / 2 * size[0]
+        radius[[0, -1]] = 0.0
+        profile = list(zip(radius.tolist(), (np.sin(t) / 2 * size[1]).tolist(), strict=True))
+        squash = (1.0, size[2] / size[0])
+        self.lathe(profile, colour, material, at=at, segments=segments, squash=squash)
+
+    def prism(
+        self,
+        outline: ArrayLike,
+        low: float,
+        high: float,
+        colour: ArrayLike,
+        material: str = PLAIN,
+        *,
+        axis: Axis = "y",
+        turns: float = 1.0,
+    ) -> None:
+        """A convex outline (K, 2) pulled along an axis from ``low`` to ``high``.
+
+        The outline is in (x, z) for y, in (z, y) for x, in (x, y) for z.
+        """
+        ring = np.asarray(outline, dtype=np.float64)
+        u, v = {"y": (0, 2), "x": (2, 1), "z": (0, 1)}[axis]
+        w = "xyz".index(axis)
+        middle = ring.mean(axis=0)
+
+        def lift(points: NDArray[np.float64], height: float) -> NDArray[np.float64]:
+            found = np.zeros((len(points), 3))
+            found[:, u], found[:, v], found[:, w] = points[:, 0], points[:, 1], height
+            return found
+
+        fan = [(0, k, k + 1) for k in range(1, len(ring) - 1)]
+        for height, sign in ((low, -1.0), (high, 1.0)):
+            out = np.zeros(3)
+            out[w] = sign
+            self.triangles(
+                material,
+                lift(ring, height),
+                np.tile(out, (len(ring), 1)),
+                ring / turns,
+                colour,
+                fan,
+            )
+        for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+            side = b - a
+            normal = np.array([side[1], -side[0]])
+            normal *= np.sign(normal @ ((a + b) / 2 - middle)) or 1.0
+            out = np.zeros(3)
+            out[u], out[v] = normal
+            pair = np.array([a, b])
+            corners = np.concatenate([lift(pair, low), lift(pair[::-1], high)])
+            along = float(np.linalg.norm(side)) / turns
+            uv = [(0, low / turns), (along, low / turns), (along, high / turns), (0, high / turns)]
+            self.triangles(
+                material, corners, np.tile(out, (4, 1)), uv, colour, [(0, 1, 2), (0, 2, 3)]
+            )
+
+    def tube(
+        self,
+        path: ArrayLike,
+        radius: float,
+        colour: ArrayLike,
+        material: str = PLAIN,
+        *,
+        segments: int = 7,
+    ) -> None:
+        """A round rod along a path (K, 3), closed at both ends."""
+        points = np.asarray(path, dtype=np.float64)
+        for a, b in itertools.pairwise(points):
+            along = b - a
+            length = float(np.linalg.norm(along))
+            if length < 1e-9:
+                continue
+            up = along / length
+            side = np.cross(up, (0.0, 0.0, 1.0) if abs(up[2]) < 0.9 else (1.0, 0.0, 0.0))
+            side /= np.linalg.norm(side)
+            frame = np.stack([side, up, np.cross(side, up)])
+            rod = Mesh()
+            rod.cylinder(
+                (0.0, length / 2, 0.0), radius, length, colour, material, segments=segments
+            )
+            for name, parts in rod._parts.items():
+                for p in parts:
+                    self.triangles(
+                        name,
+                        p.vertices @ frame + a,
+                        p.normals @ frame,
+                        p.uv,
+                        p.colours,
+                        p.triangles,
+                    )
+
+    def skin(
+        self,
+        rings: ArrayLike,
+        colour: ArrayLike,
+        material: str = PLAIN,
+        *,
+        closed: bool = True,
+        smooth: bool = True,
+        both: bool = False,
+        turns: tuple[float, float] = (1.0, 1.0),
+    ) -> None:
+        """Rings of points (R, K, 3) joined by faces: a lathe whose cross-section is free.
+
+        As there, rings that go up at the outside, in over the top and down at the inside make a
+        vessel, if each goes round as the sine and cosine of x and z do.
+
+        Args:
+            colour: one for all, or (R, K, 3).
+            closed: rings come round to where they began; if not, it is a sheet.
+            smooth: along a ring, where it bends by less than 60 degrees.
+            both: it has two fronts.
+            turns: of the texture, along a ring and from the first ring to the last.
+        """
+        points = np.asarray(rings, dtype=np.float64)
+        tints = np.broadcast_to(np.asarray(colour, dtype=np.float64), points.shape)
+        if closed:
+            points, tints = (np.concatenate([a, a[:, :1]], axis=1) for a in (points, tints))
+        r, k = points.shape[0] - 1, points.shape[1] - 1
+        out = np.cross(points[1:, 1:] - points[:-1, :-1], points[:-1, 1:] - points[1:, :-1])
+        out /= np.maximum(np.linalg.norm(out, axis=2, keepdims=True), 1e-9)
+        left, right = out.copy(), out.copy()
+        if smooth:
+            before, after = np.roll(out, 1, axis=1), np.roll(out, -1, axis=1)
+            if not closed:
+                before[:, 0], after[:, -1] = out[:, 0], out[:, -1]
+            left += before * ((before * out).sum(axis=2, keepdims=True) > 0.5)
+            right += after * ((after * out).sum(axis=2, keepdims=True) > 0.5)
+        place = [np.s_[:-1, :-1], np.s_[:-1, 1:], np.s_[1:, 1:], np.s_[1:, :-1]]
+        corners = np.stack([points[at] for at in place], axis=2).reshape(-1, 3)
+        tint = np.stack([tints[at] for at in place], axis=2).reshape(-1, 3)
+        normals = np.stack([left, right, right, left], axis=2).reshape(-1, 3)
+        u, v = np.linspace(0, turns[0], k + 1), np.linspace(0, turns[1], r + 1)
+        grid = np.stack(np.meshgrid(u, v), axis=2)
+        uv = np.stack([grid[at] for at in place], axis=2).reshape(-1, 2)
+        first = 4 * np.arange(r * k)[:, None]
+        faces = (first[:, None] + [[0, 1, 2], [0, 2, 3]]).reshape(-1, 3)
+        for side in (1, -1) if both else (1,):
+            self.triangles(material, corners, side * normals, uv, tint, faces)

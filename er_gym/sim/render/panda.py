@@ -1,0 +1,204 @@
+"""Panda3D's software rasteriser: triangles in, colour, instance and depth out, without a window.
+
+One engine and one buffer a process. Instances come with the colours, as the pictures' alpha, which
+is why there are at most :data:`MOST_INSTANCES` of them. Panda's frame is right-handed with z up: x,
+y and z here are its x, z and y.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache, partial
+from math import atan, degrees, radians, tan
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.render.camera import Camera
+from er_gym.sim.render.libx11 import provide_libx11
+from er_gym.sim.render.materials import MATERIALS
+from er_gym.sim.render.textures import texture
+
+NEAR, FAR = 0.1, 40.0
+"""Metres from the camera between which things are drawn."""
+MOST_INSTANCES = 254
+_CONFIGURATION = """
+load-display p3tinydisplay
+audio-library-name null
+window-type offscreen
+notify-level error
+textures-power-2 down
+garbage-collect-states 0
+"""
+_DEPTH_STEPS = float(1 << 20)
+_VERTEX = np.dtype([("at", "<f4", 3), ("colour", "u1", 4), ("uv", "<f4", 2)])
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """What a camera sees, top row first.
+
+    Attributes:
+        rgb: (H, W, 3) uint8.
+        ids: (H, W) uint8 number of the instance, 0 for none.
+        depth: (H, W) float32 metres along the line of view, None unless asked for.
+    """
+
+    rgb: NDArray[np.uint8]
+    ids: NDArray[np.uint8]
+    depth: NDArray[np.float32] | None
+
+
+@cache
+def core() -> Any:
+    """The module ``panda3d.core``, set up to need neither a window nor a file of settings."""
+    provide_libx11()
+    from panda3d import core as module
+
+    module.loadPrcFileData("er-gym", _CONFIGURATION)
+    return module
+
+
+class Rasteriser:
+    """A buffer to draw into; use :func:`rasteriser`. Sizes may change from picture to picture."""
+
+    def __init__(self) -> None:
+        p3d = core()
+        selection = p3d.GraphicsPipeSelection.getGlobalPtr()
+        pipes = {t.getName(): t for t in selection.getPipeTypes()}
+        pipe = selection.makePipe(pipes["TinyOffscreenGraphicsPipe"])
+        self._engine = p3d.GraphicsEngine(pipe)
+        wanted = p3d.FrameBufferProperties()
+        wanted.setRgbColor(True)
+        wanted.setRgbaBits(8, 8, 8, 8)
+        wanted.setDepthBits(24)
+        # Resizeable: the rasteriser never frees the memory of a buffer.
+        flags = p3d.GraphicsPipe.BFRefuseWindow | p3d.GraphicsPipe.BFResizeable
+        size = p3d.WindowProperties.size(300, 300)
+        self._buffer = self._engine.makeOutput(pipe, "frames", 0, wanted, size, flags)
+        self._size = (300, 300)
+        self._picture = p3d.Texture()
+        self._buffer.addRenderTexture(
+            self._picture, p3d.GraphicsOutput.RTMCopyRam, p3d.GraphicsOutput.RTPColor
+        )
+        self._buffer.setClearColorActive(True)
+        self._buffer.setClearColor(p3d.LColor(0.0, 0.0, 0.0, 0.0))
+        self._lens = p3d.PerspectiveLens()
+        self._lens.setNearFar(NEAR, FAR)
+        self._camera = p3d.NodePath(p3d.Camera("camera", self._lens))
+        region = self._buffer.makeDisplayRegion()
+        region.setCamera(self._camera)
+        self._show_depth = p3d.ConfigVariableBool("td-show-zbuffer", False)
+        from cv2 import COLOR_BGRA2RGB, cvtColor  # late: it takes 0.2 s, and most never draw
+
+        self._to_rgb = partial(cvtColor, code=COLOR_BGRA2RGB)  # four times as fast as numpy
+        self._lock = Lock()  # two threads that draw at once would mix their pictures
+
+    def draw(self, root: Any, camera: Camera, depth: bool = False) -> Frames:
+        """What a camera sees of a scene graph; the arrays are the caller's own."""
+        with self._lock:
+            width, height = camera.width, camera.height
+            if (width, height) != self._size:
+                self._buffer.setSize(width, height)
+                self._size = (width, height)
+            half = tan(radians(camera.fov) / 2)
+            self._lens.setFov(2 * degrees(atan(half * width / height)), camera.fov)
+            x, y, z = (float(value) for value in camera.position)
+            self._camera.reparentTo(root)
+            self._camera.setPos(x, z, y)
+            self._camera.setHpr(-camera.yaw, -camera.horizon, -camera.roll)
+            self._show_depth.setValue(depth)
+            self._engine.renderFrame()
+            pixels = np.frombuffer(self._picture.getRamImage(), np.uint8)
+            pixels = pixels.reshape(height, width, 4)[::-1]
+            ids = pixels[..., 3].copy()
+            rgb = np.asarray(self._to_rgb(pixels), dtype=np.uint8)
+            return Frames(rgb, ids, self._depth(width, height) if depth else None)
+
+    def _depth(self, width: int, height: int) -> NDArray[np.float32]:
+        steps = np.frombuffer(self._buffer.getScreenshot().getRamImage(), np.uint32)
+        steps = steps.reshape(height, width)[::-1]
+        share = 1.0 - 2.0 * steps.astype(np.float32) / np.float32(_DEPTH_STEPS)
+        found = 2.0 * NEAR * FAR / (FAR + NEAR - share * (FAR - NEAR))
+        return np.where(steps == 0, np.float32(FAR), found).astype(np.float32)
+
+
+@cache
+def rasteriser() -> Rasteriser:
+    """The process's own."""
+    return Rasteriser()
+
+
+@cache
+def _texture(name: str) -> Any:
+    p3d, picture = core(), texture(name)
+    found = p3d.Texture(name)
+    found.setup2dTexture(
+        picture.shape[1], picture.shape[0], p3d.Texture.TUnsignedByte, p3d.Texture.FRgb
+    )
+    found.setRamImage(np.ascontiguousarray(picture[::-1, :, ::-1]).tobytes())
+    found.setMinfilter(p3d.SamplerState.FTNearestMipmapNearest)
+    found.setMagfilter(p3d.SamplerState.FTNearest)
+    return found
+
+
+@cache
+def state(material: str) -> Any:
+    """The render state of a material."""
+    p3d, surface = core(), MATERIALS[material]
+    if surface.glass:
+        return p3d.RenderState.make(
+            p3d.TransparencyAttrib.make(p3d.TransparencyAttrib.MAlpha),
+            p3d.ColorWriteAttrib.make(7),  # colours alone: what is behind keeps its instance
+            p3d.DepthWriteAttrib.make(p3d.DepthWriteAttrib.MOff),
+            p3d.ColorAttrib.makeFlat(p3d.LColor(0.75, 0.9, 0.95, 0.22)),
+        )
+    colours = p3d.ColorAttrib.makeVertex()
+    if surface.texture is None:
+        return p3d.RenderState.make(colours)
+    return p3d.RenderState.make(p3d.TextureAttrib.make(_texture(surface.texture)), colours)
+
+
+def geometry(
+    parts: Iterable[
+        tuple[str, NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]
+    ],
+    number: int,
+    name: str,
+) -> Any:
+    """A node that draws some triangles as instance ``number`` (0: none).
+
+    Args:
+        parts: of each material its name, vertices (V, 3), colours (V, 3), uv (V, 2) and triangles
+            (F, 3).
+    """
+    if number > MOST_INSTANCES:
+        raise ValueError(f"there can be {MOST_INSTANCES} instances, not {number}")
+    p3d = core()
+    node = p3d.GeomNode(name)
+    for material, at, colours, uv, triangles in parts:
+        # Where there is a texture, the rasteriser makes 1 less of each alpha.
+        textured = MATERIALS[material].texture is not None
+        rows = np.empty(len(at), dtype=_VERTEX)
+        rows["at"] = at[:, [0, 2, 1]]
+        rows["colour"][:, :3] = np.clip(colours, 0.0, 1.0) * 255 + 0.5
+        rows["colour"][:, 3] = number + (1 if textured and number else 0)
+        rows["uv"] = uv
+        data = p3d.GeomVertexData(name, p3d.GeomVertexFormat.getV3c4t2(), p3d.Geom.UHStatic)
+        data.uncleanSetNumRows(len(rows))
+        data.modifyArrayHandle(0).copyDataFrom(rows.tobytes())
+        wide = len(rows) >= 65536
+        primitive = p3d.GeomTriangles(p3d.Geom.UHStatic)
+        primitive.setIndexType(p3d.Geom.NTUint32 if wide else p3d.Geom.NTUint16)
+        # Panda's frame is right-handed: mirrored, triangles go round the other way.
+        index = np.ascontiguousarray(triangles, dtype=np.uint32 if wide else np.uint16)
+        array = primitive.modifyVertices()
+        array.uncleanSetNumRows(index.size)
+        array.modifyHandle().copyDataFrom(index.tobytes())
+        geom = p3d.Geom(data)
+        geom.addPrimitive(primitive)
+        node.addGeom(geom, state(material))
+    return node

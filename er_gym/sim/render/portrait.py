@@ -1,0 +1,105 @@
+"""From the world to looks: what each object looks like now."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.render.built_in import built_in
+from er_gym.sim.render.look import Box, Look
+from er_gym.sim.render.palette import palette, room_kind
+from er_gym.sim.scene import Scene
+from er_gym.sim.space.surfaces import recorded_surfaces
+from er_gym.sim.world import World
+
+_ALWAYS = 0.004
+"""Nothing is thinner than this, metres."""
+
+
+@lru_cache(maxsize=128)
+def _recorded(scene: Scene) -> dict[int, Look]:
+    """The looks of what nothing has happened to yet, filled by :func:`look`."""
+    return {}
+
+
+def look(world: World, i: int) -> Look:
+    """What object i looks like in its present state: worked out once, until it changes."""
+    kept = world.looks if i in world.touched or i >= len(world.scene) else _recorded(world.scene)
+    found = kept.get(i)
+    if not isinstance(found, Look):
+        found = kept[i] = look_of(world, i)
+    return found
+
+
+def look_of(world: World, i: int) -> Look:
+    """The same, worked out anew."""
+    scene, shape = world.scene.name, world.shape(i)
+    size = np.maximum(np.ptp(shape.upright.reshape(-1, 3), axis=0), _ALWAYS)
+    underside = shape.upright[:, 0, 1].min()
+    ground = world.high[next(world.of_type("Floor")), 1]
+    return Look(
+        kind=world.types[i],
+        asset=world.asset_ids[i],
+        scene=scene,
+        room=room_kind(scene),
+        size=_triple(size),
+        height=round(float(shape.middle[1] + underside - ground), 2),
+        palette=palette(scene),
+        openness=round(float(world.openness[i]), 2) if world.state(i, "isOpen") else 0.0,
+        on=_is_on(world, i),
+        filled=(world.fill_liquid[i] or "water") if world.state(i, "isFilledWithLiquid") else "",
+        dirty=world.state(i, "isDirty"),
+        cooked=world.state(i, "isCooked"),
+        sliced=world.state(i, "isSliced"),
+        broken=world.state(i, "isBroken"),
+        used_up=world.state(i, "isUsedUp"),
+        parts=_parts(shape.upright, underside),
+        surface=_surface(world, i),
+        boards=_boards(world, i, float(shape.middle[1] + underside)),
+        built_in=built_in(scene, i),
+    )
+
+
+def _is_on(world: World, i: int) -> bool:
+    """Whether object i is switched on, itself or by the knob that controls it."""
+    if world.types[i] != "StoveBurner":
+        return world.state(i, "isToggled")
+    knobs = world.of_type("StoveKnob")
+    return any(i in (world.controlled[k] or ()) and world.state(k, "isToggled") for k in knobs)
+
+
+def _triple(values: NDArray[np.float64]) -> tuple[float, float, float]:
+    x, y, z = values.round(3).tolist()
+    return x, y, z
+
+
+def _parts(upright: NDArray[np.float64], underside: float) -> tuple[Box, ...]:
+    """The engine's parts, from the middle of the underside."""
+    lifted = upright - np.array([0.0, underside, 0.0])
+    return tuple((_triple(low), _triple(high)) for low, high in lifted)
+
+
+def _surface(world: World, i: int) -> float | None:
+    height = recorded_surfaces(world.scene.name).get(i) if i < len(world.scene) else None
+    return None if height is None else round(float(height), 3)
+
+
+def _boards(world: World, i: int, underside: float) -> tuple[float, ...]:
+    """Where shelves that are objects of their own lie within object i, over its underside."""
+    if world.types[i] not in _CASES_OF_SHELVES:
+        return ()
+    low, high = world.low[i] - 0.05, world.high[i] + 0.05
+    found = {
+        round(float(world.low[k, 1]) - underside, 3)
+        for k in world.of_type("Shelf")
+        if (low <= (world.low[k] + world.high[k]) / 2).all()
+        and ((world.low[k] + world.high[k]) / 2 <= high).all()
+    }
+    return tuple(sorted(found))
+
+
+_CASES_OF_SHELVES = frozenset(
+    {"ShelvingUnit", "Desk", "TVStand", "Dresser", "SideTable", "Cabinet"}
+)

@@ -1,0 +1,101 @@
+"""What furniture is put together from: cases, fronts, handles and legs."""
+
+from __future__ import annotations
+
+from er_gym.sim.render.look import Box, Look, shaded
+from er_gym.sim.render.mesh import Colour, Mesh, Triple
+
+WALL = 0.02
+"""Thickness of boards, metres."""
+HANDLE = 0.025
+"""How far handles stick out, metres."""
+CLEAR = 0.008
+"""How far a board lies under the shelf's own that is drawn at the same height, metres."""
+
+
+def grain(colour: Colour) -> str:
+    """Grain on what is as brown as wood; paint has none."""
+    return "wood" if colour[0] - colour[2] > 0.15 else "plain"
+
+
+def legs(
+    mesh: Mesh,
+    size: tuple[float, float, float],
+    side: float,
+    colour: Colour,
+    material: str = "wood",
+    *,
+    inset: float = 0.0,
+    taper: float = 1.0,
+) -> None:
+    """Four legs under a box of a size; ``taper``: the share of their width at the floor."""
+    w, h, d = size
+    x, z = (w - side) / 2 - inset, (d - side) / 2 - inset
+    for a in (-x, x):
+        for b in (-z, z):
+            leg = Mesh()
+            # A box's taper narrows its top: made head down, then turned over.
+            leg.box((0, 0, 0), (side, h, side), colour, material, faces="xXzZ", taper=taper)
+            mesh.add(leg, at=(a, h / 2, b), turn=("x", 180.0))
+
+
+def apron(mesh: Mesh, size: tuple[float, float], under: float, high: float, colour: Colour) -> None:
+    """The rails that join a table's legs under its top: width and depth, top and height."""
+    w, d = size
+    middle = under - high / 2
+    # Drawers may come through at the front: the rail there stands well back.
+    for z in (-d / 2, d / 2 - 0.06):
+        mesh.box((0, middle, z), (w, high, 0.02), colour, "wood", faces="zZy")
+    for sign in (-1, 1):
+        mesh.box((sign * w / 2, middle, 0), (0.02, high, d), colour, "wood", faces="xXy")
+
+
+def case(mesh: Mesh, low: Triple, high: Triple, colour: Colour, inner: Colour) -> None:
+    """A box that is open at its front, and the inside of it in a colour of its own."""
+    material = grain(colour)
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    middle = ((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2)
+    w, h, d = x1 - x0, y1 - y0, z1 - z0
+    mesh.box(middle, (w, h, d), colour, material, faces="xXyYz")
+    t = min(WALL, 0.2 * w, 0.2 * h)
+    for x in (x0 + t / 2, x1 - t / 2):
+        mesh.box((x, middle[1], z1 - 0.005), (t, h, 0.01), colour, material, faces="Z")
+    for y in (y0 + t / 2, y1 - t / 2):
+        mesh.box((middle[0], y, z1 - 0.005), (w - 2 * t, t, 0.01), colour, material, faces="Z")
+    mesh.panel((x0 + t, middle[1], middle[2]), (d, h), inner, facing="X")
+    mesh.panel((x1 - t, middle[1], middle[2]), (d, h), inner, facing="x")
+    mesh.panel((middle[0], y0 + t, middle[2]), (w, d), shaded(inner, 0.8), facing="Y")
+    mesh.panel((middle[0], y1 - t, middle[2]), (w, d), shaded(inner, 0.8), facing="y")
+    mesh.panel((middle[0], middle[1], z0 + t), (w, h), shaded(inner, 0.9), facing="Z")
+
+
+def front(size: tuple[float, float], colour: Colour, thick: float = WALL) -> Mesh:
+    """A door or a drawer front, a frame about a panel; about the origin, its back at z = 0."""
+    w, h = size
+    mesh, material = Mesh(), grain(colour)
+    mesh.box((0, 0, thick / 2), (w, h, thick), shaded(colour, 0.8), material)
+    rim = min(0.055, 0.2 * w, 0.22 * h)
+    z, proud = thick + 0.003, 0.006
+    for sign in (-1, 1):
+        at = (sign * (w - rim) / 2, 0.0, z)
+        mesh.box(at, (rim - 0.006, h - 0.006, proud), colour, material, faces="xXZ")
+        at = (0.0, sign * (h - rim) / 2, z)
+        mesh.box(at, (w - 2 * rim, rim - 0.006, proud), colour, material, faces="yYZ")
+    return mesh
+
+
+def bar(at: Triple, long: float, colour: Colour, *, upright: bool) -> Mesh:
+    """A handle on two feet that stands out in front of a place."""
+    mesh, (x, y, z) = Mesh(), at
+    half = long / 2 - 0.008
+    for sign in (-1, 1):
+        foot = (x, y + sign * half, z + 0.008) if upright else (x + sign * half, y, z + 0.008)
+        mesh.box(foot, (0.012, 0.012, 0.016), colour, faces="xXyY")
+    size = (0.014, long, 0.01) if upright else (long, 0.014, 0.01)
+    mesh.box((x, y, z + 0.018), size, colour, faces="xXyYZ")
+    return mesh
+
+
+def built_in(look: Look) -> tuple[tuple[str, Box], ...]:
+    """Type and box, in the mesh's frame, of what is let into a thing or built in under it."""
+    return look.built_in

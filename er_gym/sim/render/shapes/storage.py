@@ -1,0 +1,400 @@
+"""Cabinets, drawers, shelves, counters and boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from er_gym.sim.render.look import Box, Look, mixed, shaded
+from er_gym.sim.render.mesh import Colour, Mesh, Triple
+from er_gym.sim.render.shapes.joinery import (
+    CLEAR,
+    HANDLE,
+    WALL,
+    bar,
+    built_in,
+    case,
+    front,
+    grain,
+    legs,
+)
+from er_gym.sim.render.shapes.table import shape
+
+_CARD, _TAPE = (0.72, 0.54, 0.34), (0.86, 0.76, 0.52)
+_STEEL, _GUNMETAL, _DIAL = (0.30, 0.33, 0.35), (0.20, 0.24, 0.25), (0.85, 0.85, 0.82)
+_BRASS, _CRACK = (0.78, 0.62, 0.30), (0.12, 0.11, 0.11)
+_WICKERS = ((0.70, 0.54, 0.34), (0.50, 0.36, 0.22), (0.85, 0.80, 0.70))
+_LINEN, _LAUNDRY = (0.90, 0.88, 0.82), (0.45, 0.58, 0.72)
+_PLINTH = (0.16, 0.14, 0.13)
+_LET_IN = frozenset({"Sink", "Bathtub"})
+"""What goes through a counter's top."""
+_SLAB = 0.035
+"""Thickness of a counter's top, metres."""
+_BACK = 0.03
+"""How far a counter's base stands back from its edges, metres."""
+Rectangle = tuple[float, float, float, float]
+
+
+def _fitted(look: Look) -> Colour:
+    """Kitchens and bathrooms have cabinets of one colour, other rooms that of their furniture."""
+    return look.palette.cabinet if look.room in ("kitchens", "bathrooms") else look.palette.wood
+
+
+@shape("Cabinet")
+def cabinet(look: Look) -> Mesh:
+    """A case with one door, or two where it is wide, hinged at its sides, and upright handles."""
+    w, h, d = look.size
+    colour, mesh = _fitted(look), Mesh()
+    thick = min(WALL, 0.4 * d)
+    face = d / 2 - min(HANDLE, 0.5 * d) - thick
+    if d > 0.06:
+        low, high = (-w / 2, 0.0, -d / 2), (w / 2, h, face - 0.002)
+        case(mesh, low, high, shaded(colour, 0.92), shaded(mixed(colour, _LINEN, 0.3), 0.75))
+        if not look.boards and h > 0.6:
+            at, size = (0, h / 2, -0.08 * d), (w - 0.04, 0.016, 0.6 * d)
+            mesh.box(at, size, shaded(colour, 0.8), faces="yYZ")
+    doors, left = (2, True) if w > 0.7 else (1, bool(look.random().random() < 0.5))
+    wide, turn = w / doors, 100.0 * look.openness
+    for k in range(doors):
+        hinge = -1 if (k == 0) == (doors == 2 or left) else 1
+        x = wide * (k + 0.5) - w / 2
+        door = _door(look, wide - 0.008, h - 0.008, thick, hinge)
+        mesh.add(
+            door, at=(x, h / 2, face), turn=("y", hinge * turn), about=(hinge * wide / 2, 0, 0)
+        )
+    return mesh
+
+
+def _door(look: Look, w: float, h: float, thick: float, hinge: int) -> Mesh:
+    """A cabinet's door about its middle; ``hinge``: the side that it hangs on, -1 or 1."""
+    mesh = front((w, h), _fitted(look), thick)
+    long = min(0.16, 0.4 * h)
+    # In reach: near the lower edge of what hangs high, near the upper of what stands low.
+    y = -h / 2 + 0.06 + long / 2 if look.height > 1.2 else h / 2 - 0.06 - long / 2
+    y = min(max(1.05 - look.height - h / 2, -h / 4), h / 4) if h > 1.4 else y
+    mesh.add(bar((-hinge * (w / 2 - 0.035), y, thick), long, look.palette.metal, upright=True))
+    if look.broken:
+        for a, b, c, e in ((-0.4, 0.1, 0.3, -0.3), (-0.1, 0.4, 0.05, -0.4), (-0.05, 0, 0.4, 0.3)):
+            path = [(a * w, b * h, thick + 0.008), (c * w, e * h, thick + 0.008)]
+            mesh.tube(path, 0.005, _CRACK, segments=4)
+    return mesh
+
+
+@shape("Drawer")
+def drawer(look: Look) -> Mesh:
+    """A broad front with a level handle, and behind it a box that is open at its top."""
+    w, h, d = look.size
+    colour = _fitted(look)
+    mesh, thick = Mesh(), min(WALL, 0.3 * d)
+    face = d / 2 - min(HANDLE, 0.4 * d) - thick
+    mesh.add(front((w - 0.004, h - 0.006), shaded(colour, 1.08), thick), at=(0, h / 2, face))
+    count = 2 if w > 0.85 else 1
+    for k in range(count):
+        at = (w / count * (k + 0.5) - w / 2, h / 2, face + thick)
+        mesh.add(bar(at, min(0.16, 0.4 * w), look.palette.metal, upright=False))
+    _tray(
+        mesh, (w - 0.03, 0.75 * h, face + d / 2), -d / 2, shaded(mixed(colour, _LINEN, 0.45), 0.9)
+    )
+    return mesh
+
+
+def _tray(mesh: Mesh, size: Triple, back: float, colour: Colour) -> None:
+    """A drawer's box: thin walls about a floor."""
+    w, h, d = size
+    z = back + d / 2
+    mesh.box((0, 0.004, z), (w, 0.008, d), colour, faces="yY")
+    for sign in (-1, 1):
+        mesh.box((sign * (w / 2 - 0.006), h / 2, z), (0.012, h, d), colour, "wood", faces="xXY")
+    at = (0, h / 2, back + 0.006)
+    mesh.box(at, (w, h, 0.012), shaded(colour, 0.9), "wood", faces="zZY")
+
+
+@shape("CounterTop")
+def counter_top(look: Look) -> Mesh:
+    """A slab of stone, with holes for sinks, over a base between what is built in under it."""
+    h = look.size[1]
+    stone, mesh = look.palette.counter, Mesh()
+    top = min(max(h if look.surface is None else look.surface, 0.0), h) + 0.002
+    fitted = built_in(look)
+    # The rim of a sink lies on the slab.
+    holes = [
+        (low[0] + 0.02, low[2] + 0.02, high[0] - 0.02, high[2] - 0.02)
+        for kind, (low, high) in fitted
+        if kind in _LET_IN and low[1] < top - 0.05 < high[1]
+    ]
+    for low, high in look.parts:
+        for x0, z0, x1, z1 in _without((low[0], low[2], high[0], high[2]), holes):
+            at, size = ((x0 + x1) / 2, top - _SLAB / 2, (z0 + z1) / 2), (x1 - x0, _SLAB, z1 - z0)
+            mesh.box(at, size, stone, "stone")
+    if h > 0.3 or fitted:
+        _base(mesh, look, top - _SLAB, [box for kind, box in fitted if kind not in _LET_IN])
+    elif min(look.size[0], look.size[2]) > 0.3:
+        _foot(mesh, look, top - _SLAB)
+    return mesh
+
+
+def _foot(mesh: Mesh, look: Look, top: float) -> None:
+    """A block under a counter that nothing is known to be built in under: far from its edges."""
+    colour, tall = shaded(look.palette.cabinet, 0.85), top + look.height
+    for low, high in look.parts:
+        w, d = high[0] - low[0], high[2] - low[2]
+        at = ((low[0] + high[0]) / 2, top - tall / 2, (low[2] + high[2]) / 2)
+        back = min(0.3, 0.2 * min(w, d))
+        size = (w - 2 * back, tall, d - 2 * back)
+        mesh.box(at, size, colour, grain(colour), faces="xXzZ")
+
+
+def _without(rectangle: Rectangle, holes: Sequence[Rectangle]) -> list[Rectangle]:
+    """A rectangle cut up so that it leaves holes open: x and z from, x and z to, metres."""
+    x0, z0, x1, z1 = rectangle
+    for k, (a, b, c, e) in enumerate(holes):
+        a, b, c, e = max(a, x0), max(b, z0), min(c, x1), min(e, z1)
+        if a < c and b < e:
+            pieces = ((x0, z0, x1, b), (x0, e, x1, z1), (x0, b, a, e), (c, b, x1, e))
+            real = [p for p in pieces if p[2] - p[0] > 1e-6 and p[3] - p[1] > 1e-6]
+            return [q for p in real for q in _without(p, holes[k + 1 :])]
+    return [rectangle]
+
+
+def _base(mesh: Mesh, look: Look, top: float, fitted: Sequence[Box]) -> None:
+    """Upright panels under the edges of a counter, where neither counter nor cabinet goes on."""
+    colour, floor = shaded(look.palette.cabinet, 0.85), -look.height
+    for part in look.parts:
+        # What another part of the counter touches is no edge.
+        others = [((a[0], floor, a[2]), (b[0], top, b[2])) for a, b in look.parts if (a, b) != part]
+        for axis, sign, facing in ((0, -1, "x"), (0, 1, "X"), (2, -1, "z"), (2, 1, "Z")):
+            edge = part[sign > 0][axis] - sign * _BACK
+            along = 2 - axis
+            near = [
+                (low[along], high[along], low[1], high[1])
+                for boxes, reach in ((others, 0.05), (fitted, 0.12))
+                for low, high in boxes
+                if low[axis] - reach < edge < high[axis] + reach
+            ]
+            inner = (part[0][along] + _BACK, part[1][along] - _BACK)
+            for a, b, y0, y1 in _gaps((*inner, floor, top), near):
+                low = y1 - floor < 0.16
+                at, size = [0.0, (y0 + y1) / 2, 0.0], [0.01, y1 - y0, 0.01]
+                at[axis], at[along] = edge - sign * (0.06 if low else 0.0), (a + b) / 2
+                size[along] = b - a
+                mesh.box(
+                    (at[0], at[1], at[2]),
+                    (size[0], size[1], size[2]),
+                    _PLINTH if low else colour,
+                    "plain" if low else grain(colour),
+                    faces=facing,
+                )
+
+
+def _gaps(wall: Rectangle, taken: Sequence[Rectangle]) -> Iterator[Rectangle]:
+    """What is left of an upright rectangle: along from and to, height from and to, metres."""
+    first, last, floor, top = wall
+    ends = {first, last}
+    ends.update(min(max(end, first), last) for rectangle in taken for end in rectangle[:2])
+    for a, b in pairwise(sorted(ends)):
+        middle, y = (a + b) / 2, floor
+        spans = [(y0, y1) for x0, x1, y0, y1 in taken if x0 <= middle <= x1]
+        for y0, y1 in [*sorted(spans), (top, top)]:
+            if y0 - y > 0.04 and b - a > 0.005:
+                yield a, b, y, min(y0, top)
+            y = max(y, y1)
+
+
+@shape("Shelf")
+def shelf(look: Look) -> Mesh:
+    """A plain board under the room for things that the record calls a shelf."""
+    w, _, d = look.size
+    mesh = Mesh()
+    mesh.box((0, -0.006, 0), (w, WALL, d), shaded(look.palette.wood, 1.05), "wood")
+    return mesh
+
+
+@shape("ShelvingUnit")
+def shelving_unit(look: Look) -> Mesh:
+    """An open frame of four posts with boards one above the other, to be seen through."""
+    w, h, d = look.size
+    wood, mesh = look.palette.wood, Mesh()
+    frame = look.pick(shaded(wood, 0.8), (0.24, 0.25, 0.27))
+    post = min(0.04, w / 8, d / 5)
+    material = grain(frame)
+    legs(mesh, (w, h, d), post, frame, material)
+    for height in _boards(look):
+        at = (0.0, height - WALL / 2, 0.0)
+        mesh.box(at, (w - 0.02, WALL, d - 0.02), wood, "wood")
+    for sign in (-1, 1):
+        for height in (0.12 * h, 0.9 * h):
+            at = (sign * (w - post) / 2, height, 0.0)
+            mesh.box(at, (0.6 * post, post, d - post), frame, material, faces="xXyY")
+    ends = ((-w / 2 + post, 0.08 * h), (w / 2 - post, 0.92 * h))
+    z = -d / 2 + 0.012
+    for (x0, y0), (x1, y1) in (ends, ((ends[0][0], ends[1][1]), (ends[1][0], ends[0][1]))):
+        mesh.tube([(x0, y0, z), (x1, y1, z)], 0.008, frame, material, segments=4)
+    return mesh
+
+
+def _boards(look: Look) -> list[float]:
+    """Heights of the upper sides of a unit's boards, metres."""
+    h = look.size[1]
+    top = h if look.surface is None or look.surface < 0.5 * h else look.surface
+    asked = [max(b - CLEAR, WALL) for b in look.boards]
+    if not asked:
+        count = max(2, round(h / 0.4))
+        asked = [0.06 + (top - 0.06) * k / count for k in range(count)]
+    heights: list[float] = []
+    for height in sorted([*asked, *([0.06] if asked[0] > 0.3 else []), top]):
+        if not heights or height - heights[-1] > 0.05:
+            heights.append(height)
+    return heights
+
+
+@shape("Dresser")
+def dresser(look: Look) -> Mesh:
+    """A chest: a top that juts out over a case that drawers fill, on short feet."""
+    w, h, d = look.size
+    wood, mesh = look.palette.wood, Mesh()
+    top = h if look.surface is None else min(max(look.surface, 0.6 * h), h)
+    body = shaded(wood, 0.72)
+    foot, slab = 0.03 * min(h, 1.0), 0.022
+    case(mesh, (-w / 2 + 0.004, foot, -d / 2), (w / 2 - 0.004, top - 0.01, d / 2 - 0.03), body,
+         shaded(wood, 0.35))  # fmt: skip
+    mesh.rounded((0, top - slab / 2, 0), (w, slab, d), shaded(wood, 0.95), 0.006, "wood")
+    legs(mesh, (w - 0.02, foot, d - 0.05), 0.05, body)
+    if h - top > 0.03:
+        at, size = (0, (top + h) / 2, -d / 2 + 0.015), (w, h - top, 0.03)
+        mesh.box(at, size, body, "wood", faces="xXYzZ")
+    return mesh
+
+
+@shape("TVStand")
+def tv_stand(look: Look) -> Mesh:
+    """Low and wide with open bays for boxes and cables under a broad top."""
+    w, h, d = look.size
+    wood, mesh = look.palette.wood, Mesh()
+    colour = look.pick(shaded(wood, 0.75), (0.20, 0.18, 0.17), mixed(wood, (1.0, 1.0, 1.0), 0.5))
+    top = h if look.surface is None else min(max(look.surface, 0.6 * h), h)
+    foot = 0.1 * top if look.height < 0.1 else 0.0
+    dark = shaded(colour, 0.55)
+    case(
+        mesh, (-w / 2 + 0.01, foot, -d / 2), (w / 2 - 0.01, top - 0.01, d / 2 - 0.03), colour, dark
+    )
+    mesh.rounded((0, top - 0.015, 0), (w, 0.03, d), shaded(colour, 1.1), 0.006, "wood")
+    if foot:
+        legs(mesh, (w - 0.06, foot, d - 0.06), 0.06, dark, taper=0.6)
+    middle = (foot + top) / 2
+    at, size = (0, middle, -0.02), (WALL, top - foot - 0.02, d - 0.05)
+    mesh.box(at, size, colour, "wood", faces="xXZ")
+    heights = [b - CLEAR for b in look.boards if foot + 0.06 < b < top - 0.06] or [middle]
+    for height in heights:
+        at, size = (0, height - WALL / 2, -0.02), (w - 0.05, WALL, d - 0.06)
+        mesh.box(at, size, colour, "wood", faces="yYZ")
+    return mesh
+
+
+@shape("Safe")
+def safe(look: Look) -> Mesh:
+    """A steel box with a thick door that bears a dial and a three-armed handle."""
+    w, h, d = look.size
+    mesh, steel = Mesh(), look.pick(_STEEL, _GUNMETAL, (0.24, 0.30, 0.26))
+    proud = 0.1 * d
+    face, rim = d / 2 - proud, 0.07 * w
+    case(mesh, (-w / 2, 0, -d / 2), (w / 2, h, face - 0.002), steel, (0.34, 0.34, 0.36))
+    for sign in (-1, 1):
+        at = (sign * (w - rim) / 2, h / 2, face)
+        mesh.box(at, (rim, h, 0.02), shaded(steel, 0.9), faces="xXYyZ")
+        at = (0, h / 2 + sign * (h - rim) / 2, face)
+        mesh.box(at, (w - 2 * rim, rim, 0.02), shaded(steel, 0.9), faces="yYZ")
+    wide, high = w - 2.3 * rim, h - 2.3 * rim
+    door = Mesh()
+    door.rounded((0, 0, 0.005), (wide, high, 0.07 * d), shaded(steel, 1.35), 0.01)
+    z = 0.035 * d + 0.005
+    door.cylinder((0.12 * wide, 0.14 * high, z), 0.17 * w, 0.012, _GUNMETAL, axis="z")
+    door.cylinder((0.12 * wide, 0.14 * high, z + 0.008), 0.12 * w, 0.016, _DIAL, axis="z")
+    door.box((0.12 * wide, 0.14 * high + 0.07 * w, z + 0.017), (0.02 * w, 0.08 * w, 0.006), _CRACK)
+    hub = (0.12 * wide, -0.26 * high)
+    for x, y in ((0.0, 1.0), (-0.87, -0.5), (0.87, -0.5)):
+        end = (hub[0] + 0.13 * w * x, hub[1] + 0.13 * w * y, z + 0.012)
+        door.tube([(*hub, z + 0.012), end], 0.018 * w, _BRASS, segments=6)
+    hinge = (-wide / 2, 0, 0)
+    mesh.add(door, at=(0, h / 2, face), turn=("y", -105.0 * look.openness), about=hinge)
+    for share in (0.25, 0.75):
+        at = (-w / 2 + 0.8 * rim, share * h, face + 0.012)
+        mesh.cylinder(at, 0.03 * w, 0.14 * h, _STEEL, segments=8)
+    return mesh
+
+
+@shape("Box")
+def cardboard_box(look: Look) -> Mesh:
+    """Brown cardboard, taped along its top, or with its four flaps thrown open."""
+    w, h, d = look.size
+    mesh, card = Mesh(), shaded(_CARD, 0.9 + 0.2 * float(look.random().random()))
+    lip, skin = h - 0.012, 0.004
+    size = (w - 2 * skin, lip, d - 2 * skin)
+    mesh.box((0, lip / 2, 0), size, card, "cardboard", faces="xXyzZ", turns=0.5)
+    at = (-0.22 * w, 0.62 * h, d / 2)
+    mesh.panel(at, (0.3 * w, 0.34 * h), _LINEN, "label")
+    if look.openness:
+        inside = shaded(card, 0.7)
+        mesh.panel((-w / 2 + 0.01, lip / 2, 0), (d, lip), inside, "cardboard", facing="X")
+        mesh.panel((w / 2 - 0.01, lip / 2, 0), (d, lip), inside, "cardboard", facing="x")
+        mesh.panel((0, lip / 2, -d / 2 + 0.01), (w, lip), inside, "cardboard", facing="Z")
+        mesh.panel((0, lip / 2, d / 2 - 0.01), (w, lip), inside, "cardboard", facing="z")
+        mesh.panel((0, 0.012, 0), (w, d), inside, "cardboard", facing="Y")
+    turned = Mesh()
+    _flaps(turned, max(w, d) - 2 * skin, min(w, d) - 2 * skin, h, card, look.openness)
+    mesh.add(turned, turn=("y", 0.0 if w >= d else 90.0))
+    return mesh
+
+
+def _flaps(mesh: Mesh, w: float, d: float, h: float, colour: Colour, openness: float) -> None:
+    """The flaps of a box that is longer in x: the long ones meet in the middle, under a tape."""
+    for sign in (-1, 1):
+        flap = Mesh()
+        corners = [(x, h - 0.004, z) for x, z in _corners(w, 0.0, sign * d / 2)]
+        flap.quad(corners, shaded(colour, 1.08), "cardboard", both=True)
+        hinge = (0.0, h - 0.004, sign * d / 2)
+        mesh.add(flap, turn=("x", sign * 220.0 * openness), about=hinge)
+        flap, long = Mesh(), min(d / 2, 0.45 * w)
+        inner = sign * (w / 2 - long)
+        corners = [(x, h - 0.012, z) for z, x in _corners(d, inner, sign * w / 2)]
+        flap.quad(corners, shaded(colour, 0.95), "cardboard", both=True)
+        hinge = (sign * w / 2, h - 0.012, 0.0)
+        mesh.add(flap, turn=("z", -sign * 205.0 * openness), about=hinge)
+        if not openness:
+            at, size = (sign * (w / 2 + 0.002), h - 0.05, 0.0), (0.004, 0.1, 0.06)
+            mesh.box(at, size, _TAPE, faces="xXyzZ")
+    if not openness:
+        mesh.box((0, h - 0.002, 0), (w, 0.004, 0.06), _TAPE, faces="xXYzZ")
+
+
+def _corners(long: float, near: float, far: float) -> list[tuple[float, float]]:
+    """Of a rectangle: half its length to both sides, and from one place across to another."""
+    half = long / 2
+    return [(-half, near), (half, near), (half, far), (-half, far)]
+
+
+@shape("LaundryHamper")
+def laundry_hamper(look: Look) -> Mesh:
+    """A tall oval basket of wicker with a lid; open, one sees the washing in it."""
+    w, h, d = look.size
+    mesh, wicker = Mesh(), look.pick(*_WICKERS)
+    rim, turns = 0.88 * h, (8.0, 0.2)
+    outline = [(0, 0.01), (0.38, 0), (0.46, rim), (0.47, rim + 0.02), (0.43, rim + 0.02)]
+    outline += [(0.42, rim - 0.02), (0.37, 0.3 * h)]
+    mesh.lathe(outline, wicker, "wicker", squash=(w, d), segments=18, turns=turns)
+    for height in (0.3 * h, 0.62 * h):
+        r = 0.38 + 0.08 * height / rim
+        band = [(r, height - 0.015), (r + 0.015, height), (r, height + 0.015)]
+        mesh.lathe(band, shaded(wicker, 0.75), squash=(w, d), segments=18)
+    heap = [(0.37, 0.3 * h), (0.3, 0.5 * h), (0.12, 0.58 * h), (0, 0.56 * h)]
+    mesh.lathe(heap, look.pick(_LINEN, _LAUNDRY), "fabric", squash=(w, d), segments=12)
+    lid = Mesh()
+    top = h - rim - 0.02
+    cover = [(0.42, 0), (0.5, 0), (0.5, 0.35 * top), (0.4, 0.75 * top), (0, 0.8 * top)]
+    lid.lathe(cover, shaded(wicker, 1.1), "wicker", squash=(w, d), segments=18, turns=turns)
+    lid.lathe([(0, 0), (0.42, 0)], shaded(wicker, 0.6), squash=(w, d), segments=18)
+    lid.ball(
+        (0, 0.8 * top, 0), (0.1 * w, 0.4 * top, 0.1 * w), shaded(wicker, 0.6), segments=8, rings=4
+    )
+    hinge = (0, 0, -0.46 * d)
+    mesh.add(lid, at=(0, rim + 0.02, 0), turn=("x", -100.0 * look.openness), about=hinge)
+    return mesh
