@@ -43,18 +43,19 @@ def render(
     """
     from PIL import Image
 
-    from er_gym.thor import UnknownSceneError, make_controller
+    from er_gym.thor import SCENE_NAMES, UnknownSceneError, make_controller
 
-    with bad_input(UnknownSceneError):
-        controller = make_controller(
-            scene=scene,
-            width=width,
-            height=height,
-            fieldOfView=fov,
-            renderDepthImage=what == "depth",
-            renderInstanceSegmentation=what == "ids" or annotate,
-            snapToGrid=False,
-        )
+    if scene not in SCENE_NAMES:
+        raise BadInput(str(UnknownSceneError(scene)))
+    controller = make_controller(
+        scene=scene,
+        width=width,
+        height=height,
+        fieldOfView=fov,
+        renderDepthImage=what == "depth",
+        renderInstanceSegmentation=what == "ids" or annotate,
+        snapToGrid=False,
+    )
     if pose is not None:
         _stand(controller, pose)
     event = controller.last_event

@@ -1,4 +1,5 @@
-"""docs/gallery.md: every type of thing as it is drawn, beside its name, and rooms of each kind.
+"""docs/gallery.md and the README's picture: every type of thing with its name, rooms of each kind.
+
 
     python -m benchmarks.gallery [--kinds Fridge,Mug --states --out sheet.png]
 
@@ -33,6 +34,8 @@ _SIDE, _LABEL, _COLUMNS = 150, 15, 10
 _ROOM = (640, 400)
 _ROOMS = {"kitchens": (1, 27), "living_rooms": (212, 227), "bedrooms": (301, 315),
           "bathrooms": (403, 413)}  # fmt: skip
+_IN_FRONT = {"kitchens": 0, "living_rooms": 2, "bedrooms": 0, "bathrooms": 0}
+"""Which of a kind's views is in the README's picture."""
 _CUT = {"Sliced": "SliceObject", "Cracked": "BreakObject"}
 """Ends of types that come to be by an action, and the action."""
 
@@ -162,10 +165,13 @@ def make_gallery() -> None:
         "![Every type of object beside its name](images/gallery-things.png)",
         "",
     ]
-    for kind, numbers in track(_ROOMS.items(), "rooms", transient=True):
+    front = Image.new("RGB", (2 * _ROOM[0], 2 * _ROOM[1]))
+    for number, (kind, numbers) in enumerate(track(_ROOMS.items(), "rooms", transient=True)):
         scenes = [f"FloorPlan{number}" for number in numbers]
         assert all(number in SCENE_NUMBERS[kind] for number in numbers)
         views = [view for scene in scenes for view in room_views(scene)]
+        place = number % 2 * _ROOM[0], number // 2 * _ROOM[1]
+        front.paste(Image.fromarray(views[_IN_FRONT[kind]]), place)
         page = Image.new("RGB", (2 * _ROOM[0], len(scenes) * _ROOM[1]))
         for k, view in enumerate(views):
             page.paste(Image.fromarray(view), (k % 2 * _ROOM[0], k // 2 * _ROOM[1]))
@@ -178,6 +184,8 @@ def make_gallery() -> None:
             f"![{title}](images/gallery-{name}.jpg)",
             "",
         ]
+    small = front.resize((1000, 625), Image.Resampling.LANCZOS)
+    small.quantize(128).save(images / "rooms.png", optimize=True)
     (DOCS / "gallery.md").write_text("\n".join(lines))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from math import cos, pi, sin
 
@@ -95,10 +96,21 @@ def _smears(mesh: Mesh, size: tuple[float, float], y: float, z: float) -> None:
             )  # fmt: skip
 
 
+_CORNER, _AT_THE_BACK = 0.5, 0.1
+"""Windows deeper than the first are in corners, and drawn as deep as the second; metres."""
+
+
 @shape("Window")
 def window(look: Look) -> Mesh:
     """Sky behind cross bars, a deep white frame, a sill."""
     w, h, d, along_z = across(look)
+    if d > _CORNER:
+        # The box of a window in the corner of a room is the room's: it is at the back of it.
+        thin = Mesh()
+        wide, tall, _ = look.size
+        flat = replace(look, size=(wide, tall, _AT_THE_BACK))
+        thin.add(window(flat), at=(0.0, 0.0, (_AT_THE_BACK - look.size[2]) / 2))
+        return thin
     mesh = Mesh()
     colour = look.pick(_WHITE, _IVORY, mixed(look.palette.wood, _WHITE, 0.25))
     bar = min(0.07, 0.14 * min(w, h))
