@@ -184,8 +184,7 @@ def make_gallery() -> None:
             f"![{title}](images/gallery-{name}.jpg)",
             "",
         ]
-    small = front.resize((1000, 625), Image.Resampling.LANCZOS)
-    small.quantize(128).save(images / "rooms.png", optimize=True)
+    front.resize((1000, 625), Image.Resampling.LANCZOS).save(images / "rooms.jpg", quality=88)
     (DOCS / "gallery.md").write_text("\n".join(lines))
 
 

@@ -90,6 +90,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
       in the paper; ``"explore"``: for the nearest not yet visited (navigation) or the nearest
       (interaction), whatever the task.
     - ``max_steps``: default: the task type's own.
+    - ``render_device``: what the embedded engine draws with, one for all environments of a process:
+      ``"cpu"``, or ``"gpu"`` where there is one with EGL.
     - ``annotate``: write the types of things into the pictures, as set-of-marks prompting does.
 
     ## Version History
@@ -115,6 +117,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         step_penalty: float = 0.0,
         illegal_penalty: float = 0.0,
         annotate: bool = False,
+        render_device: str = "cpu",
         render_mode: str | None = None,
     ) -> None:
         EzPickle.__init__(
@@ -122,7 +125,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             height=height, field_of_view=field_of_view, grid_size=grid_size,
             visibility_distance=visibility_distance, instances=instances, max_steps=max_steps,
             step_penalty=step_penalty, illegal_penalty=illegal_penalty, annotate=annotate,
-            render_mode=render_mode,
+            render_device=render_device, render_mode=render_mode,
         )  # fmt: skip
         if instances not in which.POLICIES:
             raise ValueError(
@@ -139,7 +142,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._step_penalty, self._illegal_penalty = step_penalty, illegal_penalty
         self._grid_size = grid_size
         self._backend = backend
-        self._controller_arguments = {
+        self._controller_arguments: dict[str, Any] = {
             "width": width,
             "height": height,
             "fieldOfView": field_of_view,
@@ -149,6 +152,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             "headless": not self._draws,
             "renderInstanceSegmentation": annotate and self._draws,
         }
+        if self._draws and backend == "embedded":
+            self._controller_arguments["render_device"] = render_device
         self._controller: Any = None
         self._percept: Percept  # what was taken in last; nothing before the first reset
         self.action_space = spaces.Discrete(len(ACTIONS))

@@ -16,6 +16,11 @@ class BackendError(RuntimeError):
 def _embedded(arguments: dict[str, Any]) -> Controller:
     from er_gym.sim.controller import EmbeddedController
 
+    device = arguments.pop("render_device", None)
+    if device is not None:
+        from er_gym.sim.render.panda import use_device
+
+        use_device(device)
     return EmbeddedController(**arguments)
 
 
@@ -48,7 +53,8 @@ def make_controller(backend: str = "embedded", **arguments: Any) -> Controller:
     Args:
         backend: "embedded" (our engine, in this process) or "unity" (the real simulator;
             CloudRendering when there is no display).
-        **arguments: those of ``ai2thor.controller.Controller``.
+        **arguments: those of ``ai2thor.controller.Controller``; and, for the embedded engine,
+            ``render_device``: "cpu" or "gpu", one for the whole process.
 
     Raises:
         ValueError: there is no such backend.

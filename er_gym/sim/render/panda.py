@@ -1,4 +1,7 @@
-"""Panda3D's software rasteriser: triangles in, colour, instance and depth out, without a window.
+"""Panda3D without a window: triangles in, colour, instance and depth out.
+
+On the CPU by its software rasteriser; where there is a GPU with EGL and :func:`use_device` has
+asked for it, by OpenGL, from the same scene graph.
 
 One engine and one buffer a process. Instances come with the colours, as the pictures' alpha, which
 is why there are at most :data:`MOST_INSTANCES` of them. Panda's frame is right-handed with z up: x,
@@ -25,8 +28,13 @@ from er_gym.sim.render.textures import texture
 NEAR, FAR = 0.1, 40.0
 """Metres from the camera between which things are drawn."""
 MOST_INSTANCES = 254
+DEVICES = {
+    "cpu": ("p3tinydisplay", "TinyOffscreenGraphicsPipe"),
+    "gpu": ("p3headlessgl", "eglGraphicsPipe"),
+}
+"""What can draw: Panda3D's module, and the pipe in it."""
 _CONFIGURATION = """
-load-display p3tinydisplay
+load-display {module}
 audio-library-name null
 window-type offscreen
 notify-level error
@@ -52,24 +60,63 @@ class Frames:
     depth: NDArray[np.float32] | None
 
 
+class RenderDeviceError(RuntimeError):
+    """What is to draw cannot; the message says why and what to do."""
+
+
+_chosen: list[str] = []
+
+
+def use_device(name: str) -> None:
+    """Choose what draws in this process, before anything is drawn: "cpu" (the default) or "gpu".
+
+    Raises:
+        ValueError: there is no such device.
+        RenderDeviceError: this process draws with another already.
+    """
+    if name not in DEVICES:
+        raise ValueError(f"unknown render_device {name!r}; choose one of: {', '.join(DEVICES)}")
+    if not _chosen:
+        _chosen.append(name)
+    if _chosen != [name]:
+        raise RenderDeviceError(
+            f"this process draws with the {_chosen[0]} already; use the {name} in another process"
+        )
+
+
+def _device() -> str:
+    return _chosen[0] if _chosen else "cpu"
+
+
 @cache
 def core() -> Any:
     """The module ``panda3d.core``, set up to need neither a window nor a file of settings."""
-    provide_libx11()
+    use_device(_device())
+    if _device() == "cpu":
+        provide_libx11()
     from panda3d import core as module
 
-    module.loadPrcFileData("er-gym", _CONFIGURATION)
+    module.loadPrcFileData("er-gym", _CONFIGURATION.format(module=DEVICES[_device()][0]))
     return module
+
+
+def _pipe() -> Any:
+    selection, wanted = core().GraphicsPipeSelection.getGlobalPtr(), DEVICES[_device()][1]
+    kinds = {kind.getName(): kind for kind in selection.getPipeTypes()}
+    pipe = selection.makePipe(kinds[wanted]) if wanted in kinds else None
+    if pipe is None or not pipe.isValid():
+        raise RenderDeviceError(
+            f"render_device={_device()!r} cannot draw here: Panda3D's {wanted} does not start. "
+            "The gpu needs a driver with EGL; render_device='cpu' needs nothing."
+        )
+    return pipe
 
 
 class Rasteriser:
     """A buffer to draw into; use :func:`rasteriser`. Sizes may change from picture to picture."""
 
     def __init__(self) -> None:
-        p3d = core()
-        selection = p3d.GraphicsPipeSelection.getGlobalPtr()
-        pipes = {t.getName(): t for t in selection.getPipeTypes()}
-        pipe = selection.makePipe(pipes["TinyOffscreenGraphicsPipe"])
+        p3d, pipe = core(), _pipe()
         self._engine = p3d.GraphicsEngine(pipe)
         wanted = p3d.FrameBufferProperties()
         wanted.setRgbColor(True)
@@ -79,11 +126,20 @@ class Rasteriser:
         flags = p3d.GraphicsPipe.BFRefuseWindow | p3d.GraphicsPipe.BFResizeable
         size = p3d.WindowProperties.size(300, 300)
         self._buffer = self._engine.makeOutput(pipe, "frames", 0, wanted, size, flags)
+        if self._buffer is None:
+            raise RenderDeviceError(f"the {_device()} makes no buffer to draw into")
         self._size = (300, 300)
         self._picture = p3d.Texture()
         self._buffer.addRenderTexture(
             self._picture, p3d.GraphicsOutput.RTMCopyRam, p3d.GraphicsOutput.RTPColor
         )
+        self._steps = None  # where depth comes to; the software rasteriser has another way
+        if _device() == "gpu":
+            self._steps = p3d.Texture()
+            self._steps.setFormat(p3d.Texture.FDepthComponent)
+            self._buffer.addRenderTexture(
+                self._steps, p3d.GraphicsOutput.RTMCopyRam, p3d.GraphicsOutput.RTPDepth
+            )
         self._buffer.setClearColorActive(True)
         self._buffer.setClearColor(p3d.LColor(0.0, 0.0, 0.0, 0.0))
         self._lens = p3d.PerspectiveLens()
@@ -117,11 +173,15 @@ class Rasteriser:
             return Frames(rgb, ids, self._depth(width, height) if depth else None)
 
     def _depth(self, width: int, height: int) -> NDArray[np.float32]:
-        steps = np.frombuffer(self._buffer.getScreenshot().getRamImage(), np.uint32)
-        steps = steps.reshape(height, width)[::-1]
-        share = 1.0 - 2.0 * steps.astype(np.float32) / np.float32(_DEPTH_STEPS)
+        if self._steps is None:
+            raw = np.frombuffer(self._buffer.getScreenshot().getRamImage(), np.uint32)
+            share = 1.0 - 2.0 * raw.astype(np.float32) / np.float32(_DEPTH_STEPS)
+            share[raw == 0] = 1.0
+        else:
+            raw = np.frombuffer(self._steps.getRamImage(), np.float32)
+            share = 2.0 * raw - 1.0
         found = 2.0 * NEAR * FAR / (FAR + NEAR - share * (FAR - NEAR))
-        return np.where(steps == 0, np.float32(FAR), found).astype(np.float32)
+        return np.asarray(found.reshape(height, width)[::-1], dtype=np.float32)
 
 
 @cache
@@ -178,8 +238,8 @@ def geometry(
     p3d = core()
     node = p3d.GeomNode(name)
     for material, at, colours, uv, triangles in parts:
-        # Where there is a texture, the rasteriser makes 1 less of each alpha.
-        textured = MATERIALS[material].texture is not None
+        # Where there is a texture, the software rasteriser makes 1 less of each alpha.
+        textured = MATERIALS[material].texture is not None and _device() == "cpu"
         rows = np.empty(len(at), dtype=_VERTEX)
         rows["at"] = at[:, [0, 2, 1]]
         rows["colour"][:, :3] = np.clip(colours, 0.0, 1.0) * 255 + 0.5

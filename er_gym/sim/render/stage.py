@@ -11,9 +11,10 @@ from functools import lru_cache
 from typing import Any
 
 from er_gym.sim.render.camera import Camera
+from er_gym.sim.render.fixtures import fixtures
 from er_gym.sim.render.look import Look
 from er_gym.sim.render.mesh import Patch
-from er_gym.sim.render.panda import Frames, core, geometry, rasteriser
+from er_gym.sim.render.panda import MOST_INSTANCES, Frames, core, geometry, rasteriser
 from er_gym.sim.render.portrait import look
 from er_gym.sim.render.room import room_shell
 from er_gym.sim.render.shade import shaded
@@ -45,6 +46,7 @@ class Stage:
         self._placed: dict[int, _Placed] = {}
         shell = room_shell(scene_name)
         self._root.attachNewNode(_drawn(shell.rest, 0, "room"))
+        self._root.attachNewNode(_drawn(fixtures(scene_name), 0, "fixtures"))
         self._floor, self._floor_number = shell.floor, -1
         self._state = object()
 
@@ -88,7 +90,8 @@ class Stage:
             path = before.path
         else:
             self._remove(i)
-            path = self._root.attachNewNode(_node(seen, heading, i + 1))
+            number = i + 1 if i < MOST_INSTANCES else 0  # copies without end have no instance
+            path = self._root.attachNewNode(_node(seen, heading, number))
         x, y, z = shape.middle.tolist()
         path.setPos(x, z, y + float(shape.upright[:, 0, 1].min()))
         path.setH(-shape.yaw)
