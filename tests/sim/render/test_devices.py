@@ -27,7 +27,8 @@ try:
         for size in ((200, 150), (320, 240)):
             frames = stage(scene).draw(world, camera_of(world, *size), depth=True)
             name = f"{scene}-{size[0]}"
-            found |= {f"rgb-{name}": frames.rgb, f"ids-{name}": frames.ids, f"depth-{name}": frames.depth}
+            found["rgb-" + name], found["ids-" + name] = frames.rgb, frames.ids
+            found["depth-" + name] = frames.depth
 except RenderDeviceError as error:
     sys.exit(f"cannot: {error}")
 np.savez(sys.argv[2], **found)
@@ -54,7 +55,7 @@ def test_both_devices_draw_the_same(tmp_path: Path) -> None:
         if name.startswith("ids"):
             assert (one == other).mean() > 0.97, name
         elif name.startswith("depth"):
-            assert (np.abs(one - other) < 0.03).mean() > 0.95, name
+            assert (np.abs(one - other) < 0.02 + 0.02 * other).mean() > 0.95, name
         else:
             assert np.abs(one.astype(int) - other).mean() < 8, name
 
