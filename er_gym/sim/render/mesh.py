@@ -17,6 +17,20 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from er_gym.sim.render.box_faces import (
+    BOX_CORNERS,
+    BOX_NORMALS,
+    BOX_SPREAD,
+    CUT_CORNERS,
+    CUT_COUNTS,
+    CUT_FLAT,
+    CUT_NORMALS,
+    FACES,
+    SIGNS,
+    SQUARE,
+    fans,
+)
+
 Colour = tuple[float, float, float]
 Triple = tuple[float, float, float]
 Axis = Literal["x", "y", "z"]
@@ -65,77 +79,6 @@ def rotation(axis: Axis, degrees: float) -> NDArray[np.float64]:
             "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
         }[axis]
     )
-
-
-def _fans(counts: Sequence[int]) -> NDArray[np.int32]:
-    """(F, 3) triangles of convex polygons whose corners lie one after the other."""
-    found, first = [], 0
-    for count in counts:
-        found += [(first, first + k, first + k + 1) for k in range(1, count - 1)]
-        first += count
-    return np.array(found, dtype=np.int32).reshape(-1, 3)
-
-
-_FACES = "xXyYzZ"
-_SQUARE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-
-
-def _box_faces() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Of a box of half-size 1: (6, 4, 3) corners, (6, 3) normals, (6, 2, 3) what its sides span."""
-    corners, normals, spread = np.zeros((6, 4, 3)), np.zeros((6, 3)), np.zeros((6, 2, 3))
-    for k, face in enumerate(_FACES):
-        axis = "xyz".index(face.lower())
-        u, v = ((2, 1), (0, 2), (0, 1))[axis]
-        corners[k, :, axis] = normals[k, axis] = 1.0 if face.isupper() else -1.0
-        corners[k, :, u], corners[k, :, v] = _SQUARE.T
-        spread[k, 0, u] = spread[k, 1, v] = 1.0
-    return corners, normals, spread
-
-
-_BOX_CORNERS, _BOX_NORMALS, _BOX_SPREAD = _box_faces()
-_SIGNS = np.array([(a, b, c) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
-
-
-def _cut_box() -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.intp], list[int]]:
-    """The polygons of a box with its edges cut off.
-
-    Returns:
-        (V, 2) the corner of the box, and the axis of the face, that each vertex is nearest to;
-        (V, 3) normals; (V, 2) the two axes along which each polygon lies flattest; and how many
-        vertices each polygon has.
-    """
-    corners: list[tuple[int, int]] = []
-    normals: list[NDArray[np.float64]] = []
-    counts: list[int] = []
-
-    def corner(values: Mapping[int, int]) -> int:
-        return sum((values[axis] > 0) << (2 - axis) for axis in range(3))
-
-    def polygon(ring: list[tuple[int, int]], out: NDArray[np.float64]) -> None:
-        corners.extend(ring)
-        normals.extend([out] * len(ring))
-        counts.append(len(ring))
-
-    for axis in range(3):
-        u, v = (k for k in range(3) if k != axis)
-        for s in (-1, 1):
-            out = np.zeros(3)
-            out[axis] = s
-            polygon([(corner({axis: s, u: a, v: b}), axis) for a, b in _SQUARE.astype(int)], out)
-        for a in (-1, 1):  # the edges along this axis
-            for b in (-1, 1):
-                low, high = (corner({axis: s, u: a, v: b}) for s in (-1, 1))
-                out = np.zeros(3)
-                out[u], out[v] = a, b
-                polygon([(low, u), (high, u), (high, v), (low, v)], out)
-    for k, sign in enumerate(_SIGNS):
-        polygon([(k, 0), (k, 1), (k, 2)], sign.astype(np.float64))
-    steepest = np.abs(normals).argmax(axis=1)
-    flat = np.array([[k for k in range(3) if k != axis] for axis in steepest.tolist()])
-    return np.array(corners), np.array(normals), flat, counts
-
-
-_CUT_CORNERS, _CUT_NORMALS, _CUT_FLAT, _CUT_COUNTS = _cut_box()
 
 
 class Mesh:
@@ -267,18 +210,18 @@ class Mesh:
         ``turns``: metres a turn of the texture.
         """
         half = np.abs(np.asarray(size, dtype=np.float64)) / 2
-        kept = [_FACES.index(face) for face in faces]
-        corners, scale = _BOX_CORNERS[kept] * half, _BOX_SPREAD[kept] @ half
-        uv = _SQUARE * scale[:, None] / turns
+        kept = [FACES.index(face) for face in faces]
+        corners, scale = BOX_CORNERS[kept] * half, BOX_SPREAD[kept] @ half
+        uv = SQUARE * scale[:, None] / turns
         if taper != 1.0:
             corners[corners[..., 1] > 0] *= (taper, 1.0, taper)
         self.triangles(
             material,
             corners.reshape(-1, 3) + np.asarray(at),
-            np.repeat(_BOX_NORMALS[kept], 4, axis=0),
+            np.repeat(BOX_NORMALS[kept], 4, axis=0),
             uv.reshape(-1, 2),
             colour,
-            _fans([4] * len(kept)),
+            fans([4] * len(kept)),
         )
 
     def rounded(
@@ -295,15 +238,13 @@ class Mesh:
         half = np.abs(np.asarray(size, dtype=np.float64)) / 2
         cut = min(radius, *(0.9 * half))
         # Three points a corner, one on each of its faces.
-        points = np.repeat((_SIGNS * (half - cut))[:, None], 3, axis=1)
+        points = np.repeat((SIGNS * (half - cut))[:, None], 3, axis=1)
         for axis in range(3):
-            points[:, axis, axis] = _SIGNS[:, axis] * half[axis]
+            points[:, axis, axis] = SIGNS[:, axis] * half[axis]
 
-        found = points[_CUT_CORNERS[:, 0], _CUT_CORNERS[:, 1]]
-        uv = np.take_along_axis(found, _CUT_FLAT, axis=1) / turns
-        self.triangles(
-            material, found + np.asarray(at), _CUT_NORMALS, uv, colour, _fans(_CUT_COUNTS)
-        )
+        found = points[CUT_CORNERS[:, 0], CUT_CORNERS[:, 1]]
+        uv = np.take_along_axis(found, CUT_FLAT, axis=1) / turns
+        self.triangles(material, found + np.asarray(at), CUT_NORMALS, uv, colour, fans(CUT_COUNTS))
 
     def lathe(
         self,
