@@ -23,7 +23,7 @@ from benchmarks.perf.comparisons.containment import containment
 from benchmarks.perf.comparisons.placement import random_placements
 from benchmarks.perf.comparisons.poses import openable_poses
 from benchmarks.perf.comparisons.reachable import reachable
-from benchmarks.perf.comparisons.room import rooms
+from benchmarks.perf.comparisons.room import WITHIN, held_out, rooms
 from benchmarks.perf.comparisons.visibility import visible_objects
 
 CAPTURES = "unity_captures_dev.json"
@@ -93,6 +93,8 @@ def captured_rows(captures_file: Path) -> Iterator[Row]:
         f"{right} of {len(captures)}", str(len(captures)), right == len(captures),
     )  # fmt: skip
     yield Row("room bounds: faces within 0.25 m", f"{found.faces_right:.3f}")
+    apart = [abs(off).max() <= WITHIN for off in held_out(captures).values()]
+    yield Row("room bounds: scenes, by the other scenes", f"{sum(apart)} of {len(apart)}")
 
 
 def _share(name: str, part: int, whole: int, bound: float | None = None) -> Row:

@@ -7,8 +7,8 @@ environment with random legal actions. MuJoCo draws, at poses of the same kind i
 box for each object that our renderer draws and a textured plane for the floor: colours alone,
 without the instances that ours come with, and Mesa may use all cores, where ours uses one.
 
-MuJoCo is only for comparing: pip install mujoco. Its EGL renderer needs a libEGL (Debian: apt
-install libegl1 libgl1-mesa-dri), its OSMesa renderer a libOSMesa (apt install libosmesa6).
+MuJoCo is only for comparing: pip install mujoco. What its renderers need besides is said where one
+does not run.
 
 What is compared is timed in turns, round after round, and the median of the rounds is printed.
 ``--soak`` plays 10,000 steps and changes the scene 200 times, and prints how memory grows.
@@ -58,7 +58,9 @@ MEMORY_WANTED = 350
 """Environment steps per second at each size, and megabytes that a process may take up."""
 SOAK_STEPS, SOAK_SCENES = 10_000, 200
 STEP = "environment: a step, rgb"
-_MUJOCO_TIMEOUT = 120.0
+_MUJOCO_TIMEOUT = 300.0
+_MUJOCO_GL = {"egl": "libegl1 libgl1-mesa-dri", "osmesa": "libosmesa6"}
+"""MuJoCo's renderers that need no window, and the Debian packages that each needs."""
 _MUJOCO = """
 import json, os, sys, time
 import mujoco
@@ -213,10 +215,10 @@ class MuJoCo:
         return f"MuJoCo, {self.gl}, {'as it comes' if self.shadows else 'no shadows or smoothing'}"
 
     def per_second(self, scenes: list[str], size: tuple[int, int], seconds: float) -> float:
-        """Pictures.
+        """Pictures a second.
 
         Raises:
-            RuntimeError: it does not run here; the message is the last that it said.
+            RuntimeError: it does not run here; the message is the first error that it met.
         """
         rooms = [mujoco_scene(name, size) for name in scenes]
         if not self.shadows:
@@ -234,7 +236,7 @@ class MuJoCo:
             raise RuntimeError(f"it was not done after {_MUJOCO_TIMEOUT:.0f} s") from None
         except subprocess.CalledProcessError as error:
             raise RuntimeError(_first_cause(error.stderr)) from None
-        return float(result.stdout)
+        return float(result.stdout.split()[-1])
 
 
 def _first_cause(said: str) -> str:
@@ -250,11 +252,14 @@ def those_that_run(scenes: list[str], console: Console) -> list[MuJoCo]:
         console.print("nothing to compare with: pip install mujoco", style="yellow")
         return []
     found = []
-    for gl in ("egl", "osmesa"):
+    for gl, packages in _MUJOCO_GL.items():
         try:
             MuJoCo(gl, False).per_second(scenes[:1], (64, 64), 0.1)
         except RuntimeError as error:
-            console.print(f"MuJoCo's {gl} renderer does not run here: {error}", style="yellow")
+            console.print(
+                f"MuJoCo's {gl} renderer does not run here ({error}): apt install {packages}",
+                style="yellow",
+            )
         else:
             found += [MuJoCo(gl, True), MuJoCo(gl, False)]
     return found
@@ -271,10 +276,9 @@ def rates(scenes: list[str], rounds: int, seconds: float, console: Console) -> l
         for size in SIZES:
             env = environment(scenes, size)
             stack.callback(env.close)
-            timers["renderer: rgb, instances", size] = Pictures(scenes, size, False).per_second
-            timers["renderer: rgb, instances, depth", size] = Pictures(
-                scenes, size, True
-            ).per_second
+            for depth in (False, True):
+                name = f"renderer: rgb, instances{', depth' if depth else ''}"
+                timers[name, size] = Pictures(scenes, size, depth).per_second
             timers[STEP, size] = Walker([env], seed=0).steps_per_second
             for rival in rivals:
                 timers[rival.name, size] = partial(rival.per_second, scenes, size)
@@ -294,7 +298,7 @@ def rates(scenes: list[str], rounds: int, seconds: float, console: Console) -> l
 def soak(console: Console) -> list[Memory]:
     """How memory grows over many steps in a few scenes, and over changes between all scenes."""
     random = np.random.default_rng(0)
-    few = [SCENE_NAMES[k] for k in range(0, len(SCENE_NAMES), len(SCENE_NAMES) // SCENES)]
+    few = choose_scenes(str(SCENES))
     env = environment(list(SCENE_NAMES), SIZES[1])
     tasks = {task.scene: task for task in env.tasks}
     hidden = not console.is_terminal
@@ -315,9 +319,8 @@ def soak(console: Console) -> list[Memory]:
         steps = SOAK_STEPS // 2
         name = f"soak: {part * steps} steps in them"
         found.append(Memory(name, play(few, steps // SCENES)))
-    switches = [name for name, _ in zip(cycle(SCENE_NAMES), range(SOAK_SCENES), strict=False)]
     for part in (1, 2):
-        megabytes = play([str(name) for name in random.permutation(switches)], 1)
+        megabytes = play(random.permutation(np.resize(SCENE_NAMES, SOAK_SCENES)).tolist(), 1)
         found.append(Memory(f"soak: {part * SOAK_SCENES} changes among all scenes", megabytes))
     env.close()
     return found

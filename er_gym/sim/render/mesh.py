@@ -55,17 +55,23 @@ class Patch:
     triangles: NDArray[np.int32]
 
 
-def joined(patches: Sequence[Patch]) -> Patch:
-    """Several patches as one."""
+def finished(patches: Sequence[Patch]) -> Patch:
+    """Several patches as one, with normals of length 1 and triangles turned to where they point."""
     starts = np.cumsum([0, *(len(p.vertices) for p in patches[:-1])])
+    vertices = np.concatenate([p.vertices for p in patches])
+    normals = np.concatenate([p.normals for p in patches])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    faces = np.concatenate([p.triangles + s for p, s in zip(patches, starts, strict=True)])
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    # The frame is left-handed, so that the cross product points the other way.
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), normals[faces].sum(axis=1)) > 0
+    faces[inward] = faces[inward][:, [0, 2, 1]]
     return Patch(
-        np.concatenate([p.vertices for p in patches]),
-        np.concatenate([p.normals for p in patches]),
+        vertices,
+        normals,
         np.concatenate([p.uv for p in patches]),
         np.concatenate([p.colours for p in patches]),
-        np.concatenate([p.triangles + s for p, s in zip(patches, starts, strict=True)]).astype(
-            np.int32
-        ),
+        faces.astype(np.int32),
     )
 
 
@@ -89,7 +95,7 @@ class Mesh:
 
     def patches(self) -> dict[str, Patch]:
         """The triangles of each material."""
-        return {material: joined(parts) for material, parts in self._parts.items()}
+        return {material: finished(parts) for material, parts in self._parts.items()}
 
     def __bool__(self) -> bool:
         return bool(self._parts)
@@ -127,17 +133,15 @@ class Mesh:
         colour: ArrayLike,
         triangles: ArrayLike,
     ) -> None:
-        """Add triangles as they are; a colour for all, or (V, 3) one for each vertex."""
+        """Add triangles; a colour for all, or (V, 3) one for each vertex."""
         points = np.asarray(vertices, dtype=np.float32).reshape(-1, 3)
-        out = np.asarray(normals, dtype=np.float32).reshape(-1, 3)
-        out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
-        faces = np.asarray(triangles, dtype=np.int32).reshape(-1, 3)
-        a, b, c = (points[faces[:, k]] for k in range(3))
-        # The frame is left-handed, so that the cross product points the other way.
-        inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), out[faces].sum(axis=1)) > 0
-        faces = np.where(inward[:, None], faces[:, [0, 2, 1]], faces)
-        colours = np.broadcast_to(np.asarray(colour, dtype=np.float32), points.shape)
-        patch = Patch(points, out, np.asarray(uv, np.float32).reshape(-1, 2), colours, faces)
+        patch = Patch(
+            points,
+            np.asarray(normals, dtype=np.float32).reshape(-1, 3),
+            np.asarray(uv, dtype=np.float32).reshape(-1, 2),
+            np.broadcast_to(np.asarray(colour, dtype=np.float32), points.shape),
+            np.asarray(triangles, dtype=np.int32).reshape(-1, 3),
+        )
         self._parts.setdefault(material, []).append(patch)
 
     # -- flat things -----------------------------------------------------------------------------
@@ -271,37 +275,40 @@ class Mesh:
         step = np.diff(line, axis=0)
         out = np.stack([step[:, 1], -step[:, 0]], axis=1)
         out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+        below, above = out.copy(), out.copy()
+        if smooth:  # where the profile bends but little, both sides of the bend shine alike
+            bends = (out[:-1] * out[1:]).sum(axis=1) > 0.5
+            below[1:][bends] += out[:-1][bends]
+            above[:-1][bends] += out[1:][bends]
+        ends = np.stack([line[:-1], line[1:]], axis=1)[..., None]  # (S, 2, 2, 1): radius, height
+        leaning = np.stack([below, above], axis=1)[..., None]
         angle = np.arange(segments + 1) / segments * 2 * pi
         c, s = np.cos(angle), np.sin(angle)
-        for k, (low, high) in enumerate(itertools.pairwise(line)):
-            below = above = out[k]
-            if smooth and k > 0 and out[k - 1] @ out[k] > 0.5:
-                below = out[k - 1] + out[k]
-            if smooth and k < len(out) - 1 and out[k + 1] @ out[k] > 0.5:
-                above = out[k] + out[k + 1]
-            rings, normals, uv = [], [], []
-            for (radius, height), n in ((low, below), (high, above)):
-                full = np.full_like(c, height)
-                rings.append(np.stack([radius * c * squash[0], full, radius * s * squash[1]], 1))
-                across = n[0] * c / squash[0], np.full_like(c, n[1]), n[0] * s / squash[1]
-                normals.append(np.stack(across, axis=1))
-                uv.append(np.stack([angle / (2 * pi) * turns[0], full / turns[1]], axis=1))
-            first = np.arange(segments)
-            second = first + segments + 1
-            faces = [np.empty((0, 3), dtype=int)]
-            if low[0] > 1e-6:
-                faces.append(np.stack([first, first + 1, second], axis=1))
-            if high[0] > 1e-6:
-                faces.append(np.stack([first + 1, second + 1, second], axis=1))
-            order = list(_AXES[axis])
-            self.triangles(
-                material,
-                np.concatenate(rings)[:, order] + np.asarray(at),
-                np.concatenate(normals)[:, order],
-                np.concatenate(uv),
-                colour,
-                np.concatenate(faces),
-            )
+        points = np.empty((len(step), 2, len(angle), 3))
+        normals, uv = np.empty_like(points), np.empty((*points.shape[:3], 2))
+        points[..., 0], points[..., 2] = ends[:, :, 0] * c, ends[:, :, 0] * s
+        points[..., 1] = ends[:, :, 1]
+        points *= (squash[0], 1.0, squash[1])
+        normals[..., 0], normals[..., 2] = leaning[:, :, 0] * c, leaning[:, :, 0] * s
+        normals[..., 1] = leaning[:, :, 1]
+        normals /= (squash[0], 1.0, squash[1])
+        uv[..., 0], uv[..., 1] = angle / (2 * pi) * turns[0], ends[:, :, 1] / turns[1]
+        first = np.arange(segments)
+        second = first + len(angle)
+        lower = np.stack([first, first + 1, second], axis=1)
+        upper = np.stack([first + 1, second + 1, second], axis=1)
+        start = 2 * len(angle) * np.arange(len(step))[:, None, None]
+        round_below, round_above = line[:-1, 0] > 1e-6, line[1:, 0] > 1e-6  # and not a point
+        faces = [(lower + start)[round_below], (upper + start)[round_above]]
+        order = list(_AXES[axis])
+        self.triangles(
+            material,
+            points.reshape(-1, 3)[:, order] + np.asarray(at),
+            normals.reshape(-1, 3)[:, order],
+            uv.reshape(-1, 2),
+            colour,
+            np.concatenate([part.reshape(-1, 3) for part in faces]),
+        )
 
     def cylinder(
         self,
