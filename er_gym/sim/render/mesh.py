@@ -268,6 +268,7 @@ class Mesh:
         Going up a profile at the outside, in over the top and down at the inside makes a vessel.
 
         Args:
+            colour: one; or (2 * (segments + 1), 3), for the lower and the upper end of every band.
             squash: factors of the radius along the two other axes.
             turns: times that the texture goes round, and metres of height that it takes.
         """
@@ -300,13 +301,13 @@ class Mesh:
         start = 2 * len(angle) * np.arange(len(step))[:, None, None]
         round_below, round_above = line[:-1, 0] > 1e-6, line[1:, 0] > 1e-6  # and not a point
         faces = [(lower + start)[round_below], (upper + start)[round_above]]
-        order = list(_AXES[axis])
+        order, shades = list(_AXES[axis]), np.asarray(colour, dtype=np.float32)
         self.triangles(
             material,
             points.reshape(-1, 3)[:, order] + np.asarray(at),
             normals.reshape(-1, 3)[:, order],
             uv.reshape(-1, 2),
-            colour,
+            shades if shades.ndim == 1 else np.tile(shades, (len(step), 1)),
             np.concatenate([part.reshape(-1, 3) for part in faces]),
         )
 
