@@ -24,7 +24,7 @@ from er_gym.sim.world import World
 
 _SCENES = 24
 """Rooms whose graphs are kept."""
-_NODES = 4096
+_NODES = 2048
 _HEADING = 1.0
 """Things are lit as if they stood at a multiple of so many degrees."""
 

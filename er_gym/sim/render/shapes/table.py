@@ -13,7 +13,7 @@ SHAPES: dict[str, Shape] = {}
 """Object type to what draws it."""
 UNSEEN = frozenset({"Floor"})
 """Types that are drawn with the room."""
-_KEPT = 4096
+_KEPT = 256
 
 
 def shape(*kinds: str) -> Callable[[Shape], Shape]:
