@@ -148,8 +148,7 @@ def poses(world: World, types: Sequence[str], random: np.random.Generator) -> li
     places = world.scene.reachable
     height = float(world.agent.camera[1])
     found = []
-    for _ in range(WANDERING):
-        x, z = places[random.integers(len(places))]
+    for x, z in random.choice(places, WANDERING):
         yaw, horizon = random.uniform(0, 360), random.uniform(LOWEST, HIGHEST)
         found.append(_camera(x, height, z, yaw, horizon))
     for kind in types:
@@ -247,8 +246,7 @@ def learn_and_tell(
     batches = len(labels) // BATCH
     optimiser = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=0.02)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, RATE, epochs * batches)
-    hidden = not console.is_terminal
-    for epoch in track(range(epochs), "epochs", console=console, disable=hidden):
+    for epoch in track(range(epochs), "epochs", console=console, disable=not console.is_terminal):
         network.train()
         total = 0.0
         for chosen in torch.randperm(len(labels))[: batches * BATCH].view(batches, BATCH):
@@ -275,8 +273,8 @@ def _table(verdict: Verdict, figures: dict[str, float]) -> Table:
     table = Table("type", crops, right, "taken for", title="types told apart in unseen scenes")
     for kind in verdict.worst_first()[:10]:
         others = ", ".join(f"{name} {share:.0%}" for name, share in verdict.taken_for(kind)[:3])
-        count = int((verdict.truth == kind).sum())
-        table.add_row(verdict.types[kind], str(count), f"{verdict.right(kind):.1%}", others)
+        count = str(int((verdict.truth == kind).sum()))
+        table.add_row(verdict.types[kind], count, f"{verdict.right(kind):.1%}", others)
     table.add_section()
     for name, value in figures.items():
         text = f"{value:.1%}" if value <= 1 else f"{value:.0f}"
@@ -339,8 +337,11 @@ def main(seed: int, epochs: int, most: int, file: Path | None, sheet: Path | Non
     if file is not None:
         told: dict[str, Any] = {**figures, "types": {}}
         for kind in verdict.worst_first():
-            taken_for = dict(verdict.taken_for(kind))
-            told["types"][types[kind]] = {"top-1": verdict.right(kind), "taken for": taken_for}
+            told["types"][types[kind]] = {
+                "crops": int((verdict.truth == kind).sum()),
+                "top-1": verdict.right(kind),
+                "taken for": dict(verdict.taken_for(kind)),
+            }
         file.write_text(json.dumps(told, indent=1) + "\n")
 
 

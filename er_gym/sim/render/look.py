@@ -44,6 +44,7 @@ class Look:
         boards: how high over its underside there are shelves, metres.
         built_in: type and box, in the mesh's frame, of what is let into it or built in under it.
         palette: the scene's colours.
+        face: which way the face of a knob points, in the mesh's frame; None where not known.
     """
 
     kind: str
@@ -65,6 +66,7 @@ class Look:
     surface: float | None = None
     boards: tuple[float, ...] = ()
     built_in: tuple[tuple[str, Box], ...] = ()
+    face: tuple[float, float, float] | None = None
 
     def random(self) -> np.random.Generator:
         """Chance that is the same for a thing in every run, whatever state it is in."""

@@ -11,11 +11,14 @@ from er_gym.sim.render.built_in import built_in
 from er_gym.sim.render.look import Box, Look
 from er_gym.sim.render.palette import palette, room_kind
 from er_gym.sim.scene import Scene
+from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.surfaces import recorded_surfaces
 from er_gym.sim.world import World
 
 _ALWAYS = 0.004
 """Nothing is thinner than this, metres."""
+_LEVEL = 0.05
+"""An axle that rises less, of its length, is level."""
 
 
 @lru_cache(maxsize=128)
@@ -59,6 +62,7 @@ def look_of(world: World, i: int) -> Look:
         surface=_surface(world, i),
         boards=_boards(world, i, float(shape.middle[1] + underside)),
         built_in=built_in(scene, i),
+        face=_face(world, i, shape.yaw) if world.types[i] == "StoveKnob" else None,
     )
 
 
@@ -68,6 +72,21 @@ def _is_on(world: World, i: int) -> bool:
         return world.state(i, "isToggled")
     knobs = world.of_type("StoveKnob")
     return any(i in (world.controlled[k] or ()) and world.state(k, "isToggled") for k in knobs)
+
+
+def _face(world: World, i: int, yaw: float) -> tuple[float, float, float]:
+    """Where the face of knob i points, before the turn by ``yaw``.
+
+    A knob is recorded with its y along its axle, either way: its face is up or, if the axle is
+    level, to where one can stand.
+    """
+    axle = unity_rotation(world.rotation[i]) @ (0.0, 1.0, 0.0)
+    towards = np.array([0.0, 1.0, 0.0])
+    if abs(axle[1]) < _LEVEL:
+        away = world.scene.reachable - (world.low[i] + world.high[i])[::2] / 2
+        towards[:] = np.insert(away[np.hypot(*away.T).argmin()], 1, 0.0)
+    face = axle if axle @ towards > 0.0 else -axle
+    return _triple((face @ unity_rotation((0.0, yaw, 0.0))).round(2) + 0.0)
 
 
 def _triple(values: NDArray[np.float64]) -> tuple[float, float, float]:

@@ -324,19 +324,16 @@ def _flames(mesh: Mesh, r: float, h: float) -> None:
 @shape("StoveKnob")
 def stove_knob(look: Look) -> Mesh:
     """A round knob with a ridge and a mark, upright when off and level with a red mark when on."""
-    w, h, d = look.size
-    mesh = Mesh()
-    if h < 0.75 * min(w, d):
-        mesh.add(_knob(look, min(w, d) / 2, h), turn=("x", -90.0))
-    elif w < 0.78 * min(h, d):
-        for side in (-90.0, 90.0):
-            mesh.add(_knob(look, min(h, d) / 2, w / 2), turn=("y", side), at=(0, h / 2, 0))
-    else:
-        tilt = 0.0 if d < 0.8 * h else 45.0
-        thick = d if tilt == 0.0 else 0.5 * w
-        knob = _knob(look, min(w, h) / 2, thick)
-        back = thick / 2 * np.array([0.0, sin(tilt * pi / 180), cos(tilt * pi / 180)])
-        mesh.add(knob, turn=("x", -tilt), at=np.array([0.0, h / 2, 0.0]) - back)
+    face = np.array(look.face or (0.0, 0.0, 1.0))
+    # Along each axis its box is as long as what is seen of its disc and of its axle.
+    spans = np.stack([np.sqrt(1.0 - face**2), np.abs(face)], axis=1)
+    (wide, thick), *_ = np.linalg.lstsq(spans, np.array(look.size))
+    wide, thick = max(wide, 0.01), max(thick, 0.2 * wide)
+    x, y, z = face.tolist()
+    mesh, leaning = Mesh(), Mesh()
+    leaning.add(_knob(look, wide / 2, thick), turn=("x", -degrees(atan2(y, hypot(x, z)))))
+    back = np.array([0.0, look.size[1] / 2, 0.0]) - thick / 2 * face
+    mesh.add(leaning, turn=("y", degrees(atan2(x, z))), at=back)
     return mesh
 
 
