@@ -173,14 +173,15 @@ class Rasteriser:
             return Frames(rgb, ids, self._depth(width, height) if depth else None)
 
     def _depth(self, width: int, height: int) -> NDArray[np.float32]:
-        if self._steps is None:
+        if self._steps is None:  # 0 is far away, and 2**20 near
             raw = np.frombuffer(self._buffer.getScreenshot().getRamImage(), np.uint32)
-            share = 1.0 - 2.0 * raw.astype(np.float32) / np.float32(_DEPTH_STEPS)
-            share[raw == 0] = 1.0
-        else:
-            raw = np.frombuffer(self._steps.getRamImage(), np.float32)
-            share = 2.0 * raw - 1.0
-        found = 2.0 * NEAR * FAR / (FAR + NEAR - share * (FAR - NEAR))
+            found = raw.astype(np.float32)
+            found *= np.float32((FAR - NEAR) / _DEPTH_STEPS)
+        else:  # 0 is near, and 1 far away
+            found = 1.0 - np.frombuffer(self._steps.getRamImage(), np.float32)
+            found *= np.float32(FAR - NEAR)
+        found += np.float32(NEAR)
+        np.divide(np.float32(NEAR * FAR), found, out=found)
         return np.asarray(found.reshape(height, width)[::-1], dtype=np.float32)
 
 

@@ -15,6 +15,7 @@ from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.surfaces import recorded_surfaces
 from er_gym.sim.world import World
 
+_ON_THE_FLOOR = 0.1
 _ALWAYS = 0.004
 """Nothing is thinner than this, metres."""
 _LEVEL = 0.05
@@ -48,7 +49,7 @@ def look_of(world: World, i: int) -> Look:
         scene=scene,
         room=room_kind(scene),
         size=_triple(size),
-        height=round(float(shape.middle[1] + underside - ground), 2),
+        height=_height(world, i, float(shape.middle[1] + underside - ground)),
         palette=palette(scene),
         openness=round(float(world.openness[i]), 2) if world.state(i, "isOpen") else 0.0,
         on=_is_on(world, i),
@@ -64,6 +65,13 @@ def look_of(world: World, i: int) -> Look:
         built_in=built_in(scene, i),
         face=_face(world, i, shape.yaw) if world.types[i] == "StoveKnob" else None,
     )
+
+
+def _height(world: World, i: int, height: float) -> float:
+    """Over the floor, metres; what can be carried looks the same everywhere but on the floor."""
+    if world.has(i, "pickupable"):
+        return 0.0 if height < _ON_THE_FLOOR else 1.0
+    return round(height, 2)
 
 
 def _is_on(world: World, i: int) -> bool:

@@ -67,7 +67,7 @@ def room_shell(scene_name: str) -> RoomShell:
     floor, rest = Mesh(), Mesh()
     material, turns = flooring(scene_name)
     _level(floor, plan, plan.ground, 1.0, colours.floor, material, turns)
-    _level(rest, plan, plan.ceiling, -1.0, _CEILING, "plaster", 2.0)
+    _level(rest, plan, plan.ceiling, -1.0, _CEILING, "plain", 2.0)
     entry = doorway(scene_name)
     for wall in plan.walls:
         holes = tuple(_holes(plan, wall))
@@ -89,7 +89,7 @@ def _bands(kind: str, colours: Palette, height: float) -> Iterator[_Band]:
         tile = mixed(colours.wall, (1.0, 1.0, 1.0), 0.35)
         yield _Band(0.0, _TILED, "wall_tiles", tile, 1.2)
         yield _Band(_TILED, start, "plain", mixed(colours.accent, colours.wall, 0.35), 1.0)
-    yield _Band(start, height, "plaster", colours.wall, 2.0)
+    yield _Band(start, height, "plain", colours.wall, 2.0)
 
 
 # -- surfaces ------------------------------------------------------------------------------------
