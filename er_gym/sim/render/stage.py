@@ -22,7 +22,7 @@ from er_gym.sim.render.shapes import UNSEEN, build
 from er_gym.sim.space.shapes import Shape
 from er_gym.sim.world import World
 
-_SCENES = 24
+_SCENES = 64
 """Rooms whose graphs are kept."""
 _NODES = 2048
 _HEADING = 1.0
