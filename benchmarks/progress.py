@@ -13,6 +13,19 @@ _LINES = 10
 """How many lines a whole run prints where there is no terminal."""
 
 
+def bar(console: Console) -> Bar:
+    """A bar that says how many are done and, in the field ``status``, how it goes."""
+    return Bar(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[status]}"),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+    )
+
+
 class Progress:
     """A context manager; call :meth:`episode` for each that is over.
 
@@ -33,15 +46,7 @@ class Progress:
         self._before = self._done = done
         self._succeeded = succeeded
         self._start = time.monotonic()
-        self._bar = Bar(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[status]}"),
-            TimeRemainingColumn(),
-            console=console,
-            disable=not console.is_terminal,
-        )
+        self._bar = bar(console)
         self._task = self._bar.add_task(title, total=total, completed=done, status=self._status())
 
     def __enter__(self) -> Progress:

@@ -30,8 +30,9 @@ from rich.console import Console
 from benchmarks.perf.fuzz_checks import Pictures, Witness, floor, scene_of
 from benchmarks.perf.fuzz_report import Plan, Report, Step, show
 from benchmarks.perf.fuzz_requests import Request, Room, draw_request
-from benchmarks.perf.jobs import bar, choose_scenes, do_all
+from benchmarks.perf.jobs import choose_scenes, do_all
 from benchmarks.pool import Lost
+from benchmarks.progress import bar
 from er_gym.sim.controller import EmbeddedController
 from er_gym.sim.engine import Engine
 from er_gym.sim.errors import CLIENT_ERRORS

@@ -1,4 +1,4 @@
-"""What the long random plays share: which scenes, how many processes, and a bar to watch."""
+"""What the long random plays share: which scenes, and how many processes."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from benchmarks.pool import Lost, do_jobs
 from er_gym.thor import SCENE_NAMES
@@ -45,16 +43,3 @@ def do_all(
         do = make()
         return ((job, do(job)) for job in jobs)
     return do_jobs(make, jobs, workers=workers, tries=1)
-
-
-def bar(console: Console) -> Progress:
-    """A bar that says how many are done and, in the field ``status``, how it goes."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[status]}"),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-    )

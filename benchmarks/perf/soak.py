@@ -28,8 +28,9 @@ from benchmarks.perf.invariants import (
     floor_of,
     stands_on_the_floor,
 )
-from benchmarks.perf.jobs import bar, choose_scenes, do_all
+from benchmarks.perf.jobs import choose_scenes, do_all
 from benchmarks.pool import Lost
+from benchmarks.progress import bar
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks import verbs
 from er_gym.tasks.task import KeyAction, Task
