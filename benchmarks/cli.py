@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from benchmarks.cli_errors import BadInput, bad_input
+from benchmarks.cli_options import split
 from benchmarks.cli_player import doctor, player
 from benchmarks.cli_render import play, render
+from benchmarks.cli_tasks import tasks
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -76,6 +78,7 @@ cli.add_command(player)
 cli.add_command(doctor)
 cli.add_command(render)
 cli.add_command(play)
+cli.add_command(tasks)
 
 
 @cli.command()
@@ -130,7 +133,7 @@ def bench(
         asked = _load_suite(suite, tasks_file, poses)
         env = _env_kwargs(asked, agent, seed, backend=backend, instances=instances)
         all_tasks, notes = resolve_tasks(asked.tasks, env["backend"])
-        tasks = select(all_tasks, task_ids=_split(task_ids), shard=part, limit=limit)
+        chosen = select(all_tasks, task_ids=split(*task_ids), shard=part, limit=limit)
         out = out or Path("runs") / f"{file_stem(asked.name)}-{file_stem(agent)}"
         manifest = Manifest(
             suite=asked.name,
@@ -146,14 +149,14 @@ def bench(
         terminal.print(note, style="dim", markup=False, highlight=False, soft_wrap=True)
 
     judge = SCORERS.get(scorer, CORRECTED)
-    before = finished(store, tasks)
+    before = finished(store, chosen)
     succeeded = sum(score_episode(episode, judge).success for episode in before)
-    progress = Progress(terminal, f"{asked.name}, {agent}", len(tasks), len(before), succeeded)
+    progress = Progress(terminal, f"{asked.name}, {agent}", len(chosen), len(before), succeeded)
     try:
         with progress:
             outcome = run(
                 store,
-                tasks,
+                chosen,
                 workers=workers,
                 on_episode=lambda episode: progress.episode(score_episode(episode, judge).success),
             )
@@ -161,7 +164,7 @@ def bench(
         raise click.ClickException(f"{error}; the episodes done are in {out}") from error
     except KeyboardInterrupt:
         _complain(
-            f"interrupted: {len(finished(store, tasks))} of {len(tasks)} episodes are in {out}; "
+            f"interrupted: {len(finished(store, chosen))} of {len(chosen)} episodes are in {out}; "
             "the same command continues"
         )
         return INTERRUPTED
@@ -211,13 +214,19 @@ def report(runs: tuple[Path, ...], layout: str, scorer: str, by_type: bool, miss
 
 @cli.command()
 def suites() -> None:
-    """List the bundled suites."""
+    """List the suites."""
     from collections import Counter
 
-    from er_gym.tasks.suites import load_suite, suite_names
+    from er_gym.tasks.suites import load_suite, suite_config, suite_file, suite_names
     from er_gym.tasks.types import GROUPS
 
     for name in suite_names():
+        if not suite_file(name).exists():
+            click.echo(
+                f"{name}: not made yet (er-gym tasks generate --suite {name}); "
+                f"{suite_config(name).description}"
+            )
+            continue
         with bad_input():
             tasks = load_suite(name).tasks
         counts = Counter(task.type.group for task in tasks)
@@ -269,13 +278,8 @@ def _env_kwargs(suite: Suite, agent: str, seed: int, **given: str | None) -> dic
             f"unknown backend {env['backend']!r}; choose one of: {', '.join(BACKENDS)}"
         )
     env["obs_mode"] = make_agent(agent, seed=seed).obs_mode
-    EmbodiedEnv(tasks=(), **env)
+    EmbodiedEnv((), **env)
     return env
-
-
-def _split(lists: Sequence[str]) -> list[str]:
-    """The words of comma-separated lists."""
-    return [word.strip() for text in lists for word in text.split(",") if word.strip()]
 
 
 def _stdout() -> Console:

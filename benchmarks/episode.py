@@ -29,12 +29,14 @@ class KeyActionRecord(_Record):
         object_id: the AI2-THOR id of its object, ``""`` for ``end``.
         object_type: the type that the task file states, which may be empty or wrong.
         reward: what doing it is worth.
+        exact: whether it must be done to that object, not just to one of its type.
     """
 
     verb: str
     object_id: str = ""
     object_type: str = ""
     reward: float = 1.0
+    exact: bool = False
 
 
 class StepRecord(_Record):
@@ -77,6 +79,7 @@ class EpisodeRecord(_Record):
         seed: the seed of this episode (not of the run).
         steps: from ``init`` to the last.
         success: what the environment said at the end; scores are computed from the steps.
+        goal_unmet: what of the task's goal did not hold at ``end``, in words.
         end_reason: why it ended, in the environment's words; ``""`` if it crashed.
         total_reward: the sum over the steps.
         seconds: wall-clock time.
@@ -95,6 +98,7 @@ class EpisodeRecord(_Record):
     seed: int
     steps: list[StepRecord]
     success: bool
+    goal_unmet: list[str] = []
     end_reason: str
     total_reward: float
     seconds: float
@@ -119,6 +123,7 @@ def record_episode(
     max_steps: int | None = None,
     steps: list[StepRecord] | None = None,
     success: bool = False,
+    goal_unmet: list[str] | None = None,
     end_reason: str = "",
     seconds: float = 0.0,
     error: str = "",
@@ -140,6 +145,7 @@ def record_episode(
                 object_id=key.object_id,
                 object_type=key.object_type,
                 reward=key.reward,
+                exact=key.object_id in task.named,
             )
             for key in task.key_actions
         ],
@@ -148,6 +154,7 @@ def record_episode(
         seed=seed,
         steps=steps,
         success=success,
+        goal_unmet=goal_unmet or [],
         end_reason=end_reason,
         total_reward=sum(step.reward for step in steps),
         seconds=seconds,

@@ -10,7 +10,8 @@ Two scorers (:data:`SCORERS`) read the key actions differently and are the same 
 * ``paper`` takes an action's object type as the task file states it. Some files leave the type of a
   ``put`` empty; no step can match that, so those tasks cannot be done.
 * ``corrected`` takes the type from the key action's object id, and counts Sink and SinkBasin as one
-  type, because files name the one and give the id of the other.
+  type, because files name the one and give the id of the other. Where a task singles an object out,
+  it asks for that one; and a task's goal must hold for a success. The paper's files have neither.
 """
 
 from __future__ import annotations
@@ -40,11 +41,13 @@ class Scorer:
         key_type: the type that a key action asks for.
         step_type: the type that a step counts as. It starts from the agent's word: the environment
             found the object by it, so unlike a file it cannot name another type.
+        exact: whether it heeds which object a task singles out, and the task's goal.
     """
 
     name: str
     key_type: Callable[[KeyActionRecord], str]
     step_type: Callable[[StepRecord], str]
+    exact: bool = False
 
 
 def _one_sink(object_type: str) -> str:
@@ -56,6 +59,7 @@ CORRECTED = Scorer(
     "corrected",
     lambda key: _one_sink(type_of_id(key.object_id) or key.object_type),
     lambda step: _one_sink(step.object_type),
+    exact=True,
 )
 SCORERS = {scorer.name: scorer for scorer in (PAPER, CORRECTED)}
 
@@ -70,16 +74,23 @@ class Tally:
             task's name decides about it.
         points: how many scored, that ``end`` included.
         routes: key actions done besides, which score nothing: navigations that the task lists.
+        goal_holds: whether the final state is as the task asks, where the scorer heeds that.
     """
 
     expected: tuple[str, ...]
     scored: tuple[str, ...]
     points: int
     routes: int
+    goal_holds: bool = True
 
 
 def _label(verb: str, object_type: str) -> str:
     return f"{canonical_verb(verb)} {object_type}".rstrip()
+
+
+def _key_label(key: KeyActionRecord, scorer: Scorer) -> str:
+    label = _label(key.verb, scorer.key_type(key))
+    return f"{label} {key.object_id}" if key.exact and scorer.exact else label
 
 
 def _search_answered(episode: EpisodeRecord, end: StepRecord, came_from_key_action: bool) -> bool:
@@ -94,7 +105,7 @@ def tally(episode: EpisodeRecord, scorer: Scorer) -> Tally:
     Failed steps count for nothing. Each key action is matched at most once, in any order. ``end``
     scores, save in a ``single_search`` that it does not answer.
     """
-    keys = [(key, _label(key.verb, scorer.key_type(key))) for key in episode.key_actions]
+    keys = [(key, _key_label(key, scorer)) for key in episode.key_actions]
     expected = [label for key, label in keys if canonical_verb(key.verb) not in UNSCORED]
     open_keys = Counter(label for _, label in keys)
     every_key = frozenset(open_keys)
@@ -114,6 +125,8 @@ def tally(episode: EpisodeRecord, scorer: Scorer) -> Tally:
             elif _search_answered(episode, step, previous in every_key):
                 points += 1
             break
+        if open_keys[f"{label} {step.object_id}"] > 0:
+            label = f"{label} {step.object_id}"
         # An object is needed: a key action whose type the file left empty has a label without one,
         # and must stay unmatched.
         if step.object_type and open_keys[label] > 0:
@@ -125,7 +138,8 @@ def tally(episode: EpisodeRecord, scorer: Scorer) -> Tally:
                 points += 1
         if step.verb in UNSCORED:
             previous = label
-    return Tally(tuple(expected), tuple(scored), points, routes)
+    goal_holds = not (scorer.exact and episode.goal_unmet)
+    return Tally(tuple(expected), tuple(scored), points, routes, goal_holds)
 
 
 def completeness(counted: Tally) -> float:
@@ -134,8 +148,8 @@ def completeness(counted: Tally) -> float:
 
 
 def success(counted: Tally) -> bool:
-    """Whether all of them were."""
-    return bool(counted.expected) and counted.points >= len(counted.expected)
+    """Whether all of them were, and the goal holds."""
+    return bool(counted.expected) and counted.points >= len(counted.expected) and counted.goal_holds
 
 
 def search_efficiency(episode: EpisodeRecord, counted: Tally) -> float:

@@ -71,6 +71,7 @@ def play_episode(
         max_steps=max_steps,
         steps=steps,
         success=bool(info.get("success", False)) and not error,
+        goal_unmet=[str(condition) for condition in info.get("goal_unmet", ())],
         end_reason="" if error else str(info["end_reason"]),
         seconds=time.perf_counter() - start,
         error=error,

@@ -83,7 +83,7 @@ class Player:
         self._env: EmbodiedEnv | None = self._make_env()
 
     def _make_env(self) -> EmbodiedEnv:
-        return EmbodiedEnv(tasks=(), **self._kwargs)
+        return EmbodiedEnv((), **self._kwargs)
 
     def __call__(self, task: Task) -> EpisodeRecord:
         seed = episode_seed(self._seed, task.id)

@@ -300,18 +300,17 @@ def soak(console: Console) -> list[Memory]:
     random = np.random.default_rng(0)
     few = choose_scenes(str(SCENES))
     env = environment(list(SCENE_NAMES), SIZES[1])
-    tasks = {task.scene: task for task in env.tasks}
     hidden = not console.is_terminal
 
     def play(scenes: list[str], steps: int) -> float:
         for name in track(scenes, "soak", console=console, disable=hidden):
-            _, info = env.reset(seed=0, options={"task": tasks[name]})
+            _, info = env.reset(seed=0, options={"task": free_play(name)})
             for _ in range(steps):
                 _, _, ended, cut, info = env.step(
                     int(random.choice(np.flatnonzero(info["action_mask"])))
                 )
                 if ended or cut:
-                    _, info = env.reset(options={"task": tasks[name]})
+                    _, info = env.reset(options={"task": free_play(name)})
         return resident()
 
     found = [Memory(f"soak: {SCENES} scenes seen", play(few, 20))]

@@ -35,6 +35,7 @@ _PROPERTY_FOR = {
     verbs.OPEN: "openable",
     verbs.CLOSE: "openable",
     verbs.TOGGLE: "toggleable",
+    verbs.SLICE: "sliceable",
 }
 STANDS_FOR = {"Sink": "SinkBasin", "Bathtub": "BathtubBasin"}
 """Types that one puts things into by way of a part of theirs."""

@@ -19,9 +19,11 @@ from er_gym.envs.legality import Known, legal_actions, objection, suited, surrou
 from er_gym.envs.observations import OBSERVATIONS, Memory, Situation, parse_obs_mode
 from er_gym.envs.percept import Percept
 from er_gym.envs.reward import Progress, search_targets
+from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.tasks import verbs
-from er_gym.tasks.suites import load_suite
-from er_gym.tasks.task import Task
+from er_gym.tasks.goal import Condition, unmet
+from er_gym.tasks.start import begin
+from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import task_type as look_up_type
 from er_gym.thor import make_controller
 
@@ -42,15 +44,16 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     ## Action Space
     ``Discrete`` over :data:`er_gym.envs.actions.ACTIONS`, the same in every scene: ``observe``,
     ``move forward``, ``end``, and a verb with an object type for ``navigate to``, ``pickup``, ``put
-    in``, ``open``, ``close`` and ``toggle``. ``step`` also takes an
+    in``, ``open``, ``close``, ``toggle`` and ``slice``. ``step`` also takes an
     :class:`~er_gym.envs.actions.Action` or its text (``"navigate to Fridge"``).
     ``info["action_mask"]`` and :meth:`action_masks` say which are legal now.
 
     - ``navigate to`` goes to where the object can be handled. Legal for what is, or was once in
       this episode, plain to see (:func:`er_gym.envs.legality.navigable_within`), and for the task's
       own ``navigable_objects``.
-    - ``pickup``, ``put in``, ``open``, ``close``, ``toggle`` need the object to be plain to see
-      now, or visible and of a type that lies in the receptacle last navigated to.
+    - ``pickup``, ``put in``, ``open``, ``close``, ``toggle``, ``slice`` need the object to be plain
+      to see now, or visible and of a type that lies in the receptacle last navigated to; ``slice``,
+      which the paper does not have, needs a knife in the hand.
     - ``observe`` looks right, behind and left; ``info["views"]`` has the pictures.
     - ``end`` says that the task is done.
 
@@ -65,15 +68,18 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     ## Rewards
     Each key action of the task is worth its reward (1) once, in any order unless the type of task
-    is ordered; which instance of a type it is done to does not matter. ``end`` is worth its own
-    only when all others but navigation are done, and, for a search, when the target can be
-    interacted with. ``step_penalty`` and ``illegal_penalty`` are subtracted for each counted step
-    and each illegal action.
+    is ordered; which instance of a type it is done to does not matter, unless the task singles one
+    out. ``end`` is worth its own only when all others but navigation are done, the task's goal
+    holds (``info["goal_unmet"]`` says what of it does not), and, for a search, when the target can
+    be interacted with. ``step_penalty`` and ``illegal_penalty`` are subtracted for each counted
+    step and each illegal action.
 
     ## Starting State
     The agent stands at the reachable position nearest to a corner of the scene's bounds and looks
-    diagonally into the room. ``reset(seed=…)`` draws a task from ``tasks``; ``options={"task":
-    task}`` chooses one (a :class:`~er_gym.tasks.task.Task`, or the id of one of ``tasks``).
+    diagonally into the room, which is as recorded or rearranged as the task says. ``reset(seed=…)``
+    draws a task from ``episode_source``, of ``task_type`` if that is given. ``options`` pins it:
+    ``{"task": task}`` (a :class:`~er_gym.tasks.task.Task`, or its id), ``{"scene": "FloorPlan1"}``,
+    ``{"suite": name or file}`` to draw from that one this time, or any of them together.
 
     ## Episode End
     Terminates on ``end``; on the fourth same action in a row; on the third reply in a row that
@@ -81,8 +87,11 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     agent counting as the first step. ``info["end_reason"]`` says which.
 
     ## Arguments
-    - ``tasks``: what episodes are drawn from; default: the bundled suite ``mini``, those of
-      ``task_type`` if that is given.
+    - ``episode_source``: what episodes are drawn from: a list of tasks; the name of a suite
+      (default ``"mini"``); the path of a task file; ``"generate"``: the generator, live, an endless
+      stream of verified tasks in the training rooms; or an
+      :class:`~er_gym.envs.sources.EpisodeSource`.
+    - ``task_type``: draw tasks of this type only.
     - ``backend``: ``"embedded"`` or ``"unity"`` (:func:`er_gym.thor.make_controller`).
     - ``width``, ``height`` pixels; ``field_of_view`` degrees, vertical; ``grid_size`` and
       ``visibility_distance`` metres.
@@ -102,7 +111,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     def __init__(
         self,
-        tasks: Sequence[Task] | None = None,
+        episode_source: Source = "mini",
         *,
         task_type: str | None = None,
         obs_mode: str = "rgb+text",
@@ -121,8 +130,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         render_mode: str | None = None,
     ) -> None:
         EzPickle.__init__(
-            self, tasks, task_type=task_type, obs_mode=obs_mode, backend=backend, width=width,
-            height=height, field_of_view=field_of_view, grid_size=grid_size,
+            self, episode_source, task_type=task_type, obs_mode=obs_mode, backend=backend,
+            width=width, height=height, field_of_view=field_of_view, grid_size=grid_size,
             visibility_distance=visibility_distance, instances=instances, max_steps=max_steps,
             step_penalty=step_penalty, illegal_penalty=illegal_penalty, annotate=annotate,
             render_device=render_device, render_mode=render_mode,
@@ -133,7 +142,10 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             )
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"unknown render_mode {render_mode!r}; choose 'rgb_array' or None")
-        self.tasks = tuple(_default_tasks(task_type) if tasks is None else tasks)
+        self._sources: dict[str, EpisodeSource] = {}
+        self._source = episode_source
+        self._from(episode_source)  # what is wrong with it is heard of now
+        self._task_type = look_up_type(task_type) if task_type else None
         self.render_mode = render_mode
         self._obs = parse_obs_mode(obs_mode)
         self._draws = "rgb" in self._obs
@@ -166,11 +178,11 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin an episode; ``options={"task": …}`` chooses its task."""
+        """Begin an episode; ``options`` may pin its ``task``, ``scene`` or ``suite``."""
         super().reset(seed=seed)
-        self.task = self._choose((options or {}).get("task"))
+        self.task = self._choose(**_checked(options or {}))
         controller = self._started_controller(self.task.scene)
-        bounds = controller.reset(self.task.scene).metadata["sceneBounds"]
+        bounds = begin(controller, self.task.scene, self.task.start).metadata["sceneBounds"]
         self._floor = skills.reachable(
             controller, (self._backend, self.task.scene, self._grid_size)
         )
@@ -186,6 +198,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._repeats = self._unknown = 0
         self._end_reason = ""
         self._success = False
+        self._goal_unmet: tuple[Condition, ...] = ()
         placed = skills.place(controller, pose)
         self._take_in(placed)
         return self._observation("You look around the room.", True), self._info(
@@ -221,7 +234,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         else:
             object_id, outcome = self._do(understood)
         self._take_in(outcome)
-        reward = self._judge(understood, outcome) - self._step_penalty
+        reward = self._judge(understood, outcome, object_id) - self._step_penalty
         if refused:
             reward -= self._illegal_penalty
         if understood.verb == verbs.END:
@@ -237,6 +250,16 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
         return legal_actions(self._around, self._known)
 
+    @property
+    def agent_pose(self) -> AgentPose:
+        """Where the agent is now."""
+        return self._percept.pose
+
+    @property
+    def objects(self) -> Sequence[Mapping[str, Any]]:
+        """AI2-THOR's metadata of all objects, as they are now."""
+        return self._controller.last_event.metadata["objects"]  # type: ignore[no-any-return]
+
     def render(self) -> NDArray[np.uint8] | None:
         """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``."""
         if self.render_mode is None or self._controller is None:
@@ -249,10 +272,12 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         return np.ascontiguousarray(self._percept.picture)
 
     def close(self) -> None:
-        """Stop the controller."""
+        """Stop the controller, and the generator if there is one."""
         if self._controller is not None:
             self._controller.stop()
             self._controller = None
+        live = self._sources.pop(GENERATE, None)
+        getattr(live, "close", lambda: None)()
 
     # -- the loop's parts ------------------------------------------------------------------------
 
@@ -263,17 +288,27 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             )
         return self._controller
 
-    def _choose(self, wanted: Task | str | None) -> Task:
-        if isinstance(wanted, Task):
-            return wanted
-        if wanted is not None:
-            for task in self.tasks:
-                if task.id == wanted:
-                    return task
-            raise ValueError(f"no task {wanted!r} among this environment's {len(self.tasks)} tasks")
-        if not self.tasks:
-            raise ValueError("this environment has no tasks; pass tasks=… or options={'task': …}")
-        return self.tasks[int(self.np_random.integers(len(self.tasks)))]
+    def _from(self, source: Source) -> EpisodeSource:
+        """Where to draw from; the generator is made once for an environment, which closes it."""
+        if not isinstance(source, str) or source != GENERATE:
+            return make_source(source)
+        if GENERATE not in self._sources:
+            self._sources[GENERATE] = make_source(GENERATE)
+        return self._sources[GENERATE]
+
+    def _choose(
+        self,
+        task: Task | str | None = None,
+        scene: str | None = None,
+        suite: Source | None = None,
+    ) -> Task:
+        source = self._from(self._source if suite is None else suite)
+        if task is None:
+            return source.draw(self.np_random, self._task_type, scene)
+        wanted = source.find(task) if isinstance(task, str) else task
+        if scene not in (None, wanted.scene):
+            raise ValueError(f"task {wanted.id} plays in {wanted.scene}, not in {scene}")
+        return wanted
 
     def _take_in(self, outcome: skills.Outcome) -> None:
         """Remember what can be seen after a step, and in the views of an "observe"."""
@@ -328,17 +363,23 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             self._at = goal_id
         return goal_id, outcome
 
-    def _judge(self, action: Action, outcome: skills.Outcome) -> float:
+    def _judge(self, action: Action, outcome: skills.Outcome, object_id: str) -> float:
         """The reward that an action earned; decides success at ``end``."""
         if not outcome.success:
             return 0.0
         if action.verb == verbs.END:
             targets = search_targets(self.task) if self.task.type.search else frozenset()
             in_reach = self._around.in_reach
-            if not self._progress.only_end_left or not targets.issubset(in_reach):
+            if self.task.goal:
+                self._goal_unmet = unmet(self.task.goal, self.objects, in_reach)
+            if (
+                not self._progress.only_end_left
+                or not targets.issubset(in_reach)
+                or self._goal_unmet
+            ):
                 return 0.0
             self._success = True
-        self._progress, reward = self._progress.after(action)
+        self._progress, reward = self._progress.after(action, object_id)
         return reward
 
     def _not_understood(
@@ -400,6 +441,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             "object_id": object_id,
             "feedback": feedback,
             "success": self._success,
+            "goal_unmet": self._goal_unmet,
             "key_actions_done": self._progress.done,
             "key_actions_left": self._progress.left,
             "navigable": self._known.names,
@@ -410,12 +452,17 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         }
 
 
-def _default_tasks(task_type: str | None) -> list[Task]:
-    tasks = load_suite("mini").tasks
-    if task_type is None:
-        return list(tasks)
-    wanted = look_up_type(task_type)
-    return [task for task in tasks if task.type is wanted]
+def _checked(options: Mapping[str, Any]) -> Mapping[str, Any]:
+    unknown = options.keys() - {"task", "scene", "suite"}
+    if unknown:
+        raise ValueError(f"unknown option {min(unknown)!r} at reset; there are: task, scene, suite")
+    for name, kinds in (("task", Task | str), ("scene", str)):
+        if not isinstance(options.get(name), kinds | None):
+            raise ValueError(
+                f"option {name!r} at reset is {options[name]!r}; give a "
+                f"{'Task or its id' if name == 'task' else 'scene such as FloorPlan1'}"
+            )
+    return options
 
 
 def _understand(action: Action | str | int | np.integer[Any]) -> tuple[Action | None, str]:

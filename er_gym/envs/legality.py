@@ -6,7 +6,7 @@ given by their rows there. Positions are metres in AI2-THOR's world frame.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -57,6 +57,7 @@ def _of_type(*object_types: str) -> NDArray[np.bool_]:
 
 _STANDS_FOR_ANOTHER = _of_type(*STANDS_FOR)
 _BURNER = _of_type("StoveBurner")
+_KNIFE = _of_type("Knife", "ButterKnife")
 _NO_GOAL = _of_type(*NOWHERE)
 _CONDITIONS = {
     verbs.PICKUP: _Condition(lambda table: table.pickupable, "It cannot be picked up."),
@@ -76,7 +77,24 @@ _CONDITIONS = {
     verbs.TOGGLE: _Condition(
         lambda table: table.toggleable | _BURNER[table.kinds], "It has no switch."
     ),
+    verbs.SLICE: _Condition(lambda table: table.sliceable, "It cannot be sliced."),
 }
+
+
+def _empty(table: ObjectTable) -> bool:
+    return table.held < 0
+
+
+def _holds_knife(table: ObjectTable) -> bool:
+    return table.held >= 0 and bool(_KNIFE[table.kinds[table.held]])
+
+
+_HAND: Mapping[str, Callable[[ObjectTable], bool]] = {
+    verbs.PICKUP: _empty,
+    verbs.PUT: lambda table: not _empty(table),
+    verbs.SLICE: _holds_knife,
+}
+"""What verbs ask of the hand."""
 _BARE = [INDEX[Action(verb)] for verb in verbs.BARE_VERBS]
 _NUMBER = {verb: number for number, verb in enumerate(verbs.INTERACTIONS)}
 _INTERACTION_INDICES = np.stack([INDICES[verb] for verb in verbs.INTERACTIONS], axis=1)
@@ -105,10 +123,10 @@ class Affordances:
         within = navigable_within(table.volume, table.face)
         within[_NO_GOAL[table.kinds]] = 0.0
         possible = np.stack([_CONDITIONS[verb].holds(table) for verb in verbs.INTERACTIONS], axis=1)
-        if table.held < 0:
-            possible[:, _NUMBER[verbs.PUT]] = False
-        else:
-            possible[:, _NUMBER[verbs.PICKUP]] = False
+        for verb, fits in _HAND.items():
+            if not fits(table):
+                possible[:, _NUMBER[verb]] = False
+        if table.held >= 0:
             within[table.held] = 0.0
         return Affordances(
             within=within,
@@ -232,6 +250,11 @@ def objection(action: Action, around: Surroundings, known: Known) -> str:
             return f"You hold {around.objects.type_of(held)} already; put it down first."
         if action.verb == verbs.PUT and held < 0:
             return "Your hand is empty; pick something up first."
+        if action.verb == verbs.SLICE and not _holds_knife(around.objects):
+            return (
+                f"You cannot slice {name} without a knife in your hand; "
+                "pick up a Knife or a ButterKnife first."
+            )
         if not around.interactable_types[KIND_OF[name]]:
             return (
                 f"You cannot {action.verb} {name}: none is within reach and in view. "

@@ -21,21 +21,32 @@ class Progress:
     done: tuple[KeyAction, ...]
     left: tuple[KeyAction, ...]
     ordered: bool
+    named: frozenset[str] = frozenset()
+    """Ids of the objects that the task singles out: to no other may their key actions be done."""
 
     @staticmethod
     def start(task: Task) -> Progress:
         """Nothing done yet."""
-        return Progress((), task.key_actions, task.type.ordered)
+        return Progress((), task.key_actions, task.type.ordered, task.named)
 
     @property
     def only_end_left(self) -> bool:
         """Whether all that success asks for is done, but to say so."""
         return all(action.verb == verbs.END or not action.scored for action in self.left)
 
-    def after(self, action: Action) -> tuple[Progress, float]:
-        """The progress after an action that succeeded, and the reward it earns."""
+    def after(self, action: Action, object_id: str = "") -> tuple[Progress, float]:
+        """The progress after an action that succeeded, and the reward it earns.
+
+        Args:
+            object_id: what it was done to.
+        """
         for k, key in enumerate(self.left):
-            if key.verb == action.verb and same_type(key.actual_type, action.object_type):
+            right_one = key.object_id == object_id or key.object_id not in self.named
+            if (
+                right_one
+                and key.verb == action.verb
+                and same_type(key.actual_type, action.object_type)
+            ):
                 return (
                     replace(
                         self, done=(*self.done, key), left=(*self.left[:k], *self.left[k + 1 :])

@@ -293,9 +293,10 @@ _INTERACTIONS: dict[str, Callable[[Any, ObjectTable, int], Any]] = {
     verbs.CLOSE: _simple("CloseObject"),
     verbs.PUT: _put,
     verbs.TOGGLE: _toggle,
+    verbs.SLICE: _simple("SliceObject"),
 }
 
 
 def interact(controller: Any, verb: str, objects: ObjectTable, row: int) -> Outcome:
-    """Pick up, put into, open, close or toggle an object."""
+    """Pick up, put into, open, close, toggle or slice an object."""
     return _outcome(_INTERACTIONS[verb](controller, objects, row))

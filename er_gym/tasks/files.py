@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
+import zlib
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -25,17 +27,20 @@ _LONGEST_QUOTE = 60
 
 
 def read_text(path: Path) -> str:
-    """The text of a file.
+    """The text of a file, unpacked if its name ends in ``.gz``.
 
     Raises:
-        TaskFileError: it is not there, is a folder, may not be read or is not UTF-8.
+        TaskFileError: it is not there, is a folder, may not be read, or is not UTF-8 or gzip.
     """
     try:
-        return path.read_text(encoding="utf-8")
+        data = path.read_bytes()
+        return (gzip.decompress(data) if path.suffix == ".gz" else data).decode()
     except FileNotFoundError:
         raise TaskFileError(f"{path}: no such file") from None
     except UnicodeDecodeError as error:
         raise TaskFileError(f"{path}: not UTF-8 text (byte {error.start})") from None
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise TaskFileError(f"{path}: not a whole gzip file: {error}") from None
     except OSError as error:
         raise TaskFileError(f"{path}: {error.strerror}") from None
 
@@ -117,6 +122,8 @@ def _first_problem(error: ValidationError) -> str:
     field = re.sub(r"\.(\d+)", r"[\1]", ".".join(map(str, problem["loc"])))
     if problem["type"] == "missing":
         return f"lacks field {field!r}"
+    if problem["type"] == "value_error":  # one of our own validators, which says it all
+        return f"has a wrong field {field!r}: {problem['ctx']['error']}"
     given = repr(problem["input"])
     if len(given) > _LONGEST_QUOTE:
         given = given[: _LONGEST_QUOTE - 1] + "…"

@@ -2,15 +2,19 @@
 
 The header is ``{"format": "er-gym/tasks/1", "tasks": 110, …}``; the number of tasks guards against
 a file cut short, and further fields (how the file was made) are the writer's own. A task's line has
-the fields of :class:`TaskRecord`, those at their default left out.
+the fields of :class:`TaskRecord`, those at their default left out. An arrangement of a scene that
+tasks begin with has a line before the first of them, :class:`LayoutRecord`. A file whose name ends
+in ``.gz`` is compressed.
 """
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, astuple, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +30,8 @@ from er_gym.tasks.files import (
     read_text,
     validated,
 )
+from er_gym.tasks.goal import Condition
+from er_gym.tasks.start import ObjectPose, Start
 from er_gym.tasks.task import AgentPose, KeyAction, Task, type_of_id
 
 FORMAT = "er-gym/tasks/1"
@@ -58,8 +64,31 @@ class PoseRecord(_Strict):
     standing: bool = True
 
 
+class ConditionRecord(_Strict):
+    """A condition of the goal; the fields are those of :class:`~er_gym.tasks.goal.Condition`."""
+
+    object_type: str
+    object_id: str = ""
+    held: bool = False
+    in_reach: bool = False
+    inside: str = ""
+    state: dict[str, bool | str] = {}
+
+
+class LayoutRecord(_Strict):
+    """How a scene is arranged.
+
+    Attributes:
+        layout: the name by which tasks refer to it.
+        poses: object name to x, y, z, pitch, yaw and roll, for those that have been moved.
+    """
+
+    layout: str
+    poses: dict[str, tuple[float, float, float, float, float, float]]
+
+
 class TaskRecord(_Strict):
-    """A task; the fields are those of :class:`~er_gym.tasks.task.Task`."""
+    """A task; the fields are those of :class:`~er_gym.tasks.task.Task`, its start's among them."""
 
     id: str
     type: str
@@ -70,6 +99,9 @@ class TaskRecord(_Strict):
     target_objects: tuple[str, ...] = ()
     related_objects: tuple[str, ...] = ()
     navigable_objects: tuple[str, ...] = ()
+    goal: tuple[ConditionRecord, ...] = ()
+    layout: str = ""
+    dirty: tuple[str, ...] = ()
     poses: dict[str, PoseRecord] = {}
     extra: dict[str, Any] = {}
 
@@ -102,11 +134,18 @@ def read_tasks(path: str | Path) -> list[Task]:
 
 
 def write_tasks(path: str | Path, tasks: Iterable[Task], **made: object) -> None:
-    """Write a task file; ``made`` (generator, seed and so on) goes into its header."""
-    tasks = list(tasks)
+    """Write a task file, whole or not at all; ``made`` (generator, seed, …) goes into its header.
+
+    Raises:
+        ValueError: two tasks name different arrangements alike.
+    """
+    path, tasks = Path(path), list(tasks)
     header = json.dumps({"format": FORMAT, "tasks": len(tasks), **made}, ensure_ascii=False)
-    lines = [header, *(_line(_record(task)) for task in tasks)]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    text = "\n".join([header, *_lines(tasks)]) + "\n"
+    data = text.encode()
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    unfinished.write_bytes(gzip.compress(data, mtime=0) if path.suffix == ".gz" else data)
+    unfinished.replace(path)
 
 
 def digest(tasks: Iterable[Task]) -> str:
@@ -115,9 +154,23 @@ def digest(tasks: Iterable[Task]) -> str:
     The same tasks have the same digest whichever format they were read from.
     """
     total = hashlib.sha256(FORMAT.encode())
-    for task in tasks:
-        total.update(b"\n" + _line(_record(task).model_copy(update={"extra": {}})).encode())
+    for line in _lines(replace(task, extra={}) for task in tasks):
+        total.update(b"\n" + line.encode())
     return total.hexdigest()
+
+
+def _lines(tasks: Iterable[Task]) -> Iterator[str]:
+    """A line for each task, and before the first that needs it one for each arrangement."""
+    written: dict[str, Mapping[str, ObjectPose]] = {}
+    for task in tasks:
+        start = task.start
+        if start.poses and start.layout not in written:
+            written[start.layout] = start.poses
+            poses = {name: astuple(pose) for name, pose in start.poses.items()}
+            yield _line(LayoutRecord(layout=start.layout, poses=poses))
+        if start.poses != written.get(start.layout, {}):
+            raise ValueError(f"task {task.id}: another arrangement is named {start.layout!r} too")
+        yield _line(_record(task))
 
 
 def _header(lines: list[str], path: Path) -> Header:
@@ -131,13 +184,24 @@ def _header(lines: list[str], path: Path) -> Header:
 
 
 def _tasks(lines: list[str], path: Path) -> Iterator[Task]:
+    layouts: dict[str, dict[str, ObjectPose]] = {}
     for number, line in enumerate(lines, 2):
-        if line.strip():
-            where = f"{path}: the task in line {number}"
-            yield _task(validated(TaskRecord, parse_json(line, path, number), where), where)
+        if not line.strip():
+            continue
+        where, data = f"{path}: the task in line {number}", parse_json(line, path, number)
+        if isinstance(data, dict) and "layout" in data and "id" not in data:
+            layout = validated(LayoutRecord, data, f"{path}: the layout in line {number}")
+            layouts[layout.layout] = {
+                name: ObjectPose(*pose) for name, pose in layout.poses.items()
+            }
+            continue
+        record = validated(TaskRecord, data, where)
+        if record.layout and record.layout not in layouts:
+            raise TaskFileError(f"{where} begins with a layout that no line before it tells")
+        yield _task(record, layouts.get(record.layout, {}), where)
 
 
-def _task(record: TaskRecord, where: str) -> Task:
+def _task(record: TaskRecord, poses: Mapping[str, ObjectPose], where: str) -> Task:
     return Task(
         id=record.id,
         type=known_type(record.type, where),
@@ -148,6 +212,8 @@ def _task(record: TaskRecord, where: str) -> Task:
         target_objects=record.target_objects,
         related_objects=record.related_objects,
         navigable_objects=record.navigable_objects,
+        goal=tuple(_condition(condition) for condition in record.goal),
+        start=Start(record.layout, poses, record.dirty),
         poses={key: AgentPose(**pose.model_dump()) for key, pose in record.poses.items()},
         extra=record.extra,
     )
@@ -164,6 +230,14 @@ def _key_action(record: KeyActionRecord, where: str) -> KeyAction:
     )
 
 
+def _condition(record: ConditionRecord) -> Condition:
+    return Condition(**{**dict(record), "state": tuple(record.state.items())})
+
+
+def _condition_record(condition: Condition) -> ConditionRecord:
+    return ConditionRecord(**{**vars(condition), "state": dict(condition.state)})
+
+
 def _record(task: Task) -> TaskRecord:
     return TaskRecord(
         id=task.id,
@@ -175,6 +249,9 @@ def _record(task: Task) -> TaskRecord:
         target_objects=task.target_objects,
         related_objects=task.related_objects,
         navigable_objects=task.navigable_objects,
+        goal=tuple(_condition_record(condition) for condition in task.goal),
+        layout=task.start.layout,
+        dirty=task.start.dirty,
         poses={key: PoseRecord(**asdict(pose)) for key, pose in task.poses.items()},
         extra=dict(task.extra),
     )
@@ -191,5 +268,5 @@ def _key_action_record(action: KeyAction) -> KeyActionRecord:
     )
 
 
-def _line(record: TaskRecord) -> str:
+def _line(record: BaseModel) -> str:
     return record.model_dump_json(exclude_defaults=True)

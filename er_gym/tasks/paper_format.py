@@ -1,77 +1,48 @@
-"""The paper's own file formats: tasks, and the exact poses from which some objects are reached.
+"""The paper's own file formats: test files, and the exact poses from which objects are reached.
 
-A task file is a JSON list of objects; :func:`read_tasks` and :func:`write_tasks` are inverse to
-each other. What :class:`~er_gym.tasks.task.Task` has no field for travels in ``Task.extra``:
-
-- ``identity``, ``instruction_idx`` and whatever else a task's object holds, under its own name;
-- ``task_metadata``: that object without its list of actions;
-- ``actions``: per key action, what :class:`~er_gym.tasks.task.KeyAction` has no field for.
+A test file is a JSON list of objects; :func:`read_tasks` and :func:`write_tasks` are inverse to
+each other, for the paper's files as for tasks of any other origin, but for ``Task.poses``. What
+:class:`~er_gym.tasks.task.Task` has no field for travels in ``Task.extra``: ``identity``,
+``instruction_idx`` and whatever else a task's object holds, under its own name, and what
+:mod:`~er_gym.tasks.paper_records` names. What the paper's format has no field for (an id of our
+own, the goal, the start) travels in the object, under ``er_gym``.
 
 A file may leave out what has an obvious default (see :class:`PaperTask`); written again, it is
-there. A pose file is a JSON object, keyed by a task's identity.
+there. A pose file is a JSON object, keyed by a task's identity. What the paper's generator writes
+is for :mod:`~er_gym.tasks.paper_generator`.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from er_gym.tasks import verbs
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import (
     checked_ids,
     known_scene,
     known_type,
-    known_verb,
     parse_json,
     read_text,
     validated,
 )
-from er_gym.tasks.task import AgentPose, KeyAction, Task
-
-_SPELLED = {verbs.PUT: "put"}
-"""Verbs that the paper's task files spell unlike its agents' replies."""
-
-
-class _PaperModel(BaseModel):
-    """Keeps fields that it does not know, so that they can be written again."""
-
-    model_config = ConfigDict(extra="allow")
-
-
-class PaperAction(_PaperModel):
-    """A key action as the paper's files write it."""
-
-    action: str
-    objectId: str
-    objectType: str
-    relatedObject: list[str] = []
-    reward: int | float = 1
-
-
-class PaperMetadata(_PaperModel):
-    """What the paper's generator knew of a task."""
-
-    actions: list[PaperAction]
-
-
-class PaperTask(_PaperModel):
-    """A task as the paper's files write it."""
-
-    scene: str
-    tasktype: str
-    taskname: str
-    task_metadata: PaperMetadata
-    taskquery: str | None = None
-    identity: int | str
-    target_objects: list[str] = []
-    related_objects: list[str] = []
-    navigable_objects: list[str] = []
+from er_gym.tasks.paper_records import (
+    PaperTask,
+    json_kind,
+    key_actions,
+    metadata_record,
+    own_fields,
+    unknown,
+    unspoken,
+    with_own_fields,
+    without,
+    write_json,
+)
+from er_gym.tasks.task import AgentPose, Task
 
 
 class _Vector(BaseModel):
@@ -101,10 +72,10 @@ class PaperPoses(BaseModel):
 
 
 def read_tasks(path: str | Path) -> list[Task]:
-    """Read a task file of the paper.
+    """Read a test file of the paper.
 
     Returns:
-        Tasks in the file's order, with ids such as ``paper-57``.
+        Tasks in the file's order, with ids such as ``paper-57`` where the file states no other.
 
     Raises:
         TaskFileError: the file cannot be used; one line says where and why.
@@ -113,19 +84,32 @@ def read_tasks(path: str | Path) -> list[Task]:
     data = parse_json(read_text(path), path)
     if not isinstance(data, list):
         raise TaskFileError(
-            f"{path}: not a list of tasks but {_kind(data)}; "
+            f"{path}: not a list of tasks but {json_kind(data)}; "
             'the paper\'s task files look like [{"scene": …, "tasktype": …}, …]'
+        )
+    if any(isinstance(item, dict) and {"scene", "task_metadata"}.isdisjoint(item) for item in data):
+        raise TaskFileError(
+            f"{path}: not a test file: a task has neither scene nor task_metadata; if the paper's "
+            "generator wrote it, read it with er_gym.tasks.paper_generator.read_generator_tasks"
         )
     return checked_ids((_read_task(item, path, n) for n, item in enumerate(data, 1)), path)
 
 
 def write_tasks(path: str | Path, tasks: Iterable[Task]) -> None:
-    """Write tasks as the paper's files do.
+    """Write tasks as the paper's test files do; ``Task.poses`` go into a file of their own.
 
-    A task that came from elsewhere and so has no identity gets its place in the file, from 1.
+    A task that came from elsewhere and so has no identity gets its place in the file, from 1, or,
+    where another task has that identity, the next number that is as far into the file again.
+
+    Raises:
+        TaskFileError: a task could not be read again, for what its ``extra`` says.
     """
-    records = [_task_record(task, number) for number, task in enumerate(tasks, 1)]
-    _write_json(Path(path), records)
+    path, tasks = Path(path), list(tasks)
+    records = [
+        _task_record(task, identity, path, number)
+        for number, (task, identity) in enumerate(_with_identities(tasks), 1)
+    ]
+    write_json(path, records)
 
 
 def read_poses(path: str | Path) -> dict[str, dict[str, AgentPose]]:
@@ -141,7 +125,7 @@ def read_poses(path: str | Path) -> dict[str, dict[str, AgentPose]]:
     data = parse_json(read_text(path), path)
     if not isinstance(data, dict):
         raise TaskFileError(
-            f"{path}: not an object of poses but {_kind(data)}; "
+            f"{path}: not an object of poses but {json_kind(data)}; "
             'the paper\'s pose files look like {"57": {"scene": …, …}, …}'
         )
     entries = {
@@ -157,26 +141,44 @@ def read_poses(path: str | Path) -> dict[str, dict[str, AgentPose]]:
 
 
 def write_poses(path: str | Path, tasks: Iterable[Task]) -> None:
-    """Write the poses of those tasks that state any, as the paper's file does."""
+    """Write the poses of those tasks that state any, as the paper's file does.
+
+    The tasks have the identities that :func:`write_tasks` gives to the same list.
+    """
     entries = {
-        str(_identity(task, number)): {
+        str(identity): {
             "scene": task.scene,
             "tasktype": task.type.name,
             "taskname": task.name,
             **{object_id: _pose_record(pose) for object_id, pose in task.poses.items()},
         }
-        for number, task in enumerate(tasks, 1)
+        for task, identity in _with_identities(list(tasks))
         if task.poses
     }
-    _write_json(Path(path), entries)
+    write_json(Path(path), entries)
 
 
 def with_poses(tasks: Iterable[Task], poses: Mapping[str, Mapping[str, AgentPose]]) -> list[Task]:
-    """The same tasks, each with the poses that a pose file states for its identity."""
+    """The same tasks, each with the poses that a pose file states for its identity.
+
+    Tasks without an identity have the one that :func:`write_tasks` gives them, so that the list
+    must be the whole of what a file holds.
+    """
     return [
-        replace(task, poses={**task.poses, **poses.get(str(task.extra.get("identity")), {})})
-        for task in tasks
+        replace(task, poses={**task.poses, **poses.get(str(identity), {})})
+        for task, identity in _with_identities(list(tasks))
     ]
+
+
+def _with_identities(tasks: Sequence[Task]) -> list[tuple[Task, object]]:
+    taken = {str(task.extra["identity"]) for task in tasks if "identity" in task.extra}
+    found: list[tuple[Task, object]] = []
+    for place, task in enumerate(tasks, 1):
+        number = place
+        while str(number) in taken:
+            number += len(tasks)
+        found.append((task, task.extra.get("identity", number)))
+    return found
 
 
 def _read_task(data: object, path: Path, number: int) -> Task:
@@ -184,78 +186,43 @@ def _read_task(data: object, path: Path, number: int) -> Task:
     where = f"{path}: task {number}" + (f" (identity {identity})" if identity is not None else "")
     paper = validated(PaperTask, data, where)
     actions = paper.task_metadata.actions
-    return Task(
+    task = Task(
         id=f"paper-{paper.identity}",
         type=known_type(paper.tasktype, where),
         scene=known_scene(paper.scene, where),
         instruction=paper.taskquery or paper.taskname,
         name=paper.taskname,
-        key_actions=tuple(_key_action(action, where) for action in actions),
+        key_actions=key_actions(actions, where),
         target_objects=tuple(paper.target_objects),
         related_objects=tuple(paper.related_objects),
         navigable_objects=tuple(paper.navigable_objects),
         extra={
             "identity": paper.identity,
-            **_unknown(paper),
-            "task_metadata": _unknown(paper.task_metadata),
-            "actions": [_unspoken(action) for action in actions],
+            **unknown(paper),
+            "task_metadata": unknown(paper.task_metadata),
+            "actions": [unspoken(action) for action in actions],
         },
     )
+    return with_own_fields(task, paper.er_gym, where)
 
 
-def _key_action(action: PaperAction, where: str) -> KeyAction:
-    return KeyAction(
-        verb=known_verb(action.action, where),
-        object_id=action.objectId,
-        object_type=action.objectType,
-        related_objects=tuple(action.relatedObject),
-        reward=action.reward,
-    )
-
-
-def _unspoken(action: PaperAction) -> dict[str, Any]:
-    """What of a key action :class:`KeyAction` does not tell, an odd spelling of the verb too."""
-    usual = action.action == _spelled(verbs.canonical_verb(action.action))
-    return _unknown(action) | ({} if usual else {"action": action.action})
-
-
-def _task_record(task: Task, number: int) -> dict[str, Any]:
-    extra = dict(task.extra)
-    metadata = extra.pop("task_metadata", {})
-    unspoken = extra.pop("actions", [{}] * len(task.key_actions))
-    assert isinstance(metadata, Mapping)
-    assert isinstance(unspoken, list)
-    return {
+def _task_record(task: Task, identity: object, path: Path, number: int) -> dict[str, Any]:
+    extra = without(task.extra, PaperTask)
+    extra.pop("actions", None)
+    record = {
         "scene": task.scene,
         "tasktype": task.type.name,
         "taskname": task.name,
-        "task_metadata": {
-            "taskname": task.name,
-            "tasktype": task.type.name,
-            "actions": [
-                _action_record(action) | rest
-                for action, rest in zip(task.key_actions, unspoken, strict=True)
-            ],
-            "totalreward": _plain(sum(action.reward for action in task.key_actions)),
-            **metadata,
-        },
+        "task_metadata": metadata_record(task),
         "taskquery": task.instruction,
-        "identity": _identity(task, number),
+        "identity": identity,
         "target_objects": list(task.target_objects),
         "related_objects": list(task.related_objects),
         "navigable_objects": list(task.navigable_objects),
         **extra,
     }
-
-
-def _action_record(action: KeyAction) -> dict[str, Any]:
-    return {
-        "action": _spelled(action.verb),
-        "objectId": action.object_id,
-        "objectType": action.object_type,
-        "reward": _plain(action.reward),
-        "relatedObject": list(action.related_objects),
-    }
+    plain = _read_task(record, path, number)
+    return record | own_fields(replace(task, poses={}), plain)
 
 
 def _agent_pose(pose: PaperPose) -> AgentPose:
@@ -277,30 +244,3 @@ def _pose_record(pose: AgentPose) -> dict[str, Any]:
         "agent_isstanding": pose.standing,
         "agent_rotation": {"x": 0.0, "y": pose.rotation, "z": 0.0},
     }
-
-
-def _identity(task: Task, number: int) -> object:
-    return task.extra.get("identity", number)
-
-
-def _spelled(verb: str) -> str:
-    return _SPELLED.get(verb, verb)
-
-
-def _unknown(model: BaseModel) -> dict[str, Any]:
-    return dict(model.model_extra or {})
-
-
-def _plain(reward: float) -> int | float:
-    """Whole rewards as the files write them: 1, not 1.0."""
-    return int(reward) if float(reward).is_integer() else reward
-
-
-def _kind(data: object) -> str:
-    kinds = {dict: "an object", list: "a list", str: "a string", type(None): "null"}
-    return kinds.get(type(data), "a number or a truth value")
-
-
-def _write_json(path: Path, data: object) -> None:
-    text = json.dumps(data, indent=4, ensure_ascii=False)
-    path.write_text(text + "\n", encoding="utf-8")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from er_gym.tasks.errors import TaskFileError
+from er_gym.tasks.start import begin
 from er_gym.tasks.task import Task, type_of_id
 from er_gym.thor import make_controller
 
@@ -63,7 +65,7 @@ def resolve_task(task: Task, scene_ids: Collection[str]) -> tuple[Task, list[str
         poses={fit(i): pose for i, pose in task.poses.items()},
     )
     for action in fitted.key_actions:
-        if action.object_id and action.object_id not in known:
+        if action.object_id and _to_be_there(action.object_id) not in known:
             kind = type_of_id(action.object_id)
             there = [i for i in scene_ids if type_of_id(i) == kind]
             raise TaskFileError(
@@ -72,6 +74,12 @@ def resolve_task(task: Task, scene_ids: Collection[str]) -> tuple[Task, list[str
             )
     notes.update(_doubtful(task))
     return fitted, list(notes.values())
+
+
+def _to_be_there(object_id: str) -> str:
+    """Whose part an id names, if it is a slice: that is not there yet when the episode begins."""
+    whole, _, part = object_id.rpartition("|")
+    return whole if re.fullmatch(r"\w+Sliced_\d+|EggCracked", part) else object_id
 
 
 def _doubtful(task: Task) -> Mapping[str, str]:
@@ -91,17 +99,20 @@ def resolve_tasks(tasks: Sequence[Task], backend: str = "embedded") -> tuple[lis
     """:func:`resolve_task` for each of several tasks, in the scenes of a backend.
 
     Raises:
-        ValueError: the backend does not have one of the scenes, or there is no such backend.
+        ValueError: the backend does not have one of the scenes, cannot arrange it as a task asks,
+            or there is no such backend.
         TaskFileError: as for :func:`resolve_task`.
     """
-    scene_ids: dict[str, list[str]] = {}
+    ids: dict[tuple[str, str], list[str]] = {}
     with make_controller(backend, headless=True) as controller:
-        for scene in dict.fromkeys(task.scene for task in tasks):
-            metadata = controller.reset(scene).metadata
-            scene_ids[scene] = [entry["objectId"] for entry in metadata["objects"]]
+        for task in tasks:
+            arrangement = (task.scene, task.start.layout)
+            if arrangement not in ids:
+                metadata = begin(controller, task.scene, replace(task.start, dirty=())).metadata
+                ids[arrangement] = [entry["objectId"] for entry in metadata["objects"]]
     fitted, notes = [], []
     for task in tasks:
-        one, said = resolve_task(task, scene_ids[task.scene])
+        one, said = resolve_task(task, ids[task.scene, task.start.layout])
         fitted.append(one)
         notes.extend(said)
     return fitted, notes

@@ -1,11 +1,13 @@
 """Suites: lists of tasks to be played under stated environment settings.
 
-A bundled suite ``NAME`` is ``configs/suites/NAME.yaml`` and the task file it names, which lies in
-``er_gym/tasks/data``. Any task file is a suite of its own: :func:`suite_from_file`.
+A suite ``NAME`` is ``configs/suites/NAME.yaml`` and the task file it names. That comes with er-gym,
+in ``er_gym/tasks/data``, or is made by ``er-gym tasks generate`` and kept in :func:`suite_home`.
+Any task file is a suite of its own: :func:`suite_from_file`.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,11 +19,16 @@ from pydantic import BaseModel, ConfigDict
 from er_gym.tasks import jsonl_format, paper_format
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import read_text, validated
+from er_gym.tasks.making import Making
 from er_gym.tasks.task import Task
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _DATA = _PACKAGE / "tasks" / "data"
-_READERS = {".json": paper_format.read_tasks, ".jsonl": jsonl_format.read_tasks}
+_READERS = {
+    ".json": paper_format.read_tasks,
+    ".jsonl": jsonl_format.read_tasks,
+    ".jsonl.gz": jsonl_format.read_tasks,
+}
 
 
 @dataclass(frozen=True)
@@ -43,27 +50,54 @@ class Suite:
     description: str = ""
 
 
-class _SuiteConfig(BaseModel):
-    """A file in ``configs/suites``; the suite's name is the file's."""
+class SuiteConfig(BaseModel):
+    """A file in ``configs/suites``; the suite's name is the file's.
+
+    Attributes:
+        description: a sentence for people.
+        tasks: the name of the task file.
+        env: keyword arguments of ``EmbodiedEnv``.
+        generate: how the tasks are made.
+        seed: with which seed.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
     description: str
     tasks: str
     env: dict[str, Any] = {}
+    generate: Making | None = None
+    seed: int = 0
 
 
 def suite_names() -> tuple[str, ...]:
-    """The names of the bundled suites, in alphabetical order."""
+    """The names of the suites, in alphabetical order."""
     return tuple(sorted(file.stem for file in _suite_configs().glob("*.yaml")))
 
 
 def load_suite(name: str) -> Suite:
-    """Load a bundled suite.
+    """Load a suite by its name.
 
     Raises:
         ValueError: there is no such suite; the message lists those there are.
-        TaskFileError: one of its files is damaged.
+        TaskFileError: one of its files is damaged, or it has not been made yet.
+    """
+    config, file = suite_config(name), suite_file(name)
+    if not file.exists():
+        raise TaskFileError(
+            f"the suite {name!r} is made, not shipped, and is not in {file.parent} yet; "
+            f"run: er-gym tasks generate --suite {name}"
+        )
+    tasks = tuple(jsonl_format.read_tasks(file))
+    return Suite(name, tasks, jsonl_format.digest(tasks), config.env, config.description)
+
+
+def suite_config(name: str) -> SuiteConfig:
+    """What ``configs/suites/NAME.yaml`` says.
+
+    Raises:
+        ValueError: there is no such suite; the message lists those there are.
+        TaskFileError: the file is damaged.
     """
     if name not in suite_names():
         raise ValueError(
@@ -71,25 +105,44 @@ def load_suite(name: str) -> Suite:
             "or give a task file"
         )
     file = _suite_configs() / f"{name}.yaml"
-    config = validated(_SuiteConfig, yaml.safe_load(read_text(file)), f"{file}: the suite")
-    tasks = tuple(jsonl_format.read_tasks(_DATA / config.tasks))
-    return Suite(name, tasks, jsonl_format.digest(tasks), config.env, config.description)
+    return validated(SuiteConfig, yaml.safe_load(read_text(file)), f"{file}: the suite")
+
+
+def suite_file(name: str) -> Path:
+    """Where a suite's tasks are: with er-gym, or else in :func:`suite_home`, made or not."""
+    tasks = suite_config(name).tasks
+    bundled = _DATA / tasks
+    return bundled if bundled.exists() else suite_home() / tasks
+
+
+def suite_home() -> Path:
+    """Where suites are kept that do not come with er-gym.
+
+    ``$ER_GYM_HOME/suites``; by default ``~/.local/share/er-gym/suites``, or where
+    ``$XDG_DATA_HOME`` says.
+    """
+    home = os.environ.get("ER_GYM_HOME")
+    if home:
+        return Path(home) / "suites"
+    data = os.environ.get("XDG_DATA_HOME")
+    return (Path(data) if data else Path.home() / ".local" / "share") / "er-gym" / "suites"
 
 
 def suite_from_file(path: str | Path) -> Suite:
-    """Make a suite of a task file: the paper's ``.json`` or our own ``.jsonl``.
+    """Make a suite of a task file: the paper's ``.json`` or our own ``.jsonl`` or ``.jsonl.gz``.
 
     Raises:
         TaskFileError: the file cannot be used; one line says where and why.
     """
     path = Path(path)
-    reader = _READERS.get(path.suffix.lower())
-    if reader is None:
+    ending = next((end for end in _READERS if path.name.lower().endswith(end)), "")
+    if not ending:
         raise TaskFileError(
-            f"{path}: a task file ends in .json (the paper's format) or .jsonl (er-gym's)"
+            f"{path}: a task file ends in .json (the paper's format), "
+            ".jsonl or .jsonl.gz (er-gym's)"
         )
-    tasks = tuple(reader(path))
-    return Suite(path.stem, tasks, jsonl_format.digest(tasks))
+    tasks = tuple(_READERS[ending](path))
+    return Suite(path.name[: -len(ending)], tasks, jsonl_format.digest(tasks))
 
 
 def _suite_configs() -> Path:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from er_gym.tasks import verbs
+from er_gym.tasks.goal import Condition
+from er_gym.tasks.start import Start
 from er_gym.tasks.types import TaskType
 
 _COORDINATE = re.compile(r"[+-]?\d+\.\d+")
@@ -90,6 +93,9 @@ class Task:
         key_actions: in the order in which an expert does them.
         target_objects, related_objects: object ids; names stand for these first.
         navigable_objects: object types that may be navigated to from the start.
+        goal: how things must be in the end, beside the key actions; the paper's files say nothing
+            of it.
+        start: how the scene is arranged when the episode begins.
         poses: object id to the exact pose that going to it leads to, where the file states one.
         extra: fields of the file that nothing here reads, kept so that it can be written again.
     """
@@ -103,6 +109,8 @@ class Task:
     target_objects: tuple[str, ...] = ()
     related_objects: tuple[str, ...] = ()
     navigable_objects: tuple[str, ...] = ()
+    goal: tuple[Condition, ...] = ()
+    start: Start = field(default_factory=Start)
     poses: Mapping[str, AgentPose] = field(default_factory=dict)
     extra: Mapping[str, object] = field(default_factory=dict)
 
@@ -110,3 +118,13 @@ class Task:
     def max_steps(self) -> int:
         """The step limit of the task's type, the first step being the placing of the agent."""
         return self.type.max_steps
+
+    @property
+    def total_reward(self) -> float:
+        """What all key actions together are worth."""
+        return sum(action.reward for action in self.key_actions)
+
+    @cached_property
+    def named(self) -> frozenset[str]:
+        """Ids of the objects that the words single out; elsewhere any object of a type will do."""
+        return frozenset(condition.object_id for condition in self.goal) - {""}

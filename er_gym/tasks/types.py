@@ -5,6 +5,7 @@ Names, groups and step limits are the paper's (Embodied-Reasoner, arXiv 2503.216
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 SEARCH, MANIPULATE, TRANSPORT, COMPOSITE = "Search", "Manipulate", "Transport", "Composite"
@@ -33,6 +34,10 @@ class TaskType:
     max_steps: int
     ordered: bool = False
     search: bool = False
+
+    def __reduce__(self) -> tuple[Callable[[str], TaskType], tuple[str]]:
+        # A row stays the row of the table when it goes to another process.
+        return task_type, (self.name,)
 
 
 # fmt: off

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ai2thor.controller import Controller
+if TYPE_CHECKING:
+    from ai2thor.controller import Controller  # half a second to import
 
 
 class BackendError(RuntimeError):
@@ -29,6 +30,8 @@ def _unity(arguments: dict[str, Any]) -> Controller:
         from ai2thor.platform import CloudRendering
 
         arguments.setdefault("platform", CloudRendering)
+    from ai2thor.controller import Controller
+
     try:
         return Controller(**arguments)
     except Exception as error:  # whatever the client raises here means: no Unity on this machine

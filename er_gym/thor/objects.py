@@ -24,7 +24,16 @@ from er_gym.thor.object_types import OBJECT_TYPES
 TYPES = tuple(OBJECT_TYPES)
 """Object types by number."""
 KIND_OF = {name: number for number, name in enumerate(TYPES)}
-_FLAGS = ("pickupable", "receptacle", "openable", "toggleable", "isOpen", "isToggled")
+_FLAGS = {
+    "pickupable": "pickupable",
+    "receptacle": "receptacle",
+    "openable": "openable",
+    "toggleable": "toggleable",
+    "sliceable": "sliceable",
+    "is_open": "isOpen",
+    "is_toggled": "isToggled",
+}
+"""Columns of truth values, by what the metadata calls them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +46,7 @@ class ObjectTable:
     Attributes:
         ids: ``objectId`` of each. row: the row of each id.
         kinds: (N,) index of each one's type in :data:`TYPES`.
-        pickupable, receptacle, openable, toggleable, is_open, is_toggled: (N,) bool.
+        pickupable, receptacle, openable, toggleable, sliceable, is_open, is_toggled: (N,) bool.
         centre, size: (N, 3) of each one's axis-aligned box, world frame, metres.
         parents: rows of the receptacles that each lies in, innermost first.
         contents: rows of what lies in each.
@@ -54,6 +63,7 @@ class ObjectTable:
     receptacle: NDArray[np.bool_]
     openable: NDArray[np.bool_]
     toggleable: NDArray[np.bool_]
+    sliceable: NDArray[np.bool_]
     is_open: NDArray[np.bool_]
     is_toggled: NDArray[np.bool_]
     centre: NDArray[np.float64]
@@ -117,24 +127,22 @@ def _of_entries(metadata: Mapping[str, Any]) -> _Seen:
         boxes = [entry["axisAlignedBoundingBox"][name] for entry in entries]
         return np.array([(b["x"], b["y"], b["z"]) for b in boxes]).reshape(-1, 3)
 
-    flags = {name: np.array([bool(e[name]) for e in entries], dtype=bool) for name in _FLAGS}
+    flags: dict[str, Any] = {
+        column: np.array([bool(e[name]) for e in entries], dtype=bool)
+        for column, name in _FLAGS.items()
+    }
     held = metadata["inventoryObjects"]
     table = ObjectTable(
         ids=ids,
         row=row,
         kinds=np.array([KIND_OF[e["objectType"]] for e in entries], dtype=np.intp),
-        pickupable=flags["pickupable"],
-        receptacle=flags["receptacle"],
-        openable=flags["openable"],
-        toggleable=flags["toggleable"],
-        is_open=flags["isOpen"],
-        is_toggled=flags["isToggled"],
         centre=box("center"),
         size=box("size"),
         parents=rows("parentReceptacles"),
         contents=rows("receptacleObjectIds"),
         controlled=rows("controlledObjects"),
         held=row.get(held[0]["objectId"], -1) if held else -1,
+        **flags,
     )
     seen, in_reach = (
         np.array([bool(entry[name]) for entry in entries], dtype=bool)
@@ -143,8 +151,8 @@ def _of_entries(metadata: Mapping[str, Any]) -> _Seen:
     return table, seen, in_reach
 
 
-_HAS = [PROPERTIES.index(name) for name in ("pickupable", "receptacle", "openable", "toggleable")]
-_IS = [STATES.index(name) for name in ("isOpen", "isToggled")]
+_HAS = {c: PROPERTIES.index(name) for c, name in _FLAGS.items() if name in PROPERTIES}
+_IS = {c: STATES.index(name) for c, name in _FLAGS.items() if name in STATES}
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,18 +198,14 @@ def _of_world(world: World) -> ObjectTable:
 
 def _table(world: World) -> ObjectTable:
     names = _names(world)
-    pickupable, receptacle, openable, toggleable = world.properties[:, _HAS].T.copy()
-    is_open, is_toggled = world.states[:, _IS].T.copy()
+    has = world.properties[:, list(_HAS.values())].T.copy()
+    states = world.states[:, list(_IS.values())].T.copy()
     return ObjectTable(
         ids=names.ids,
         row=names.row,
         kinds=names.kinds,
-        pickupable=pickupable,
-        receptacle=receptacle,
-        openable=openable,
-        toggleable=toggleable,
-        is_open=is_open,
-        is_toggled=is_toggled,
+        **dict(zip(_HAS, has, strict=True)),
+        **dict(zip(_IS, states, strict=True)),
         centre=(world.low + world.high) / 2,
         size=world.high - world.low,
         parents=tuple(world.parents),

@@ -13,14 +13,16 @@ from benchmarks.store import RunDirectoryError, RunStore, file_stem
 GOLDEN = """
 {"format": "er-gym/episode/1", "task_id": "t", "task_type": "single_search", "scene": "FloorPlan1",
  "instruction": "Find it.", "name": "Look for the Mug.",
- "key_actions": [{"verb": "end", "object_id": "", "object_type": "", "reward": 1.0}],
+ "key_actions": [{"verb": "end", "object_id": "", "object_type": "", "reward": 1.0,
+                  "exact": false}],
  "max_steps": 22, "agent": "random", "seed": 3,
  "steps": [{"verb": "init", "object_type": "", "object_id": "", "success": true, "feedback": "",
             "navigable": ["Bed"], "interactable": [], "reward": 0.0, "thought": "", "text": ""},
            {"verb": "error", "object_type": "", "object_id": "", "success": false,
             "feedback": "no such action", "navigable": ["Bed"], "interactable": [],
             "reward": -0.5, "thought": "hm", "text": "dance"}],
- "success": false, "end_reason": "no known action", "total_reward": -0.5, "seconds": 1.25,
+ "success": false, "goal_unmet": ["Mug is held"],
+ "end_reason": "no known action", "total_reward": -0.5, "seconds": 1.25,
  "error": ""}
 """
 
@@ -39,6 +41,13 @@ def test_the_wire_format_of_an_episode():
 def test_other_formats_are_not_misread(change):
     with pytest.raises(ValidationError):
         EpisodeRecord.model_validate({**json.loads(GOLDEN), **change})
+
+
+def test_what_was_written_before_goals_is_read_still() -> None:
+    old = json.loads(GOLDEN)
+    del old["goal_unmet"], old["key_actions"][0]["exact"]
+    read = EpisodeRecord.model_validate(old)
+    assert (read.goal_unmet, read.key_actions[0].exact) == ([], False)
 
 
 def test_write_and_read(store, episode):

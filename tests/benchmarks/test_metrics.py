@@ -239,6 +239,33 @@ def test_a_sink_and_its_basin_are_one_to_the_corrected_scorer(episode, said, key
     assert score_episode(played, PAPER).success == key.startswith(f"put in {said} ")
 
 
+def test_an_unmet_goal_is_no_success_to_the_corrected_scorer(episode):
+    played = episode(("pickup Egg", "end"), ("pickup Egg", "end"))
+    unmet = played.model_copy(update={"goal_unmet": ["Egg is held"]})
+    assert [score_episode(unmet, scorer).success for scorer in (PAPER, CORRECTED)] == [True, False]
+    assert score_episode(played, CORRECTED).success
+    assert score_episode(unmet, CORRECTED).search_efficiency == 0.0
+    assert score_episode(unmet, CORRECTED).completeness == 1.0
+
+
+def test_an_object_that_is_singled_out_is_the_only_one_that_counts_to_the_corrected_scorer(
+    episode, step
+):
+    wanted, other = "Egg|+00.00|+01.00|+02.00", "Egg|+09.00|+01.00|+02.00"
+    exact = episode(("pickup Egg", "end"), ())
+    key = exact.key_actions[0].model_copy(update={"exact": True})
+
+    def scored(object_id, scorer):
+        steps = [step(text) for text in ("init", "pickup Egg", "end")]
+        steps[1] = steps[1].model_copy(update={"object_id": object_id})
+        keys = [key, *exact.key_actions[1:]]
+        return score_episode(exact.model_copy(update={"steps": steps, "key_actions": keys}), scorer)
+
+    assert [scored(i, CORRECTED).success for i in (wanted, other)] == [True, False]
+    assert [scored(i, PAPER).success for i in (wanted, other)] == [True, True]
+    assert scored(other, CORRECTED).missing == (f"pickup Egg {wanted}",)
+
+
 def test_wilson():
     # n = 10, k = 8: the textbook interval is 0.4902 to 0.9433.
     estimate = wilson(8, 10)

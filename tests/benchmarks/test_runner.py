@@ -30,14 +30,14 @@ def tasks(tasks_file):
 
 @pytest.fixture
 def env():
-    made = EmbodiedEnv(tasks=(), obs_mode="text")
+    made = EmbodiedEnv((), obs_mode="text")
     yield made
     made.close()
 
 
 @pytest.fixture
 def short_env():
-    made = EmbodiedEnv(tasks=(), obs_mode="text", max_steps=8)
+    made = EmbodiedEnv((), obs_mode="text", max_steps=8)
     yield made
     made.close()
 

@@ -34,7 +34,7 @@ def make_entry(
     **fields: Any,
 ) -> Entry:
     """An object's metadata: visible, and of the type that its id begins with."""
-    flags = ("isPickedUp", "pickupable", "receptacle", "openable", "toggleable")
+    flags = ("isPickedUp", "pickupable", "receptacle", "openable", "toggleable", "sliceable")
     return {
         "objectId": object_id,
         "objectType": object_id.split("|")[0],

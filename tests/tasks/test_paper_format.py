@@ -2,18 +2,47 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from er_gym.tasks import TaskFileError, verbs
-from er_gym.tasks.generate import generate_tasks
+from er_gym.tasks import AgentPose, KeyAction, Task, TaskFileError, load_suite, task_type, verbs
+from er_gym.tasks.goal import Condition
 from er_gym.tasks.paper_format import read_poses, read_tasks, with_poses, write_poses, write_tasks
-from er_gym.thor import accepts
+from er_gym.tasks.start import ObjectPose, Start
 
 MUG = "Mug|-00.38|+01.09|+03.19"
 SINK = "Sink|-01.39|+00.98|+00.44|SinkBasin"
+OWN = Task(
+    id="FloorPlan4-wash-Mug",
+    type=task_type("long-range tasks with dependency relationships"),
+    scene="FloorPlan4",
+    instruction="Wash that café’s Mug.",
+    name="wash the Mug",
+    key_actions=(
+        KeyAction(verbs.PICKUP, MUG, "", reward=0.5),
+        KeyAction(verbs.PUT, SINK, "SinkBasin", (SINK, MUG)),
+        KeyAction(verbs.END),
+    ),
+    target_objects=(SINK,),
+    related_objects=(MUG,),
+    goal=(
+        Condition("Mug", MUG, inside="SinkBasin", state=(("isDirty", False), ("fill", "water"))),
+        Condition("Plate", held=True),
+        Condition("Faucet", in_reach=True, state=(("isToggled", True),)),
+    ),
+    start=Start(
+        "FloorPlan4-7",
+        {"Mug_1": ObjectPose(-0.3799, 1.1, 3.1868, yaw=359.9999), "Pot_2": ObjectPose(1, 2, 3)},
+        (MUG, "Plate|+01.00|+01.00|+01.00"),
+    ),
+)
+"""A task that has all that the paper's format has no field for."""
+BARE = Task(
+    "look", task_type("single_search"), "FloorPlan301", "Look for a Pen.", (KeyAction(verbs.END),)
+)
 
 
 def paper_task(**changes: Any) -> dict[str, Any]:
@@ -111,16 +140,108 @@ def test_what_a_file_leaves_out_has_its_default(write: Callable[[object], Path])
     assert [action.reward for action in task.key_actions] == [1, 1, 1, 1]
 
 
-def test_generated_tasks_can_be_written_for_the_papers_code(
-    scene_objects: Callable[[str], list[dict[str, Any]]], tmp_path: Path
-) -> None:
-    tasks = list(generate_tasks(scene_objects("FloorPlan1"), "FloorPlan1", accepts))
+def test_generated_tasks_are_written_for_the_papers_code_and_read_again(tmp_path: Path) -> None:
+    tasks = list(load_suite("mini").tasks)
     path = tmp_path / "own.json"
     write_tasks(path, tasks)
-    again = read_tasks(path)
-    assert [task.extra["identity"] for task in again] == list(range(1, len(tasks) + 1))
-    assert [task.key_actions for task in again] == [task.key_actions for task in tasks]
-    assert [task.instruction for task in again] == [task.instruction for task in tasks]
+    assert read_tasks(path) == tasks
+    data = json.loads(path.read_text(encoding="utf-8"))
+    assert [task["identity"] for task in data] == list(range(1, len(tasks) + 1))
+    assert [task["taskquery"] for task in data] == [task.instruction for task in tasks]
+
+
+OWN_TASKS = {
+    "all fields": OWN,
+    "few fields": BARE,
+    "an id as the paper's": replace(BARE, id="paper-1"),
+    "an identity": replace(OWN, extra={"identity": 3}),
+    "an identity that the id repeats": replace(OWN, id="paper-3", extra={"identity": 3}),
+    "more fields": replace(OWN, extra={"colour": "blue", "sizes": [1, {"a": None}]}),
+    "fields that have a place": replace(OWN, extra={"scene": "FloorPlan9", "er_gym": 1}),
+    "metadata": replace(OWN, extra={"task_metadata": {"totalreward": 9, "actions": 0}}),
+    "odd metadata": replace(OWN, extra={"task_metadata": 1, "actions": [1, {"reward": 7}, {}]}),
+    "no words": replace(OWN, instruction="", goal=(), start=Start()),
+    "dirty alone": replace(BARE, start=Start(dirty=(MUG,))),
+    "poses without a name": replace(BARE, start=Start(poses={"Mug_1": ObjectPose(1, 2, 3)})),
+    "a goal alone": replace(BARE, goal=(Condition("Pen", in_reach=True),)),
+}
+
+
+@pytest.mark.parametrize("task", OWN_TASKS.values(), ids=OWN_TASKS)
+def test_writing_and_reading_gives_back_tasks_of_any_origin(task: Task, tmp_path: Path) -> None:
+    path, again = tmp_path / "own.json", tmp_path / "again.json"
+    write_tasks(path, [task])
+    assert read_tasks(path) == [task]
+    write_tasks(again, read_tasks(path))
+    assert json.loads(again.read_text()) == json.loads(path.read_text())
+
+
+def test_the_papers_tasks_stay_equal_whatever_becomes_of_them(
+    write: Callable[[object], Path], tmp_path: Path
+) -> None:
+    (task,) = read_tasks(write([paper_task()]))
+    tasks = [
+        task,
+        replace(task, id="again"),
+        replace(task, id="paper-58", extra={**task.extra, "identity": 58}, goal=OWN.goal),
+        replace(task, id="short", key_actions=task.key_actions[1:]),
+        replace(task, id="other", key_actions=task.key_actions[::-1]),
+    ]
+    path = tmp_path / "changed.json"
+    write_tasks(path, tasks)
+    assert read_tasks(path) == tasks
+    data = json.loads(path.read_text())
+    assert data[0] == paper_task()
+    assert set(data[2]["er_gym"]) == {"goal"}
+
+
+def test_what_the_papers_format_has_no_field_for_lies_under_one_key(tmp_path: Path) -> None:
+    path = tmp_path / "own.json"
+    write_tasks(path, [OWN, BARE])
+    own, bare = json.loads(path.read_text(encoding="utf-8"))
+    assert own["er_gym"] == {
+        "id": OWN.id,
+        "goal": [
+            {
+                "object_type": "Mug",
+                "object_id": MUG,
+                "inside": "SinkBasin",
+                "state": {"isDirty": False, "fill": "water"},
+            },
+            {"object_type": "Plate", "held": True},
+            {"object_type": "Faucet", "in_reach": True, "state": {"isToggled": True}},
+        ],
+        "layout": "FloorPlan4-7",
+        "layout_poses": {
+            "Mug_1": [-0.3799, 1.1, 3.1868, 0.0, 359.9999, 0.0],
+            "Pot_2": [1, 2, 3, 0.0, 0.0, 0.0],
+        },
+        "dirty": list(OWN.start.dirty),
+    }
+    assert bare["er_gym"] == {"id": "look"}
+
+
+def test_a_place_that_is_anothers_identity_is_not_given_twice(tmp_path: Path) -> None:
+    pose = AgentPose(0.25, 0.9, -1.5, 180.0)
+    tasks = [
+        replace(BARE, id="a", extra={"identity": 2}, poses={MUG: pose}),
+        replace(BARE, id="b", poses={SINK: pose}),
+        replace(BARE, id="c"),
+    ]
+    write_tasks(tmp_path / "tasks.json", tasks)
+    write_poses(tmp_path / "poses.json", tasks)
+    identities = [task["identity"] for task in json.loads((tmp_path / "tasks.json").read_text())]
+    assert identities == [2, 5, 3]
+    again = read_tasks(tmp_path / "tasks.json")
+    assert again == [replace(task, poses={}) for task in tasks]
+    assert with_poses(again, read_poses(tmp_path / "poses.json")) == tasks
+
+
+def test_a_task_that_could_not_be_read_again_is_not_written(tmp_path: Path) -> None:
+    path = tmp_path / "tasks.json"
+    with pytest.raises(TaskFileError, match=r"task 2 .*wrong field 'identity"):
+        write_tasks(path, [OWN, replace(BARE, extra={"identity": [1]})])
+    assert not path.exists()
 
 
 def without(field: str) -> dict[str, Any]:
@@ -131,6 +252,10 @@ def with_action(**changes: Any) -> dict[str, Any]:
     task = paper_task()
     task["task_metadata"]["actions"][1].update(changes)
     return task
+
+
+def with_own(**fields: Any) -> list[dict[str, Any]]:
+    return [paper_task(er_gym=fields)]
 
 
 WRONG = {
@@ -150,6 +275,23 @@ WRONG = {
     "scene": ([paper_task(scene="FloorPlan31")], "unknown scene 'FloorPlan31'; choose one "),
     "verb": ([with_action(action="hop")], "unknown action 'hop'; choose one of: navigate to"),
     "same identity": ([paper_task(), paper_task()], "2 tasks have the id 'paper-57'"),
+    "the generator's": (
+        [paper_task()["task_metadata"]],
+        "not a test file: a task has neither scene nor task_metadata; if the paper's generator",
+    ),
+    "own: no object": (
+        [paper_task(er_gym=[])],
+        "task 1 (identity 57) has a wrong field 'er_gym': input should be",
+    ),
+    "own: unknown field": (with_own(gaol=[]), "has a wrong field 'er_gym.gaol': extra inputs"),
+    "own: no list": (with_own(goal={}), "has a wrong field 'er_gym.goal': input should be"),
+    "own: empty condition": (with_own(goal=[{}]), "lacks field 'er_gym.goal[0].object_type'"),
+    "own: short pose": (
+        with_own(layout_poses={"Mug_1": [1, 2, 3]}), "lacks field 'er_gym.layout_poses.Mug_1[3]'",
+    ),
+    "own: id": (with_own(id="a/b"), "the task id 'a/b' cannot be a file name"),
+    "own: type": (with_own(type="dance"), "unknown tasktype 'dance'; choose one of: "),
+    "own: scene": (with_own(scene="Home"), "unknown scene 'Home'; choose one of FloorPlan1-30"),
     "bad identity": ([paper_task(identity="../x")], "cannot be a file name"),
 }  # fmt: skip
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gzip
 import json
 from collections import Counter
 from collections.abc import Callable
@@ -16,14 +17,15 @@ from er_gym.tasks import (
     TaskFileError,
     load_suite,
     suite_from_file,
-    suite_names,
     task_type,
     verbs,
 )
 from er_gym.tasks.generate import GENERATED_TYPES
+from er_gym.tasks.goal import Condition
 from er_gym.tasks.jsonl_format import FORMAT, digest, read_tasks, write_tasks
 from er_gym.tasks.paper_format import write_tasks as write_paper_tasks
 from er_gym.tasks.rooms import ROOM_KINDS, room_kind
+from er_gym.tasks.start import ObjectPose, Start
 
 PLATE = "Plate|+00.96|+01.65|-02.61"
 TASK = Task(
@@ -95,6 +97,14 @@ WRONG = {
     "newer": ([{**HEADER, "format": "er-gym/tasks/9"}], "format 'er-gym/tasks/9'; this er-gym"),
     "cut short": ([HEADER], "its header says 1 tasks, and it has 0"),
     "not JSON": ([HEADER, "", '{"id": '], "not JSON: Expecting value (line 3, column 8)"),
+    "no layout": (
+        [HEADER, {**TASK_LINE, "key_actions": [], "layout": "x"}],
+        "the task in line 2 begins with a layout that no line before it tells",
+    ),
+    "wrong layout": (
+        [HEADER, {"layout": "x", "poses": {"Apple": [1, 2]}}],
+        "the layout in line 2 lacks field 'poses.Apple[2]'",
+    ),
     "lacks field": ([HEADER, TASK_LINE], "the task in line 2 lacks field 'key_actions'"),
     "misspelled": (
         [HEADER, {**TASK_LINE, "key_actions": [], "poise": 1}],
@@ -118,7 +128,7 @@ def test_a_wrong_file_gives_one_clear_line(
 
 
 def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(TaskFileError, match=r"ends in \.json \(the paper's format\) or \.jsonl"):
+    with pytest.raises(TaskFileError, match=r"ends in \.json \(the paper's format\), \.jsonl or"):
         suite_from_file(tmp_path / "tasks.csv")
 
 
@@ -129,12 +139,68 @@ def test_an_unknown_suite_is_answered_with_those_there_are() -> None:
         load_suite("../mini")
 
 
-@pytest.mark.parametrize("name", suite_names())
+def test_a_suite_that_is_not_made_says_how_to_make_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ER_GYM_HOME", str(tmp_path))
+    with pytest.raises(TaskFileError, match="run: er-gym tasks generate --suite train"):
+        load_suite("train")
+    (tmp_path / "suites").mkdir()
+    write_tasks(tmp_path / "suites" / "train.jsonl.gz", [TASK])
+    assert load_suite("train").tasks == (TASK,)
+
+
+MOVED = Start("FloorPlan1-7", {"Apple_1": ObjectPose(1.0, 0.9, -1.25, yaw=90.0)})
+
+
+def test_a_start_and_a_goal_are_kept(tmp_path: Path) -> None:
+    path = tmp_path / "own.jsonl.gz"
+    goal = (
+        Condition("Cup", held=True, state=(("isDirty", False), ("fillLiquid", "water"))),
+        Condition("Plate", PLATE, in_reach=True, inside="Shelf"),
+    )
+    first = replace(TASK, goal=goal, start=replace(MOVED, dirty=(PLATE,)))
+    tasks = [first, replace(first, id="b", start=MOVED), replace(first, id="c", start=Start())]
+    write_tasks(path, tasks)
+    assert read_tasks(path) == tasks
+    lines = gzip.decompress(path.read_bytes()).decode().splitlines()
+    assert [("poses" in line) for line in lines].count(True) == 4  # the layout, and three tasks'
+    assert sum('"layout":' in line and '"id":' not in line for line in lines) == 1
+    assert digest(tasks) != digest([replace(first, start=Start()), *tasks[1:]])
+
+
+def test_one_name_for_two_arrangements_is_refused(tmp_path: Path) -> None:
+    other = replace(TASK, id="b", start=replace(MOVED, poses={"Apple_1": ObjectPose(0, 0, 0)}))
+    with pytest.raises(ValueError, match="task b: another arrangement is named 'FloorPlan1-7'"):
+        write_tasks(tmp_path / "own.jsonl", [replace(TASK, start=MOVED), other])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_same_tasks_give_the_same_bytes(tmp_path: Path) -> None:
+    one, other = tmp_path / "one.jsonl.gz", tmp_path / "other.jsonl.gz"
+    write_tasks(one, [TASK])
+    write_tasks(other, [TASK])
+    assert one.read_bytes() == other.read_bytes()
+
+
+def test_what_is_no_whole_gzip_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "cut.jsonl.gz"
+    write_tasks(path, [TASK])
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(TaskFileError, match="not a whole gzip file"):
+        read_tasks(path)
+    path.write_text("hello")
+    with pytest.raises(TaskFileError, match="not a whole gzip file"):
+        read_tasks(path)
+
+
+@pytest.mark.parametrize("name", ["mini", "er-1k"])
 def test_a_bundled_suite_loads(name: str, repository: Path) -> None:
     suite = load_suite(name)
     assert (suite.name, suite.digest) == (name, digest(suite.tasks))
     config = yaml.safe_load((repository / "configs" / "suites" / f"{name}.yaml").read_text())
     assert (suite.description, suite.env) == (config["description"], config["env"])
+    assert suite.env == load_suite("mini").env
     assert not any(task.navigable_objects or task.poses for task in suite.tasks)
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from er_gym.sim.scene import PROPERTIES
 from er_gym.sim.space.shapes.families import family
 from er_gym.sim.world import World
 
 _FLOOR = [0, 2]
+_RECEPTACLE = PROPERTIES.index("receptacle")
 _BESIDE = 0.02
 """How far the middle of a thing may be off what it lies on, metres: recorded boxes are rough."""
 _SLACK = 0.06
@@ -28,8 +30,11 @@ def receptacles_of(world: World, i: int) -> tuple[int, ...]:
     """
     within = {i, *world.inside(i)}
     found = []
-    for r in np.flatnonzero(world.exists).tolist():
-        if r not in within and world.has(r, "receptacle"):
+    # What is not even near on the floor plan need not be looked at one by one.
+    low, high = world.low[:, _FLOOR], world.high[:, _FLOOR]
+    near = ((low[i] <= high + _SLACK) & (high[i] >= low - _SLACK)).all(axis=1)
+    for r in np.flatnonzero(near & world.exists & world.properties[:, _RECEPTACLE]).tolist():
+        if r not in within:
             fit = _fit(world, r, i)
             if fit is not None:
                 area = float(np.prod((world.high[r] - world.low[r])[_FLOOR]))

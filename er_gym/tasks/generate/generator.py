@@ -3,62 +3,213 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from er_gym.tasks import verbs
-from er_gym.tasks.generate.plan import Plan
-from er_gym.tasks.generate.room import Accepts, read_room
-from er_gym.tasks.generate.rules import RULES, Rule
-from er_gym.tasks.generate.words import a, it
+from er_gym.tasks.generate.plan import Plan, Row
+from er_gym.tasks.generate.room import Accepts, Room, Thing, read_room
+from er_gym.tasks.generate.rules import ROWS
+from er_gym.tasks.generate.script import Impossible
+from er_gym.tasks.generate.words import a, in_the, is_are, it
+from er_gym.tasks.goal import Condition, unmet
 from er_gym.tasks.rooms import room_kind
+from er_gym.tasks.start import Start, begin, shuffled
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME
+from er_gym.thor import accepts as thor_accepts
+
+AMBIGUOUS = "the words fit several objects, which ask for different actions"
+DONE_ALREADY = "the goal holds from the start"
+SAME_PLACES = "one type would name two places"
+
+
+def arranged(controller: Any, scene: str, seed: int) -> Generator:
+    """The generator for a room in one of its arrangements; 0 is the recorded one."""
+    start = shuffled(controller, scene, seed) if seed else Start()
+    return Generator(scene, begin(controller, scene, start).metadata["objects"], start)
+
+
+@dataclass(frozen=True)
+class Generator:
+    """Makes the tasks of a scene as it is when an episode begins.
+
+    Args:
+        scene: its name, such as ``FloorPlan1``.
+        objects: ``event.metadata["objects"]``.
+        start: how the scene was arranged.
+        accepts: whether a thing of one type may be put into a receptacle of another.
+        rows: what to make.
+        dropped: counts the reasons for which tasks were not made.
+    """
+
+    scene: str
+    objects: Sequence[Mapping[str, Any]]
+    start: Start = field(default_factory=Start)
+    accepts: Accepts = thor_accepts
+    rows: Sequence[Row] = ROWS
+    dropped: Counter[str] = field(default_factory=Counter)
+
+    @cached_property
+    def room(self) -> Room:
+        """The scene as the rules see it."""
+        return read_room(self.objects, self.accepts)
+
+    def tasks(self, types: Collection[str] = ()) -> Iterator[Task]:
+        """Yield the candidate tasks, row by row; the same for the same arguments.
+
+        Args:
+            types: names of task types; all where it is empty.
+        """
+        for row in self.rows:
+            if not types or row.type in types:
+                for choice in row.choices(self.room):
+                    task = self._candidate(row, choice)
+                    if isinstance(task, Task):
+                        yield task
+                    elif task:
+                        self.dropped[task] += 1
+
+    def request(self, type_name: str, *object_ids: str) -> Task:
+        """The task of a type about given objects, whether or not the rules would choose them.
+
+        Args:
+            object_ids: what is handled and where it goes, in the order of the instruction: one for
+                a search, a pickup or a toggle, two for a transfer, four for two transfers.
+
+        Raises:
+            ValueError: no such type is generated on request, the scene has no such object, or their
+                number is wrong.
+        """
+        row = next((row for row in self.rows if row.type == type_name and not row.slug), None)
+        if row is None:
+            known = ", ".join(row.type for row in self.rows if not row.slug)
+            raise ValueError(f"no {type_name!r} tasks are made on request; choose one of: {known}")
+        unknown = [i for i in object_ids if i not in self.room.things]
+        if unknown:
+            raise ValueError(f"{self.scene} has no object {unknown[0]!r} when the task begins")
+        things = [self.room.things[object_id] for object_id in object_ids]
+        try:
+            plan = row.plan(self.room, *things)
+        except (TypeError, Impossible) as error:
+            raise ValueError(
+                f"no {type_name!r} task about {len(things)} objects: {error}"
+            ) from None
+        return self._task(row, plan, ())
+
+    def _candidate(self, row: Row, choice: tuple[Thing, ...]) -> Task | str:
+        """The task of a choice; or why there is none, "" if it is the same as another's."""
+        plan = row.plan(self.room, *choice)
+        if not plan.names_one_place_each:
+            return SAME_PLACES
+        named: list[Thing] = []
+        for subject in plan.subjects:
+            others = self.room.others(subject)
+            if not others:
+                continue
+            if self._interchangeable(row, choice, plan, subject, others):
+                if self._comes_first(subject, others):
+                    continue
+                return ""
+            if not row.names_places or not self._told_by_place(subject, others):
+                return AMBIGUOUS
+            named.append(subject)
+        task = self._task(row, plan, named)
+        # Of a search one cannot tell without looking; its target is never in sight and reach of
+        # everywhere.
+        standing = [condition for condition in task.goal if not condition.in_reach]
+        if standing and not task.start.dirty and not unmet(standing, self.objects):
+            return DONE_ALREADY
+        return task
+
+    def _interchangeable(
+        self, row: Row, choice: tuple[Thing, ...], plan: Plan, subject: Thing, others: list[Thing]
+    ) -> bool:
+        """Whether any thing of the subject's type would do: each asks for the same actions."""
+        if any(not unmet((each,), self.objects) for each in _about(plan.goal, subject)):
+            return False
+        for other in others:
+            swapped = tuple(other if thing == subject else thing for thing in choice)
+            try:
+                if row.plan(self.room, *swapped).scored != plan.scored:
+                    return False
+            except Impossible:
+                return False
+        return True
+
+    def _comes_first(self, subject: Thing, others: list[Thing]) -> bool:
+        """Whether it is the one that stands for all the interchangeable ones."""
+        order = list(self.room.things)
+        qualify = [t for t in others if self.room.is_exposed(t) or self.room.is_enclosed(t)]
+        return all(order.index(subject.id) < order.index(other.id) for other in qualify)
+
+    def _told_by_place(self, subject: Thing, others: list[Thing]) -> bool:
+        """Whether the type of what it lies in tells it from the others."""
+        place = self.room.place_of(subject)
+        holders = {parent.type for other in others for parent in self.room.parents(other)}
+        return place != subject and place.type not in holders
+
+    def _task(self, row: Row, plan: Plan, named: Sequence[Thing]) -> Task:
+        task_id = self._id(row, plan, named)
+        words = {**self._words(plan, named), **plan.words}
+        sayings = row.sayings(words)
+        gone_to = [action.object_id for action in plan.key_actions if action.verb == verbs.NAVIGATE]
+        ids = {thing.type: thing.id for thing in named}
+        return Task(
+            id=task_id,
+            type=BY_NAME[row.type],
+            scene=self.scene,
+            # Not hash(): that differs from process to process.
+            instruction=sayings[zlib.crc32(task_id.encode()) % len(sayings)],
+            name=sayings[0],
+            key_actions=plan.key_actions,
+            target_objects=tuple(dict.fromkeys(gone_to)),
+            related_objects=plan.related,
+            goal=tuple(
+                replace(condition, object_id=ids.get(condition.object_type, ""))
+                for condition in plan.goal
+            ),
+            start=replace(self.start, dirty=plan.dirty),
+        )
+
+    def _id(self, row: Row, plan: Plan, named: Sequence[Thing]) -> str:
+        handled = [
+            action.object_type
+            for action in plan.key_actions
+            if action.verb in (verbs.PICKUP, verbs.PUT, verbs.TOGGLE, verbs.SLICE)
+        ] or [thing.type for thing in plan.subjects]
+        places = [f"from_{self.room.place_of(thing).type}" for thing in named]
+        return "-".join((self.start.layout or self.scene, row.slug or row.type, *handled, *places))
+
+    def _words(self, plan: Plan, named: Sequence[Thing]) -> dict[str, str]:
+        words = {"room": room_kind(self.scene)}
+        for prefix, thing in zip(("", "second_"), plan.subjects, strict=False):
+            name, one = thing.type, a(thing.type)
+            if thing in named:
+                where = in_the(self.room.place_of(thing).type)
+                name = f"{thing.type} that {is_are(thing.type)} {where}"
+                one = f"the {name}"
+            words |= {
+                f"{prefix}object": name,
+                f"{prefix}an_object": one,
+                f"{prefix}it": it(thing.type),
+                f"{prefix}is": is_are(thing.type),
+            }
+        return words
+
+
+def _about(goal: Sequence[Condition], thing: Thing) -> list[Condition]:
+    return [c for c in goal if c.object_type == thing.type and not (c.in_reach or c.held)]
 
 
 def generate_tasks(
-    objects: Sequence[Mapping[str, Any]], scene: str, accepts: Accepts
+    objects: Sequence[Mapping[str, Any]],
+    scene: str,
+    accepts: Accepts = thor_accepts,
+    start: Start = Start(),  # noqa: B008  (frozen)
 ) -> Iterator[Task]:
-    """Yield the candidate tasks of a scene, type by type; the same for the same arguments.
-
-    Args:
-        objects: ``event.metadata["objects"]`` of the scene as it is when an episode begins.
-        scene: its name, such as ``FloorPlan1``.
-        accepts: whether a thing of one type may be put into a receptacle of another;
-            ``er_gym.thor.accepts`` is AI2-THOR's answer.
-    """
-    room = read_room(objects, accepts)
-    for rule in RULES:
-        for plan in rule.plans(room):
-            if plan.names_one_place_each:
-                yield _task(rule, plan, scene)
-
-
-def _task(rule: Rule, plan: Plan, scene: str) -> Task:
-    subjects = [
-        action.object_type
-        for action in plan.key_actions
-        if action.verb in (verbs.PICKUP, verbs.PUT, verbs.TOGGLE)
-    ] or [thing.type for thing in plan.handled]
-    task_id = "-".join((scene, rule.slug or rule.type, *subjects))
-    subject = plan.handled[0].type
-    words = {
-        "object": subject,
-        "an_object": a(subject),
-        "it": it(subject),
-        "room": room_kind(scene),
-        **plan.words,
-    }
-    # Not hash(): that differs from process to process.
-    template = rule.templates[zlib.crc32(task_id.encode()) % len(rule.templates)]
-    gone_to = [action.object_id for action in plan.key_actions if action.verb == verbs.NAVIGATE]
-    return Task(
-        id=task_id,
-        type=BY_NAME[rule.type],
-        scene=scene,
-        instruction=template.format_map(words),
-        name=rule.templates[0].format_map(words),
-        key_actions=plan.key_actions,
-        target_objects=tuple(dict.fromkeys(gone_to)),
-        related_objects=tuple(thing.id for thing in plan.handled),
-    )
+    """Yield the candidate tasks of a scene: :meth:`Generator.tasks`."""
+    return Generator(scene, objects, start, accepts).tasks()

@@ -1,27 +1,51 @@
-"""Plans of doing something to one thing where it is: take it, switch it."""
+"""Doing something to one thing where it is: take it, switch it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
-from er_gym.tasks import verbs
-from er_gym.tasks.generate.key_actions import do, fetch, go_to
-from er_gym.tasks.generate.plan import Plan, make_plan
-from er_gym.tasks.generate.room import Room
+from er_gym.tasks.generate.plan import Plan, Row, from_templates, plan_of
+from er_gym.tasks.generate.room import Room, Thing
+from er_gym.tasks.generate.script import Script
+from er_gym.tasks.generate.templates import PICK_UP, TOGGLE
 
 NEVER_TOGGLED = frozenset({"StoveKnob", "StoveBurner", "LightSwitch"})
 
 
-def pickups(room: Room, hidden: bool) -> Iterator[Plan]:
-    """Take each thing that can be carried."""
-    for spot in room.carried(hidden):
-        yield make_plan(fetch(spot), [spot.thing])
+def pickup(room: Room, thing: Thing) -> Plan:
+    """Take a thing."""
+    script = Script(room)
+    script.fetch(thing)
+    return plan_of(script, thing)
 
 
-def toggles(room: Room) -> Iterator[Plan]:
-    """Switch each exposed thing that has a switch."""
-    for spot in room.exposed:
-        thing = spot.thing
-        if thing.toggleable and thing.type not in NEVER_TOGGLED:
-            actions = [go_to(spot.place, thing), do(verbs.TOGGLE, thing)]
-            yield make_plan(actions, [thing], way="off" if thing.on else "on")
+def toggle(room: Room, thing: Thing) -> Plan:
+    """Switch a thing."""
+    script = Script(room)
+    script.switch(thing)
+    return plan_of(script, thing, way="off" if thing.on else "on")
+
+
+def _carried(room: Room, hidden: bool) -> Iterator[tuple[Thing]]:
+    return ((thing,) for thing in room.carried(hidden))
+
+
+def _switches(room: Room) -> Iterator[tuple[Thing]]:
+    for thing in room.things.values():
+        if thing.toggleable and thing.type not in NEVER_TOGGLED and room.is_exposed(thing):
+            yield (thing,)
+
+
+ROWS = (
+    *(
+        Row(
+            name,
+            choices=partial(_carried, hidden=hidden),
+            plan=pickup,
+            sayings=from_templates(PICK_UP),
+        )
+        for name, hidden in (("single_pickup", False), ("single_pickup_from_closerep", True))
+    ),
+    Row("single_toggle", choices=_switches, plan=toggle, sayings=from_templates(TOGGLE)),
+)

@@ -1,17 +1,23 @@
-"""A scene as the rules see it: its things, and the spots where one finds them."""
+"""A scene as the rules see it: an affiliation graph of who lies in what."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import hypot
 from typing import Any, TypeAlias
 
 Accepts: TypeAlias = Callable[[str, str], bool]
 """Whether a thing of the first type may be put into a receptacle of the second."""
 
 NEVER_VISITED = frozenset({"Floor", "Toilet", "Chair", "Stool"})
-"""Receptacle types that no task sends the agent to."""
+"""Receptacle types that no task of its own accord sends the agent to: one stands on the floor
+anyhow, a toilet does not count, and the boxes of chairs and stools reach under tables, so that the
+scenes put things into both."""
+WHOLES = frozenset({"Sink", "Bathtub"})
+"""Receptacle types that nothing is put into: things go into their basins."""
+WATER_REACH = 1.0
+"""A Faucet is a basin's if their middles are so near, metres on the floor plan."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +27,7 @@ class Thing:
     Attributes:
         closed: whether it opens and is shut.
         on: whether it is switched on.
+        controlled: ids of what it is the switch of, as a stove knob is of its burner.
         volume: of its axis-aligned box, m³.
         x, z: the middle of that box, metres, AI2-THOR's world frame.
     """
@@ -34,59 +41,110 @@ class Thing:
     closed: bool
     toggleable: bool
     on: bool
+    controlled: tuple[str, ...]
+    dirtyable: bool
+    fillable: bool
+    cookable: bool
+    sliceable: bool
     volume: float
     x: float
     z: float
 
 
 @dataclass(frozen=True)
-class Spot:
-    """Something to handle, and the receptacle that one goes to for it."""
-
-    thing: Thing
-    place: Thing
-
-
-@dataclass(frozen=True)
 class Room:
-    """A scene's things by id, in scene order, sorted into what the rules speak of."""
+    """A scene's things by id, in scene order.
+
+    Attributes:
+        objects: the metadata that it was read from.
+    """
 
     things: Mapping[str, Thing]
     accepts: Accepts
-    exposed: tuple[Spot, ...] = ()
-    enclosed: tuple[Spot, ...] = ()
+    objects: Sequence[Mapping[str, Any]]
 
     def parents(self, thing: Thing) -> list[Thing]:
         """What a thing lies in, as far as that is in the scene."""
         return [self.things[parent] for parent in thing.parents if parent in self.things]
+
+    def of_type(self, *types: str) -> list[Thing]:
+        """All things of these types."""
+        return [thing for thing in self.things.values() if thing.type in types]
+
+    def others(self, thing: Thing) -> list[Thing]:
+        """All other things of its type."""
+        return [other for other in self.of_type(thing.type) if other != thing]
 
     def stands_free(self, thing: Thing) -> bool:
         """Whether a thing stands on the floor or on nothing."""
         parents = self.parents(thing)
         return not parents or any(parent.type == "Floor" for parent in parents)
 
-    def of_type(self, *types: str) -> list[Thing]:
-        """All things of these types."""
-        return [thing for thing in self.things.values() if thing.type in types]
+    def place_of(self, thing: Thing) -> Thing:
+        """What one goes to for a thing: the receptacle that it lies in, else the thing itself.
 
-    def carried(self, hidden: bool) -> Iterator[Spot]:
-        """Where there are things to pick up: the enclosed ones or the exposed ones."""
-        spots = self.enclosed if hidden else self.exposed
-        return (spot for spot in spots if spot.thing.pickupable)
+        Of several, what is closed comes first, then what stands free, then what is not carried
+        about itself, then what the metadata names first; a chair or the like only if there is
+        nothing else.
+        """
+        parents = [parent for parent in self.parents(thing) if parent.receptacle]
+        fit = [parent for parent in parents if may_visit(parent)] or [
+            parent for parent in parents if parent.type != "Floor"
+        ]
+        if not fit:
+            return thing
+        return max(
+            fit,
+            key=lambda parent: (
+                parent.closed,
+                self.stands_free(parent),
+                not parent.pickupable,
+            ),
+        )
+
+    def is_exposed(self, thing: Thing) -> bool:
+        """Whether it lies in something that does not open and that stands free."""
+        return not any(parent.openable for parent in self.parents(thing)) and any(
+            may_visit(parent) and self.stands_free(parent) for parent in self.parents(thing)
+        )
+
+    def is_enclosed(self, thing: Thing) -> bool:
+        """Whether it lies in something closed that stands free."""
+        return any(
+            parent.receptacle and parent.closed and may_visit(parent) and self.stands_free(parent)
+            for parent in self.parents(thing)
+        )
+
+    def carried(self, hidden: bool) -> Iterator[Thing]:
+        """What there is to pick up: the enclosed things or the exposed ones."""
+        qualifies = self.is_enclosed if hidden else self.is_exposed
+        return (thing for thing in self.things.values() if thing.pickupable and qualifies(thing))
+
+    def is_in(self, thing: Thing, target: Thing) -> bool:
+        """Whether a thing is, or lies in, that target or another part of it (a Sink's basin)."""
+        return any(same_whole(target.id, holder) for holder in (thing.id, *thing.parents))
+
+    def washing_place(self) -> tuple[Thing, Thing] | None:
+        """The SinkBasin and its Faucet, which is off: the scene has one of each, that one can name.
+
+        None where a bathtub's basin is nearer to the Faucet: the water runs into that.
+        """
+        sinks, faucets = self.of_type("SinkBasin"), self.of_type("Faucet")
+        if len(sinks) != 1 or len(faucets) != 1 or faucets[0].on:
+            return None
+        faucet = faucets[0]
+
+        def gap(basin: Thing) -> float:
+            return hypot(basin.x - faucet.x, basin.z - faucet.z)
+
+        nearest = min(self.of_type("SinkBasin", "BathtubBasin"), key=gap)
+        fed = nearest == sinks[0] and gap(nearest) <= WATER_REACH
+        return (nearest, faucet) if fed else None
 
 
 def read_room(objects: Sequence[Mapping[str, Any]], accepts: Accepts) -> Room:
-    """Sort ``metadata["objects"]``; only what is alone of its type gets a spot."""
-    things = {item["objectId"]: _thing(item) for item in objects}
-    counts = Counter(thing.type for thing in things.values())
-    bare = Room(things, accepts)
-    only = [thing for thing in things.values() if counts[thing.type] == 1]
-    return Room(
-        things,
-        accepts,
-        exposed=tuple(spot for thing in only for spot in _exposed(bare, thing)),
-        enclosed=tuple(spot for thing in only for spot in _enclosed(bare, thing)),
-    )
+    """Read ``metadata["objects"]``."""
+    return Room({item["objectId"]: _thing(item) for item in objects}, accepts, objects)
 
 
 def _thing(item: Mapping[str, Any]) -> Thing:
@@ -102,28 +160,15 @@ def _thing(item: Mapping[str, Any]) -> Thing:
         closed=item["openable"] and not item["isOpen"],
         toggleable=item["toggleable"],
         on=item["isToggled"],
+        controlled=tuple(item["controlledObjects"] or ()),
+        dirtyable=item["dirtyable"],
+        fillable=item["canFillWithLiquid"],
+        cookable=item["cookable"],
+        sliceable=item["sliceable"],
         volume=size["x"] * size["y"] * size["z"],
         x=box["center"]["x"],
         z=box["center"]["z"],
     )
-
-
-def _exposed(room: Room, thing: Thing) -> list[Spot]:
-    """Where an exposed thing is gone to: one spot, or none."""
-    parents = room.parents(thing)
-    return [] if any(parent.openable for parent in parents) else _spots(room, thing, parents)
-
-
-def _enclosed(room: Room, thing: Thing) -> list[Spot]:
-    """Where an enclosed thing is gone to: one spot, or none."""
-    closed = [parent for parent in room.parents(thing) if parent.receptacle and parent.closed]
-    return _spots(room, thing, closed)
-
-
-def _spots(room: Room, thing: Thing, parents: Iterable[Thing]) -> list[Spot]:
-    """The largest of those parents that stand free, or nothing."""
-    places = [parent for parent in parents if may_visit(parent) and room.stands_free(parent)]
-    return [Spot(thing, largest(places))] if places else []
 
 
 def largest(things: Iterable[Thing]) -> Thing:
@@ -134,6 +179,11 @@ def largest(things: Iterable[Thing]) -> Thing:
 def may_visit(thing: Thing) -> bool:
     """Whether tasks may send the agent to a thing."""
     return thing.type not in NEVER_VISITED
+
+
+def may_fill(thing: Thing) -> bool:
+    """Whether tasks may put something there, a receptacle given."""
+    return may_visit(thing) and thing.type not in WHOLES
 
 
 def same_whole(one_id: str, other_id: str) -> bool:

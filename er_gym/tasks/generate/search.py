@@ -1,16 +1,35 @@
-"""Plans of searches: go to where a thing is, open what hides it."""
+"""Searches: go to where a thing is, open what hides it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
-from er_gym.tasks.generate.key_actions import go_to, open_if_closed
-from er_gym.tasks.generate.plan import Plan, make_plan
-from er_gym.tasks.generate.room import Room
+from er_gym.tasks.generate.plan import Plan, Row, from_templates, plan_of
+from er_gym.tasks.generate.room import Room, Thing
+from er_gym.tasks.generate.script import Script
+from er_gym.tasks.generate.templates import FIND
+from er_gym.tasks.goal import Condition
 
 
-def searches(room: Room, hidden: bool) -> Iterator[Plan]:
-    """Find each thing that can be carried."""
-    for spot in room.carried(hidden):
-        actions = [go_to(spot.place, spot.thing), *open_if_closed(spot.place)]
-        yield make_plan(actions, [spot.thing])
+def search(room: Room, thing: Thing) -> Plan:
+    """Find a thing."""
+    script = Script(room)
+    script.visit(thing)
+    return plan_of(script, thing, goal=(Condition(thing.type, in_reach=True),))
+
+
+def _each(room: Room, hidden: bool) -> Iterator[tuple[Thing]]:
+    return ((thing,) for thing in room.carried(hidden))
+
+
+ROWS = tuple(
+    Row(
+        name,
+        choices=partial(_each, hidden=hidden),
+        plan=search,
+        sayings=from_templates(FIND),
+        names_places=False,
+    )
+    for name, hidden in (("single_search", False), ("single_search_from_closerep", True))
+)

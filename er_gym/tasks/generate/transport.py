@@ -1,71 +1,76 @@
-"""Plans of transfers: fetch a thing, put it somewhere else."""
+"""Transfers: fetch a thing, put it somewhere else."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from functools import partial
 
-from er_gym.tasks.generate.key_actions import deliver, fetch
-from er_gym.tasks.generate.plan import Plan, make_plan
-from er_gym.tasks.generate.room import Room, Spot, Thing, largest, may_visit, same_whole
+from er_gym.tasks.generate.plan import Plan, Row, from_templates, plan_of
+from er_gym.tasks.generate.room import Room, Thing, largest, may_fill
+from er_gym.tasks.generate.script import Script
+from er_gym.tasks.generate.templates import MOVE
 from er_gym.tasks.generate.words import in_the
 
-WHOLES = frozenset({"Sink", "Bathtub"})
-"""Receptacle types that nothing is put into: things go into their basins."""
+
+def transfer(room: Room, thing: Thing, target: Thing) -> Plan:
+    """Fetch a thing and put it into a target."""
+    script = Script(room)
+    script.fetch(thing)
+    script.put(target)
+    return plan_of(script, thing, place=in_the(target.type))
 
 
-@dataclass(frozen=True)
-class Transfer:
-    """Something to carry, the receptacle that takes it, and the one that one goes to for that."""
-
-    source: Spot
-    target: Thing
-    place: Thing
-
-    @property
-    def handled(self) -> tuple[Thing, ...]:
-        """What it takes hold of or fills that one does not go to itself."""
-        small = (self.target,) if self.target != self.place else ()
-        return (self.source.thing, *small)
+def transfers(room: Room, hidden: bool) -> Iterator[tuple[Thing, Thing]]:
+    """Every exposed or enclosed thing, with one target of each receptacle type that takes it."""
+    targets = [target for group in _by_type(room) if (target := _target_of(room, group))]
+    for thing in room.carried(hidden):
+        for target in targets:
+            if room.accepts(thing.type, target.type) and not room.is_in(thing, target):
+                yield thing, target
 
 
-def transfer_plans(room: Room, hidden: bool, into_closed: bool) -> Iterator[Plan]:
-    """Every transfer of an enclosed or exposed thing to a closed target or another one."""
-    for move in transfers(room, hidden):
-        if move.target.closed == into_closed:
-            yield make_plan(
-                [*fetch(move.source), *deliver(move.target, move.place)],
-                move.handled,
-                place=in_the(move.target.type),
-            )
+def _target_of(room: Room, group: list[Thing]) -> Thing | None:
+    """The largest of some receptacles of one type, if a transfer may go there.
+
+    None may be open where another is shut: the words do not say which.
+    """
+    alike = len({thing.closed for thing in group}) == 1
+    fit = [thing for thing in group if _is_target(room, thing)]
+    return largest(fit) if fit and alike else None
 
 
-def transfers(room: Room, hidden: bool) -> Iterator[Transfer]:
-    """Every thing to carry, with one target of each receptacle type that takes it."""
-    # What can be carried is gone to where it stands, unless that is the floor.
-    standing_on = {spot.thing: spot.place for spot in room.carried(hidden=False)}
-    targets = [thing for thing in room.things.values() if _is_target(room, thing, standing_on)]
-    largest_ones = [largest(group) for group in _by_type(targets)]
-    for source in room.carried(hidden):
-        for target in largest_ones:
-            if room.accepts(source.thing.type, target.type) and not is_in(source, target):
-                yield Transfer(source, target, standing_on.get(target, target))
+def _is_target(room: Room, thing: Thing) -> bool:
+    """Whether transfers may go to a thing: a receptacle that stands somewhere one can say.
+
+    What can be carried is gone to where it stands, unless that is the floor.
+    """
+    return (thing.receptacle and may_fill(thing)) and (
+        not thing.pickupable or room.is_exposed(thing) or room.stands_free(thing)
+    )
 
 
-def _is_target(room: Room, thing: Thing, portable: Container[Thing]) -> bool:
-    """Whether transfers may go to a thing: a receptacle that stands somewhere one can say."""
-    fits = thing.receptacle and may_visit(thing) and thing.type not in WHOLES
-    return fits and (not thing.pickupable or thing in portable or room.stands_free(thing))
-
-
-def _by_type(things: Iterable[Thing]) -> Iterable[list[Thing]]:
+def _by_type(room: Room) -> Iterable[list[Thing]]:
     groups: dict[str, list[Thing]] = {}
-    for thing in things:
+    for thing in room.things.values():
         groups.setdefault(thing.type, []).append(thing)
     return groups.values()
 
 
-def is_in(source: Spot, target: Thing) -> bool:
-    """Whether a thing is, or lies in, that target or another part of it (a Sink and its basin)."""
-    holders = (source.thing.id, source.place.id, *source.thing.parents)
-    return any(same_whole(target.id, holder) for holder in holders)
+def _moves(room: Room, hidden: bool, into_closed: bool) -> Iterator[tuple[Thing, Thing]]:
+    return (move for move in transfers(room, hidden) if move[1].closed == into_closed)
+
+
+ROWS = tuple(
+    Row(
+        name,
+        choices=partial(_moves, hidden=hidden, into_closed=into_closed),
+        plan=transfer,
+        sayings=from_templates(MOVE),
+    )
+    for name, hidden, into_closed in (
+        ("pickup_and_put", False, False),
+        ("pickup_and_put_in_closerep", False, True),
+        ("pickup_from_closerep_and_put", True, False),
+        ("pickup_from_closerep_and_put_in_closerep", True, True),
+    )
+)

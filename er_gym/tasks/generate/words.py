@@ -1,4 +1,4 @@
-"""English for object types: articles, pronouns, prepositions."""
+"""English for object types: articles, pronouns, verbs, prepositions."""
 
 from __future__ import annotations
 
@@ -7,14 +7,21 @@ HOLLOW = frozenset({
     "BathtubBasin", "Bowl", "Box", "Cabinet", "CoffeeMachine", "Cup", "Drawer", "Fridge",
     "GarbageCan", "LaundryHamper", "Microwave", "Mug", "Pan", "Pot", "Safe", "SinkBasin", "Toaster",
 })
-# fmt: on
-"""Receptacle types that things are "in"; they are "on" the others."""
+"""Receptacle types that things are "in"; they are "on" the others.
 
-PLURAL = frozenset({"Boots"})
+Bathtub, Sink and Toilet are not among them: in the 120 scenes, what one can pick up from these lies
+on the rim or the closed lid. What lies further down is in a BathtubBasin or a SinkBasin.
+"""
+
+PLURAL = frozenset({"Blinds", "Boots", "Curtains"})
 """Types that are spoken of as "them"."""
 
-UNCOUNTED = frozenset({"AluminumFoil", "Bread", "Lettuce", "TableTopDecor", "ToiletPaper"})
+UNCOUNTED = frozenset({
+    "AluminumFoil", "AppleSliced", "Bread", "BreadSliced", "Lettuce", "LettuceSliced",
+    "PotatoSliced", "RoomDecor", "TableTopDecor", "ToiletPaper", "TomatoSliced",
+})
 """Types that, like the plural ones, take "some" where others take "a" or "an"."""
+# fmt: on
 
 
 def a(object_type: str) -> str:
@@ -27,6 +34,11 @@ def a(object_type: str) -> str:
 def it(object_type: str) -> str:
     """The pronoun for a thing of a type: "it" or "them"."""
     return "them" if object_type in PLURAL else "it"
+
+
+def is_are(object_type: str) -> str:
+    """The verb for a thing of a type: "is" or "are"."""
+    return "are" if object_type in PLURAL else "is"
 
 
 def in_the(receptacle_type: str) -> str:

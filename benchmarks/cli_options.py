@@ -1,0 +1,34 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import click
+
+workers_option = click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    default=os.cpu_count() or 1,
+    help="How many processes.  [default: one for each processor]",
+)
+
+
+def split(*lists: str | None) -> list[str]:
+    """The words of comma-separated lists."""
+    return [word.strip() for text in lists for word in (text or "").split(",") if word.strip()]
+
+
+class Span(click.ParamType):
+    """``3``, ``2-5`` or ``4-``: from and to, both included."""
+
+    name = "A-B"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[float, float | None]:
+        low, dash, high = str(value).partition("-")
+        try:
+            start = float(low)
+            return start, (float(high) if high else None) if dash else start
+        except ValueError:
+            self.fail(f"{value!r} is no range; give a number, A-B, or A- for no end", param, ctx)

@@ -1,0 +1,167 @@
+"""``er-gym tasks``: make tasks, check them, read them, count them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from benchmarks.cli_errors import BadInput, bad_input
+from benchmarks.cli_generate import generate
+from benchmarks.cli_options import split, workers_option
+
+if TYPE_CHECKING:
+    from er_gym.tasks.suites import Suite
+
+
+@click.group()
+def tasks() -> None:
+    """Make tasks, check that they can be done, read them, count them."""
+
+
+tasks.add_command(generate)
+
+
+@tasks.command()
+@click.argument("suites", nargs=-1, required=True, metavar="SUITE|FILE...")
+@workers_option
+def verify(suites: tuple[str, ...], workers: int) -> int:
+    """Play every task with the solver, and say which cannot be done.
+
+    Exit code 1 if there is one. The solver knows the key actions; it must succeed from the task's
+    own start, within the step limit, and earn the whole reward.
+    """
+    from contextlib import closing
+
+    from rich.console import Console
+
+    from benchmarks.pool import Lost, do_jobs
+    from benchmarks.progress import Progress
+    from er_gym.envs.verify import Verifier
+    from er_gym.tasks.resolve import resolve_tasks
+
+    console = Console(stderr=True)
+    failed = 0
+    for name in suites:
+        with bad_input():
+            suite = _suite(name)
+            todo, _ = resolve_tasks(suite.tasks)
+        solved = 0
+        with (
+            Progress(console, suite.name, len(todo)) as progress,
+            closing(do_jobs(Verifier, todo, workers=workers)) as results,
+        ):
+            for task, verdict in results:
+                problem = "the engine died" if isinstance(verdict, Lost) else verdict.problem
+                solved += not problem
+                progress.episode(not problem)
+                if problem:
+                    detail = "" if isinstance(verdict, Lost) else f": {verdict.detail}"
+                    click.echo(f"{suite.name}: {task.id}: {problem}{detail}")
+        failed += len(todo) - solved
+        click.echo(f"{suite.name}: {solved} of {len(todo)} tasks can be done")
+    return 1 if failed else 0
+
+
+@tasks.command()
+@click.argument("suite", metavar="SUITE|FILE")
+@click.argument("ids", nargs=-1, metavar="[ID...]")
+@click.option(
+    "--limit",
+    type=click.IntRange(min=1),
+    default=3,
+    show_default=True,
+    help=("Without ids: how many of each type."),
+)
+@click.option("--types", metavar="NAMES", help="Without ids: of these types, with commas.")
+def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> None:
+    """Print tasks as a person would want to read them."""
+    from dataclasses import fields
+
+    from er_gym.tasks.difficulty import Difficulty
+    from er_gym.tasks.resolve import resolve_tasks
+    from er_gym.tasks.show import describe
+    from er_gym.tasks.types import BY_NAME, task_type
+
+    with bad_input():
+        every = _suite(suite).tasks
+        if ids:
+            known = {task.id: task for task in every}
+            unknown = [i for i in ids if i not in known]
+            if unknown:
+                some = ", ".join(list(known)[:3])
+                raise BadInput(f"no task {unknown[0]!r} in {suite}; ids are such as {some}")
+            chosen = [known[i] for i in ids]
+        else:
+            kinds = [task_type(name) for name in split(types)] or list(BY_NAME.values())
+            by_kind = [[task for task in every if task.type is kind] for kind in kinds]
+            chosen = [task for of_kind in by_kind for task in of_kind[:limit]]
+        fitted, _ = resolve_tasks(chosen)
+    names = [field.name for field in fields(Difficulty)]
+    pages = []
+    for task in fitted:
+        told = task.extra.get("difficulty")  # whoever wrote the file may mean something else by it
+        known = isinstance(told, Mapping) and all(name in told for name in names)
+        figures = Difficulty(**{name: told[name] for name in names}) if known else None
+        pages.append(describe(task, figures))
+    click.echo("\n\n".join(pages))
+
+
+@tasks.command()
+@click.argument("suite", metavar="SUITE|FILE")
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help=("Draw the charts into this folder, as PNG."),
+)
+def stats(suite: str, out: Path | None) -> None:
+    """Count a suite's tasks by type, room, scene and split, and draw the distributions."""
+    from benchmarks.counts import print_counts
+
+    with bad_input(ImportError):
+        found = _suite(suite)
+        print_counts(found.tasks, {}, by_scene=True)
+        if out is not None:
+            from benchmarks.charts import draw_charts
+
+            for file in draw_charts(found.tasks, out, found.name):
+                click.echo(file)
+
+
+@tasks.command()
+@click.argument("suite", metavar="SUITE|FILE|FOLDER")
+@click.argument("out", metavar="FILE|FOLDER", type=click.Path(path_type=Path))
+def convert(suite: str, out: Path) -> None:
+    """Write tasks in another format, without loss.
+
+    FILE.json is the paper's test file, FILE.jsonl or FILE.jsonl.gz our own; a folder holds the
+    paper's generator files, one for each scene and type, and is read and written as a whole.
+    """
+    from er_gym.tasks import jsonl_format, paper_format
+    from er_gym.tasks.paper_generator import read_generator_tasks, write_generator_tasks
+
+    with bad_input():
+        folder = Path(suite).is_dir()
+        found = read_generator_tasks(suite) if folder else list(_suite(suite).tasks)
+        if out.name.endswith((".jsonl", ".jsonl.gz")):
+            jsonl_format.write_tasks(out, found)
+        elif out.suffix == ".json":
+            paper_format.write_tasks(out, found)
+        elif out.suffix:
+            raise BadInput(f"{out}: give FILE.json, FILE.jsonl, FILE.jsonl.gz or a folder")
+        else:
+            write_generator_tasks(out, found)
+    click.echo(f"{len(found)} tasks: {out}")
+
+
+# -- parts ----------------------------------------------------------------------------------------
+
+
+def _suite(name: str) -> Suite:
+    """A suite by its name, or a task file."""
+    from er_gym.tasks.suites import load_suite, suite_from_file, suite_names
+
+    path = Path(name)
+    return load_suite(name) if name in suite_names() or not path.exists() else suite_from_file(path)

@@ -1,0 +1,90 @@
+"""The ceiling: a player that knows the key actions, and plays them as a careful agent would."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from er_gym.envs.actions import INDEX, STANDS_FOR, Action
+from er_gym.envs.reward import same_type
+from er_gym.tasks import verbs
+from er_gym.tasks.task import KeyAction
+
+
+class Solver:
+    """Does a task's key actions in their order, and what it takes to be able to.
+
+    It goes where a key action leads; if the place is not in sight it looks round, then walks to one
+    thing after another that is, until the place is too. It opens what is closed before it puts
+    something in. What it knows beforehand are the key actions; all else it reads from ``info`` as
+    any agent may. One solver plays one episode.
+    """
+
+    def __init__(self) -> None:
+        self._went: list[str] = []
+        self._looked = False
+        self._tried: dict[KeyAction, int] = {}
+        self._current: KeyAction | None = None
+
+    def next(self, info: Mapping[str, Any]) -> tuple[Action, KeyAction | None]:
+        """The next action, and the key action that it is for; None when all are done.
+
+        Args:
+            info: what the last ``env.reset`` or ``env.step`` returned.
+        """
+        plan = [key for key in info["key_actions_left"] if key.verb != verbs.END]
+        if not plan:
+            return Action(verbs.END), None
+        key = plan[0]
+        if key is not self._current:
+            self._current, self._looked, self._went = key, False, []
+        return self._towards(key, info), key
+
+    def _towards(self, key: KeyAction, info: Mapping[str, Any]) -> Action:
+        name = _name_in(key.actual_type, info["navigable"], info["interactable"])
+        if key.verb == verbs.NAVIGATE:
+            if name in info["navigable"]:
+                return Action(verbs.NAVIGATE, name)
+            return self._explore(info)
+        stuck = info["action"] == Action(key.verb, key.actual_type) and not info["action_success"]
+        if stuck and key.verb == verbs.OPEN and _legal(Action(verbs.TOGGLE, name), info):
+            return Action(verbs.TOGGLE, name)  # an appliance opens only when it is off
+        for candidate in (key.actual_type, STANDS_FOR.get(key.actual_type, key.actual_type)):
+            action = Action(key.verb, candidate)
+            if _legal(action, info):
+                return action
+        if key.verb == verbs.PUT:
+            to_open = Action(verbs.OPEN, name)
+            if _legal(to_open, info):
+                return to_open
+        if name in info["navigable"] and self._tried.get(key, 0) < 2:
+            self._tried[key] = self._tried.get(key, 0) + 1
+            return Action(verbs.NAVIGATE, name)
+        return self._explore(info)
+
+    def _explore(self, info: Mapping[str, Any]) -> Action:
+        """Look round once, then go from thing to thing, those not visited yet first."""
+        if not self._looked:
+            self._looked = True
+            return Action(verbs.OBSERVE)
+        fresh = [name for name in info["navigable"] if name not in self._went]
+        if not fresh:
+            return Action(verbs.MOVE_FORWARD)
+        self._went.append(fresh[0])
+        return Action(verbs.NAVIGATE, fresh[0])
+
+
+def _name_in(wanted: str, *lists: Sequence[str]) -> str:
+    """The spelling under which a type is at hand: a SinkBasin may be there as its Sink."""
+    for names in lists:
+        if wanted in names:
+            return wanted
+        for name in names:
+            if same_type(name, wanted):
+                return name
+    return wanted
+
+
+def _legal(action: Action, info: Mapping[str, Any]) -> bool:
+    index = INDEX.get(action)
+    return index is not None and bool(info["action_mask"][index])

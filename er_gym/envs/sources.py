@@ -1,0 +1,121 @@
+"""Where episodes come from: a list of tasks, a suite, a file, or the generator, live."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Protocol, TypeAlias, runtime_checkable
+
+import numpy as np
+
+from er_gym.tasks.suites import load_suite, suite_file, suite_from_file
+from er_gym.tasks.task import Task
+from er_gym.tasks.types import TaskType
+
+GENERATE = "generate"
+"""The name of the endless source."""
+
+
+@runtime_checkable
+class EpisodeSource(Protocol):
+    """Something that tasks are drawn from."""
+
+    def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
+        """A task, the same for a generator in the same state.
+
+        Args:
+            task_type: of what type, any for None.
+            scene: in which scene, any for None.
+
+        Raises:
+            ValueError: there is none.
+        """
+        ...
+
+    def find(self, task_id: str) -> Task:
+        """The task of an id.
+
+        Raises:
+            ValueError: there is none.
+        """
+        ...
+
+
+Source: TypeAlias = EpisodeSource | Sequence[Task] | str | Path
+
+
+class TaskList:
+    """Draws from a list of tasks, each as likely as any other."""
+
+    def __init__(self, tasks: Sequence[Task], name: str = "this environment") -> None:
+        self.tasks = tuple(tasks)
+        self._name = name
+
+    @cached_property
+    def _fitting(self) -> dict[tuple[str, str], list[Task]]:
+        """The tasks by name of their type and by scene, ``""`` standing for any."""
+        found: defaultdict[tuple[str, str], list[Task]] = defaultdict(list)
+        for task in self.tasks:
+            for kind in (task.type.name, ""):
+                for scene in (task.scene, ""):
+                    found[kind, scene].append(task)
+        return found
+
+    def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
+        """One of the tasks that fit."""
+        kind = task_type.name if task_type else ""
+        fitting = self._fitting.get((kind, scene or ""))
+        if not fitting:
+            asked = " ".join(filter(None, [kind, "tasks", scene and f"in {scene}"]))
+            among = f" among its {len(self.tasks)} tasks" if self.tasks else ""
+            raise ValueError(f"{self._name} has no {asked}{among}")
+        return fitting[int(rng.integers(len(fitting)))]
+
+    def find(self, task_id: str) -> Task:
+        """The task of that id."""
+        for task in self.tasks:
+            if task.id == task_id:
+                return task
+        raise ValueError(f"no task {task_id!r} among the {len(self.tasks)} of {self._name}")
+
+
+def make_source(source: Source) -> EpisodeSource:
+    """What :class:`~er_gym.envs.embodied_env.EmbodiedEnv` draws from.
+
+    Args:
+        source: a list of tasks, the name of a suite, the path of a task file (``.json``, ``.jsonl``
+            or ``.jsonl.gz``), ``"generate"``, or an :class:`EpisodeSource`.
+
+    Raises:
+        ValueError: there is no such suite, or the file cannot be used.
+    """
+    if source == GENERATE:
+        # Late: what verifies tasks is made of environments, which are made of sources.
+        from er_gym.envs.live import Live
+
+        return Live()
+    if isinstance(source, str | Path):
+        name = str(source)
+        is_file = "/" in name or name.endswith((".json", ".jsonl", ".jsonl.gz"))
+        path = Path(name).resolve() if is_file else suite_file(name)
+        changed = path.stat().st_mtime_ns if path.exists() else 0
+        return _read(str(path) if is_file else name, is_file, changed)
+    if isinstance(source, EpisodeSource):
+        return source
+    if isinstance(source, Sequence):
+        tasks = [task for task in source if isinstance(task, Task)]
+        if len(tasks) == len(source):
+            return TaskList(tasks)
+    raise ValueError(
+        f"{source!r} is no source of episodes; give a suite's name, a task file, "
+        f"{GENERATE!r}, a list of tasks, or an EpisodeSource"
+    )
+
+
+@lru_cache(maxsize=16)
+def _read(name: str, is_file: bool, changed: int) -> TaskList:
+    """The tasks of a suite or file, read once as long as it does not change."""
+    suite = suite_from_file(name) if is_file else load_suite(name)
+    return TaskList(suite.tasks, f"the suite {suite.name}")

@@ -1,0 +1,125 @@
+"""Whether a task can be done: the solver plays it on the embedded engine."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict, dataclass, replace
+
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.solver import Solver
+from er_gym.tasks import verbs
+from er_gym.tasks.difficulty import difficulty
+from er_gym.tasks.generate import Generator
+from er_gym.tasks.goal import unmet
+from er_gym.tasks.making import Making
+from er_gym.tasks.splits import UNSEEN_TYPES, subject_types
+from er_gym.tasks.task import Task
+from er_gym.tasks.types import TASK_TYPES
+
+REASONS = (
+    "the goal holds from the start",
+    "there is no room to put it",
+    "it is nowhere to be found or out of reach",
+    "the step limit",
+    "the goal does not hold in the end",
+    "a key action is worth nothing",
+)
+(_DONE_ALREADY, _NO_ROOM, _NOT_FOUND, _STEP_LIMIT, _GOAL, _REWARD) = REASONS
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What came of playing a task.
+
+    Attributes:
+        problem: one of :data:`REASONS`, ``""`` for a task that can be done.
+        detail: the last thing that the agent was told.
+        steps: how many it took, the placing of the agent among them.
+        start: x and z of where the agent began, metres.
+    """
+
+    problem: str
+    detail: str
+    steps: int
+    start: tuple[float, float]
+
+    @property
+    def solved(self) -> bool:
+        """Whether the task can be done."""
+        return not self.problem
+
+
+class Verifier:
+    """Plays tasks, one after another, in an environment of its own; close it in the end.
+
+    A task passes if the solver succeeds within the step limit, earns all of the reward, and has
+    something to do: the goal must not hold from the start.
+    """
+
+    def __init__(self) -> None:
+        self._env = EmbodiedEnv((), obs_mode="state")
+        self._starts: dict[str, tuple[float, float]] = {}
+
+    def start_of(self, scene: str) -> tuple[float, float]:
+        """x and z of where episodes in a scene begin, however it is arranged; metres."""
+        if scene not in self._starts:
+            nothing = Task("nothing", TASK_TYPES[0], scene, "", ())
+            self._env.reset(options={"task": nothing})
+            pose = self._env.agent_pose
+            self._starts[scene] = (pose.x, pose.z)
+        return self._starts[scene]
+
+    def __call__(self, task: Task) -> Verdict:
+        """Play a task from its own start."""
+        _, info = self._env.reset(seed=0, options={"task": task})
+        pose = self._env.agent_pose
+        where = (pose.x, pose.z)
+        standing = [condition for condition in task.goal if not condition.in_reach]
+        if standing and not unmet(standing, self._env.objects):
+            return Verdict(_DONE_ALREADY, "", 1, where)
+        solver = Solver()
+        earned, over = 0.0, False
+        while not over:
+            action, _ = solver.next(info)
+            _, reward, terminated, truncated, info = self._env.step(action)
+            earned += float(reward)
+            over = terminated or truncated
+        problem = ""
+        if not info["success"]:
+            problem = _problem(info["end_reason"], info["action"].verb, bool(info["goal_unmet"]))
+        elif abs(earned - task.total_reward) > 1e-6:
+            problem = _REWARD
+        return Verdict(problem, _plain(info["feedback"]), info["steps"], where)
+
+    def close(self) -> None:
+        """Stop the environment."""
+        self._env.close()
+
+
+def unwanted(task: Task, room: Generator, making: Making, verify: Verifier) -> str:
+    """Why a generated task is not one that is wanted, ``""`` if it is; nothing is played."""
+    if not making.unseen_objects and UNSEEN_TYPES & subject_types(task):
+        return "it is about things that training never sees"
+    if making.is_any_difficulty:
+        return ""
+    figures = difficulty(task, room.objects, verify.start_of(task.scene))
+    return "" if making.admits(figures) else "it is not as difficult as asked"
+
+
+def with_difficulty(task: Task, room: Generator, verdict: Verdict) -> Task:
+    """The task, which says in ``extra["difficulty"]`` how hard it is and how many steps it took."""
+    figures = difficulty(task, room.objects, verdict.start)
+    told = {**asdict(figures), "distance": round(figures.distance, 2), "steps": verdict.steps}
+    return replace(task, extra={"difficulty": told})
+
+
+def _problem(end_reason: str, verb: str, goal_unmet: bool) -> str:
+    if goal_unmet:
+        return _GOAL
+    if end_reason == "step limit":
+        return _STEP_LIMIT
+    return _NO_ROOM if verb == verbs.PUT else _NOT_FOUND
+
+
+def _plain(feedback: str) -> str:
+    return re.sub(r"\s+", " ", feedback)

@@ -1,0 +1,95 @@
+"""How a suite is made: the part of its configuration that the generator reads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from er_gym.tasks.difficulty import Difficulty
+from er_gym.tasks.splits import SCENES
+from er_gym.tasks.types import BY_NAME
+from er_gym.thor import SCENE_NAMES
+
+Span = tuple[float, float | None]
+"""From and to, both included; no end for None."""
+
+
+class Making(BaseModel):
+    """What to generate.
+
+    Attributes:
+        total: how many tasks.
+        scenes: a set of rooms by its name (:data:`~er_gym.tasks.splits.SCENES`), or rooms.
+        types: names of task types; all where it is empty.
+        layouts: how many arrangements of each room, beside the recorded one.
+        per_layout: how many tasks of a type are kept of each arrangement, to choose from.
+        unseen_objects: whether tasks may be about the types that training never sees.
+        hidden_depth, distractors, distance: what difficulty tasks may have
+            (:class:`~er_gym.tasks.difficulty.Difficulty`).
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    total: int = Field(gt=0)
+    scenes: str | tuple[str, ...] = "all"
+    types: tuple[str, ...] = ()
+    layouts: int = Field(0, ge=0)
+    per_layout: int = Field(3, gt=0)
+    unseen_objects: bool = True
+    hidden_depth: Span = (0, None)
+    distractors: Span = (0, None)
+    distance: Span = (0, None)
+
+    @field_validator("scenes")
+    @classmethod
+    def _known_scenes(cls, scenes: str | tuple[str, ...]) -> str | tuple[str, ...]:
+        names = () if isinstance(scenes, str) and scenes in SCENES else scenes
+        names = (names,) if isinstance(names, str) else names
+        unknown = [name for name in names if name not in SCENE_NAMES]
+        if unknown or not scenes:
+            raise ValueError(
+                f"unknown scene {''.join(unknown[:1])!r}; "
+                f"give names such as FloorPlan1, or one of: {', '.join(SCENES)}"
+            )
+        return scenes
+
+    @field_validator("types")
+    @classmethod
+    def _known_types(cls, types: tuple[str, ...]) -> tuple[str, ...]:
+        for name in types:
+            if name not in BY_NAME:
+                raise ValueError(f"unknown type {name!r}; choose of: {', '.join(BY_NAME)}")
+        return types
+
+    @field_validator("hidden_depth", "distractors", "distance")
+    @classmethod
+    def _ordered(cls, span: Span) -> Span:
+        low, high = span
+        if not (math.isfinite(low) and (high is None or low <= high < math.inf)):
+            raise ValueError(f"no range: from {low:g} to {high}; give the smaller number first")
+        return span
+
+    @property
+    def rooms(self) -> Sequence[str]:
+        """The rooms, by name."""
+        if isinstance(self.scenes, str):
+            return SCENES.get(self.scenes, (self.scenes,))
+        return tuple(dict.fromkeys(self.scenes))
+
+    @property
+    def is_any_difficulty(self) -> bool:
+        """Whether a task may be as difficult as it likes."""
+        return self.hidden_depth == self.distractors == self.distance == (0, None)
+
+    def admits(self, difficulty: Difficulty) -> bool:
+        """Whether a task may be so difficult."""
+        return all(
+            low <= value <= (math.inf if high is None else high)
+            for value, (low, high) in (
+                (difficulty.hidden_depth, self.hidden_depth),
+                (difficulty.distractors, self.distractors),
+                (difficulty.distance, self.distance),
+            )
+        )

@@ -1,0 +1,253 @@
+"""What the paper's two task formats share: the records, and what these have no field for.
+
+What :class:`~er_gym.tasks.task.Task` has no field for travels in ``Task.extra``:
+
+- ``task_metadata``: what the paper's generator knew of the task, without its list of actions;
+- ``actions``: per key action, what :class:`~er_gym.tasks.task.KeyAction` has no field for.
+
+What the paper's records have no field for travels in :class:`OwnFields`, under the key ``er_gym``.
+The paper's own files have no such key and, read and written again, get none.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, astuple, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+from er_gym.tasks import verbs
+from er_gym.tasks.files import known_scene, known_type, known_verb
+from er_gym.tasks.goal import Condition
+from er_gym.tasks.jsonl_format import ConditionRecord, PoseRecord
+from er_gym.tasks.start import ObjectPose, Start
+from er_gym.tasks.task import AgentPose, KeyAction, Task
+
+_SPELLED = {verbs.PUT: "put"}
+"""Verbs that the paper's task files spell unlike its agents' replies."""
+
+
+class OwnFields(BaseModel):
+    """What the paper's fields do not say of a task; a field left out is as they say.
+
+    Attributes:
+        id: stated also where ``extra`` is not what the paper's fields leave of it; a task that
+            states it has no ``extra`` but the one stated here, and no identity by its place.
+        layout_poses: object name to x, y, z, pitch, yaw and roll.
+        poses: object id to the agent's pose; a test file has its pose file instead.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    id: str | None = None
+    type: str | None = None
+    scene: str | None = None
+    instruction: str | None = None
+    name: str | None = None
+    target_objects: tuple[str, ...] = ()
+    related_objects: tuple[str, ...] = ()
+    navigable_objects: tuple[str, ...] = ()
+    goal: tuple[ConditionRecord, ...] = ()
+    layout: str = ""
+    layout_poses: dict[str, tuple[float, float, float, float, float, float]] = {}
+    dirty: tuple[str, ...] = ()
+    poses: dict[str, PoseRecord] = {}
+    extra: dict[str, Any] = {}
+
+
+_ALIKE = (
+    "id", "instruction", "name", "target_objects", "related_objects", "navigable_objects",
+)  # fmt: skip
+"""Fields that :class:`OwnFields` takes from a task, and gives it, as they are."""
+
+
+class _PaperModel(BaseModel):
+    """Keeps fields that it does not know, so that they can be written again."""
+
+    model_config = ConfigDict(extra="allow")
+
+
+class PaperAction(_PaperModel):
+    """A key action as the paper's files write it."""
+
+    action: str
+    objectId: str
+    objectType: str
+    relatedObject: list[str] = []
+    reward: int | float = 1
+
+
+class PaperMetadata(_PaperModel):
+    """What the paper's generator knew of a task, as its test file repeats it."""
+
+    actions: list[PaperAction]
+
+
+class PaperGenerated(PaperMetadata):
+    """The same as the paper's generator writes it."""
+
+    taskname: str
+    tasktype: str
+    metadatapath: str = ""
+    er_gym: OwnFields = OwnFields()
+
+
+class PaperTask(_PaperModel):
+    """A task as the paper's test file writes it."""
+
+    scene: str
+    tasktype: str
+    taskname: str
+    task_metadata: PaperMetadata
+    taskquery: str | None = None
+    identity: int | str
+    target_objects: list[str] = []
+    related_objects: list[str] = []
+    navigable_objects: list[str] = []
+    er_gym: OwnFields = OwnFields()
+
+
+def key_actions(actions: list[PaperAction], where: str) -> tuple[KeyAction, ...]:
+    """The key actions that are written so; a :class:`TaskFileError` names an unknown verb."""
+    return tuple(
+        KeyAction(
+            verb=known_verb(action.action, where),
+            object_id=action.objectId,
+            object_type=action.objectType,
+            related_objects=tuple(action.relatedObject),
+            reward=action.reward,
+        )
+        for action in actions
+    )
+
+
+def unspoken(action: PaperAction) -> dict[str, Any]:
+    """What of a key action :class:`KeyAction` does not tell, an odd spelling of the verb too."""
+    usual = action.action == _spelled(verbs.canonical_verb(action.action))
+    return unknown(action) | ({} if usual else {"action": action.action})
+
+
+def unknown(model: BaseModel) -> dict[str, Any]:
+    """The fields that a model does not know."""
+    return dict(model.model_extra or {})
+
+
+def metadata_record(task: Task) -> dict[str, Any]:
+    """What the paper's generator would know of a task, but for where the scene's metadata lie."""
+    metadata = task.extra.get("task_metadata")
+    return {
+        "taskname": task.name,
+        "tasktype": task.type.name,
+        "actions": _action_records(task),
+        "totalreward": _plain(task.total_reward),
+        **without(metadata, PaperMetadata),
+    }
+
+
+def without(fields: object, model: type[BaseModel]) -> dict[str, Any]:
+    """Fields without those that a model knows; none, if they are not even a mapping."""
+    if not isinstance(fields, Mapping):
+        return {}
+    return {name: value for name, value in fields.items() if name not in model.model_fields}
+
+
+def own_fields(task: Task, plain: Task) -> dict[str, Any]:
+    """What the paper's fields do not say of a task, as a record under its key, or nothing.
+
+    Args:
+        plain: the task as the paper's fields alone tell it.
+    """
+    own: dict[str, Any] = {
+        name: getattr(task, name)
+        for name in (*_ALIKE, "scene")
+        if getattr(task, name) != getattr(plain, name)
+    }
+    if task.type != plain.type:
+        own["type"] = task.type.name
+    if "id" in own or task.extra != plain.extra:
+        own |= {"id": task.id, "extra": dict(task.extra)}
+    record = OwnFields(
+        **own,
+        goal=tuple(
+            ConditionRecord(**{**vars(condition), "state": dict(condition.state)})
+            for condition in task.goal
+        ),
+        layout=task.start.layout,
+        layout_poses={name: astuple(pose) for name, pose in task.start.poses.items()},
+        dirty=task.start.dirty,
+        poses={key: PoseRecord(**asdict(pose)) for key, pose in task.poses.items()},
+    )
+    fields = record.model_dump(exclude_defaults=True)
+    return {"er_gym": fields} if fields else {}
+
+
+def with_own_fields(plain: Task, own: OwnFields, where: str) -> Task:
+    """The task that the paper's fields, as ``plain``, and our own tell together."""
+    defaults = OwnFields()
+    stated = {
+        name: getattr(own, name) for name in _ALIKE if getattr(own, name) != getattr(defaults, name)
+    }
+    return replace(
+        plain,
+        type=plain.type if own.type is None else known_type(own.type, where),
+        scene=plain.scene if own.scene is None else known_scene(own.scene, where),
+        goal=tuple(
+            Condition(**{**dict(condition), "state": tuple(condition.state.items())})
+            for condition in own.goal
+        ),
+        start=Start(
+            own.layout,
+            {name: ObjectPose(*pose) for name, pose in own.layout_poses.items()},
+            own.dirty,
+        ),
+        poses={key: AgentPose(**dict(pose)) for key, pose in own.poses.items()},
+        extra=plain.extra if own.id is None and not own.extra else own.extra,
+        **stated,
+    )
+
+
+def json_kind(data: object) -> str:
+    """What parsed JSON is, for a message."""
+    kinds = {dict: "an object", list: "a list", str: "a string", type(None): "null"}
+    return kinds.get(type(data), "a number or a truth value")
+
+
+def write_json(path: Path, data: object) -> None:
+    """Write a file as the paper's are laid out."""
+    text = json.dumps(data, indent=4, ensure_ascii=False)
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def _action_records(task: Task) -> list[dict[str, Any]]:
+    rest = task.extra.get("actions")
+    if not isinstance(rest, list) or len(rest) != len(task.key_actions):
+        rest = [{}] * len(task.key_actions)
+    return [
+        {
+            "action": _as_spelled(action.verb, more),
+            "objectId": action.object_id,
+            "objectType": action.object_type,
+            "reward": _plain(action.reward),
+            "relatedObject": list(action.related_objects),
+            **without(more, PaperAction),
+        }
+        for action, more in zip(task.key_actions, rest, strict=True)
+    ]
+
+
+def _as_spelled(verb: str, more: object) -> str:
+    """The verb as the task's file spelled it, unless that was another verb."""
+    odd = more.get("action") if isinstance(more, Mapping) else None
+    return odd if isinstance(odd, str) and verbs.canonical_verb(odd) == verb else _spelled(verb)
+
+
+def _spelled(verb: str) -> str:
+    return _SPELLED.get(verb, verb)
+
+
+def _plain(reward: float) -> int | float:
+    """Whole rewards as the files write them: 1, not 1.0."""
+    return int(reward) if float(reward).is_integer() else reward

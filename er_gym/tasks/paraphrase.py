@@ -1,0 +1,241 @@
+"""The hook by which a language model words instructions anew.
+
+The model is the user's: any function from a prompt to a reply. What it replied is kept in a file,
+so that it is asked once; what is kept is checked anew each time it is used.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import zlib
+from collections.abc import Callable, Collection, Iterator, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import TypeAlias, cast
+
+from pydantic import BaseModel, ConfigDict
+
+from er_gym.tasks.files import validated
+from er_gym.thor import OBJECT_TYPES
+
+Ask: TypeAlias = Callable[[str], str]
+"""A language model: a prompt to its reply."""
+
+LONGEST = 400
+"""Characters that a paraphrase may have."""
+
+PROMPT_VERSION = 1
+"""A part of the key that replies are kept under; a new one has the model asked again."""
+
+_PROMPT = """\
+Here is an instruction for a robot in a home:
+
+{instruction}
+
+Write {count} other ways to say it. Each must mean exactly the same: the same things, the same
+places, the same order, nothing left out and nothing added. Vary the wording: a command, a polite
+request, a question, a statement of what is needed.
+{names}
+Write one instruction on each line, each at most {longest} characters long, beginning with a capital
+letter and ending with a full stop or a question mark. No numbering, no quotation marks, no other
+text.
+"""
+_NAMES = "\nKeep these words spelled exactly as they are, capital letters included: {names}.\n"
+
+_BULLET = re.compile(r"(?:[-*•–—]\s+|\(?\d{1,2}[.):]+\s*)")
+_QUOTES = tuple(zip("\"'“‘«`*", "\"'”’»`*", strict=True))
+_SENTENCES = re.compile(r"[A-Z][^\x00-\x1f\x7f{}]*[a-z][^\x00-\x1f\x7f{}]*[.?!]")
+_WORD = re.compile(r"\w+")
+
+
+class _Entry(BaseModel):
+    """A line of the file of replies."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    key: str
+    instruction: str
+    reply: str
+
+
+class Paraphraser:
+    """Has a model paraphrase instructions, and remembers what it replied.
+
+    Processes may share a file; two that begin with the same instruction at the same time both ask,
+    and later ones use the first reply. Models should not share one: it says nothing of who replied.
+    """
+
+    def __init__(self, ask: Ask, cache: Path | None, count: int = 3) -> None:
+        """Read what was replied before.
+
+        Args:
+            ask: the model; what it raises is not caught.
+            cache: JSON lines of replies, made when the first one comes; None to keep no file.
+            count: how many paraphrases to ask for, and to return at most.
+
+        Raises:
+            ValueError: ``count`` is below 1, or ``cache`` has JSON lines of another kind.
+        """
+        if count < 1:
+            raise ValueError(f"count is {count}; ask for at least 1 paraphrase")
+        self._ask = ask
+        self._cache = cache
+        self._count = count
+        self._replies = {} if cache is None else _read(cache)
+
+    def __call__(self, instruction: str, names: Collection[str]) -> tuple[str, ...]:
+        """Up to ``count`` paraphrases of an instruction; none if the model gave none of use.
+
+        Args:
+            instruction: one line of English.
+            names: what each paraphrase must have, spelled so: object types, perhaps "off".
+
+        Raises:
+            ValueError: the instruction itself lacks one of the names.
+        """
+        if lacking := sorted(name for name in set(names) if not _has(instruction, name)):
+            raise ValueError(
+                f"the instruction {instruction!r} lacks {', '.join(map(repr, lacking))}; "
+                "give names as they stand in it"
+            )
+        prompt = make_prompt(instruction, names, self._count)
+        key = hashlib.sha256(f"{PROMPT_VERSION}\n{prompt}".encode()).hexdigest()
+        if key not in self._replies:
+            entry = _Entry(key=key, instruction=instruction, reply=self._ask(prompt))
+            if self._cache is not None:
+                _append(self._cache, entry)
+            self._replies[key] = entry.reply
+        return usable(self._replies[key], instruction, names)[: self._count]
+
+
+def make_prompt(instruction: str, names: Collection[str], count: int) -> str:
+    """What a model is asked; the order of ``names`` makes no difference."""
+    kept = _NAMES.format(names=", ".join(sorted(set(names)))) if names else ""
+    return _PROMPT.format(instruction=instruction, count=count, names=kept, longest=LONGEST)
+
+
+def usable(reply: str, instruction: str, names: Collection[str]) -> tuple[str, ...]:
+    """The lines of a reply that may stand for the instruction, in order, each once.
+
+    Such a line has every one of ``names``, no object type that the instruction has not, and whole
+    sentences, of at most :data:`LONGEST` characters. Nothing checks that it means the same.
+    """
+    own_types = _types(instruction)
+    seen = {_plain(instruction)}
+    found = []
+    for line in map(_bare, reply.splitlines()):
+        if (
+            len(line) <= LONGEST
+            and _SENTENCES.fullmatch(line)
+            and all(_has(line, name) for name in names)
+            and _types(line) <= own_types
+            and _plain(line) not in seen
+        ):
+            seen.add(_plain(line))
+            found.append(line)
+    return tuple(found)
+
+
+def names_in(instruction: str) -> frozenset[str]:
+    """The object types that an instruction names."""
+    return frozenset(_types(instruction))
+
+
+def choose(variants: Sequence[str], task_id: str) -> str:
+    """One of several wordings of a task, the same for the same id in every process.
+
+    Raises:
+        ValueError: there are none.
+    """
+    if not variants:
+        raise ValueError(f"task {task_id}: no wordings to choose from; give at least one")
+    return variants[zlib.crc32(task_id.encode()) % len(variants)]
+
+
+def load_ask(spec: str) -> Ask:
+    """The function that a spec such as ``my_package.models:ask`` names.
+
+    Raises:
+        ValueError: it is no such spec, its module cannot be imported, or has no such function.
+    """
+    wanted = "expected package.module:function, a function from a prompt to a reply"
+    module_name, colon, name = spec.partition(":")
+    parts = module_name.split(".")
+    if not colon or not name.isidentifier() or not all(map(str.isidentifier, parts)):
+        raise ValueError(f"cannot use {spec!r} as a language model: {wanted}")
+    try:
+        module = import_module(module_name)
+    except Exception as error:  # a module may raise anything
+        reason = (str(error).strip().splitlines() or [""])[0]
+        raise ValueError(
+            f"cannot import {module_name!r} of {spec!r} ({type(error).__name__}: {reason}): "
+            f"{wanted}, with the module's folder on PYTHONPATH"
+        ) from error
+    function = getattr(module, name, None)
+    if not callable(function):
+        lack = "is not callable" if hasattr(module, name) else "is not there"
+        raise ValueError(f"{name!r} of {spec!r} {lack} in {module_name}: {wanted}")
+    return cast(Ask, function)
+
+
+def _read(cache: Path) -> dict[str, str]:
+    """Key to reply; a line that is not whole, since its writer was killed, is passed over."""
+    replies: dict[str, str] = {}
+    for number, data in _json_lines(cache):
+        entry = validated(_Entry, data, f"{cache}: the reply in line {number}")
+        replies.setdefault(entry.key, entry.reply)
+    return replies
+
+
+def _json_lines(path: Path) -> Iterator[tuple[int, object]]:
+    try:
+        lines = path.read_bytes().split(b"\n")
+    except FileNotFoundError:
+        return
+    for number, line in enumerate(lines, 1):
+        try:
+            data = json.loads(line)
+        except ValueError:  # not JSON, or not even text
+            continue
+        yield number, data
+
+
+def _append(cache: Path, entry: _Entry) -> None:
+    """Add a line in one write, so that it is there whole or, if we are killed, at most torn."""
+    cache.parent.mkdir(parents=True, exist_ok=True)
+    line = json.dumps(entry.model_dump()).encode() + b"\n"
+    with open(cache, "ab+", buffering=0) as file:  # O_APPEND: other writers' lines stay whole
+        end = file.seek(0, os.SEEK_END)
+        if end:
+            file.seek(end - 1)
+            if file.read(1) != b"\n":  # a torn line is not to spoil this one
+                line = b"\n" + line
+        file.write(line)
+
+
+def _bare(line: str) -> str:
+    """A line without numbering, bullet and quotation marks, its spaces single."""
+    line = " ".join(line.split())
+    if bullet := _BULLET.match(line):
+        line = line[bullet.end() :]
+    for opening, closing in _QUOTES:
+        if len(line) > 1 and line.startswith(opening) and line.endswith(closing):
+            line = line[1:-1].strip(opening + closing)
+    return line
+
+
+def _has(text: str, name: str) -> bool:
+    """Whether a text has a name as a word, or words, of its own, spelled exactly so."""
+    return re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text) is not None
+
+
+def _types(text: str) -> set[str]:
+    return {word for word in _WORD.findall(text) if word in OBJECT_TYPES}
+
+
+def _plain(text: str) -> str:
+    """What texts that differ in no word have in common."""
+    return " ".join(_WORD.findall(text)).casefold()

@@ -1,0 +1,57 @@
+"""What is kept from training: rooms, and types of things."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from er_gym.tasks import verbs
+from er_gym.tasks.task import Task, type_of_id
+from er_gym.thor import SCENE_NAMES
+
+# fmt: off
+EVALUATION_SCENES = (
+    "FloorPlan1", "FloorPlan2", "FloorPlan3",
+    "FloorPlan201", "FloorPlan202", "FloorPlan203",
+    "FloorPlan301", "FloorPlan302", "FloorPlan303",
+    "FloorPlan401", "FloorPlan403", "FloorPlan404",
+)
+"""The twelve rooms of the paper's test tasks, three of each kind."""
+_ALSO_HELD_OUT = ("FloorPlan4", "FloorPlan22", "FloorPlan27")
+"""Rooms in which tasks of the paper's test file play that are long-range."""
+TRAINING_SCENES = tuple(
+    name for name in SCENE_NAMES if name not in (*EVALUATION_SCENES, *_ALSO_HELD_OUT)
+)
+"""All rooms in which no test task of the paper that we know of plays."""
+UNSEEN_TYPES = frozenset({
+    "AlarmClock", "Kettle", "Ladle", "Newspaper", "SprayBottle", "Statue", "TissueBox", "Watch",
+})
+"""Types that no training task is about: no one looks for them, takes them or switches them."""
+# fmt: on
+SCENES: Mapping[str, tuple[str, ...]] = {
+    "all": SCENE_NAMES,
+    "training": TRAINING_SCENES,
+    "evaluation": EVALUATION_SCENES,
+}
+"""Sets of rooms by name."""
+
+
+def subject_types(task: Task) -> frozenset[str]:
+    """The types that a task is about: what is looked for, taken, switched or sliced."""
+    acted_on = {
+        action.actual_type
+        for action in task.key_actions
+        if action.verb in (verbs.PICKUP, verbs.TOGGLE, verbs.SLICE)
+    }
+    return frozenset(acted_on or {type_of_id(object_id) for object_id in task.related_objects})
+
+
+def split(task: Task) -> str:
+    """How new a task is to who was trained in the training rooms on tasks about the other types.
+
+    Returns:
+        ``seen``, ``unseen room``, ``unseen object`` or ``unseen room and object``.
+    """
+    new_room = task.scene.removesuffix("_physics") not in TRAINING_SCENES
+    new_object = not UNSEEN_TYPES.isdisjoint(subject_types(task))
+    new = [name for name, is_new in (("room", new_room), ("object", new_object)) if is_new]
+    return f"unseen {' and '.join(new)}" if new else "seen"

@@ -1,0 +1,138 @@
+"""How a scene is made ready for a task: as recorded, or rearranged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+_DECIMALS = 4
+"""Of kept poses: a tenth of a millimetre, a ten-thousandth of a degree."""
+_SOMEWHERE_ELSE = 20
+"""How many receptacles a thing tries before it stays where it is."""
+_ATTEMPTS = 20
+"""How many arrangements are looked at for one of which the poses tell all."""
+
+
+@dataclass(frozen=True)
+class ObjectPose:
+    """Where an object is: metres and degrees, AI2-THOR's world frame."""
+
+    x: float
+    y: float
+    z: float
+    pitch: float = 0.0
+    yaw: float = 0.0
+    roll: float = 0.0
+
+
+@dataclass(frozen=True)
+class Start:
+    """How a scene differs from the recorded one when an episode begins.
+
+    Attributes:
+        layout: a name for the arrangement, ``""`` for the recorded one.
+        poses: an object's ``name`` in the metadata to where it is, for those that have been moved.
+            Objects that have been moved have other ids than in the recorded scene: AI2-THOR names
+            things after their places.
+        dirty: ids of objects that are made dirty.
+    """
+
+    layout: str = ""
+    poses: Mapping[str, ObjectPose] = field(default_factory=dict)
+    dirty: tuple[str, ...] = ()
+
+
+def begin(controller: Any, scene: str, start: Start) -> Any:
+    """Load a scene and arrange it; returns the last event.
+
+    Raises:
+        ValueError: an object of the start is not in the scene.
+    """
+    event = controller.reset(scene)
+    if start.poses:
+        event = controller.step(
+            action="SetObjectPoses",
+            objectPoses=_all_poses(event.metadata["objects"], start),
+            placeStationary=True,
+        )
+        _check(event, scene, start)
+    for object_id in start.dirty:
+        event = controller.step(action="DirtyObject", objectId=object_id, forceAction=True)
+        _check(event, scene, start)
+    return event
+
+
+def _check(event: Any, scene: str, start: Start) -> None:
+    if not event.metadata["lastActionSuccess"]:
+        raise ValueError(
+            f"{scene} cannot be arranged as {start.layout or 'its task asks'!r}: "
+            f"{event.metadata['errorMessage']}"
+        )
+
+
+def _all_poses(objects: list[dict[str, Any]], start: Start) -> list[dict[str, Any]]:
+    """What SetObjectPoses needs: the pose of everything loose, for it takes away the rest."""
+    recorded = {
+        entry["name"]: _pose(entry) for entry in objects if entry["pickupable"] or entry["moveable"]
+    }
+    return [
+        {
+            "objectName": name,
+            "position": {"x": pose.x, "y": pose.y, "z": pose.z},
+            "rotation": {"x": pose.pitch, "y": pose.yaw, "z": pose.roll},
+        }
+        for name, pose in {**recorded, **start.poses}.items()
+    ]
+
+
+def _pose(entry: Mapping[str, Any]) -> ObjectPose:
+    position, rotation = entry["position"], entry["rotation"]
+    return ObjectPose(*(position[axis] for axis in "xyz"), *(rotation[axis] for axis in "xyz"))
+
+
+def shuffled(controller: Any, scene: str, seed: int) -> Start:
+    """A scene with everything that can be carried put somewhere else, by a seed.
+
+    AI2-THOR's ``InitialRandomSpawn`` chooses the places, closed receptacles among them; the poses
+    are kept, so that the start is the same on every engine and for good. An arrangement of which
+    one cannot tell from the poses alone what lies in what is passed over for the next.
+    """
+    objects = controller.reset(scene).metadata["objects"]
+    recorded = {entry["name"]: _pose(entry) for entry in objects}
+    best, fewest = Start(), float("inf")
+    for attempt in range(_ATTEMPTS):
+        if attempt:
+            controller.reset(scene)
+        spawned = controller.step(
+            action="InitialRandomSpawn",
+            randomSeed=seed * _ATTEMPTS + attempt,
+            forceVisible=False,
+            numPlacementAttempts=_SOMEWHERE_ELSE,
+            placeStationary=True,
+        ).metadata["objects"]
+        poses = {
+            entry["name"]: _rounded(pose)
+            for entry in spawned
+            if (pose := _pose(entry)) != recorded.get(entry["name"], pose)
+        }
+        start = Start(f"{scene}-{seed}", poses)
+        wanted = _holders(spawned)
+        arranged = _holders(begin(controller, scene, start).metadata["objects"])
+        doubtful = sum(holders != wanted[name] for name, holders in arranged.items())
+        if doubtful < fewest:
+            best, fewest = start, doubtful
+        if not doubtful:
+            break
+    return best
+
+
+def _holders(objects: list[dict[str, Any]]) -> dict[str, frozenset[str]]:
+    """Object name to the receptacles that it lies in."""
+    return {entry["name"]: frozenset(entry["parentReceptacles"] or ()) for entry in objects}
+
+
+def _rounded(pose: ObjectPose) -> ObjectPose:
+    # Adding 0.0 turns a minus zero into a plain one.
+    values = (pose.x, pose.y, pose.z, pose.pitch, pose.yaw, pose.roll)
+    return ObjectPose(*(round(value, _DECIMALS) + 0.0 for value in values))

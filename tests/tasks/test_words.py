@@ -1,0 +1,288 @@
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from er_gym.tasks.generate import templates
+from er_gym.tasks.generate.templates import STYLES, in_order
+from er_gym.tasks.generate.words import (
+    HOLLOW,
+    PLURAL,
+    UNCOUNTED,
+    a,
+    in_the,
+    is_are,
+    it,
+)
+from er_gym.thor import OBJECT_TYPES
+
+WORDINGS = {
+    name: getattr(templates, name) for name in ("FIND", "PICK_UP", "TOGGLE", "MOVE", "MOVE_TWO")
+}
+EVERY = [(name, template) for name, rows in WORDINGS.items() for template in rows]
+FIRST = {
+    "FIND": "Find the {object} in the {room}.",
+    "PICK_UP": "Pick up the {object} in the {room}.",
+    "TOGGLE": "Turn {way} the {object} in the {room}.",
+    "MOVE": "Put the {object} {place}.",
+    "MOVE_TWO": "First, put the {object} {place}; then, put the {second_object} {second_place}.",
+}
+ON = frozenset(
+    {
+        *("ArmChair", "Bathtub", "Bed", "Chair", "CoffeeTable", "CounterTop", "Desk"),
+        *("DiningTable", "DogBed", "Dresser", "Floor", "Footstool", "HandTowelHolder", "Ottoman"),
+        *("Plate", "Shelf", "ShelvingUnit", "SideTable", "Sink", "Sofa", "Stool", "StoveBurner"),
+        *("TVStand", "Toilet", "ToiletPaperHanger", "TowelHolder"),
+    }
+)
+
+
+def subject(object_type: str, where: str = "") -> dict[str, str]:
+    """What templates say of a thing; with ``where`` it is told from its like."""
+    relative = f" that {is_are(object_type)} {where}" if where else ""
+    return {
+        "object": object_type + relative,
+        "an_object": f"the {object_type}{relative}" if where else a(object_type),
+        "it": it(object_type),
+        "is": is_are(object_type),
+    }
+
+
+def second(words: dict[str, str]) -> dict[str, str]:
+    return {f"second_{key}": word for key, word in words.items() if key != "is"}
+
+
+SUBJECTS = {
+    "vowel": subject("Apple"),
+    "uncounted": subject("Bread"),
+    "plural": subject("Boots"),
+    "long": subject("Book", "on the Desk"),
+    "plural-long": subject("Boots", "in the Box"),
+}
+PARTNERS = {
+    "vowel": subject("Boots"),
+    "uncounted": subject("Egg"),
+    "plural": subject("Lettuce"),
+    "long": subject("CD", "in the Drawer"),
+    "plural-long": subject("ToiletPaper", "on the Toilet"),
+}
+
+
+def fill(template: str, case: str) -> str:
+    words = {
+        **SUBJECTS[case],
+        **second(PARTNERS[case]),
+        "room": "living room",
+        "way": "off",
+        "place": "in the Fridge",
+        "second_place": "on the Shelf",
+    }
+    return template.format_map(words)
+
+
+@pytest.mark.parametrize("wording", WORDINGS)
+def test_a_wording_has_many_templates_all_different(wording: str) -> None:
+    rows = WORDINGS[wording]
+    assert rows[0] == FIRST[wording]
+    assert len(rows) >= 14
+    assert len({re.sub(r"\W+", " ", row).casefold() for row in rows}) == len(rows)
+    assert len({" ".join(row.split()[:3]) for row in rows}) >= 12
+
+
+@pytest.mark.parametrize("case", SUBJECTS)
+@pytest.mark.parametrize(("wording", "template"), EVERY)
+def test_a_filled_template_is_an_english_instruction(
+    wording: str, template: str, case: str
+) -> None:
+    text = fill(template, case)
+    assert re.fullmatch(r"[A-Z].*[.?]", text)
+    assert not re.search(r"[{}]|\s\s|\s[,.;:?]|^\s|\s$", text)
+    assert not re.search(r"[.?] [a-z]", text)
+    assert not re.search(r"\ba [aeiou]|\ban [^aeiou]", text, re.IGNORECASE)
+    assert not re.search(r"\b(the|a|an|some) (the|a|an|some)\b", text)
+    assert "'s" not in text
+
+
+@pytest.mark.parametrize("case", SUBJECTS)
+@pytest.mark.parametrize(("wording", "template"), EVERY)
+def test_a_filled_template_names_everything(wording: str, template: str, case: str) -> None:
+    text = fill(template, case)
+    assert SUBJECTS[case]["object"] in text
+    assert ("in the Fridge" in text) == (wording in ("MOVE", "MOVE_TWO"))
+    assert (" off" in text) == (wording == "TOGGLE")
+    if wording == "MOVE_TWO":
+        assert PARTNERS[case]["object"] in text
+        assert "on the Shelf" in text
+
+
+@pytest.mark.parametrize(("wording", "template"), EVERY)
+def test_pronouns_and_verbs_agree_with_the_subject(wording: str, template: str) -> None:
+    words = {"room": "kitchen", "way": "on", "place": "in the Box", "second_place": "on the Bed"}
+    one, many = subject("Apple"), subject("Boots")
+    singular = template.format_map({**words, **one, **second(one)})
+    plural = template.format_map({**words, **many, **second(many)})
+    assert not re.search(r"\bthem\b|Apple (are|have)\b|are the Apple", singular)
+    # "see to it that" is not about the thing.
+    assert not re.search(r"(?<!see to )\bit\b|Boots (is|has|goes)\b|is the Boots", plural)
+
+
+@pytest.mark.parametrize("template", WORDINGS["FIND"])
+def test_a_search_does_not_ask_to_take_the_thing(template: str) -> None:
+    taking = r"\b(pick|take|get|grab|fetch|bring|hold|held|carry|give|lift|hand)\b"
+    assert not re.search(taking, template, re.IGNORECASE)
+
+
+@pytest.mark.parametrize("template", WORDINGS["PICK_UP"])
+def test_a_pickup_says_that_the_thing_is_to_be_held(template: str) -> None:
+    held = r"[Pp]ick(ed|ing)? (up|\{it\} up)|hand\b|\b[Hh]old(ing)?\b|\bheld\b"
+    assert re.search(held, template)
+
+
+@pytest.mark.parametrize(
+    ("field", "follows"), [("{object}", r" \{way\}"), ("{an_object}", r" (up|\{way\})")]
+)
+def test_no_particle_is_torn_from_its_verb_by_a_long_name(field: str, follows: str) -> None:
+    for _, template in EVERY:
+        assert not re.search(re.escape(field) + follows, template)
+
+
+@pytest.mark.parametrize("template", WORDINGS["MOVE_TWO"])
+def test_two_transfers_are_in_plain_order(template: str) -> None:
+    order = r"\b([Ff]irst|then|after|afterwards|order|[Bb]efore|[Oo]nce|[Ww]hen|[Nn]ext|[Ss]tep)\b"
+    assert re.search(order, template)
+    first, other = template.index("{place}"), template.index("{second_place}")
+    assert first < other or template.startswith("Before you put the {second_object}")
+
+
+CLAUSES = (
+    "take the Lettuce and wash it in the SinkBasin, under the Faucet",
+    "slice the Lettuce with the Knife",
+    "put the Knife in the Drawer, and shut that",
+    "fry the PotatoSliced in the Pan",
+    "switch off the StoveKnob",
+    "serve the Lettuce on the Plate",
+)
+
+
+@pytest.mark.parametrize("count", range(1, 7))
+@pytest.mark.parametrize("style", range(STYLES))
+def test_joined_clauses_stand_verbatim_in_their_order(style: int, count: int) -> None:
+    clauses = CLAUSES[:count]
+    text = in_order(clauses, style)
+    lowered = text.casefold()
+    places = [lowered.find(clause.casefold()) for clause in clauses]
+    assert places == sorted(places)
+    assert places[0] >= 0
+    for place, clause in zip(places, clauses, strict=True):
+        assert text[place + 1 : place + len(clause)] == clause[1:]
+    assert re.fullmatch(r"[A-Z].*[.?]", text)
+    assert not re.search(r"[{}]|\s\s|\s[,.;:?]|[,.;:?]{2}|[.?] [a-z]", text)
+
+
+@pytest.mark.parametrize("style", range(STYLES))
+def test_one_clause_alone_has_no_order(style: int) -> None:
+    text = in_order(["slice the Bread"], style)
+    assert not re.search(r"\b(first|then|next|step|finally|begin)\b", text, re.IGNORECASE)
+
+
+def test_styles_differ() -> None:
+    assert STYLES >= 12
+    for count in (1, 2, 3, 6):
+        assert len({in_order(CLAUSES[:count], style) for style in range(STYLES)}) == STYLES
+
+
+def test_a_clause_may_hold_braces() -> None:
+    assert in_order(["say {clause}", "say {}"], 0) == "First, say {clause}. Then, say {}."
+
+
+def test_only_the_last_of_three_or_more_is_the_final_one() -> None:
+    assert in_order(["go", "look"], 0) == "First, go. Then, look."
+    assert in_order(["go", "look", "stop"], 0) == "First, go. Then, look. Finally, stop."
+    assert in_order(["go", "look", "turn", "stop"], 4) == (
+        "Step 1: go. Step 2: look. Step 3: turn. Step 4: stop."
+    )
+
+
+def test_joining_nothing_or_in_no_known_style_is_an_error() -> None:
+    with pytest.raises(ValueError, match="no clauses to join"):
+        in_order([], 0)
+    for style in (-1, STYLES):
+        with pytest.raises(ValueError, match=f"unknown style {style}; choose one from 0 to"):
+            in_order(["go"], style)
+
+
+def test_every_receptacle_is_either_hollow_or_not() -> None:
+    receptacles = {name for name, kind in OBJECT_TYPES.items() if "receptacle" in kind.properties}
+    assert receptacles == HOLLOW | ON
+    assert not HOLLOW & ON
+
+
+@pytest.mark.parametrize(
+    ("receptacle", "where"),
+    [
+        # What lies on the rim or the lid, not in the hollow.
+        ("Sink", "on the Sink"),
+        ("SinkBasin", "in the SinkBasin"),
+        ("Bathtub", "on the Bathtub"),
+        ("BathtubBasin", "in the BathtubBasin"),
+        ("Toilet", "on the Toilet"),
+        ("Plate", "on the Plate"),
+        ("Bowl", "in the Bowl"),
+        ("Pan", "in the Pan"),
+        ("Pot", "in the Pot"),
+        ("Mug", "in the Mug"),
+        ("CoffeeMachine", "in the CoffeeMachine"),
+        ("StoveBurner", "on the StoveBurner"),
+        ("Toaster", "in the Toaster"),
+        ("ShelvingUnit", "on the ShelvingUnit"),
+        ("Dresser", "on the Dresser"),
+        ("Safe", "in the Safe"),
+        ("Cabinet", "in the Cabinet"),
+        ("ArmChair", "on the ArmChair"),
+        ("Sofa", "on the Sofa"),
+        ("Bed", "on the Bed"),
+        ("DogBed", "on the DogBed"),
+        ("Footstool", "on the Footstool"),
+        ("LaundryHamper", "in the LaundryHamper"),
+        ("GarbageCan", "in the GarbageCan"),
+        ("ToiletPaperHanger", "on the ToiletPaperHanger"),
+        ("HandTowelHolder", "on the HandTowelHolder"),
+    ],
+)
+def test_where_a_thing_lies(receptacle: str, where: str) -> None:
+    assert in_the(receptacle) == where
+
+
+@pytest.mark.parametrize(
+    ("object_type", "some", "pronoun", "verb"),
+    [
+        ("Apple", "an Apple", "it", "is"),
+        ("AlarmClock", "an AlarmClock", "it", "is"),
+        ("EggCracked", "an EggCracked", "it", "is"),
+        ("Ottoman", "an Ottoman", "it", "is"),
+        ("HousePlant", "a HousePlant", "it", "is"),
+        ("CD", "a CD", "it", "is"),
+        ("TVStand", "a TVStand", "it", "is"),
+        ("TissueBox", "a TissueBox", "it", "is"),
+        ("PaperTowelRoll", "a PaperTowelRoll", "it", "is"),
+        ("AluminumFoil", "some AluminumFoil", "it", "is"),
+        ("Bread", "some Bread", "it", "is"),
+        ("BreadSliced", "some BreadSliced", "it", "is"),
+        ("AppleSliced", "some AppleSliced", "it", "is"),
+        ("ToiletPaper", "some ToiletPaper", "it", "is"),
+        ("Boots", "some Boots", "them", "are"),
+        ("Blinds", "some Blinds", "them", "are"),
+        ("Curtains", "some Curtains", "them", "are"),
+    ],
+)
+def test_articles_pronouns_verbs(object_type: str, some: str, pronoun: str, verb: str) -> None:
+    assert (a(object_type), it(object_type), is_are(object_type)) == (some, pronoun, verb)
+
+
+def test_the_lists_name_real_types_and_every_plural_one() -> None:
+    assert not (PLURAL | UNCOUNTED) - OBJECT_TYPES.keys()
+    assert not PLURAL & UNCOUNTED
+    assert {name for name in OBJECT_TYPES if name.endswith("s")} - PLURAL == {"ShowerGlass"}
+    assert {name for name in OBJECT_TYPES if name.endswith("Sliced")} <= UNCOUNTED
+    assert not [name for name in OBJECT_TYPES if name.startswith("U")]  # a User, an Urn
