@@ -74,8 +74,7 @@ class Verifier:
         _, info = self._env.reset(seed=0, options={"task": task})
         pose = self._env.agent_pose
         where = (pose.x, pose.z)
-        standing = [condition for condition in task.goal if not condition.in_reach]
-        if standing and not unmet(standing, self._env.objects):
+        if task.goal and not unmet(task.goal, self._env.objects, info["interactable"]):
             return Verdict(_DONE_ALREADY, "", 1, where)
         solver = Solver()
         earned, over = 0.0, False

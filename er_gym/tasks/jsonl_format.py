@@ -74,6 +74,15 @@ class ConditionRecord(_Strict):
     inside: str = ""
     state: dict[str, bool | str] = {}
 
+    @classmethod
+    def of(cls, condition: Condition) -> ConditionRecord:
+        """The record of a condition."""
+        return cls(**{**vars(condition), "state": dict(condition.state)})
+
+    def condition(self) -> Condition:
+        """The condition that is recorded."""
+        return Condition(**{**dict(self), "state": tuple(self.state.items())})
+
 
 class LayoutRecord(_Strict):
     """How a scene is arranged.
@@ -212,7 +221,7 @@ def _task(record: TaskRecord, poses: Mapping[str, ObjectPose], where: str) -> Ta
         target_objects=record.target_objects,
         related_objects=record.related_objects,
         navigable_objects=record.navigable_objects,
-        goal=tuple(_condition(condition) for condition in record.goal),
+        goal=tuple(condition.condition() for condition in record.goal),
         start=Start(record.layout, poses, record.dirty),
         poses={key: AgentPose(**pose.model_dump()) for key, pose in record.poses.items()},
         extra=record.extra,
@@ -230,14 +239,6 @@ def _key_action(record: KeyActionRecord, where: str) -> KeyAction:
     )
 
 
-def _condition(record: ConditionRecord) -> Condition:
-    return Condition(**{**dict(record), "state": tuple(record.state.items())})
-
-
-def _condition_record(condition: Condition) -> ConditionRecord:
-    return ConditionRecord(**{**vars(condition), "state": dict(condition.state)})
-
-
 def _record(task: Task) -> TaskRecord:
     return TaskRecord(
         id=task.id,
@@ -249,7 +250,7 @@ def _record(task: Task) -> TaskRecord:
         target_objects=task.target_objects,
         related_objects=task.related_objects,
         navigable_objects=task.navigable_objects,
-        goal=tuple(_condition_record(condition) for condition in task.goal),
+        goal=tuple(map(ConditionRecord.of, task.goal)),
         layout=task.start.layout,
         dirty=task.start.dirty,
         poses={key: PoseRecord(**asdict(pose)) for key, pose in task.poses.items()},

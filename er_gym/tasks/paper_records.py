@@ -21,7 +21,6 @@ from pydantic import BaseModel, ConfigDict
 
 from er_gym.tasks import verbs
 from er_gym.tasks.files import known_scene, known_type, known_verb
-from er_gym.tasks.goal import Condition
 from er_gym.tasks.jsonl_format import ConditionRecord, PoseRecord
 from er_gym.tasks.start import ObjectPose, Start
 from er_gym.tasks.task import AgentPose, KeyAction, Task
@@ -171,10 +170,7 @@ def own_fields(task: Task, plain: Task) -> dict[str, Any]:
         own |= {"id": task.id, "extra": dict(task.extra)}
     record = OwnFields(
         **own,
-        goal=tuple(
-            ConditionRecord(**{**vars(condition), "state": dict(condition.state)})
-            for condition in task.goal
-        ),
+        goal=tuple(map(ConditionRecord.of, task.goal)),
         layout=task.start.layout,
         layout_poses={name: astuple(pose) for name, pose in task.start.poses.items()},
         dirty=task.start.dirty,
@@ -194,10 +190,7 @@ def with_own_fields(plain: Task, own: OwnFields, where: str) -> Task:
         plain,
         type=plain.type if own.type is None else known_type(own.type, where),
         scene=plain.scene if own.scene is None else known_scene(own.scene, where),
-        goal=tuple(
-            Condition(**{**dict(condition), "state": tuple(condition.state.items())})
-            for condition in own.goal
-        ),
+        goal=tuple(condition.condition() for condition in own.goal),
         start=Start(
             own.layout,
             {name: ObjectPose(*pose) for name, pose in own.layout_poses.items()},

@@ -95,8 +95,8 @@ def shuffled(controller: Any, scene: str, seed: int) -> Start:
     """A scene with everything that can be carried put somewhere else, by a seed.
 
     AI2-THOR's ``InitialRandomSpawn`` chooses the places, closed receptacles among them; the poses
-    are kept, so that the start is the same on every engine and for good. An arrangement of which
-    one cannot tell from the poses alone what lies in what is passed over for the next.
+    are kept, so that the start is the same on every engine and for good. Of several arrangements it
+    is the first of which the poses alone tell what lies in what, or that of which they tell most.
     """
     objects = controller.reset(scene).metadata["objects"]
     recorded = {entry["name"]: _pose(entry) for entry in objects}

@@ -98,10 +98,7 @@ def test_who_does_the_key_actions_earns_all_and_succeeds(env: EmbodiedEnv, kind:
         assert goal_holds(env, task, info), task.id
 
 
-# Exposed searches may begin beside what is looked for; all else has something left to do.
-@pytest.mark.parametrize(
-    "kind", [kind for kind in TASK_TYPES if kind.name != "single_search"], ids=lambda k: k.env_id
-)
+@KINDS
 def test_who_ends_at_once_earns_nothing(env: EmbodiedEnv, kind: TaskType) -> None:
     for task in sample(kind):
         info = begin(env, task)

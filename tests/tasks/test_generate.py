@@ -601,6 +601,16 @@ def test_ids_and_starts_of_a_rearranged_room_name_its_layout() -> None:
         assert (task.scene, task.start) == ("FloorPlan1", start)
 
 
+def test_one_of_two_that_are_alike_is_moved_where_the_other_cannot_go() -> None:
+    room = room_of([COUNTER, SINK, BASIN, book(1, "Sink"), book(2, "CounterTop")])
+    assert {
+        task.id.rpartition("pickup_and_put-")[2] for task in room.tasks(["pickup_and_put"])
+    } == {
+        "Book-SinkBasin",
+        "Book-CounterTop-from_Sink",
+    }
+
+
 # -- on request ----------------------------------------------------------------------------------
 
 
@@ -638,6 +648,22 @@ FAULTS = {
         ["single_toggle", APPLE["objectId"], EGG["objectId"]],
         "no 'single_toggle' task about 2 objects",
     ),
+    "what cannot be carried": (
+        ["single_pickup", COUNTER["objectId"]],
+        r"no 'single_pickup' task about 1 objects: CounterTop\|.* cannot be carried",
+    ),
+    "what has no switch": (
+        ["single_toggle", APPLE["objectId"]],
+        r"no 'single_toggle' task about 1 objects: Apple\|.* has no switch",
+    ),
+    "what takes nothing": (
+        ["pickup_and_put", EGG["objectId"], APPLE["objectId"]],
+        r"Egg\|.* cannot be put into Apple\|",
+    ),
+    "into itself": (
+        ["pickup_and_put", BOWL["objectId"], BOWL["objectId"]],
+        r"Bowl\|.* cannot be put into Bowl\|",
+    ),
     "no such object": (
         ["single_pickup", "Unicorn|+00.00|+00.00|+01.00"],
         r"FloorPlan1 has no object 'Unicorn\|\+00.00\|\+00.00\|\+01.00' when the task begins",
@@ -648,7 +674,7 @@ FAULTS = {
 @pytest.mark.parametrize(("asked", "message"), FAULTS.values(), ids=FAULTS)
 def test_a_wrong_request_gets_one_clear_line(asked: list[str], message: str) -> None:
     with pytest.raises(ValueError, match=message) as caught:
-        room_of([*FURNITURE, APPLE, EGG]).request(*asked)
+        room_of([*FURNITURE, APPLE, EGG, BOWL]).request(*asked)
     assert "\n" not in str(caught.value)
 
 

@@ -431,7 +431,7 @@ def casts(recipe: Recipe, *things: Thing) -> set[tuple[str, ...]]:
 
 
 OF_A_KIND = {
-    "loose": {"Knife", "Apple", "Egg", "CellPhone"},
+    "loose": {"Knife", "Apple", "Egg", "CellPhone", "Bowl"},
     "furniture": {"CounterTop", "DiningTable", "SinkBasin"},
     "locker": {"Fridge"},
     "switch": {"DeskLamp", "FloorLamp"},
@@ -447,6 +447,7 @@ def test_kinds_of_things(kind: str) -> None:
         thing("Toilet", receptacle=True, openable=True, closed=True),
         thing("Box", "Floor", receptacle=True, pickupable=True, openable=True, closed=True),
         thing("Safe", receptacle=True, openable=True),
+        thing("Bowl", "CounterTop", receptacle=True, pickupable=True),
         thing("Book", "Floor", pickupable=True),
         thing("Laptop", openable=True, closed=True),
         thing("FloorLamp", "Floor", toggleable=True),
@@ -560,6 +561,19 @@ FAULTS = {
         GOOD.replace("put", "throw"),
         "recipe 'tidy': a step is ['throw']; it must be one of: put, wash, ",
     ),
+    "no step": (
+        GOOD.replace("- put: [thing, place]", "[]"),
+        "recipe 'tidy': it has no steps",
+    ),
+    "too few roles": (
+        GOOD.replace("[thing, place]", "[thing]"),
+        "recipe 'tidy': the step 'put' is about 1 roles; it takes 2",
+    ),
+    "no such type": (
+        GOOD.replace("loose", "[Potatoe]"),
+        "recipe 'tidy': role 'thing' has unknown object type 'Potatoe'",
+    ),
+    "one name twice": (f"{GOOD}{GOOD}", "two recipes are named 'tidy'"),
     "two in one": (
         GOOD.replace("- put: [thing, place]", "- {put: [thing, place], wash: [thing]}"),
         "recipe 'tidy': a step is ['put', 'wash']; it must be one of: put, wash, ",

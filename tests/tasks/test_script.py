@@ -40,7 +40,8 @@ EGG = thing("Egg", "Fridge", pickupable=True)
 POTATO = thing("Potato", "CounterTop", pickupable=True, sliceable=True, cookable=True)
 LETTUCE = thing("Lettuce", "Fridge", pickupable=True, sliceable=True)
 KNIFE = thing("Knife", "DiningTable", pickupable=True)
-EVERYTHING = (COUNTER, TABLE, FRIDGE, BURNER, LAMP, BOWL, CUP, EGG, POTATO, LETTUCE, KNIFE)
+KNOB = thing("StoveKnob", toggleable=True, controlled=(BURNER.id,))
+EVERYTHING = (COUNTER, TABLE, FRIDGE, BURNER, KNOB, LAMP, BOWL, CUP, EGG, POTATO, LETTUCE, KNIFE)
 ROOM = Room({item.id: item for item in EVERYTHING}, lambda what, where: True, ())
 
 

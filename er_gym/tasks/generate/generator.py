@@ -64,14 +64,16 @@ class Generator:
         Args:
             types: names of task types; all where it is empty.
         """
+        made: set[str] = set()
         for row in self.rows:
             if not types or row.type in types:
                 for choice in row.choices(self.room):
                     task = self._candidate(row, choice)
-                    if isinstance(task, Task):
-                        yield task
-                    elif task:
+                    if isinstance(task, str):
                         self.dropped[task] += 1
+                    elif task.id not in made:  # else it is the same, about another of its objects
+                        made.add(task.id)
+                        yield task
 
     def request(self, type_name: str, *object_ids: str) -> Task:
         """The task of a type about given objects, whether or not the rules would choose them.
@@ -101,7 +103,7 @@ class Generator:
         return self._task(row, plan, ())
 
     def _candidate(self, row: Row, choice: tuple[Thing, ...]) -> Task | str:
-        """The task of a choice; or why there is none, "" if it is the same as another's."""
+        """The task of a choice; or why there is none."""
         plan = row.plan(self.room, *choice)
         if not plan.names_one_place_each:
             return SAME_PLACES
@@ -111,9 +113,7 @@ class Generator:
             if not others:
                 continue
             if self._interchangeable(row, choice, plan, subject, others):
-                if self._comes_first(subject, others):
-                    continue
-                return ""
+                continue
             if not row.names_places or not self._told_by_place(subject, others):
                 return AMBIGUOUS
             named.append(subject)
@@ -139,12 +139,6 @@ class Generator:
             except Impossible:
                 return False
         return True
-
-    def _comes_first(self, subject: Thing, others: list[Thing]) -> bool:
-        """Whether it is the one that stands for all the interchangeable ones."""
-        order = list(self.room.things)
-        qualify = [t for t in others if self.room.is_exposed(t) or self.room.is_enclosed(t)]
-        return all(order.index(subject.id) < order.index(other.id) for other in qualify)
 
     def _told_by_place(self, subject: Thing, others: list[Thing]) -> bool:
         """Whether the type of what it lies in tells it from the others."""

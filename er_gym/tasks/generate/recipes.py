@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib.resources import files
+from inspect import signature
 from itertools import permutations
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from er_gym.tasks.generate.room import Room, Thing, largest, may_fill
 from er_gym.tasks.generate.script import Impossible, Script
 from er_gym.tasks.generate.templates import STYLES, in_order
 from er_gym.tasks.generate.words import in_the
+from er_gym.thor import OBJECT_TYPES
 
 SHORTEST, LONGEST = 9, 28
 """How many key actions a long-range task has, ``end`` among them."""
@@ -289,7 +291,9 @@ def read_recipes(path: Path) -> tuple[Recipe, ...]:
     recipes = tuple(
         validated(Recipe, item, f"{path}: recipe {number}") for number, item in enumerate(data, 1)
     )
-    for recipe in recipes:
+    for number, recipe in enumerate(recipes):
+        if recipe.name in {other.name for other in recipes[:number]}:
+            raise TaskFileError(f"{path}: two recipes are named {recipe.name!r}")
         _check(recipe, f"{path}: recipe {recipe.name!r}")
     return recipes
 
@@ -301,15 +305,28 @@ def _check(recipe: Recipe, where: str) -> None:
                 f"{where}: role {role!r} is of unknown kind {kind!r}; "
                 f"give a list of object types or one of: {', '.join(KINDS)}"
             )
+        unknown = (
+            [] if isinstance(kind, str) else [name for name in kind if name not in OBJECT_TYPES]
+        )
+        if unknown:
+            raise TaskFileError(f"{where}: role {role!r} has unknown object type {unknown[0]!r}")
+    if not recipe.steps:
+        raise TaskFileError(f"{where}: it has no steps")
     for step in recipe.steps:
         if len(step) != 1 or not set(step) <= set(STEPS):
             raise TaskFileError(
                 f"{where}: a step is {list(step)}; it must be one of: {', '.join(STEPS)}"
             )
-        unknown = [role for roles in step.values() for role in roles if role not in recipe.roles]
-        if unknown:
+        ((name, roles),) = step.items()
+        strange = [role for role in roles if role not in recipe.roles]
+        if strange:
             raise TaskFileError(
-                f"{where}: a step names {unknown[0]!r}; its roles are: {', '.join(recipe.roles)}"
+                f"{where}: a step names {strange[0]!r}; its roles are: {', '.join(recipe.roles)}"
+            )
+        takes = len(signature(STEPS[name]).parameters) - 1
+        if len(roles) != takes:
+            raise TaskFileError(
+                f"{where}: the step {name!r} is about {len(roles)} roles; it takes {takes}"
             )
 
 

@@ -109,6 +109,8 @@ class Script:
         """Take a thing from where the agent stands."""
         if self.held is not None:
             raise Impossible(f"the hand holds {self.held.type} already")
+        if not thing.pickupable:
+            raise Impossible(f"{thing.id} cannot be carried")
         self._do(verbs.PICKUP, thing)
         self._handle(thing)
         self.held = thing
@@ -120,6 +122,8 @@ class Script:
         """Put what is in the hand into a target, going to where that is."""
         if self.held is None:
             raise Impossible("the hand is empty")
+        if not target.receptacle or target == self.held:
+            raise Impossible(f"{self.held.id} cannot be put into {target.id}")
         place = target if not target.pickupable else self.place_of(target)
         self.go(place, target)
         self.open(place)
@@ -138,6 +142,9 @@ class Script:
 
     def toggle(self, thing: Thing) -> None:
         """Switch a thing on, or off if it is on; the agent is there."""
+        knobs = (knob for knob in self.room.things.values() if thing.id in knob.controlled)
+        if not thing.toggleable and not any(knobs):
+            raise Impossible(f"{thing.id} has no switch")
         self._do(verbs.TOGGLE, thing)
         self._on[thing.id] = not self.is_on(thing)
         if thing.toggleable:  # a burner has its state in its knob
