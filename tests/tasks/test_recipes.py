@@ -161,7 +161,7 @@ KITCHEN = (
 
 
 def room_of(*things: Thing, accepts: Callable[[str, str], bool] = lambda what, where: True) -> Room:
-    return Room({item.id: item for item in things}, accepts, ())
+    return Room({item.id: item for item in things}, accepts)
 
 
 def follow(text: str, *cast: Thing, room: Room | None = None) -> Plan:

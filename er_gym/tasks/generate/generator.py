@@ -118,12 +118,9 @@ class Generator:
                 return AMBIGUOUS
             named.append(subject)
         task = self._task(row, plan, named)
-        # Of a search one cannot tell without looking; its target is never in sight and reach of
-        # everywhere.
+        # Whether a search begins beside what is looked for is seen by who plays it.
         standing = [condition for condition in task.goal if not condition.in_reach]
-        if standing and not task.start.dirty and not unmet(standing, self.objects):
-            return DONE_ALREADY
-        return task
+        return DONE_ALREADY if standing and not unmet(standing, self.objects) else task
 
     def _interchangeable(
         self, row: Row, choice: tuple[Thing, ...], plan: Plan, subject: Thing, others: list[Thing]

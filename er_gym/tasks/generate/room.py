@@ -53,15 +53,10 @@ class Thing:
 
 @dataclass(frozen=True)
 class Room:
-    """A scene's things by id, in scene order.
-
-    Attributes:
-        objects: the metadata that it was read from.
-    """
+    """A scene's things by id, in scene order, and what goes where."""
 
     things: Mapping[str, Thing]
     accepts: Accepts
-    objects: Sequence[Mapping[str, Any]]
 
     def parents(self, thing: Thing) -> list[Thing]:
         """What a thing lies in, as far as that is in the scene."""
@@ -144,7 +139,7 @@ class Room:
 
 def read_room(objects: Sequence[Mapping[str, Any]], accepts: Accepts) -> Room:
     """Read ``metadata["objects"]``."""
-    return Room({item["objectId"]: _thing(item) for item in objects}, accepts, objects)
+    return Room({item["objectId"]: _thing(item) for item in objects}, accepts)
 
 
 def _thing(item: Mapping[str, Any]) -> Thing:
