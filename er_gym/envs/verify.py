@@ -109,7 +109,7 @@ def with_difficulty(task: Task, room: Generator, verdict: Verdict) -> Task:
     """The task, which says in ``extra["difficulty"]`` how hard it is and how many steps it took."""
     figures = difficulty(task, room.objects, verdict.start)
     told = {**asdict(figures), "distance": round(figures.distance, 2), "steps": verdict.steps}
-    return replace(task, extra={"difficulty": told})
+    return replace(task, extra={**task.extra, "difficulty": told})
 
 
 def _problem(end_reason: str, verb: str, goal_unmet: bool) -> str:

@@ -164,6 +164,7 @@ class Generator:
                 for condition in plan.goal
             ),
             start=replace(self.start, dirty=plan.dirty),
+            extra={"made_by": row.slug or row.type},
         )
 
     def _id(self, row: Row, plan: Plan, named: Sequence[Thing]) -> str:

@@ -19,8 +19,8 @@ def select_balanced(tasks: Iterable[Task], total: int, rng: random.Random) -> li
 
     Types get equal shares; where one has fewer tasks, the others share the rest. Each choice within
     a type takes the kind of room chosen least for this type, in it the scene chosen least for this
-    type and then of all, and there the task whose words have been used least for this type; ``rng``
-    decides between equals.
+    type and then of all, there the recipe chosen least, and the task whose words have been used
+    least for this type; ``rng`` decides between equals.
 
     Args:
         tasks: to choose from.
@@ -65,22 +65,35 @@ def _evenly(
     """Draw the tasks of one type out of ``pool`` until it is empty."""
     kind_uses: Counter[str] = Counter()
     type_uses: Counter[str] = Counter()
+    row_uses: Counter[str] = Counter()
     word_uses: Counter[str] = Counter()
     while pool:
         scene = min(
             rng.sample(sorted(pool), len(pool)),
             key=lambda name: (kind_uses[room_kind(name)], type_uses[name], scene_uses[name]),
         )
-        # The mean, not the sum: that would prefer the shortest tasks.
-        task = min(pool[scene], key=lambda task: fmean(word_uses[word] for word in _words(task)))
+        task = min(
+            pool[scene],
+            key=lambda task: (
+                row_uses[_row(task)],
+                # The mean, not the sum: that would prefer the shortest tasks.
+                fmean(word_uses[word] for word in _words(task)),
+            ),
+        )
         pool[scene].remove(task)
         if not pool[scene]:
             del pool[scene]
         kind_uses[room_kind(scene)] += 1
         type_uses[scene] += 1
+        row_uses[_row(task)] += 1
         scene_uses[scene] += 1
         word_uses.update(_words(task))
         yield task
+
+
+def _row(task: Task) -> str:
+    """What made it: types of long-range tasks have several recipes."""
+    return str(task.extra.get("made_by", ""))
 
 
 def _words(task: Task) -> set[str]:
