@@ -7,12 +7,22 @@ from collections.abc import Callable
 from agents.base import Agent, Decision
 from agents.scripted.oracle import OracleAgent
 from agents.scripted.random import RandomAgent
+from agents.scripted.searcher import SearcherAgent
 
-__all__ = ["AGENTS", "Agent", "Decision", "OracleAgent", "RandomAgent", "make_agent"]
+__all__ = [
+    "AGENTS",
+    "Agent",
+    "Decision",
+    "OracleAgent",
+    "RandomAgent",
+    "SearcherAgent",
+    "make_agent",
+]
 
 AGENTS: dict[str, Callable[[int], Agent]] = {
     "oracle": lambda seed: OracleAgent(),
     "random": RandomAgent,
+    "searcher": lambda seed: SearcherAgent(),
 }
 """By name: how to make the agent, given a seed."""
 

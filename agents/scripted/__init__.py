@@ -1,1 +1,1 @@
-"""Agents without a model: the oracle, and the random one."""
+"""Agents without a model: the oracle, the random one, and the searcher."""

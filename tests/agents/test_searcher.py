@@ -1,0 +1,196 @@
+"""The searcher reads instructions, knows no more than any agent may, and beats chance by far."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import pytest
+
+from agents import make_agent
+from agents.scripted.searcher import words
+from agents.scripted.searcher.words import Goal, understand
+from benchmarks.metrics import CORRECTED, score_episode
+from benchmarks.play import episode_seed, play_episode
+from er_gym.envs.actions import STANDS_FOR
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.reward import search_targets
+from er_gym.tasks import verbs
+from er_gym.tasks.paper_format import read_tasks
+from er_gym.tasks.suites import load_suite
+from er_gym.tasks.task import Task
+from er_gym.tasks.types import TASK_TYPES
+
+Deeds = list[tuple[str, str]]
+MACHINES = {
+    words.BREW: ("CoffeeMachine", 1),
+    words.HEAT: ("Microwave", 2),
+    words.TOAST: ("Toaster", 1),
+    words.CHILL: ("Fridge", 0),
+}
+
+
+def deeds_of(goals: Iterable[Goal]) -> Deeds:
+    """What is to be done to which types, but for getting about, opening and closing."""
+    found: Deeds = []
+    held, water = "", False
+
+    def take(thing: str) -> None:
+        nonlocal held
+        if held != thing:
+            found.append((verbs.PICKUP, thing))
+        held = thing
+
+    def put(thing: str, place: str) -> None:
+        nonlocal held
+        take(thing)
+        found.append((verbs.PUT, STANDS_FOR.get(place, place)))
+        held = ""
+
+    goals = list(goals)
+    for goal in goals:
+        if goal.kind == words.FIND and len(goals) == 1:
+            found.append((words.FIND, goal.thing))
+        elif goal.kind == words.TAKE:
+            take(goal.thing)
+        elif goal.kind == words.PUT:
+            put(goal.thing, goal.place)
+        elif goal.kind == words.TOGGLE:
+            found.append((verbs.TOGGLE, goal.thing))
+        elif goal.kind == words.SLICE:
+            take(goal.place)
+            found.append((verbs.SLICE, goal.thing))
+        elif goal.kind == words.WASH:
+            put(goal.thing, "SinkBasin")
+            found += [] if water else [(verbs.TOGGLE, "Faucet")]
+            water = True
+            take(goal.thing)
+        elif goal.kind in MACHINES:
+            machine, times = MACHINES[goal.kind]
+            put(goal.thing, machine)
+            found += [(verbs.TOGGLE, machine)] * times
+            take(goal.thing)
+    return found
+
+
+def deeds_asked(task: Task) -> Deeds:
+    if task.type.search:
+        return [(words.FIND, name) for name in search_targets(task)]
+    handled = (verbs.PICKUP, verbs.PUT, verbs.TOGGLE, verbs.SLICE)
+    return [
+        (key.verb, STANDS_FOR.get(key.actual_type, key.actual_type))
+        for key in task.key_actions
+        if key.verb in handled
+    ]
+
+
+def misread(tasks: Iterable[Task]) -> list[str]:
+    return [t.instruction for t in tasks if deeds_of(understand(t.instruction)) != deeds_asked(t)]
+
+
+@pytest.mark.parametrize("suite", ["mini", "er-1k"])
+def test_instructions_of_suites_are_understood(suite: str) -> None:
+    tasks = load_suite(suite).tasks
+    wrong = misread(tasks)
+    assert len(wrong) <= 0.01 * len(tasks), wrong[:5]
+
+
+def test_instructions_of_the_paper_are_understood(shared_data) -> None:
+    tasks = read_tasks(shared_data / "paper_tasks_dev.json")
+    wrong = misread(tasks)
+    assert len(wrong) <= 0.02 * len(tasks), wrong[:5]
+
+
+@pytest.mark.parametrize(
+    ("instruction", "goals"),
+    [
+        ("Bring me the credit card.", [Goal("take", "CreditCard")]),
+        ("Could you tell me where the watch is?", [Goal("find", "Watch")]),
+        ("Flip the switch of the CoffeeMachine", [Goal("toggle", "CoffeeMachine")]),
+        ("Switch the desk lamp off.", [Goal("toggle", "DeskLamp")]),
+        ("Drop the pen into the bin.", [Goal("put", "Pen", "GarbageCan")]),
+        ("Make sure the apple ends up in the fridge.", [Goal("put", "Apple", "Fridge")]),
+        ("The box belongs on the sofa.", [Goal("put", "Box", "Sofa")]),
+        ("Take the Book that is on the Desk.", [Goal("take", "Book", source="Desk")]),
+        (
+            "Put the Cup on the Shelf after putting the Mug in the Fridge.",
+            [Goal("put", "Mug", "Fridge"), Goal("put", "Cup", "Shelf")],
+        ),
+        (
+            "First, place Cup on GarbageCan, then, place Mug on SinkBasin.",
+            [Goal("put", "Cup", "GarbageCan"), Goal("put", "Mug", "SinkBasin")],
+        ),
+        (
+            "Open the fridge, take the egg and close the fridge.",
+            [Goal("open", "Fridge"), Goal("take", "Egg"), Goal("close", "Fridge")],
+        ),
+        ("Colourless green ideas sleep furiously.", []),
+        ("", []),
+    ],
+)
+def test_other_wordings_are_understood_too(instruction: str, goals: list[Goal]) -> None:
+    assert list(understand(instruction)) == goals
+
+
+@pytest.fixture(scope="module")
+def env() -> Iterable[EmbodiedEnv]:
+    env = EmbodiedEnv([], obs_mode="text", instances="explore")
+    yield env
+    env.close()
+
+
+class Blinkered:
+    """An agent from whom all is kept that only the environment should know."""
+
+    obs_mode = "text"
+    told = frozenset({"navigable", "interactable", "action_mask", "action_success", "feedback"})
+
+    def __init__(self) -> None:
+        self.agent = make_agent("searcher")
+
+    def told_of(self, info: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: value for name, value in info.items() if name in self.told}
+
+    def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        only_words = Task("", TASK_TYPES[0], "", task.instruction, ())
+        self.agent.reset(only_words, obs, self.told_of(info))
+
+    def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Any:
+        return self.agent.act(obs, self.told_of(info))
+
+
+def test_it_has_no_privileged_knowledge_and_plays_the_same_again(env: EmbodiedEnv) -> None:
+    for task in load_suite("mini").tasks[::6]:
+        open_eyed = play_episode(env, make_agent("searcher", 1), task, 0)
+        blinkered = play_episode(env, Blinkered(), task, 0)
+        assert [step.text for step in open_eyed.steps] == [step.text for step in blinkered.steps]
+        assert not blinkered.error
+
+
+def test_it_solves_most_of_mini_without_breaking_rules(env: EmbodiedEnv) -> None:
+    tasks = load_suite("mini").tasks
+    records = [
+        play_episode(env, make_agent("searcher"), task, episode_seed(0, task.id)) for task in tasks
+    ]
+    assert [record.error for record in records] == [""] * len(records)
+    assert {record.end_reason for record in records} == {"end"}
+    solved = [record for record in records if score_episode(record, CORRECTED).success]
+    assert len(solved) >= 0.8 * len(records)
+    steps = [step for record in records for step in record.steps]
+    illegal = [step for step in steps if step.feedback.startswith("You cannot")]
+    assert len(illegal) <= 0.02 * len(steps), [step.feedback for step in illegal[:5]]
+
+
+def test_nonsense_ends_at_once(env: EmbodiedEnv) -> None:
+    scene = load_suite("mini").tasks[0].scene
+    task = Task("nonsense", TASK_TYPES[0], scene, "Colourless green ideas.", ())
+    record = play_episode(env, make_agent("searcher"), task, 0)
+    assert [step.verb for step in record.steps] == [verbs.INIT, verbs.END]
+
+
+def test_what_the_room_lacks_is_given_up_in_time(env: EmbodiedEnv) -> None:
+    scene = load_suite("mini").tasks[0].scene
+    task = Task("lacking", TASK_TYPES[0], scene, "Find the ShowerGlass in the Safe.", ())
+    record = play_episode(env, make_agent("searcher"), task, 0)
+    assert record.error == ""
+    assert record.end_reason == "end"
