@@ -142,9 +142,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             )
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"unknown render_mode {render_mode!r}; choose 'rgb_array' or None")
-        self._sources: dict[str, EpisodeSource] = {}
-        self._source = episode_source
-        self._from(episode_source)  # what is wrong with it is heard of now
+        self._live: EpisodeSource | None = None
+        self._generates = isinstance(episode_source, str) and episode_source == GENERATE
+        self._source = self._from(episode_source)
         self._task_type = look_up_type(task_type) if task_type else None
         self.render_mode = render_mode
         self._obs = parse_obs_mode(obs_mode)
@@ -276,7 +276,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         if self._controller is not None:
             self._controller.stop()
             self._controller = None
-        live = self._sources.pop(GENERATE, None)
+        live, self._live = self._live, None
         getattr(live, "close", lambda: None)()
 
     # -- the loop's parts ------------------------------------------------------------------------
@@ -292,9 +292,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         """Where to draw from; the generator is made once for an environment, which closes it."""
         if not isinstance(source, str) or source != GENERATE:
             return make_source(source)
-        if GENERATE not in self._sources:
-            self._sources[GENERATE] = make_source(GENERATE)
-        return self._sources[GENERATE]
+        if self._live is None:
+            self._live = make_source(GENERATE)
+        return self._live
 
     def _choose(
         self,
@@ -302,7 +302,11 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         scene: str | None = None,
         suite: Source | None = None,
     ) -> Task:
-        source = self._from(self._source if suite is None else suite)
+        source = self._source
+        if suite is not None:
+            source = self._from(suite)
+        elif self._generates and self._live is None:  # closed, and begun again
+            source = self._source = self._from(GENERATE)
         if task is None:
             return source.draw(self.np_random, self._task_type, scene)
         wanted = source.find(task) if isinstance(task, str) else task
