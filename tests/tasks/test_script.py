@@ -2,32 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
+from things_by_hand import thing
 
-from er_gym.tasks.generate.room import Room, Thing
+from er_gym.tasks.generate.room import Room
 from er_gym.tasks.generate.script import Impossible, Script
 from er_gym.tasks.goal import Condition
-
-
-def thing(object_type: str, *parents: str, **fields: Any) -> Thing:
-    """A thing in or on the things of some types."""
-    plain: dict[str, Any] = {
-        **dict.fromkeys(("receptacle", "pickupable", "openable", "closed", "toggleable"), False),
-        **dict.fromkeys(("on", "dirtyable", "fillable", "cookable", "sliceable"), False),
-        "controlled": (),
-        "volume": 1.0,
-        "x": 0.0,
-        "z": 0.0,
-    }
-    return Thing(
-        f"{object_type}|+00.00|+00.00|+00.00",
-        object_type,
-        tuple(f"{parent}|+00.00|+00.00|+00.00" for parent in parents),
-        **{**plain, **fields},
-    )
-
 
 COUNTER = thing("CounterTop", receptacle=True)
 TABLE = thing("DiningTable", receptacle=True)
