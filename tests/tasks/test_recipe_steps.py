@@ -20,7 +20,6 @@ from er_gym.tasks.generate.room import Room, Thing
 from er_gym.tasks.generate.script import Impossible
 from er_gym.tasks.goal import Condition
 
-Objects = list[dict[str, Any]]
 RECIPES = {recipe.name: recipe for recipe in bundled_recipes()}
 
 
