@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import asdict, dataclass, replace
 
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -10,6 +9,7 @@ from er_gym.envs.solver import Solver
 from er_gym.tasks import verbs
 from er_gym.tasks.difficulty import difficulty
 from er_gym.tasks.generate import Generator
+from er_gym.tasks.generate.generator import DONE_ALREADY
 from er_gym.tasks.goal import unmet
 from er_gym.tasks.making import Making
 from er_gym.tasks.splits import UNSEEN_TYPES, subject_types
@@ -17,14 +17,14 @@ from er_gym.tasks.task import Task
 from er_gym.tasks.types import TASK_TYPES
 
 REASONS = (
-    "the goal holds from the start",
+    DONE_ALREADY,
     "there is no room to put it",
     "it is nowhere to be found or out of reach",
     "the step limit",
     "the goal does not hold in the end",
     "a key action is worth nothing",
 )
-(_DONE_ALREADY, _NO_ROOM, _NOT_FOUND, _STEP_LIMIT, _GOAL, _REWARD) = REASONS
+(_, _NO_ROOM, _NOT_FOUND, _STEP_LIMIT, _GOAL, _REWARD) = REASONS
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Verifier:
         pose = self._env.agent_pose
         where = (pose.x, pose.z)
         if task.goal and not unmet(task.goal, self._env.objects, info["interactable"]):
-            return Verdict(_DONE_ALREADY, "", 1, where)
+            return Verdict(DONE_ALREADY, "", 1, where)
         solver = Solver()
         earned, over = 0.0, False
         while not over:
@@ -88,7 +88,8 @@ class Verifier:
             problem = _problem(info["end_reason"], info["action"].verb, bool(info["goal_unmet"]))
         elif abs(earned - task.total_reward) > 1e-6:
             problem = _REWARD
-        return Verdict(problem, _plain(info["feedback"]), info["steps"], where)
+        detail = " ".join(info["feedback"].split())
+        return Verdict(problem, detail, info["steps"], where)
 
     def close(self) -> None:
         """Stop the environment."""
@@ -118,7 +119,3 @@ def _problem(end_reason: str, verb: str, goal_unmet: bool) -> str:
     if end_reason == "step limit":
         return _STEP_LIMIT
     return _NO_ROOM if verb == verbs.PUT else _NOT_FOUND
-
-
-def _plain(feedback: str) -> str:
-    return re.sub(r"\s+", " ", feedback)
