@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
+import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
@@ -82,3 +84,24 @@ def parse(text: str) -> Action | None:
         if words.startswith(f"{verb} "):
             return _BY_TEXT.get(f"{verbs.canonical_verb(verb)} {words[len(verb) + 1 :]}")
     return None
+
+
+def understand(action: Action | str | int | np.integer[Any]) -> tuple[Action | None, str]:
+    """The action meant, None if a text names none; and the text.
+
+    Args:
+        action: an index, an :class:`Action` or its text.
+
+    Raises:
+        gymnasium.error.InvalidAction: it is none of these, or an index that is out of range.
+    """
+    if isinstance(action, str):
+        return parse(action), action
+    if isinstance(action, Action):
+        return parse(str(action)), str(action)
+    if isinstance(action, int | np.integer | np.ndarray) and 0 <= int(action) < len(ACTIONS):
+        return ACTIONS[int(action)], str(ACTIONS[int(action)])
+    raise gymnasium.error.InvalidAction(
+        f"{action!r} is no action: give an index from 0 to {len(ACTIONS) - 1}, an Action, or text "
+        "such as 'navigate to Fridge'"
+    )

@@ -14,9 +14,16 @@ from numpy.typing import NDArray
 
 from er_gym.envs import instances as which
 from er_gym.envs import skills
-from er_gym.envs.actions import ACTIONS, Action, parse
+from er_gym.envs.actions import ACTIONS, Action, understand
 from er_gym.envs.legality import Known, legal_actions, objection, suited, surroundings
-from er_gym.envs.observations import OBSERVATIONS, Memory, Situation, parse_obs_mode
+from er_gym.envs.observations import (
+    MAX_REPEATS,
+    OBSERVATIONS,
+    Memory,
+    Situation,
+    goal_row,
+    parse_obs_mode,
+)
 from er_gym.envs.percept import Percept
 from er_gym.envs.reward import Progress, search_targets
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
@@ -26,9 +33,8 @@ from er_gym.tasks.start import begin
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import task_type as look_up_type
 from er_gym.thor import make_controller
+from er_gym.thor.objects import ENTRY_KEYS
 
-MAX_REPEATS = 3
-"""The same action once more than this in a row ends the episode, unexecuted."""
 MAX_UNKNOWN = 3
 """So many replies in a row that name no known action end the episode."""
 
@@ -187,15 +193,14 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             controller, (self._backend, self.task.scene, self._grid_size)
         )
         pose = skills.start_pose(bounds, self._floor)
-        self._memory = Memory(pose)
+        self._memory = Memory(pose, goal_row(self.task.instruction))
         self._progress = Progress.start(self.task)
         self._known = Known(self.task.navigable_objects)
         self._at = ""  # id of the object last navigated to
         self._visited: dict[str, list[str]] = {}
         self._steps = 1
         self._limit = self._max_steps or self.task.max_steps
-        self._last: Action | None = None
-        self._repeats = self._unknown = 0
+        self._unknown = 0
         self._end_reason = ""
         self._success = False
         self._goal_unmet: tuple[Condition, ...] = ()
@@ -217,15 +222,14 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         """
         if self._controller is None or self._end_reason:
             raise gymnasium.error.ResetNeeded("call reset() first: no episode is under way")
-        understood, text = _understand(action)
+        understood, text = understand(action)
         if understood is None:
             return self._not_understood(text)
         self._unknown = 0
-        self._repeats = self._repeats + 1 if understood == self._last else 1
-        self._last = understood
-        if self._repeats > MAX_REPEATS:
+        if understood == self._memory.last and self._memory.repeats >= MAX_REPEATS:
             self._end_reason = "repeated action"
-            feedback = f"You have tried to {understood} {self._repeats} times in a row; that is it."
+            times = self._memory.repeats + 1
+            feedback = f"You have tried to {understood} {times} times in a row; that is it."
             return self._reply(understood, text, False, "", feedback, 0.0)
         self._steps += 1
         refused = objection(understood, self._around, self._known)
@@ -233,6 +237,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             object_id, outcome = "", skills.Outcome(None, False, refused)
         else:
             object_id, outcome = self._do(understood)
+        self._memory.act(understood, outcome.success)
         self._take_in(outcome)
         reward = self._judge(understood, outcome, object_id) - self._step_penalty
         if refused:
@@ -321,7 +326,14 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                 self._percept = percept
                 self._around = surroundings(percept, self._at)
                 self._known.add(percept.objects.kinds[self._around.navigable])
-                self._memory.look(percept)
+                self._memory.look(percept, self._at_kind)
+
+    @property
+    def _at_kind(self) -> int | None:
+        """The type of what was last navigated to, if that is still there."""
+        objects = self._percept.objects
+        row = objects.row.get(self._at)
+        return None if row is None else int(objects.kinds[row])
 
     def _do(self, action: Action) -> tuple[str, skills.Outcome]:
         if action.verb == verbs.OBSERVE:
@@ -375,7 +387,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             targets = search_targets(self.task) if self.task.type.search else frozenset()
             in_reach = self._around.in_reach
             if self.task.goal:
-                self._goal_unmet = unmet(self.task.goal, self.objects, in_reach)
+                self._goal_unmet = unmet(self.task.goal, self._objects_of_goal(), in_reach)
             if (
                 not self._progress.only_end_left
                 or not targets.issubset(in_reach)
@@ -385,6 +397,14 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             self._success = True
         self._progress, reward = self._progress.after(action, object_id)
         return reward
+
+    def _objects_of_goal(self) -> Sequence[Mapping[str, Any]]:
+        """Metadata of the objects that the goal is about; of all, where it asks for more than is
+        at hand, since that takes longer than the rest of a step."""
+        goal = self.task.goal
+        if all(name in ENTRY_KEYS for condition in goal for name, _ in condition.state):
+            return self._percept.objects.entries({condition.object_type for condition in goal})
+        return self.objects
 
     def _not_understood(
         self, text: str
@@ -418,8 +438,6 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         return self._observation(feedback, success), reward, terminated, truncated, info
 
     def _observation(self, feedback: str, success: bool) -> dict[str, Any]:
-        objects = self._percept.objects
-        at = objects.row.get(self._at)
         situation = Situation(
             percept=self._percept,
             around=self._around,
@@ -427,7 +445,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             known=self._known,
             instruction=self.task.instruction,
             feedback=feedback,
-            at=None if at is None else int(objects.kinds[at]),
+            at=self._at_kind,
             success=success,
             steps=self._steps,
             max_steps=self._limit,
@@ -467,20 +485,6 @@ def _checked(options: Mapping[str, Any]) -> Mapping[str, Any]:
                 f"{'Task or its id' if name == 'task' else 'scene such as FloorPlan1'}"
             )
     return options
-
-
-def _understand(action: Action | str | int | np.integer[Any]) -> tuple[Action | None, str]:
-    """The action meant, None if a text names none; and the text."""
-    if isinstance(action, str):
-        return parse(action), action
-    if isinstance(action, Action):
-        return parse(str(action)), str(action)
-    if isinstance(action, int | np.integer | np.ndarray) and 0 <= int(action) < len(ACTIONS):
-        return ACTIONS[int(action)], str(ACTIONS[int(action)])
-    raise gymnasium.error.InvalidAction(
-        f"{action!r} is no action: give an index from 0 to {len(ACTIONS) - 1}, an Action, or text "
-        "such as 'navigate to Fridge'"
-    )
 
 
 def _feedback(action: Action, outcome: skills.Outcome) -> str:

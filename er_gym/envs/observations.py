@@ -18,14 +18,32 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from er_gym.envs.actions import Action
 from er_gym.envs.legality import Known, Surroundings
 from er_gym.envs.percept import Percept, names
+from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
 from er_gym.thor.objects import KIND_OF, TYPES
 
-_PER_TYPE = ("visible", "seen", "navigable", "interactable", "open", "on", "held", "at", "goal")
+_DID = tuple(f"did {verb}" for verb in verbs.OBJECT_VERBS)
+FEATURES = (
+    *("visible", "seen", "navigable", "interactable", "open", "on", "held", "at"),
+    *("goal", "found", "last"),
+    *_DID,
+)
+"""What ``state`` says of each object type, 0 to 1:
+
+- ``visible`` now, ``seen`` ever in this episode, ``navigable`` and ``interactable`` as the action
+  mask has it;
+- ``open``, ``on``: one was when last seen; ``held``: in the hand; ``at``: last navigated to;
+- ``goal``: the instruction names it, 1 for the first it names, then 1/2, 1/3 …;
+- ``found``: the greatest ``goal`` of what was in view, and not in the hand, on arriving there or
+  since;
+- ``last``: the last action named it;
+- ``did`` and a verb: how often that was done to it in this episode, 4 times or more being 1.
+"""
 _POSE = ("right", "ahead", "sin", "cos", "horizon", "standing")
-_EPISODE = ("steps", "success", "holding")
+_EPISODE = ("steps", "success", "holding", "repeats")
 GOAL_VERBS: Mapping[str, str] = {
     "search": r"find|search|look|locate|where",
     "pickup": r"pick|take|grab|get|fetch|bring",
@@ -36,13 +54,40 @@ GOAL_VERBS: Mapping[str, str] = {
     "then": r"then|after|before|first",
 }
 """Words of an instruction that say what to do, by what they say."""
-STATE_LAYOUT = (*_POSE, *_EPISODE, *GOAL_VERBS, *(f"{f}:{t}" for f in _PER_TYPE for t in TYPES))
-"""What each entry of the ``state`` vector means, in order."""
-_SCALARS = len(STATE_LAYOUT) - len(_PER_TYPE) * len(TYPES)
-_ROW = {feature: row for row, feature in enumerate(_PER_TYPE)}
+SCALARS = (
+    *_POSE,
+    *_EPISODE,
+    *(f"last {verb}" for verb in (*verbs.BARE_VERBS, *verbs.OBJECT_VERBS)),
+    *GOAL_VERBS,
+)
+"""What ``state`` says of the agent and the episode:
+
+- ``right``, ``ahead``: how far from where it began, tens of metres, -1 to 1, in the frame of the
+  view it began with; ``sin``, ``cos`` of how far it has turned since, clockwise; ``horizon``,
+  right angles downwards; ``standing`` 0 or 1;
+- ``steps``: the share of the step limit that is used up; ``success`` of the last action; whether it
+  is ``holding`` something; ``repeats``: how often in a row the last action was done, 1 being the
+  most that is let pass;
+- ``last`` and a verb: what the last action was, 0 or 1;
+- :data:`GOAL_VERBS`, 0 or 1: what the words of the instruction ask for.
+"""
+STATE_LAYOUT = (*SCALARS, *(f"{feature}:{name}" for feature in FEATURES for name in TYPES))
+"""What each entry of the ``state`` vector means, in order: :data:`SCALARS`, then a row of types for
+each of :data:`FEATURES`."""
+_LAST = {verb: SCALARS.index(f"last {verb}") for verb in (*verbs.BARE_VERBS, *verbs.OBJECT_VERBS)}
+_ROW = {feature: row for row, feature in enumerate(FEATURES)}
+_FIRST_DID = _ROW[_DID[0]]
+_OFTEN = 4
+"""What has been done so often need not be counted further."""
 _ROOM_SCALE = 10.0
 """Offsets from the start are divided by so many metres."""
 _TEXT_LENGTH = 20_000
+MAX_REPEATS = 3
+"""The same action once more than this in a row ends the episode, unexecuted."""
+
+
+def _nothing() -> NDArray[np.float32]:
+    return np.zeros(len(TYPES), dtype=np.float32)
 
 
 def _no_types() -> NDArray[np.bool_]:
@@ -51,21 +96,48 @@ def _no_types() -> NDArray[np.bool_]:
 
 @dataclass(eq=False)
 class Memory:
-    """What an agent that pays attention remembers of an episode, by object type: (T,) bool."""
+    """What an agent that pays attention remembers of an episode, by object type: (T,) bool.
+
+    Attributes:
+        start: where it began.
+        wanted: (T,) float32, the weight of each type in the instruction, see :func:`goal`.
+        found: (T,) float32, the greatest weight of what was in view at each type gone to.
+        did: (len(OBJECT_VERBS), T) how often each was done.
+        last, repeats: the last action, and how often in a row.
+    """
 
     start: AgentPose
+    wanted: NDArray[np.float32] = field(default_factory=_nothing)
     seen: NDArray[np.bool_] = field(default_factory=_no_types)
     is_open: NDArray[np.bool_] = field(default_factory=_no_types)
     is_on: NDArray[np.bool_] = field(default_factory=_no_types)
+    found: NDArray[np.float32] = field(default_factory=_nothing)
+    did: NDArray[np.float32] = field(default_factory=lambda: np.zeros((len(_DID), len(TYPES)), "f"))
+    last: Action | None = None
+    repeats: int = 0
 
-    def look(self, percept: Percept) -> None:
-        """Take in what is visible now."""
+    def look(self, percept: Percept, at: int | None = None) -> None:
+        """Take in what is visible now; ``at``: the type of what was last navigated to."""
         objects, visible = percept.objects, percept.visible
         self.seen |= percept.visible_types
         out_of_sight = ~percept.visible_types
         for remembered, now in ((self.is_open, objects.is_open), (self.is_on, objects.is_toggled)):
             remembered &= out_of_sight
             remembered[objects.kinds[visible & now]] = True
+        if at is not None:
+            weights = self.wanted * percept.visible_types
+            weights[at] = 0.0
+            if objects.held >= 0:
+                weights[objects.kinds[objects.held]] = 0.0
+            self.found[at] = max(self.found[at], weights.max())
+
+    def act(self, action: Action, success: bool) -> None:
+        """Remember what was done, or tried."""
+        self.repeats = self.repeats + 1 if action == self.last else 1
+        self.last = action
+        if success and action.object_type:
+            row = verbs.OBJECT_VERBS.index(action.verb)
+            self.did[row, KIND_OF[action.object_type]] += 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +187,8 @@ def goal(instruction: str) -> tuple[tuple[float, ...], tuple[tuple[str, float], 
 
 
 @lru_cache(maxsize=4096)
-def _goal_row(instruction: str) -> NDArray[np.float32]:
-    """(T,) the weight of each type in what an instruction asks for."""
+def goal_row(instruction: str) -> NDArray[np.float32]:
+    """(T,) float32, the weight of each type in what an instruction asks for; not to be written."""
     row = np.zeros(len(TYPES), dtype=np.float32)
     for name, weight in goal(instruction)[1]:
         row[KIND_OF[name]] = weight
@@ -143,23 +215,33 @@ def _relative_pose(situation: Situation) -> tuple[float, ...]:
 
 def _state(situation: Situation) -> NDArray[np.float32]:
     memory, objects = situation.memory, situation.percept.objects
+    last = memory.last
     scalars = (
         *_relative_pose(situation),
         situation.steps / situation.max_steps,
         float(situation.success),
         float(objects.held >= 0),
-        *goal(situation.instruction)[0],
+        memory.repeats / MAX_REPEATS,
     )
     vector = np.zeros(len(STATE_LAYOUT), dtype=np.float32)
-    vector[:_SCALARS] = [min(max(scalar, -1.0), 1.0) for scalar in scalars]
-    table = vector[_SCALARS:].reshape(len(_PER_TYPE), len(TYPES))
+    vector[: len(scalars)] = scalars
+    np.clip(vector[: len(scalars)], -1.0, 1.0, out=vector[: len(scalars)])
+    vector[len(SCALARS) - len(GOAL_VERBS) : len(SCALARS)] = goal(situation.instruction)[0]
+    if last is not None:
+        vector[_LAST[last.verb]] = 1.0
+    table = vector[len(SCALARS) :].reshape(len(FEATURES), len(TYPES))
     table[_ROW["visible"]] = situation.percept.visible_types
     table[_ROW["seen"]] = memory.seen
     table[_ROW["navigable"]] = situation.known.types
     table[_ROW["interactable"]] = situation.around.interactable_types
     table[_ROW["open"]] = memory.is_open
     table[_ROW["on"]] = memory.is_on
-    table[_ROW["goal"]] = _goal_row(situation.instruction)
+    table[_ROW["goal"]] = memory.wanted
+    table[_ROW["found"]] = memory.found
+    np.minimum(memory.did, _OFTEN, out=table[_FIRST_DID:])
+    table[_FIRST_DID:] /= _OFTEN
+    if last is not None and last.object_type:
+        table[_ROW["last"], KIND_OF[last.object_type]] = 1.0
     if objects.held >= 0:
         table[_ROW["held"], objects.kinds[objects.held]] = 1.0
     if situation.at is not None:

@@ -9,7 +9,9 @@ next asked for.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +82,10 @@ class ThirdPartyCamera:
     field_of_view: float
 
 
+_NOT_OBJECTS = frozenset({"scene", "settings", "agent", "cameras", "arrangement", "looks", "base"})
+"""What a snapshot of the objects has no copy of."""
+
+
 @dataclass
 class World:
     """A scene being lived in. Made by :meth:`World.load`.
@@ -87,7 +93,8 @@ class World:
     Attributes mirror AI2-THOR's object metadata, one row an object: ``position``, ``rotation``,
     ``low`` and ``high`` (corners of the axis-aligned box) are (N, 3), metres and degrees;
     ``properties`` and ``states`` are (N, P) and (N, S) bool, see :meth:`has` and :meth:`state`.
-    ``untouched`` is True until something has been changed.
+    ``untouched`` is True until something has been changed. ``base`` is how the room was arranged
+    before, by ``SetObjectPoses``, if it was; it is not to be changed.
     ``parents[i]`` are the receptacles that object i is in, innermost first as recorded.
     ``entries`` is where :mod:`er_gym.sim.metadata` keeps what it said of objects that have not
     changed since, ``looks`` where the renderer does; ``touched`` are the objects that something has
@@ -120,6 +127,7 @@ class World:
     salient_materials: list[tuple[str, ...] | None]
     held: int = -1
     untouched: bool = True
+    base: World | None = None
     cameras: tuple[ThirdPartyCamera, ...] = ()
     index: dict[str, int] = field(default_factory=dict)
     derived: dict[str, object] = field(default_factory=dict)
@@ -168,6 +176,22 @@ class World:
         world._nesting = recorded.nesting(scene)
         world._by_type = recorded.rows_by_type(scene)
         return world
+
+    def snapshot(self) -> World:
+        """The objects as they are now, to be restored by :meth:`become`; they are its :attr:`base`
+        from now on."""
+        self.base = replace(self, **_objects(self))
+        return self.base
+
+    def become(self, kept: World) -> None:
+        """Put every object into the state of a snapshot of the same scene.
+
+        The agent stays where it is. What has been worked out from where things are is shared, until
+        something is moved.
+        """
+        for name, value in _objects(kept).items():
+            setattr(self, name, value)
+        self.base = kept
 
     # -- reading ---------------------------------------------------------------------------------
 
@@ -338,7 +362,7 @@ class World:
     def changed(self) -> None:
         """Say that something is elsewhere than it was, or has been opened or shut."""
         self.restated()
-        self.arrangement.clear()
+        self.arrangement = {}  # not cleared: other worlds may be arranged like this, see become()
 
     def restated(self) -> None:
         """Say that something is in another state than it was, where it is."""
@@ -488,3 +512,13 @@ class World:
     def configure(self, **changes: object) -> None:
         """Change settings by name."""
         self.settings = replace(self.settings, **changes)  # type: ignore[arg-type]
+
+
+def _objects(world: World) -> dict[str, Any]:
+    """Copies of all that is said of a world's objects; what they look like is to be found anew."""
+    copies = {
+        each.name: copy(getattr(world, each.name))
+        for each in fields(world)
+        if each.name not in _NOT_OBJECTS
+    }
+    return {**copies, "arrangement": world.arrangement, "looks": {}}

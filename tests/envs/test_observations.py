@@ -7,7 +7,14 @@ import pytest
 from support import make_task
 
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.observations import GOAL_VERBS, STATE_LAYOUT, goal, parse_obs_mode
+from er_gym.envs.observations import (
+    FEATURES,
+    GOAL_VERBS,
+    SCALARS,
+    STATE_LAYOUT,
+    goal,
+    parse_obs_mode,
+)
 from er_gym.tasks.task import AgentPose
 
 FRIDGE = "Fridge|-02.10|+00.00|+01.07"
@@ -116,3 +123,54 @@ def test_text_keeps_to_its_characters(state_env: EmbodiedEnv) -> None:
 def test_bad_obs_modes(mode: str) -> None:
     with pytest.raises(ValueError, match="unknown obs_mode"):
         parse_obs_mode(mode)
+
+
+# -- what is remembered ----------------------------------------------------------------------------
+
+
+def test_state_remembers_what_was_done_to_what(state_env: EmbodiedEnv) -> None:
+    task = make_task("single_pickup", ("open", FRIDGE), instruction="Take the Egg.")
+    obs, _ = state_env.reset(options={"task": task})
+    assert [entry(obs, name) for name in ("repeats", "last navigate to", "last:Fridge")] == [0] * 3
+    state_env.step("navigate to Fridge")
+    obs, *_ = state_env.step("navigate to Fridge")
+    assert entry(obs, "did navigate to:Fridge") == 0.5  # twice, of 4
+    assert entry(obs, "repeats") == pytest.approx(2 / 3)
+    assert [entry(obs, name) for name in ("last navigate to", "last:Fridge")] == [1, 1]
+    obs, *_ = state_env.step("pickup Egg")  # refused: it is shut in
+    assert entry(obs, "did pickup:Egg") == 0.0
+    assert entry(obs, "last:Egg") == 1.0
+    assert entry(obs, "repeats") == pytest.approx(1 / 3)
+    state_env.step("open Fridge")
+    obs, *_ = state_env.step("pickup Egg")
+    assert [entry(obs, name) for name in ("did open:Fridge", "did pickup:Egg")] == [0.25, 0.25]
+    assert [entry(obs, name) for name in ("last:Fridge", "last:Egg")] == [0, 1]
+
+
+def test_state_remembers_where_it_saw_what_it_wants(state_env: EmbodiedEnv) -> None:
+    task = make_task(
+        "single_pickup", ("open", FRIDGE), instruction="Take the Egg to the Microwave."
+    )
+    obs, _ = state_env.reset(options={"task": task})
+    obs, *_ = state_env.step("navigate to Fridge")
+    before = entry(obs, "found:Fridge")
+    assert before < 1.0  # the egg is shut in; the microwave may be in view
+    obs, *_ = state_env.step("open Fridge")
+    assert entry(obs, "found:Fridge") == 1.0
+    state_env.step("pickup Egg")
+    obs, *_ = state_env.step("navigate to Window")
+    assert entry(obs, "found:Fridge") == 1.0
+    assert entry(obs, "found:Window") < 1.0  # what is in the hand is not found there
+
+
+def test_a_new_episode_begins_with_nothing_remembered(state_env: EmbodiedEnv) -> None:
+    task = make_task("single_pickup", ("open", FRIDGE), instruction="Take the Egg.")
+    first, _ = state_env.reset(options={"task": task})
+    state_env.step("navigate to Fridge")
+    state_env.step("open Fridge")
+    again, _ = state_env.reset(options={"task": task})
+    assert (first["state"] == again["state"]).all()
+
+
+def test_the_layout_names_every_entry_once() -> None:
+    assert len(STATE_LAYOUT) == len(set(STATE_LAYOUT)) == len(SCALARS) + len(FEATURES) * 124

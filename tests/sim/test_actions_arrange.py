@@ -52,6 +52,31 @@ def test_everything_where_it_is_changes_nothing(kitchen):
     assert comparable(kitchen) == before
 
 
+def test_a_room_that_is_arranged_again_is_the_same_room(kitchen):
+    """The second time it is remembered; what was done to the first is not."""
+    wanted = moved_apple(kitchen, x=-0.2, z=0.1)
+    arranged = []
+    for _ in range(3):
+        kitchen.event = kitchen.controller.reset("FloorPlan1")
+        kitchen.do("SetObjectPoses", objectPoses=wanted)
+        arranged.append(json.dumps(kitchen.event.metadata["objects"]))
+        check(kitchen)
+        kitchen.do("OpenObject", FRIDGE, forceAction=True)
+        kitchen.take(next(o["objectId"] for o in loose(kitchen) if o["pickupable"]))
+        kitchen.do("DirtyObject", kitchen.one("Mug"), forceAction=True)
+        assert json.dumps(kitchen.event.metadata["objects"]) != arranged[-1]
+    assert len(set(arranged)) == 1
+
+
+def test_what_was_changed_before_it_is_arranged_stays_changed(kitchen):
+    wanted = moved_apple(kitchen, x=-0.2, z=0.1)
+    kitchen.do("SetObjectPoses", objectPoses=wanted)
+    kitchen.event = kitchen.controller.reset("FloorPlan1")
+    kitchen.do("OpenObject", FRIDGE, forceAction=True)
+    kitchen.do("SetObjectPoses", objectPoses=wanted)
+    assert kitchen[FRIDGE]["isOpen"]
+
+
 def test_what_is_not_named_leaves_the_scene(kitchen):
     apple = kitchen[APPLE]
     stays = [pose for pose in poses(kitchen) if pose["objectName"] == apple["name"]]

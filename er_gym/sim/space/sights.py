@@ -11,13 +11,13 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from itertools import count as counter
 from math import hypot
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim import recorded
 from er_gym.sim.scene import load_scene
 from er_gym.sim.space.rays import Targets, blocked_by, crossings
 from er_gym.sim.space.reach import Outlines
@@ -25,9 +25,9 @@ from er_gym.sim.world import Settings, World
 
 _RUN = 26
 """So many points, those of a small box, are held against a box at once before each is by itself."""
-_ARRANGEMENTS = 512
-_VIEWPOINTS = 128
-_ANSWERS = 512
+_ARRANGEMENTS = 1024
+_VIEWPOINTS = 1024
+_ANSWERS = 2048
 
 Found = TypeVar("Found")
 Floats = NDArray[np.float32]
@@ -62,14 +62,16 @@ class Sights:
         of: (P,) whose each is. first, count: (N,) where each object's points begin, how many.
         low, high: (M, 3) corners of boxes that hide things; whose: (M,) whose they are.
         own: (N, M) the boxes of each object and of what it lies in or on, which do not hide it.
-        gone: (M,) boxes of the recorded arrangement that are not there any more.
+        gone: (M,) boxes of earlier arrangements that are not there any more.
         pairs: (N, M) which boxes are to be asked about for whose points.
         away: (N,) which objects are shut away, in the hand or no more.
         reach: corners x, z of a rectangle around everything, metres.
-        before: the recorded arrangement, None if this is that one.
+        before: the arrangement that this one was made from by a few changes; None of the recorded
+            one. A room that was arranged anew as a whole comes in between.
         anew: (P,) the points about which that one says nothing, None if there are none.
-        moved: (K,) rows of the objects that are not where they were recorded.
+        moved: (K,) rows of the objects that are not where they were then.
         moved_outlines: theirs, from above; those of all objects in the recorded arrangement.
+        number: its own.
     """
 
     points: Floats
@@ -88,6 +90,7 @@ class Sights:
     anew: NDArray[np.bool_] | None
     moved: NDArray[np.intp]
     moved_outlines: Outlines | None
+    number: int = field(default_factory=counter().__next__)
     _viewpoints: OrderedDict[tuple[float, ...], Viewpoint] = field(default_factory=OrderedDict)
     _answers: OrderedDict[Any, Any] = field(default_factory=OrderedDict)
 
@@ -303,8 +306,10 @@ def sights_anew(world: World) -> Sights:
 
 
 @lru_cache(maxsize=128)
-def _as_recorded(scene_name: str) -> Sights:
-    return sights_anew(World.load(load_scene(scene_name), Settings()))
+def _as_recorded(scene_name: str) -> World:
+    world = World.load(load_scene(scene_name), Settings())
+    world.arrangement["sights"] = sights_anew(world)
+    return world
 
 
 _SAME = 1e-6
@@ -313,7 +318,7 @@ _SAME = 1e-6
 
 @dataclass(frozen=True)
 class _Difference:
-    """How the world differs from the recorded arrangement, in what lines of sight depend on.
+    """How the world differs from another arrangement, in what lines of sight depend on.
 
     Attributes:
         away: (N,) which objects are shut away, in the hand or no more.
@@ -324,8 +329,9 @@ class _Difference:
     elsewhere: NDArray[np.intp]
 
     @staticmethod
-    def of(world: World) -> _Difference:
-        scene, count = world.scene, len(world.scene)
+    def of(world: World, base: World, before: Sights) -> _Difference:
+        """From ``base``, whose sights are known."""
+        count = len(base)
         away = world.hidden.copy()
         away[world.in_hand] = True
         displaced = np.array(world.displaced(), dtype=np.intp)
@@ -333,25 +339,26 @@ class _Difference:
         if not len(rows):
             return _Difference(away, rows)
         new, rows = rows[rows >= count], rows[rows < count]
-        half = scene.aabb_size[rows] / 2
         apart = np.abs(
             [
-                world.low[rows] - (scene.aabb_center[rows] - half),
-                world.high[rows] - (scene.aabb_center[rows] + half),
-                world.rotation[rows] - scene.rotation[rows],
+                world.low[rows] - base.low[rows],
+                world.high[rows] - base.high[rows],
+                world.rotation[rows] - base.rotation[rows],
             ]
         )
         moved = (apart > _SAME).any(axis=(0, 2))
         within = world.nesting.within[rows]
-        moved |= (within[:, :count] != recorded.nesting(scene).within[rows]).any(axis=1)
+        moved |= (within[:, :count] != base.nesting.within[rows]).any(axis=1)
         moved |= within[:, count:].any(axis=1)
+        if before.before is not None:  # nothing was found out there about what was shut away
+            moved |= before.away[rows]
         return _Difference(away, np.concatenate([rows[moved], new]))
 
-    def key(self, world: World) -> tuple[Any, ...]:
+    def key(self, world: World, before: Sights) -> tuple[Any, ...]:
         """What the arrangement can be known again by."""
         rows = self.elsewhere
         return (
-            world.scene.name,
+            before.number,
             self.away.tobytes(),
             rows.tobytes(),
             world.low[rows].tobytes(),
@@ -362,7 +369,7 @@ class _Difference:
 
 
 def _changed(world: World, before: Sights, difference: _Difference) -> Sights:
-    """The sights of the world as it is now, by what is different from the recorded arrangement."""
+    """The sights of the world as it is now, by what is different from another arrangement."""
     away, elsewhere = difference.away, difference.elsewhere
     count, old = len(world), len(before.count)
     was_away = np.ones(count, dtype=bool)
@@ -375,6 +382,7 @@ def _changed(world: World, before: Sights, difference: _Difference) -> Sights:
     whose = np.concatenate([before.whose, come[2]])
     is_new = np.arange(len(whose)) >= len(before.whose)
     gone = ~is_new & (moved | away)[whose]
+    gone[: len(before.gone)] |= before.gone
     own = _own(world, whose)
     # Of what stays, only what has come has to be asked about; of what moved, all that is there.
     pairs = ~own & np.where(moved[:, None], ~gone, is_new)
@@ -445,15 +453,16 @@ def sights(world: World) -> Sights:
 
 
 def _found(world: World) -> Sights:
-    before = _as_recorded(world.scene.name)
+    base = world.base or _as_recorded(world.scene.name)
+    before = sights(base)
     if world.untouched:
         return before
-    difference = _Difference.of(world)
+    difference = _Difference.of(world, base, before)
     if not len(difference.elsewhere) and np.array_equal(difference.away, before.away):
         return before
     return _kept(
         _known,
-        difference.key(world),
+        difference.key(world, before),
         _ARRANGEMENTS,
         lambda: _changed(world, before, difference),
     )
