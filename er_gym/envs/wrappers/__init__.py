@@ -1,0 +1,16 @@
+"""Wrappers for learning: the instruction as a vector, and a reward that tells more.
+
+::
+
+    env = gymnasium.make("ER-SinglePickup-v0", obs_mode="state")
+    env = KeyActionShaping(InstructionEmbedding(env), gamma=0.99)
+
+Each works on what ``gymnasium.make`` returns and on an ``EmbodiedEnv`` as it is, in any order.
+Nothing heavy is imported before an encoder that needs it is made.
+"""
+
+from er_gym.envs.wrappers.encoders import Encoder, make_encoder
+from er_gym.envs.wrappers.instruction import InstructionEmbedding
+from er_gym.envs.wrappers.shaping import KeyActionShaping
+
+__all__ = ["Encoder", "InstructionEmbedding", "KeyActionShaping", "make_encoder"]

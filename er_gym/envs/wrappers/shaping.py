@@ -1,0 +1,77 @@
+"""A reward that tells at once how far a task has come, and asks for the same behaviour."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any
+
+import gymnasium
+from gymnasium.utils import RecordConstructorArgs
+
+from er_gym.envs.wrappers.base import TaskWrapper, told
+
+
+def potential(info: Mapping[str, Any]) -> float:
+    """Minus the share of the task's key actions that is left, in [-1, 0].
+
+    Raises:
+        ValueError: ``info`` is none of an er-gym environment.
+    """
+    left, done = (len(told(info, f"key_actions_{state}")) for state in ("left", "done"))
+    return -left / max(left + done, 1)
+
+
+class KeyActionShaping(TaskWrapper, RecordConstructorArgs):
+    """Adds potential-based shaping (Ng, Harada and Russell, ICML 1999) to the reward.
+
+    With the potential Φ(s) = -scale × (key actions left / key actions of the task), a step from s
+    to s' gets γ Φ(s') − Φ(s) more. Φ is 0 where an episode has terminated, whatever is left, but
+    not where it is truncated: a learner goes on from there by its own estimate. So all that an
+    episode of T steps gets more, discounted, is γ^T Φ(s_T) − Φ(s_0), which no choice of actions
+    changes once it terminates, and the best policies stay the best. This holds for the discount
+    that the learner uses, and for truncated episodes if it does bootstrap there.
+
+    **For training only, never for evaluation.** The reward then tells about the task what the agent
+    is not told: how many key actions are left. Its sums cannot be compared with those of others,
+    and a step that ends an episode early is paid what was still owed. ``info["unshaped_reward"]``
+    keeps the environment's own reward of each step. Evaluate in an environment without this
+    wrapper, or with ``scale=0``.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], gamma: float, scale: float = 1.0) -> None:
+        """Wrap an environment.
+
+        Args:
+            env: one of er-gym's, wrapped or not.
+            gamma: the learner's own discount γ, from 0 to 1.
+            scale: what all key actions of a task are worth together, 0 or more; 0 leaves the reward
+                as it is.
+
+        Raises:
+            ValueError: gamma or scale is out of its range.
+        """
+        if not 0.0 <= gamma <= 1.0:
+            raise ValueError(f"gamma is {gamma!r}; give the learner's discount, from 0 to 1")
+        if not (isfinite(scale) and scale >= 0.0):
+            raise ValueError(f"scale is {scale!r}; give a finite number, 0 or more")
+        RecordConstructorArgs.__init__(self, gamma=gamma, scale=scale)
+        TaskWrapper.__init__(self, env)
+        self._gamma, self._scale = gamma, scale
+        self._potential = 0.0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode."""
+        obs, info = self.env.reset(seed=seed, options=options)
+        self._potential = self._scale * potential(info)
+        return obs, info
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Do an action; ``info["unshaped_reward"]`` is what the environment gave for it."""
+        obs, reward, terminated, truncated, info = self.env.step(action)
+        before = self._potential
+        self._potential = 0.0 if terminated else self._scale * potential(info)
+        shaped = float(reward) + self._gamma * self._potential - before
+        return obs, shaped, terminated, truncated, {**info, "unshaped_reward": float(reward)}
