@@ -19,6 +19,8 @@ __all__ = [
     "make_agent",
 ]
 
+RL = "rl:"
+"""What the name of a trained policy begins with; its run directory follows."""
 AGENTS: dict[str, Callable[[int], Agent]] = {
     "oracle": lambda seed: OracleAgent(),
     "random": RandomAgent,
@@ -28,12 +30,27 @@ AGENTS: dict[str, Callable[[int], Agent]] = {
 
 
 def make_agent(name: str, seed: int = 0) -> Agent:
-    """An agent by name.
+    """An agent by name: one of :data:`AGENTS`, or ``rl:RUN`` for a trained policy.
 
     Raises:
         ValueError: there is none of that name; the message lists those there are.
     """
+    if name.startswith(RL):
+        return _trained(name.removeprefix(RL))
     make = AGENTS.get(name)
     if make is None:
-        raise ValueError(f"unknown agent {name!r}; choose one of: {', '.join(AGENTS)}")
+        raise ValueError(
+            f"unknown agent {name!r}; choose one of: {', '.join(AGENTS)}, "
+            f"or {RL}RUN with a run directory of er-gym train-rl"
+        )
     return make(seed)
+
+
+def _trained(path: str) -> Agent:
+    try:
+        from agents.rl.agent import RLAgent  # late: torch
+    except ImportError as error:
+        raise ValueError(
+            f"agent {RL}{path} needs {error.name}, which is not installed: pip install 'er-gym[rl]'"
+        ) from error
+    return RLAgent(path)

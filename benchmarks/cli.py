@@ -19,6 +19,7 @@ from benchmarks.cli_options import split
 from benchmarks.cli_player import doctor, player
 from benchmarks.cli_render import play, render
 from benchmarks.cli_tasks import tasks
+from benchmarks.cli_train import train_rl
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -79,6 +80,7 @@ cli.add_command(doctor)
 cli.add_command(render)
 cli.add_command(play)
 cli.add_command(tasks)
+cli.add_command(train_rl)
 
 
 @cli.command()

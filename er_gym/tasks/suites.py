@@ -72,7 +72,7 @@ class SuiteConfig(BaseModel):
 
 def suite_names() -> tuple[str, ...]:
     """The names of the suites, in alphabetical order."""
-    return tuple(sorted(file.stem for file in _suite_configs().glob("*.yaml")))
+    return tuple(sorted(file.stem for file in config_directory("suites").glob("*.yaml")))
 
 
 def load_suite(name: str) -> Suite:
@@ -104,7 +104,7 @@ def suite_config(name: str) -> SuiteConfig:
             f"unknown suite {name!r}; choose one of: {', '.join(suite_names())}; "
             "or give a task file"
         )
-    file = _suite_configs() / f"{name}.yaml"
+    file = config_directory("suites") / f"{name}.yaml"
     return validated(SuiteConfig, yaml.safe_load(read_text(file)), f"{file}: the suite")
 
 
@@ -145,7 +145,10 @@ def suite_from_file(path: str | Path) -> Suite:
     return Suite(path.name[: -len(ending)], tasks, jsonl_format.digest(tasks))
 
 
-def _suite_configs() -> Path:
-    """A wheel carries configs/ inside the package, a checkout has it beside the package."""
-    inside = _PACKAGE / "configs" / "suites"
-    return inside if inside.is_dir() else _PACKAGE.parent / "configs" / "suites"
+def config_directory(kind: str) -> Path:
+    """Where the configurations of a kind are, such as ``suites``.
+
+    A wheel carries configs/ inside the package, a checkout has it beside the package.
+    """
+    inside = _PACKAGE / "configs" / kind
+    return inside if inside.is_dir() else _PACKAGE.parent / "configs" / kind

@@ -1,0 +1,193 @@
+"""What happens beside learning: checkpoints, the curve, evaluation, the curriculum."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import torch
+from sb3_contrib.common.maskable.callbacks import MaskableEvalCallback
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import KVWriter
+
+from agents.rl.config import Phase
+
+MODEL = "model.zip"
+CURVE = "curve.jsonl"
+
+
+def save(model: BaseAlgorithm, run: Path) -> None:
+    """Write the model so that whatever is found under its name is whole."""
+    beside = run / f".{MODEL}.{os.getpid()}.zip"
+    model.save(beside)
+    with beside.open("rb") as file:
+        os.fsync(file.fileno())
+    beside.replace(run / MODEL)
+
+
+class Checkpoints(BaseCallback):
+    """Saves the model every so many steps, between one update and the next rollout.
+
+    Attributes:
+        steps: how many had been made when a rollout last began or ended: between these, what has
+            been played is lost with the process, and a model is saved as one of so many steps.
+    """
+
+    def __init__(self, run: Path, every: int) -> None:
+        super().__init__()
+        self._run, self._every = run, every
+        self.steps = 0
+
+    def save(self) -> None:
+        """Save now."""
+        self.model.num_timesteps = self.steps
+        save(self.model, self._run)
+
+    def _on_training_start(self) -> None:
+        self.steps = self._saved_at = self.num_timesteps
+
+    def _on_rollout_start(self) -> None:
+        self.steps = self.num_timesteps
+        if self.steps - self._saved_at >= self._every:
+            save(self.model, self._run)
+            self._saved_at = self.steps
+
+    def _on_rollout_end(self) -> None:
+        self.steps = self.num_timesteps
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class Curve(KVWriter):
+    """Appends what the logger is told to ``curve.jsonl``, a line each time, with steps and seconds.
+
+    A run that is continued drops the lines that came after its checkpoint.
+    """
+
+    def __init__(self, run: Path, steps: int) -> None:
+        self._file = run / CURVE
+        kept = [line for line in read_curve(run) if line["steps"] <= steps]
+        beside = self._file.with_suffix(".tmp")
+        beside.write_text("".join(json.dumps(line) + "\n" for line in kept))
+        beside.replace(self._file)
+        self._before = kept[-1]["seconds"] if kept else 0.0
+        self._began = time.monotonic()
+
+    def write(
+        self, key_values: dict[str, Any], key_excluded: dict[str, Any], step: int = 0
+    ) -> None:
+        """Append a line."""
+        line = {"steps": step, "seconds": round(self._before + time.monotonic() - self._began, 1)}
+        line |= {key: float(value) for key, value in key_values.items() if _is_number(value)}
+        with self._file.open("a") as file:
+            file.write(json.dumps(line) + "\n")
+
+    def close(self) -> None:
+        """Nothing to do: each line is written when it comes."""
+
+
+def _is_number(value: object) -> bool:
+    return hasattr(value, "__float__")
+
+
+def read_curve(run: Path) -> list[dict[str, float]]:
+    """The lines of a run's curve so far; a half-written last line is left out."""
+    file = run / CURVE
+    lines = []
+    for text in file.read_text().splitlines() if file.exists() else ():
+        try:
+            lines.append(json.loads(text))
+        except json.JSONDecodeError:
+            break
+    return lines
+
+
+class HeldOut(MaskableEvalCallback):
+    """sb3-contrib's evaluation, every so many steps rather than calls, between two rollouts."""
+
+    def __init__(self, env: Any, every: int, count: int, seed: int) -> None:
+        super().__init__(env, n_eval_episodes=count, eval_freq=1, verbose=0, warn=False)
+        self._every, self._seed = every, seed
+
+    def _on_training_start(self) -> None:
+        self._looked_at = self.num_timesteps
+
+    def _on_rollout_start(self) -> None:
+        if self.num_timesteps - self._looked_at >= self._every:
+            self.look()
+
+    def _on_step(self) -> bool:
+        return True
+
+    def look(self) -> None:
+        """Evaluate now, on the same episodes every time."""
+        self._looked_at = self.num_timesteps
+        self.eval_env.seed(self._seed)
+        super()._on_step()
+
+
+class Threads(BaseCallback):
+    """Torch has so many threads to learn with, and one while the environments need the cores."""
+
+    def __init__(self, threads: int) -> None:
+        super().__init__()
+        self._threads = threads
+
+    def _on_rollout_start(self) -> None:
+        torch.set_num_threads(1)
+
+    def _on_rollout_end(self) -> None:
+        torch.set_num_threads(self._threads)
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class Curriculum(BaseCallback):
+    """Says to the environments which task types it is the turn of."""
+
+    def __init__(self, phases: Sequence[Phase], types: Sequence[str]) -> None:
+        super().__init__()
+        self._phases, self._after = phases, tuple(types)
+        self._now: tuple[str, ...] | None = None
+
+    def _on_rollout_start(self) -> None:
+        types = next(
+            (phase.types for phase in self._phases if self.num_timesteps < phase.until), self._after
+        )
+        if types != self._now:
+            self._now = types
+            self.training_env.env_method("set_types", types)
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class ByType(BaseCallback):
+    """Logs the success rate of each task type over its last episodes."""
+
+    def __init__(self, over: int = 100) -> None:
+        super().__init__()
+        self._over = over
+        self._last: dict[str, list[bool]] = {}
+
+    def _on_step(self) -> bool:
+        for info in self.locals["infos"]:
+            if "is_success" in info:
+                self._note(info)
+        return True
+
+    def _note(self, info: Mapping[str, Any]) -> None:
+        last = self._last.setdefault(info["task_type"], [])
+        last.append(info["is_success"])
+        del last[: -self._over]
+
+    def _on_rollout_end(self) -> None:
+        for name, successes in self._last.items():
+            self.logger.record(f"success/{name}", sum(successes) / len(successes))

@@ -1,0 +1,141 @@
+"""Environments to learn in. Imports no torch: worker processes make them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.rl.config import Episodes
+from agents.rl.demonstrations import Demonstrations, demonstrate
+from agents.rl.perception import Obs, Perception
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.sources import EpisodeSource, make_source
+from er_gym.envs.wrappers import KeyActionShaping
+from er_gym.tasks.task import Task
+from er_gym.tasks.types import BY_NAME, TaskType
+
+_TRAINING_ONLY = ("step_penalty", "illegal_penalty", "success_bonus", "shaping")
+"""What changes the reward."""
+
+
+class TrainingRules(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Running out of steps terminates an episode, and success is worth a bonus.
+
+    The step limit is part of the task, and how near it is stands in the observation: beyond it
+    nothing is to be had, so nothing is to be hoped for.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], success_bonus: float) -> None:
+        super().__init__(env)
+        self._bonus = success_bonus
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Do an action."""
+        obs, reward, terminated, truncated, info = self.env.step(action)
+        reward += self._bonus * info["success"]
+        return obs, reward, terminated or truncated, False, info
+
+
+class LearningEnv(gymnasium.Wrapper[Obs, Any, Any, Any]):
+    """Draws tasks of the wanted types, and shows the learner what :class:`Perception` makes.
+
+    Args:
+        env: an ``EmbodiedEnv``, shaped or not.
+        source: where tasks come from.
+        types: which; each as often as any other, or whatever comes where there are none.
+        perception: what is shown.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env[Any, Any],
+        source: EpisodeSource,
+        types: Sequence[str],
+        perception: Perception,
+    ) -> None:
+        super().__init__(env)
+        self._source, self._perception = source, perception
+        self.set_types(types)
+        self._rng = np.random.default_rng()
+        self.observation_space = perception.space
+
+    def set_types(self, types: Sequence[str]) -> None:
+        """Draw tasks of these types from the next episode on."""
+        self._types: tuple[TaskType | None, ...] = tuple(BY_NAME[name] for name in types) or (None,)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Obs, dict[str, Any]]:
+        """Begin an episode, drawn unless ``options`` pin it."""
+        if seed is not None:
+            self._rng = np.random.default_rng(seed)
+        obs, info = self.env.reset(seed=seed, options=options or {"task": self._draw()})
+        info["seen"] = obs
+        return self._perception.begin(obs, info, info["task"].instruction), info
+
+    def step(self, action: Any) -> tuple[Obs, Any, bool, bool, dict[str, Any]]:
+        """Do an action."""
+        obs, reward, terminated, truncated, info = self.env.step(action)
+        info["seen"] = obs
+        return self._perception.see(obs, info), reward, terminated, truncated, info
+
+    def action_masks(self) -> NDArray[np.int8]:
+        """(A,) int8, the actions that are legal now."""
+        masks: NDArray[np.int8] = self.env.get_wrapper_attr("action_masks")()
+        return masks
+
+    def demonstrate(self, *asked: Any) -> Demonstrations:
+        """See :func:`agents.rl.demonstrations.demonstrate`; for ``make_env(with_text=True)``."""
+        return demonstrate(self, *asked)
+
+    def close(self) -> None:
+        """Close the environment and the source."""
+        super().close()
+        getattr(self._source, "close", lambda: None)()
+
+    def _draw(self) -> Task:
+        kind = self._types[int(self._rng.integers(len(self._types)))]
+        return self._source.draw(self._rng, kind, None)
+
+
+def make_env(
+    options: Episodes, gamma: float = 1.0, with_mask: bool = False, with_text: bool = False
+) -> gymnasium.Env[Obs, Any]:
+    """An environment to learn in.
+
+    Args:
+        gamma: the learner's discount, for shaping.
+        with_mask: whether the observation holds the action mask.
+        with_text: whether ``info["seen"]``, the environment's own observation, holds text, as
+            scripted agents need it.
+
+    Raises:
+        ValueError: there is no such suite or encoder.
+        TaskFileError: the suite has not been made, or its file is damaged. (It is a ValueError.)
+    """
+    env: gymnasium.Env[Any, Any] = TrainingRules(
+        EmbodiedEnv(
+            (),
+            obs_mode=f"{options.obs_mode}+text" if with_text else options.obs_mode,
+            width=options.width,
+            height=options.height,
+            instances=options.instances,
+            step_penalty=options.step_penalty,
+            illegal_penalty=options.illegal_penalty,
+            max_steps=options.max_steps,
+        ),
+        options.success_bonus,
+    )
+    if options.shaping:
+        env = KeyActionShaping(env, gamma, options.shaping)
+    perception = Perception(options, with_mask)
+    return LearningEnv(env, make_source(options.episodes), options.types, perception)
+
+
+def for_evaluation(options: Episodes, episodes: str) -> Episodes:
+    """The same, on other episodes, with the reward as the environment has it."""
+    return options.model_copy(update={"episodes": episodes, **dict.fromkeys(_TRAINING_ONLY, 0.0)})

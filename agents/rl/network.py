@@ -1,0 +1,135 @@
+"""A network over object types: the same weights for every type, so that what is learnt about one
+serves for all.
+
+The state observation is a table with a row of features for each object type. Only the types that
+matter now, those that can be gone to or handled, held or named, are looked at, some 20 of 124:
+nothing else can be acted on. Each type's row goes through the same layers, together with what the
+type is (a learnt vector and AI2-THOR's properties of it), how it goes with the types that the
+instruction names, and a summary of all other types. Out come a number for each verb with that type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import torch
+from gymnasium import spaces
+from torch import Tensor, nn
+from torch.nn import functional
+
+from er_gym.envs.actions import ACTIONS, INDEX, INDICES, Action
+from er_gym.envs.observations import FEATURES, SCALARS
+from er_gym.tasks import verbs
+from er_gym.thor import OBJECT_TYPES
+
+TYPES = tuple(OBJECT_TYPES)
+_PROPERTIES = tuple(sorted({name for kind in OBJECT_TYPES.values() for name in kind.properties}))
+_MATTERS = [FEATURES.index(name) for name in ("navigable", "interactable", "held", "goal")]
+_GOAL = FEATURES.index("goal")
+_MANY = 8
+"""So many types have something to say, at a guess."""
+_NOWHERE = len(ACTIONS)
+"""Where the number for a verb goes that makes no sense with a type: it is cut off."""
+
+
+class TypeNetwork(nn.Module):
+    """Numbers for every action, and a summary for a value.
+
+    Args:
+        space: with a key ``state``; optionally ``instruction`` (E,) and ``rgb`` (channels, H, W),
+            as Stable-Baselines3 turns pictures; a ``mask`` is not looked at.
+        width: of the layers.
+        kind: length of the learnt vector of a type.
+        outputs: how many numbers an action gets: 1 for a logit or a value, more for quantiles.
+    """
+
+    def __init__(
+        self, space: spaces.Dict, width: int = 64, kind: int = 16, outputs: int = 1
+    ) -> None:
+        super().__init__()
+        self.width, self.outputs, self.actions = width, outputs, len(ACTIONS)
+        properties = torch.tensor(
+            [[float(p in OBJECT_TYPES[name].properties) for p in _PROPERTIES] for name in TYPES]
+        )
+        self.register_buffer("properties", properties, persistent=False)
+        places = [INDICES[verb].tolist() for verb in verbs.OBJECT_VERBS]
+        index = torch.tensor(places).T  # (T, V)
+        self.register_buffer("index", index.where(index >= 0, _NOWHERE), persistent=False)
+        self.kinds = nn.Parameter(torch.randn(len(TYPES), kind) * 0.3)
+        known = kind + len(_PROPERTIES)
+        extras = {key: box for key, box in space.spaces.items() if key not in ("state", "mask")}
+        told = sum(int(box.shape[0]) for key, box in extras.items() if key != "rgb")
+        self.eye = _eye(width, extras["rgb"].shape[0]) if "rgb" in extras else None
+        told += width if self.eye is not None else 0
+        self._told = [key for key in extras if key != "rgb"]
+        self.is_a = nn.Linear(known, width, bias=False)
+        self.offers = nn.Linear(known, kind)
+        self.asks = nn.Linear(2 * known, kind)
+        self.row = nn.Linear(len(FEATURES) + kind, width, bias=False)
+        self.room = nn.Linear(len(SCALARS) + told + 2 * known, width)
+        self.gather = nn.Linear(4 * width, width)
+        self.row2 = nn.Linear(width, width, bias=False)
+        self.room2 = nn.Linear(width, width)
+        self.each = nn.Linear(width, len(verbs.OBJECT_VERBS) * outputs)
+        self.bare = nn.Linear(4 * width, len(verbs.BARE_VERBS) * outputs)
+        self.summary_width = 4 * width
+        bare = [INDEX[Action(verb)] for verb in verbs.BARE_VERBS]
+        self.register_buffer("bare_index", torch.tensor(bare), persistent=False)
+
+    def forward(self, obs: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
+        """(B, A, outputs) for the actions, 0 for those that cannot be legal; (B, 4 width)."""
+        state = obs["state"]
+        size = len(state)
+        scalars = state[:, : len(SCALARS)]
+        table = state[:, len(SCALARS) :].view(size, len(FEATURES), len(TYPES))
+        at, which = (table[:, _MATTERS] > 0).any(dim=1).nonzero(as_tuple=True)  # (M,), (M,)
+        kinds = torch.cat([self.kinds, self.properties], dim=1)  # (T, K)
+        goal = table[:, _GOAL]
+        first = (goal == 1).float() @ kinds  # (B, K)
+        later = (goal * (goal < 1)) @ kinds
+        wanted = torch.cat([first, later], dim=1)
+        # How well a type goes with what is wanted: an apple is looked for in a fridge.
+        fit = functional.embedding(which, self.offers(kinds)) * self.asks(wanted).index_select(
+            0, at
+        )
+        told = [obs[key] for key in self._told]
+        if self.eye is not None:
+            told.append(self.eye(obs["rgb"]))
+        room = self.room(torch.cat([scalars, *told, wanted], dim=1))  # (B, W)
+        row = self.row(torch.cat([table[at, :, which], fit], dim=1))  # (M, W)
+        row = row + functional.embedding(which, self.is_a(kinds))
+        hidden = torch.relu(row + room.index_select(0, at))
+        named = goal[at, which]  # (M,)
+        room = torch.relu(self.gather(torch.cat([room, _pooled(hidden, at, named, size)], dim=1)))
+        hidden = torch.relu(self.row2(hidden) + self.room2(room).index_select(0, at))
+        summary = torch.cat([room, _pooled(hidden, at, named, size)], dim=1)  # (B, 4 W)
+        each = self.each(hidden).view(len(at), len(verbs.OBJECT_VERBS), self.outputs)
+        numbers = state.new_zeros(size, len(ACTIONS) + 1, self.outputs)
+        numbers = numbers.index_put((at[:, None], self.index[which]), each)
+        bare = self.bare(summary).view(size, len(verbs.BARE_VERBS), self.outputs)
+        numbers = numbers.index_copy(1, self.bare_index, bare)
+        return numbers[:, :-1], summary
+
+
+def _pooled(rows: Tensor, at: Tensor, goal: Tensor, size: int) -> Tensor:
+    """(B, 3 W) of the rows (M, W) that belong to each of B: their sum, scaled to be about 1; that
+    of the type that the instruction names first; those of the others that it names."""
+    first, later = (goal == 1).to(rows), goal * (goal < 1)  # (M,)
+    parts = torch.cat([rows / _MANY, rows * first[:, None], rows * later[:, None]], dim=1)
+    return rows.new_zeros(size, parts.shape[1]).index_add(0, at, parts)
+
+
+def _eye(width: int, channels: int) -> nn.Module:
+    """A small convolutional network for pictures (B, channels, H, W) in 0 to 1."""
+    return nn.Sequential(
+        nn.Conv2d(channels, 16, 5, stride=3),
+        nn.ReLU(),
+        nn.Conv2d(16, 32, 3, stride=2),
+        nn.ReLU(),
+        nn.Conv2d(32, 32, 3, stride=2),
+        nn.ReLU(),
+        nn.AdaptiveAvgPool2d(3),
+        nn.Flatten(),
+        nn.Linear(32 * 9, width),
+        nn.ReLU(),
+    )

@@ -1,0 +1,83 @@
+"""The type-wise network as a policy for sb3-contrib's MaskablePPO."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from gymnasium import spaces
+from sb3_contrib.common.maskable.distributions import MaskableDistribution
+from sb3_contrib.common.maskable.policies import MaskableActorCriticPolicy
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.type_aliases import Schedule
+from torch import Tensor, nn
+
+from agents.rl.network import TypeNetwork
+
+
+class TypeFeatures(BaseFeaturesExtractor):
+    """(B, actions × outputs + summary): all that :class:`TypeNetwork` says, side by side."""
+
+    def __init__(
+        self, observation_space: spaces.Dict, width: int = 64, kind: int = 16, outputs: int = 1
+    ) -> None:
+        network = TypeNetwork(observation_space, width, kind, outputs)
+        super().__init__(observation_space, network.actions * outputs + network.summary_width)
+        self.network = network
+
+    def forward(self, obs: dict[str, Tensor]) -> Tensor:
+        """Numbers first, then the summary."""
+        numbers, summary = self.network(obs)
+        return torch.cat([numbers.flatten(1), summary], dim=1)
+
+
+class _Split(nn.Module):
+    """Takes logits and summary apart again, as Stable-Baselines3's policies have it."""
+
+    def __init__(self, logits: int, summary: int) -> None:
+        super().__init__()
+        self.latent_dim_pi, self.latent_dim_vf = logits, summary
+
+    def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
+        return self.forward_actor(features), self.forward_critic(features)
+
+    def forward_actor(self, features: Tensor) -> Tensor:
+        return features[:, : self.latent_dim_pi]
+
+    def forward_critic(self, features: Tensor) -> Tensor:
+        return features[:, self.latent_dim_pi :]
+
+
+class TypePolicy(MaskableActorCriticPolicy):
+    """Logits and value from one :class:`TypeNetwork`; ``policy_kwargs``: ``width``, ``kind``."""
+
+    def __init__(self, *args: Any, width: int = 64, kind: int = 16, **kwargs: Any) -> None:
+        self._shape = {"width": width, "kind": kind}
+        super().__init__(
+            *args,
+            **{
+                **kwargs,
+                "features_extractor_class": TypeFeatures,
+                "features_extractor_kwargs": self._shape,
+            },
+        )
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        network = self.features_extractor.network
+        self.mlp_extractor = _Split(network.actions, network.summary_width)
+        self.action_net = nn.Identity()
+        self.value_net = nn.Sequential(
+            nn.Linear(network.summary_width, network.width), nn.ReLU(), nn.Linear(network.width, 1)
+        )
+        for last in (network.each, network.bare, self.value_net[-1]):
+            with torch.no_grad():
+                last.weight.mul_(0.1)  # begin by trying everything alike
+        self.optimizer = self.optimizer_class(
+            self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs
+        )
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        return {**super()._get_constructor_parameters(), **self._shape}
+
+    def _get_action_dist_from_latent(self, latent_pi: Tensor) -> MaskableDistribution:
+        return self.action_dist.proba_distribution(action_logits=latent_pi)

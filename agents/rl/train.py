@@ -1,0 +1,233 @@
+"""A training run from its configuration: begun, or continued from its last checkpoint.
+
+A run directory holds ``config.yaml`` (all of the configuration), ``model.zip`` (the last
+checkpoint, whole at any time), ``curve.jsonl`` (what was logged, with steps and seconds) and
+``tensorboard/``. Running the same again continues; when all steps are done it does nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback, CallbackList, ProgressBarCallback
+from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
+from stable_baselines3.common.utils import set_random_seed
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor
+
+from agents.rl import dqn, ppo
+from agents.rl.callbacks import (
+    MODEL,
+    ByType,
+    Checkpoints,
+    Curriculum,
+    Curve,
+    HeldOut,
+    Threads,
+)
+from agents.rl.cloning import clone, watch
+from agents.rl.config import Episodes, Evaluation, TrainConfig, WarmStart, dump, load_config
+from agents.rl.envs import for_evaluation, make_env
+from agents.rl.vec import WorkerVecEnv
+
+CONFIG = "config.yaml"
+_EVALUATION_SEED = 10_000
+"""Every evaluation of every run begins with the same episodes."""
+
+
+class Family(NamedTuple):
+    """How the learners of a family are made and loaded."""
+
+    make: Callable[[TrainConfig, Any, VecEnv], BaseAlgorithm]
+    load: Callable[..., BaseAlgorithm]
+    needs_mask: bool
+    """Whether the observation has to hold the action mask."""
+
+
+FAMILIES = {
+    "ppo": Family(ppo.make, ppo.load, needs_mask=False),
+    "dqn": Family(dqn.make, dqn.load_dqn, needs_mask=True),
+    "qrdqn": Family(dqn.make, dqn.load_qrdqn, needs_mask=True),
+}
+
+
+class RunConflict(ValueError):
+    """A directory that holds another run; the message says what to do."""
+
+
+def train(
+    config: TrainConfig,
+    run: Path,
+    *,
+    show_progress: bool = False,
+    more: tuple[BaseCallback, ...] = (),
+) -> BaseAlgorithm:
+    """Train until ``config.total_steps`` are done; returns the learner.
+
+    Args:
+        run: the run directory.
+        show_progress: whether to draw a bar.
+        more: callbacks of the caller's own.
+
+    Raises:
+        RunConflict: the directory holds a run of another configuration.
+        KeyboardInterrupt: Ctrl-C; what has been learnt is saved.
+    """
+    prepare(config, run)
+    torch.distributions.Distribution.set_default_validate_args(False)  # at every step, for nothing
+    # What Adam remembers of weights that get no gradient, such as those of types that no room of
+    # the training has, fades until every operation on it takes a hundred times as long.
+    torch.set_flush_denormal(True)
+    model = load_last(run)
+    steps = 0 if model is None else model.num_timesteps
+    if model is not None and steps >= config.total_steps:
+        return model
+    family = FAMILIES[config.algorithm.name]
+    # Continued, a run plays other episodes than when it was begun.
+    seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
+    env = vectorised(config, config.env, seed)
+    checkpoints = Checkpoints(run, config.checkpoint_every)
+    callbacks = [checkpoints, Threads(config.threads), ByType(), *more]
+    held_out = None
+    try:
+        if config.evaluation is not None:
+            held_out = _held_out(config, config.evaluation)
+            callbacks.append(held_out)
+        if config.curriculum:
+            callbacks.append(Curriculum(config.curriculum, config.env.types))
+        if show_progress:
+            callbacks.append(ProgressBarCallback())
+        if model is None:
+            model = family.make(config, config.algorithm, env)
+            if config.warm_start is not None:
+                _warm(model, config, config.warm_start, run, seed)
+            env.seed(seed)
+        else:
+            model.set_env(env)
+            set_random_seed(seed)
+        model.set_logger(_logger(config, run, steps))
+        try:
+            model.learn(
+                config.total_steps - steps,
+                callback=CallbackList(callbacks),
+                reset_num_timesteps=False,
+            )
+        finally:
+            if checkpoints.steps:
+                checkpoints.save()
+        if held_out is not None:
+            held_out.look()
+        model.logger.close()
+    finally:
+        env.close()
+        if held_out is not None:
+            held_out.eval_env.close()
+    return model
+
+
+def _warm(model: BaseAlgorithm, config: TrainConfig, how: WarmStart, run: Path, seed: int) -> None:
+    seen = watch(config, how, seed)
+    agreement = clone(model, seen, how, seed)
+    rate = seen.successes / seen.episodes
+    (run / "warm_start.json").write_text(
+        json.dumps({"teacher_success": rate, "steps": len(seen), "agreement": agreement})
+    )
+
+
+def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOut:
+    env = vectorised(config, for_evaluation(config.env, asked.episodes), _EVALUATION_SEED)
+    return HeldOut(env, asked.every, asked.count, _EVALUATION_SEED)
+
+
+def prepare(config: TrainConfig, run: Path) -> None:
+    """Make the run directory, or see that it is this run's.
+
+    More steps may be asked for than before; anything else has to be the same.
+
+    Raises:
+        RunConflict: it is not.
+    """
+    file = run / CONFIG
+    if file.exists():
+        before = load_config(file)
+        if before.model_copy(update={"total_steps": config.total_steps}) != config:
+            differ = _differences(before.model_dump(), config.model_dump())
+            raise RunConflict(
+                f"{run} holds a run of another configuration ({differ}); give another --out, "
+                "or the configuration that it was begun with"
+            )
+    run.mkdir(parents=True, exist_ok=True)
+    beside = file.with_suffix(".tmp")
+    beside.write_text(dump(config))
+    beside.replace(file)
+
+
+def _differences(one: dict[str, Any], other: dict[str, Any], path: str = "") -> str:
+    found = []
+    for name in one:
+        a, b = one[name], other.get(name)
+        if isinstance(a, dict) and isinstance(b, dict):
+            found.append(_differences(a, b, f"{path}{name}."))
+        elif a != b and f"{path}{name}" != "total_steps":
+            found.append(f"{path}{name} was {a}, now {b}")
+    return ", ".join(filter(None, found))
+
+
+def load_last(run: Path) -> BaseAlgorithm | None:
+    """The learner of a run's last checkpoint, None if there is none yet.
+
+    Raises:
+        ValueError: it cannot be read.
+    """
+    file = run / MODEL
+    if not file.exists():
+        return None
+    config = load_config(run / CONFIG)
+    try:
+        return FAMILIES[config.algorithm.name].load(file)
+    except (zipfile.BadZipFile, RuntimeError, KeyError, ValueError) as error:
+        raise ValueError(f"{file} cannot be read as a model: {error}") from error
+
+
+def vectorised(config: TrainConfig, options: Episodes, seed: int) -> VecEnv:
+    """``config.vec.envs`` environments in worker processes, seeded one after the other."""
+    family = FAMILIES[config.algorithm.name]
+    make = partial(make_env, options, config.algorithm.gamma, family.needs_mask)
+    env = VecMonitor(WorkerVecEnv([make] * config.vec.envs, config.vec.workers))
+    env.seed(seed)
+    return env
+
+
+def _logger(config: TrainConfig, run: Path, steps: int) -> Logger:
+    writers: list[KVWriter] = [Curve(run, steps)]
+    if config.tensorboard:
+        writers.append(TensorBoardOutputFormat(str(run / "tensorboard")))
+    if config.wandb:
+        _start_wandb(config, run)
+    return Logger(str(run), writers)
+
+
+def _start_wandb(config: TrainConfig, run: Path) -> None:
+    """Weights & Biases reads what TensorBoard is told."""
+    try:
+        import wandb
+    except ImportError:
+        raise ValueError(
+            "wandb is not installed; pip install wandb, or leave 'wandb' empty in the configuration"
+        ) from None
+    wandb.init(
+        project=config.wandb,
+        name=run.name,
+        id=run.name,
+        resume="allow",
+        dir=run,
+        config=config.model_dump(mode="json"),
+        sync_tensorboard=True,
+    )

@@ -1,0 +1,78 @@
+"""``er-gym train-rl``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from benchmarks.cli_errors import BadInput, bad_input
+
+_INTERRUPTED = 130
+
+
+@click.command(name="train-rl")
+@click.option(
+    "--config",
+    required=True,
+    metavar="FILE",
+    help="A training run in YAML, or the name of one that comes with er-gym.",
+)
+@click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Overrule a setting, such as total_steps=20000 or env.types=[single_search]; again and "
+    "again.",
+)
+@click.option("--seed", type=click.IntRange(min=0), help="[default: the configuration's]")
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="The run directory.  [default: runs/rl/CONFIG-SEED]",
+)
+def train_rl(config: str, overrides: tuple[str, ...], seed: int | None, out: Path | None) -> int:
+    """Train a policy by reinforcement learning; needs the extra rl.
+
+    The same command again continues from the last checkpoint. `er-gym bench --agent rl:RUN` plays a
+    suite with what has been learnt.
+    """
+    from agents.rl.config import config_file, load_config
+
+    with bad_input():
+        file = config_file(config)
+        wanted = load_config(file, overrides, {} if seed is None else {"seed": seed})
+    run = out or Path("runs") / "rl" / f"{file.stem}-{wanted.seed}"
+    try:
+        from agents.rl import train as training
+    except ImportError as error:
+        raise BadInput(
+            f"{error.name or error} is not installed, and training needs it: "
+            "pip install 'er-gym[rl]'"
+        ) from error
+    try:
+        with bad_input():
+            model = training.train(wanted, run, show_progress=True)
+    except (RuntimeError, EOFError) as error:
+        raise click.ClickException(f"{error}; what has been learnt is in {run}") from error
+    except KeyboardInterrupt:
+        click.echo(
+            f"er-gym: interrupted; what has been learnt is in {run}, the same command continues",
+            err=True,
+        )
+        return _INTERRUPTED
+    _say_result(run, model)
+    return 0
+
+
+def _say_result(run: Path, model: Any) -> None:
+    from agents.rl.callbacks import read_curve
+
+    click.echo(f"{model.num_timesteps:,} steps: {run}")
+    looked = [line for line in read_curve(run) if "eval/success_rate" in line]
+    if looked:
+        rate = looked[-1]["eval/success_rate"]
+        click.echo(f"success on the episodes of evaluation: {100 * rate:.1f} %")
+    click.echo(f"er-gym bench --suite mini --instances explore --agent rl:{run}")

@@ -1,0 +1,94 @@
+"""Learning curves as pictures, drawn with matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_COLORS = ("#2470ad", "#b5762a", "#2a8c82", "#54278f", "#a33b4a", "#5b6b2f")
+_INK, _MUTED, _GRID = "#222222", "#666666", "#e4e4e4"
+_POINTS = 200
+_PANELS = {
+    "rollout/success_rate": "while it trains, training rooms",
+    "eval/success_rate": "held out, unseen rooms",
+}
+
+
+class Curved(Protocol):
+    """What has a learning curve."""
+
+    @property
+    def curve(self) -> list[dict[str, float]]:
+        """Lines with ``steps`` and what was logged."""
+
+
+def draw_curves(families: Mapping[str, Sequence[Curved]], out: Path) -> list[Path]:
+    """Draw success over steps and over minutes, a line a family: mean, least and most of its seeds.
+
+    Returns:
+        The files.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise ImportError("pictures need matplotlib: pip install 'er-gym[charts]'") from error
+    out.mkdir(parents=True, exist_ok=True)
+    made = []
+    for over, scale, label in (("steps", 1e-3, "thousand steps"), ("seconds", 1 / 60, "minutes")):
+        figure = Figure((11, 4.2), facecolor="white", layout="constrained")
+        for axes, (key, title) in zip(
+            figure.subplots(1, 2, sharey=True), _PANELS.items(), strict=True
+        ):
+            for color, (name, runs) in zip(_COLORS, families.items(), strict=False):
+                _family(axes, runs, key, over, scale, color, name)
+            _dress(axes, title, label)
+        figure.axes[0].set_ylabel("success, %", color=_MUTED)
+        figure.axes[1].legend(frameon=False, labelcolor=_INK, loc="lower right")
+        file = out / f"learning_{over}.png"
+        figure.savefig(file, dpi=100)
+        made.append(file)
+    return made
+
+
+def _family(
+    axes: Axes,
+    runs: Sequence[Curved],
+    key: str,
+    over: str,
+    scale: float,
+    color: str,
+    name: str,
+) -> None:
+    lines = []
+    for run in runs:
+        points = [(line[over] * scale, 100 * line[key]) for line in run.curve if key in line]
+        if points:
+            lines.append(np.array(points).T)
+    if not lines:
+        return
+    at = np.linspace(max(x[0] for x, _ in lines), min(x[-1] for x, _ in lines), _POINTS)
+    values = np.array([np.interp(at, x, y) for x, y in lines])
+    axes.plot(at, values.mean(axis=0), color=color, label=name, linewidth=1.8)
+    if len(lines) > 1:
+        axes.fill_between(
+            at, values.min(axis=0), values.max(axis=0), color=color, alpha=0.18, linewidth=0
+        )
+
+
+def _dress(axes: Axes, title: str, label: str) -> None:
+    axes.set_title(title, loc="left", fontsize=11, color=_INK)
+    axes.set_xlabel(label, color=_MUTED)
+    axes.set_ylim(0, 100)
+    axes.grid(color=_GRID, linewidth=0.8)
+    axes.tick_params(length=0, labelcolor=_MUTED)
+    for spine in axes.spines.values():
+        spine.set_visible(False)

@@ -1,0 +1,84 @@
+"""A run's YAML: what fits, what does not, and how that is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from agents.rl.config import config_file, config_names, dump, load_config
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "run.yaml"
+    path.write_text("total_steps: 1000\nenv: {types: [single_search]}\n")
+    return path
+
+
+@pytest.mark.parametrize("name", config_names())
+def test_those_that_come_with_er_gym_are_whole(name: str) -> None:
+    config = load_config(config_file(name))
+    assert config.env.instances == "explore"  # what the figures of docs/baselines.md are under
+
+
+def test_defaults_and_overrides(file: Path) -> None:
+    config = load_config(
+        file, ["env.step_penalty=0.5", "algorithm.n_steps=64", "algorithm.name=ppo"], {"seed": 7}
+    )
+    assert (config.seed, config.env.step_penalty, config.algorithm.name) == (7, 0.5, "ppo")
+    assert config.env.types == ("single_search",)
+
+
+def test_what_is_written_out_is_read_the_same(file: Path, tmp_path: Path) -> None:
+    config = load_config(
+        file, ["warm_start.teacher=oracle", "curriculum=[{until: 10, types: [single_toggle]}]"]
+    )
+    again = tmp_path / "again.yaml"
+    again.write_text(dump(config))
+    assert load_config(again) == config
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["total_steps"], r"'total_steps' is no override; give NAME=VALUE"),
+        (["total_steps=0"], r"'total_steps': input should be greater than 0, not 0"),
+        (["steps=5"], r"'steps': extra inputs are not permitted"),
+        (["env.types=[fly]"], r"unknown type 'fly'; choose of: single_search,"),
+        (["env.obs_mode=text"], r"'env.obs_mode': input should be 'state' or 'rgb\+state'"),
+        (["algorithm.name=sarsa"], r"'algorithm'.*'ppo'"),
+        (["total_steps.more=1"], r"'total_steps' is 1000, which has no fields"),
+        (
+            ["curriculum=[{until: 9, types: [single_search]}, {until: 9, types: [single_search]}]"],
+            r"end at \[9, 9\]; let each end later",
+        ),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_one_line(file: Path, overrides: list[str], message: str) -> None:
+    with pytest.raises(ValueError, match=message) as caught:
+        load_config(file, overrides)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("a: [", "not YAML"), ("- 1", "is a table of settings"), ("", "is a table of settings")],
+)
+def test_files_that_are_none(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text(text)
+    with pytest.raises(ValueError, match=message):
+        load_config(file)
+
+
+def test_a_run_that_is_not_there() -> None:
+    with pytest.raises(ValueError, match="no training run 'nowhere'; give a YAML file, or one of:"):
+        config_file("nowhere")
+
+
+def test_what_needs_the_warm_start(file: Path) -> None:
+    overrides: list[Any] = ["warm_start.teacher=searcher", "algorithm.name=dqn"]
+    with pytest.raises(ValueError, match="warm_start goes with ppo"):
+        load_config(file, overrides)

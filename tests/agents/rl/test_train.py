@@ -1,0 +1,213 @@
+"""Training runs: they learn, they continue, they end with as many steps as were asked for."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from stable_baselines3.common.callbacks import BaseCallback
+
+from agents.rl.callbacks import MODEL, read_curve
+from agents.rl.config import TrainConfig, dump
+from agents.rl.train import RunConflict, load_last, train
+
+Make = Callable[..., TrainConfig]
+ROOT = Path(__file__).resolve().parents[3]
+
+
+class Returns(BaseCallback):
+    """Keeps the return of every episode, and the actions of every step."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.returns: list[float] = []
+        self.actions: list[int] = []
+
+    def _on_step(self) -> bool:
+        self.actions += self.locals["actions"].ravel().tolist()
+        self.returns += [info["episode"]["r"] for info in self.locals["infos"] if "episode" in info]
+        return True
+
+
+class Interrupt(BaseCallback):
+    """Presses Ctrl-C after so many steps."""
+
+    def __init__(self, after: int) -> None:
+        super().__init__()
+        self.after = after
+
+    def _on_step(self) -> bool:
+        if self.num_timesteps >= self.after:
+            raise KeyboardInterrupt
+        return True
+
+
+def weights(model: Any) -> list[np.ndarray]:
+    return [value.numpy() for value in model.policy.state_dict().values()]
+
+
+def test_the_return_rises(make_config: Make, tmp_path: Path) -> None:
+    """A few thousand steps are enough by far to find out what is worth something."""
+    config = make_config(
+        total_steps=8192,
+        vec={"envs": 16, "workers": 2},
+        algorithm={"name": "ppo", "n_steps": 64, "batch_size": 256, "learning_rate": 3e-3},
+        env={"episodes": "mini", "types": ["single_toggle"], "max_steps": 12},
+    )
+    seen = Returns()
+    train(config, tmp_path / "run", more=(seen,))
+    fifth = len(seen.returns) // 5
+    before, after = np.mean(seen.returns[:fifth]), np.mean(seen.returns[-fifth:])
+    assert after > before + 0.2
+
+
+def test_a_seed_gives_the_same_policy_again(make_config: Make, tmp_path: Path) -> None:
+    runs, played = [], []
+    for number, seed in enumerate((3, 3, 4)):
+        seen = Returns()
+        config = make_config(seed=seed, total_steps=512)
+        runs.append(weights(train(config, tmp_path / str(number), more=(seen,))))
+        played.append(seen.actions)
+    assert played[0] == played[1] != played[2]
+    assert all((one == other).all() for one, other in zip(runs[0], runs[1], strict=True))
+
+
+def test_the_run_directory(make_config: Make, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    config = make_config(
+        evaluation={"episodes": "mini", "every": 256, "count": 4}, tensorboard=True
+    )
+    model = train(config, run)
+    assert model.num_timesteps == 512
+    assert {file.name for file in run.iterdir()} == {
+        "config.yaml", "curve.jsonl", "model.zip", "tensorboard"
+    }  # fmt: skip
+    curve = read_curve(run)
+    assert [line["steps"] for line in curve] == sorted(line["steps"] for line in curve)
+    assert curve[-1]["steps"] == 512
+    assert 0 <= curve[-1]["eval/success_rate"] <= 1
+    assert any("success/single_pickup" in line for line in curve)
+    assert list((run / "tensorboard").iterdir())
+
+
+def test_more_steps_continue_a_run_and_none_left_do_nothing(
+    make_config: Make, tmp_path: Path
+) -> None:
+    run = tmp_path / "run"
+    train(make_config(total_steps=512), run)
+    assert train(make_config(total_steps=1024), run).num_timesteps == 1024
+    saved = (run / MODEL).stat().st_mtime_ns
+    assert train(make_config(total_steps=1024), run).num_timesteps == 1024
+    assert (run / MODEL).stat().st_mtime_ns == saved
+    assert [line["steps"] for line in read_curve(run)] == [256, 512, 768, 1024]
+
+
+def test_another_configuration_is_refused(make_config: Make, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    train(make_config(), run)
+    with pytest.raises(RunConflict, match=r"\(seed was 0, now 1\); give another --out"):
+        train(make_config(seed=1), run)
+
+
+def test_ctrl_c_loses_no_more_than_a_rollout(make_config: Make, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    config = make_config(total_steps=1024)
+    with pytest.raises(KeyboardInterrupt):
+        train(config, run, more=(Interrupt(700),))
+    model = load_last(run)
+    assert model is not None
+    assert model.num_timesteps == 512
+    assert train(config, run).num_timesteps == 1024
+
+
+def test_a_damaged_model_is_one_clear_error(make_config: Make, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    train(make_config(), run)
+    (run / MODEL).write_bytes(b"PK")
+    with pytest.raises(ValueError, match=r"model.zip cannot be read as a model"):
+        load_last(run)
+
+
+def test_a_curriculum_takes_the_types_in_turn(make_config: Make, tmp_path: Path) -> None:
+    config = make_config(
+        total_steps=768,
+        env={"episodes": "mini", "types": ["single_pickup"], "max_steps": 4},
+        curriculum=[{"until": 300, "types": ["single_toggle"]}],
+    )
+    kinds: list[tuple[int, str]] = []
+
+    class Kinds(BaseCallback):
+        def _on_step(self) -> bool:
+            kinds.extend(
+                (self.num_timesteps, info["task_type"])
+                for info in self.locals["infos"]
+                if "task_type" in info
+            )
+            return True
+
+    train(config, tmp_path / "run", more=(Kinds(),))
+    # Those under way when the types change are played to their end.
+    assert "single_toggle" in {kind for steps, kind in kinds if 60 < steps < 500}
+    assert {kind for steps, kind in kinds if steps < 500 and steps > 60} == {"single_toggle"}
+    assert {kind for steps, kind in kinds if steps > 560} == {"single_pickup"}
+
+
+def test_it_learns_from_pictures_and_the_sentence(make_config: Make, tmp_path: Path) -> None:
+    config = make_config(
+        total_steps=32,
+        vec={"envs": 2, "workers": 1},
+        algorithm={"name": "ppo", "n_steps": 16, "batch_size": 16},
+        env={
+            "episodes": "mini",
+            "types": ["single_toggle"],
+            "obs_mode": "rgb+state",
+            "width": 48,
+            "height": 27,
+            "frames": 2,
+            "instruction": "hashed",
+            "shaping": 0.5,
+        },
+    )
+    run = tmp_path / "run"
+    model = train(config, run)
+    assert model.observation_space["rgb"].shape == (6, 27, 48)  # SB3 has channels first
+    assert model.observation_space["instruction"].shape == (64,)
+    again = load_last(run)
+    assert all((a == b).all() for a, b in zip(weights(model), weights(again), strict=True))
+
+
+def test_sigkill_and_the_same_command_again(make_config: Make, tmp_path: Path) -> None:
+    """Killed at a random moment, it ends with the same number of steps and a model that loads."""
+    file, run = tmp_path / "small.yaml", tmp_path / "run"
+    config = make_config(total_steps=4000, checkpoint_every=256)
+    file.write_text(dump(config))
+    command = [
+        sys.executable, "-m", "benchmarks.cli", "train-rl", "--config", str(file), "--out", str(run)
+    ]  # fmt: skip
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    first = subprocess.Popen(
+        command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    deadline = time.monotonic() + 90
+    while not (run / MODEL).exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(np.random.default_rng().uniform(0, 1.0))
+    first.send_signal(signal.SIGKILL)
+    first.wait()
+    killed = load_last(run)
+    assert killed is not None
+    assert killed.num_timesteps % 256 == 0
+    again = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
+    assert again.returncode == 0, again.stderr
+    done = load_last(run)
+    assert done is not None
+    assert done.num_timesteps == 4096  # 4,000 asked for, in rollouts of 256
+    assert "4,096 steps" in again.stdout
