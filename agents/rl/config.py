@@ -75,7 +75,7 @@ class Episodes(_Model):
 class Vectorised(_Model):
     """How many environments, in how many processes."""
 
-    envs: Positive = 64
+    envs: Positive = 128
     workers: Positive = 2
 
 
@@ -131,11 +131,11 @@ class PPO(_Model):
     """MaskablePPO of sb3-contrib; the names are its own. The rates fall to ``final`` of theirs."""
 
     name: Literal["ppo"] = "ppo"
-    learning_rate: Rate = 1e-3
+    learning_rate: Rate = 2e-3
     final_learning_rate: Fraction = 0.1
-    n_steps: Positive = 64
-    batch_size: Positive = 512
-    n_epochs: Positive = 3
+    n_steps: Positive = 32
+    batch_size: Positive = 1024
+    n_epochs: Positive = 2
     gamma: Fraction = 0.97
     gae_lambda: Fraction = 0.95
     clip_range: Rate = 0.2
@@ -197,6 +197,11 @@ class TrainConfig(_Model):
     threads: Positive = 1
     tensorboard: bool = True
     wandb: str = ""
+
+    @field_validator("algorithm", mode="before")
+    @classmethod
+    def _ppo_unless_named(cls, given: Any) -> Any:
+        return {"name": "ppo", **given} if isinstance(given, dict) else given
 
     @model_validator(mode="after")
     def _phases_in_order(self) -> TrainConfig:

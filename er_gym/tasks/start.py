@@ -53,7 +53,7 @@ def begin(controller: Any, scene: str, start: Start) -> Any:
     if start.poses:
         event = controller.step(
             action="SetObjectPoses",
-            objectPoses=_all_poses(event.metadata["objects"], start),
+            objectPoses=_all_poses(_recorded_poses(controller, scene, event), start),
             placeStationary=True,
         )
         _check(event, scene, start)
@@ -71,11 +71,24 @@ def _check(event: Any, scene: str, start: Start) -> None:
         )
 
 
-def _all_poses(objects: list[dict[str, Any]], start: Start) -> list[dict[str, Any]]:
+_recorded: dict[tuple[type, str], Mapping[str, ObjectPose]] = {}
+"""By the kind of controller, which is to say by engine, and scene."""
+
+
+def _recorded_poses(controller: Any, scene: str, event: Any) -> Mapping[str, ObjectPose]:
+    """Where everything loose is in a scene that has just been loaded, by name."""
+    key = (type(controller), scene)
+    if key not in _recorded:
+        _recorded[key] = {
+            entry["name"]: _pose(entry)
+            for entry in event.metadata["objects"]
+            if entry["pickupable"] or entry["moveable"]
+        }
+    return _recorded[key]
+
+
+def _all_poses(recorded: Mapping[str, ObjectPose], start: Start) -> list[dict[str, Any]]:
     """What SetObjectPoses needs: the pose of everything loose, for it takes away the rest."""
-    recorded = {
-        entry["name"]: _pose(entry) for entry in objects if entry["pickupable"] or entry["moveable"]
-    }
     return [
         {
             "objectName": name,

@@ -24,9 +24,7 @@ def test_those_that_come_with_er_gym_are_whole(name: str) -> None:
 
 
 def test_defaults_and_overrides(file: Path) -> None:
-    config = load_config(
-        file, ["env.step_penalty=0.5", "algorithm.n_steps=64", "algorithm.name=ppo"], {"seed": 7}
-    )
+    config = load_config(file, ["env.step_penalty=0.5", "algorithm.n_steps=32"], {"seed": 7})
     assert (config.seed, config.env.step_penalty, config.algorithm.name) == (7, 0.5, "ppo")
     assert config.env.types == ("single_search",)
 
