@@ -16,7 +16,8 @@ from er_gym.thor import SCENE_NAMES, make_controller, thor_executable
 from er_gym.thor.player import Release, vulkan_is_there
 
 EXTRAS = {
-    "rl": ("torch", "stable-baselines3", "sb3-contrib"),
+    "rl": ("sb3-contrib", "stable-baselines3", "tensorboard", "torch", "tqdm"),
+    "trl": ("torch", "transformers", "trl"),
     "vlm": ("torch", "transformers", "qwen-vl-utils", "openai"),
     "match": ("sentence-transformers",),
 }

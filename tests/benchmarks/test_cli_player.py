@@ -85,7 +85,7 @@ def test_uninstalling_nothing_is_bad_input(er_gym):
 
 def lines(out: str) -> dict[str, str]:
     """A part's name to its whole line."""
-    parts = ["embedded engine", "renderer", "player", "Unity build", "GPU", "extra rl"]
+    parts = ["embedded engine", "renderer", "player", "Unity build", "GPU", "extra rl", "extra trl"]
     parts += ["extra vlm", "extra match"]
     found = {part: line for line in out.splitlines() for part in parts if line[4:].startswith(part)}
     assert list(found) == parts
