@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,6 +22,7 @@ from stable_baselines3.common.callbacks import BaseCallback, CallbackList, Progr
 from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
+from torch.distributions import Distribution
 
 from agents.rl import dqn, ppo
 from agents.rl.callbacks import (
@@ -81,10 +83,6 @@ def train(
         KeyboardInterrupt: Ctrl-C; what has been learnt is saved.
     """
     prepare(config, run)
-    torch.distributions.Distribution.set_default_validate_args(False)  # at every step, for nothing
-    # What Adam remembers of weights that get no gradient, such as those of types that no room of
-    # the training has, fades until every operation on it takes a hundred times as long.
-    torch.set_flush_denormal(True)
     model = load_last(run)
     steps = 0 if model is None else model.num_timesteps
     if model is not None and steps >= config.total_steps:
@@ -114,11 +112,12 @@ def train(
             set_random_seed(seed)
         model.set_logger(_logger(config, run, steps))
         try:
-            model.learn(
-                config.total_steps - steps,
-                callback=CallbackList(callbacks),
-                reset_num_timesteps=False,
-            )
+            with quick_arithmetic():
+                model.learn(
+                    config.total_steps - steps,
+                    callback=CallbackList(callbacks),
+                    reset_num_timesteps=False,
+                )
         finally:
             if checkpoints.steps:
                 checkpoints.save()
@@ -130,6 +129,20 @@ def train(
         if held_out is not None:
             held_out.eval_env.close()
     return model
+
+
+@contextmanager
+def quick_arithmetic() -> Iterator[None]:
+    """Tiny numbers count as 0, and distributions do not check what they are given, for a while."""
+    # What Adam remembers of weights that get no gradient, such as those of types that no room of
+    # the training has, fades until every operation on it takes a hundred times as long.
+    torch.set_flush_denormal(True)
+    Distribution.set_default_validate_args(False)
+    try:
+        yield
+    finally:
+        torch.set_flush_denormal(False)
+        Distribution.set_default_validate_args(__debug__)
 
 
 def _warm(model: BaseAlgorithm, config: TrainConfig, how: WarmStart, run: Path, seed: int) -> None:

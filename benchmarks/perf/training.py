@@ -17,7 +17,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import click
-import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
@@ -25,7 +24,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
 from agents.rl.callbacks import Threads
 from agents.rl.config import TrainConfig, config_file, load_config
 from agents.rl.ppo import make
-from agents.rl.train import vectorised
+from agents.rl.train import quick_arithmetic, vectorised
 
 
 @dataclass
@@ -129,11 +128,10 @@ def show(name: str, clock: Clock, rates: Rates, steps: int) -> None:
 @click.option("--set", "overrides", multiple=True, metavar="NAME=VALUE")
 def main(config: str, steps: int, peer_steps: int, overrides: tuple[str, ...]) -> None:
     """Measure, and print."""
-    torch.distributions.Distribution.set_default_validate_args(False)
-    torch.set_flush_denormal(True)
     asked = load_config(config_file(config), overrides)
-    show(config, *ours(asked, steps), steps)
-    show("PPO on MiniGrid", *minigrid(asked, peer_steps), peer_steps)
+    with quick_arithmetic():
+        show(config, *ours(asked, steps), steps)
+        show("PPO on MiniGrid", *minigrid(asked, peer_steps), peer_steps)
 
 
 if __name__ == "__main__":

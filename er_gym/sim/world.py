@@ -82,7 +82,9 @@ class ThirdPartyCamera:
     field_of_view: float
 
 
-_NOT_OBJECTS = frozenset({"scene", "settings", "agent", "cameras", "arrangement", "looks", "base"})
+_NOT_OBJECTS = frozenset(
+    {"scene", "settings", "agent", "cameras", "derived", "arrangement", "looks", "base"}
+)
 """What a snapshot of the objects has no copy of."""
 
 
@@ -521,4 +523,4 @@ def _objects(world: World) -> dict[str, Any]:
         for each in fields(world)
         if each.name not in _NOT_OBJECTS
     }
-    return {**copies, "arrangement": world.arrangement, "looks": {}}
+    return {**copies, "derived": {}, "arrangement": world.arrangement, "looks": {}}

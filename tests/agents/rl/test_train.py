@@ -87,6 +87,7 @@ def test_the_run_directory(make_config: Make, tmp_path: Path) -> None:
     )
     model = train(config, run)
     assert model.num_timesteps == 512
+    assert np.array([5e-324]) * 1.0 > 0  # arithmetic is as it was before
     assert {file.name for file in run.iterdir()} == {
         "config.yaml", "curve.jsonl", "model.zip", "tensorboard"
     }  # fmt: skip
