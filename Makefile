@@ -9,6 +9,9 @@ PYTHON ?= python3
 VENV ?= .venv
 WORKERS ?= 2
 
+# Without bytecode every worker process of the tests would compile torch and its like again.
+unexport PYTHONDONTWRITEBYTECODE
+
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Python compiles what it imports; compiling all of it beforehand only takes time.
