@@ -24,6 +24,7 @@ import click
 import numpy as np
 from rich.console import Console
 
+from agents import make_agent
 from agents.rl.callbacks import MODEL, read_curve
 from agents.rl.config import TrainConfig, load_config
 from benchmarks.curves import draw_curves
@@ -108,8 +109,6 @@ class Player:
 
     def play(self, agent: str, tasks: Sequence[Task], where: str, name: str) -> list[Score]:
         """The scores of an agent under ``instances="explore"``."""
-        from agents import make_agent
-
         manifest = Manifest(
             suite=where,
             suite_digest=jsonl_format.digest(tasks),
@@ -227,7 +226,7 @@ def main(runs: tuple[Path, ...], work: Path, workers: int, each: int, out: Path)
         (work / f"{name}.json").write_text(json.dumps(results))
         parts.append(_section(name, members, results))
     pictures = draw_curves(families, out.parent / "images")
-    out.write_text(_page(parts, pictures, runs))
+    out.write_text(_page(parts, pictures))
     click.echo(f"{out}, {', '.join(str(picture) for picture in pictures)}")
 
 
@@ -286,7 +285,7 @@ def _span(values: Sequence[float]) -> str:
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
-def _page(parts: Sequence[str], pictures: Sequence[Path], runs: Sequence[Path]) -> str:
+def _page(parts: Sequence[str], pictures: Sequence[Path]) -> str:
     shown = "\n\n".join(f"![{picture.stem}](images/{picture.name})" for picture in pictures)
     tables = "\n".join(parts)
     return f"""# Baselines

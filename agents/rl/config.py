@@ -128,7 +128,8 @@ class Network(_Model):
 
 
 class PPO(_Model):
-    """MaskablePPO of sb3-contrib; the names are its own. The rates fall to ``final`` of theirs."""
+    """MaskablePPO of sb3-contrib; the names are its own, but for ``final_learning_rate``: the share
+    of the learning rate that is left in the end."""
 
     name: Literal["ppo"] = "ppo"
     learning_rate: Rate = 2e-3

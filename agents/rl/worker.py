@@ -7,6 +7,7 @@ because one message then carries a batch.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 from collections.abc import Callable, Sequence
@@ -17,7 +18,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-Obs = dict[str, NDArray[Any]]
+from agents.rl.perception import Obs
 
 
 class Batch(NamedTuple):
@@ -123,7 +124,8 @@ def serve(pipe: Connection, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the trainer's business
     # A batch process does not push the trainer aside when it is woken: on a machine with as many
     # cores as workers, the others would otherwise wait for their actions until it is done.
-    os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    with contextlib.suppress(AttributeError, OSError):  # not everywhere, nor always allowed
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
     envs: Envs | None = None
     try:
         while True:
