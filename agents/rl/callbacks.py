@@ -14,6 +14,7 @@ from sb3_contrib.common.maskable.callbacks import MaskableEvalCallback
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import KVWriter
+from stable_baselines3.common.vec_env import VecEnv
 
 from agents.rl.config import Phase
 
@@ -157,25 +158,28 @@ class Curriculum(BaseCallback):
         self._phases, self._after = phases, tuple(types)
         self._now: tuple[str, ...] | None = None
 
-    def _on_rollout_start(self) -> None:
-        types = next(
-            (phase.types for phase in self._phases if self.num_timesteps < phase.until), self._after
-        )
+    def tell(self, env: VecEnv, steps: int) -> None:
+        """Say it for the episodes that begin after so many steps."""
+        types = next((phase.types for phase in self._phases if steps < phase.until), self._after)
         if types != self._now:
             self._now = types
-            self.training_env.env_method("set_types", types)
+            env.env_method("set_types", types)
+
+    def _on_rollout_start(self) -> None:
+        self.tell(self.training_env, self.num_timesteps)
 
     def _on_step(self) -> bool:
         return True
 
 
 class ByType(BaseCallback):
-    """Logs the success rate of each task type over its last episodes."""
+    """Logs the success rate over its last episodes of each task type that was played."""
 
     def __init__(self, over: int = 100) -> None:
         super().__init__()
         self._over = over
         self._last: dict[str, list[bool]] = {}
+        self._played: set[str] = set()
 
     def _on_step(self) -> bool:
         for info in self.locals["infos"]:
@@ -183,11 +187,16 @@ class ByType(BaseCallback):
                 self._note(info)
         return True
 
+    def _on_rollout_start(self) -> None:
+        self._played.clear()
+
     def _note(self, info: Mapping[str, Any]) -> None:
+        self._played.add(info["task_type"])
         last = self._last.setdefault(info["task_type"], [])
         last.append(info["is_success"])
         del last[: -self._over]
 
     def _on_rollout_end(self) -> None:
-        for name, successes in self._last.items():
+        for name in sorted(self._played):
+            successes = self._last[name]
             self.logger.record(f"success/{name}", sum(successes) / len(successes))

@@ -135,8 +135,8 @@ class PPO(_Model):
     learning_rate: Rate = 2e-3
     final_learning_rate: Fraction = 0.1
     n_steps: Positive = 32
-    batch_size: Positive = 1024
-    n_epochs: Positive = 2
+    batch_size: Positive = 512
+    n_epochs: Positive = 1
     gamma: Fraction = 0.97
     gae_lambda: Fraction = 0.95
     clip_range: Rate = 0.2

@@ -13,7 +13,7 @@ from agents.rl.config import Episodes
 from agents.rl.demonstrations import Demonstrations, demonstrate
 from agents.rl.perception import Obs, Perception
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.sources import EpisodeSource, make_source
+from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.envs.wrappers import KeyActionShaping
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, TaskType
@@ -103,12 +103,17 @@ class LearningEnv(gymnasium.Wrapper[Obs, Any, Any, Any]):
 
 
 def make_env(
-    options: Episodes, gamma: float = 1.0, with_mask: bool = False, with_text: bool = False
+    options: Episodes,
+    gamma: float = 1.0,
+    with_mask: bool = False,
+    with_text: bool = False,
+    share: tuple[int, int] = (0, 1),
 ) -> gymnasium.Env[Obs, Any]:
     """An environment to learn in.
 
     Args:
         gamma: the learner's discount, for shaping.
+        share: which of how many processes it is in; each plays in rooms of its own.
         with_mask: whether the observation holds the action mask.
         with_text: whether ``info["seen"]``, the environment's own observation, holds text, as
             scripted agents need it.
@@ -132,8 +137,10 @@ def make_env(
     )
     if options.shaping:
         env = KeyActionShaping(env, gamma, options.shaping)
-    perception = Perception(options, with_mask)
-    return LearningEnv(env, make_source(options.episodes), options.types, perception)
+    source = make_source(options.episodes)
+    if isinstance(source, TaskList):
+        source = source.share(*share)
+    return LearningEnv(env, source, options.types, Perception(options, with_mask))
 
 
 def for_evaluation(options: Episodes, episodes: str) -> Episodes:

@@ -99,7 +99,9 @@ def train(
             held_out = _held_out(config, config.evaluation)
             callbacks.append(held_out)
         if config.curriculum:
-            callbacks.append(Curriculum(config.curriculum, config.env.types))
+            curriculum = Curriculum(config.curriculum, config.env.types)
+            curriculum.tell(env, steps)
+            callbacks.append(curriculum)
         if show_progress:
             callbacks.append(ProgressBarCallback())
         if model is None:
@@ -210,7 +212,8 @@ def load_last(run: Path) -> BaseAlgorithm | None:
 
 
 def vectorised(config: TrainConfig, options: Episodes, seed: int) -> VecEnv:
-    """``config.vec.envs`` environments in worker processes, seeded one after the other."""
+    """``config.vec.envs`` environments in worker processes, seeded one after the other; each
+    process plays in its share of the rooms."""
     family = FAMILIES[config.algorithm.name]
     make = partial(make_env, options, config.algorithm.gamma, family.needs_mask)
     env = VecMonitor(WorkerVecEnv([make] * config.vec.envs, config.vec.workers))

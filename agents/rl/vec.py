@@ -6,6 +6,7 @@ import contextlib
 import multiprocessing
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -28,7 +29,8 @@ class WorkerVecEnv(VecEnv):
     action masks with the observations rather than when asked once more.
 
     Args:
-        make: makes an environment each; has to be picklable.
+        make: makes an environment each, given ``share=(index, count)`` of the process that it is
+            made in; has to be picklable.
         workers: how many processes; they are spawned, and import no torch.
 
     Raises:
@@ -36,17 +38,16 @@ class WorkerVecEnv(VecEnv):
     """
 
     def __init__(
-        self, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]], workers: int = 2
+        self, make: Sequence[Callable[..., gymnasium.Env[Any, Any]]], workers: int = 2
     ) -> None:
         context = multiprocessing.get_context("spawn")
         workers = min(workers, len(make))
         self._rows = np.array_split(np.arange(len(make)), workers)
         self._pipes, self._processes = [], []
-        for rows in self._rows:
+        for worker, rows in enumerate(self._rows):
             ours, theirs = context.Pipe()
-            process = context.Process(
-                target=serve, args=(theirs, [make[row] for row in rows]), daemon=True
-            )
+            mine = [partial(make[row], share=(worker, workers)) for row in rows]
+            process = context.Process(target=serve, args=(theirs, mine), daemon=True)
             process.start()
             theirs.close()
             self._pipes.append(ours)

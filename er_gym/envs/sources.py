@@ -73,6 +73,22 @@ class TaskList:
             raise ValueError(f"{self._name} has no {asked}{among}")
         return fitting[int(rng.integers(len(fitting)))]
 
+    @lru_cache(maxsize=64)  # noqa: B019  (few lists, and they are kept anyhow)
+    def share(self, index: int, count: int) -> TaskList:
+        """Every ``count``-th scene's tasks, from the ``index``-th on; all of them, if that would
+        leave a share without a type that the list has.
+
+        What an engine remembers of a room serves its own process alone, so that processes are
+        quicker when each plays in rooms of its own.
+        """
+        scenes = sorted({task.scene for task in self.tasks})
+        share_of = {scene: place % count for place, scene in enumerate(scenes)}
+        types = {task.type for task in self.tasks}
+        if len({(share_of[task.scene], task.type) for task in self.tasks}) < count * len(types):
+            return self
+        mine = [task for task in self.tasks if share_of[task.scene] == index]
+        return TaskList(mine, self._name)
+
     def find(self, task_id: str) -> Task:
         """The task of that id."""
         for task in self.tasks:

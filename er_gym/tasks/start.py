@@ -51,11 +51,9 @@ def begin(controller: Any, scene: str, start: Start) -> Any:
     """
     event = controller.reset(scene)
     if start.poses:
-        event = controller.step(
-            action="SetObjectPoses",
-            objectPoses=_all_poses(_recorded_poses(controller, scene, event), start),
-            placeStationary=True,
-        )
+        poses = _all_poses(_recorded_poses(controller, scene, event), start)
+        del event  # what nobody keeps, the embedded engine need not work out
+        event = controller.step(action="SetObjectPoses", objectPoses=poses, placeStationary=True)
         _check(event, scene, start)
     for object_id in start.dirty:
         event = controller.step(action="DirtyObject", objectId=object_id, forceAction=True)

@@ -95,8 +95,7 @@ class ObjectTable:
 
         :data:`ENTRY_KEYS` has the keys. The whole metadata takes a hundred times as long to make.
         """
-        kinds = [KIND_OF[name] for name in object_types if name in KIND_OF]
-        rows = np.flatnonzero(np.isin(self.kinds, kinds)).tolist()
+        rows = [row for name in set(object_types) for row in self.of_type(name)]
         holders = {holder for k in rows for holder in self.parents[k]}
         return [
             {

@@ -175,6 +175,21 @@ def test_a_list_a_suite_and_a_file_of_the_same_tasks_are_drawn_alike(
     assert drawn(make(paper), 0).instruction == rows[0][0].instruction
 
 
+def test_shares_of_a_list_have_every_type_and_no_room_in_common() -> None:
+    shares = [TaskList(MINI).share(index, 3) for index in range(3)]
+    assert sorted(task.id for share in shares for task in share.tasks) == sorted(
+        task.id for task in MINI
+    )
+    rooms = [{task.scene for task in share.tasks} for share in shares]
+    assert not rooms[0] & rooms[1] | rooms[1] & rooms[2] | rooms[0] & rooms[2]
+    assert all({task.type for task in share.tasks} == set(TASK_TYPES) for share in shares)
+
+
+def test_a_list_too_small_to_be_shared_is_everyones() -> None:
+    few = TaskList(MINI[:5])
+    assert few.share(1, 40) is few
+
+
 def test_a_list_without_what_is_asked_for_says_so(make: Callable[..., EmbodiedEnv]) -> None:
     env = make(PICKUPS, task_type="single_toggle")
     with pytest.raises(ValueError, match=rf"no single_toggle tasks among its {len(PICKUPS)} tasks"):

@@ -53,6 +53,13 @@ def set_object_poses(
     named again is copied, nobody asks whether there is room, and what has moved gets the id of its
     new place. ``placeStationary`` False lets things fall from there.
     """
+    # Rooms are mostly arranged right after they are loaded, and the same way again and again.
+    wanted = (world.scene.name, placeStationary, *map(_key, objectPoses))
+    fresh = world.untouched
+    if fresh and wanted in _arranged:
+        _arranged.move_to_end(wanted)
+        world.become(_arranged[wanted])
+        return
     for pose in objectPoses:
         for axis in "xyz":
             within(f"position.{axis}", getattr(pose.position, axis), -FARTHEST, FARTHEST)
@@ -70,13 +77,6 @@ def set_object_poses(
                 "ObjectNotFound",
             )
     if not objectPoses:
-        return
-    # Rooms are mostly arranged right after they are loaded, and the same way again and again.
-    wanted = (world.scene.name, placeStationary, *map(_key, objectPoses))
-    fresh = world.untouched
-    if fresh and wanted in _arranged:
-        _arranged.move_to_end(wanted)
-        world.become(_arranged[wanted])
         return
     for i in set(loose.values()) - {loose[pose.objectName] for pose in objectPoses}:
         world.remove(i)

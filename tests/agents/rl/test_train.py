@@ -59,7 +59,7 @@ def test_the_return_rises(make_config: Make, tmp_path: Path) -> None:
     config = make_config(
         total_steps=8192,
         vec={"envs": 16, "workers": 2},
-        algorithm={"name": "ppo", "n_steps": 64, "batch_size": 256, "learning_rate": 3e-3},
+        algorithm={"n_steps": 64, "batch_size": 256, "n_epochs": 4, "learning_rate": 3e-3},
         env={"episodes": "mini", "types": ["single_toggle"], "max_steps": 12},
     )
     seen = Returns()
@@ -156,8 +156,7 @@ def test_a_curriculum_takes_the_types_in_turn(make_config: Make, tmp_path: Path)
 
     train(config, tmp_path / "run", more=(Kinds(),))
     # Those under way when the types change are played to their end.
-    assert "single_toggle" in {kind for steps, kind in kinds if 60 < steps < 500}
-    assert {kind for steps, kind in kinds if steps < 500 and steps > 60} == {"single_toggle"}
+    assert {kind for steps, kind in kinds if steps < 500} == {"single_toggle"}
     assert {kind for steps, kind in kinds if steps > 560} == {"single_pickup"}
 
 

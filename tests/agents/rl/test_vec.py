@@ -49,7 +49,10 @@ def play(env: VecEnv, steps: int) -> list[np.ndarray]:
 
 
 def test_it_plays_what_subproc_vec_env_plays(vec: WorkerVecEnv) -> None:
-    other = SubprocVecEnv([partial(make_env, OPTIONS)] * 3, start_method="spawn")
+    shares = [(0, 2), (0, 2), (1, 2)]  # two environments in the first process, one in the second
+    other = SubprocVecEnv(
+        [partial(make_env, OPTIONS, share=share) for share in shares], start_method="spawn"
+    )
     try:
         assert is_masking_supported(other)
         assert is_masking_supported(vec)
