@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 from agents.base import Agent, Decision
 from agents.scripted.oracle import OracleAgent
 from agents.scripted.random import RandomAgent
 from agents.scripted.searcher import SearcherAgent
+from agents.vlm.settings import AgentSettings
+from agents.vlm.speaker import Speaker, speaks, ways_to_name
 
 __all__ = [
     "AGENTS",
@@ -30,20 +33,28 @@ AGENTS: dict[str, Callable[[int], Agent]] = {
 
 
 def make_agent(name: str, seed: int = 0) -> Agent:
-    """An agent by name: one of :data:`AGENTS`, or ``rl:RUN`` for a trained policy.
+    """An agent by name: one of :data:`AGENTS`, ``rl:RUN`` for a trained policy, or, with the
+    settings that are the default, one that speaks (:mod:`agents.vlm.speaker`).
 
     Raises:
         ValueError: there is none of that name; the message lists those there are.
     """
     if name.startswith(RL):
         return _trained(name.removeprefix(RL))
+    if speaks(name):
+        return _speaker(name).agent(seed)
     make = AGENTS.get(name)
     if make is None:
         raise ValueError(
-            f"unknown agent {name!r}; choose one of: {', '.join(AGENTS)}, "
-            f"or {RL}RUN with a run directory of er-gym train-rl"
+            f"unknown agent {name!r}; choose one of: {', '.join(AGENTS)}; "
+            f"{RL}RUN with a run directory of er-gym train-rl; {ways_to_name()}"
         )
     return make(seed)
+
+
+@lru_cache(maxsize=4)
+def _speaker(name: str) -> Speaker:
+    return Speaker(name, AgentSettings())
 
 
 def _trained(path: str) -> Agent:

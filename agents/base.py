@@ -24,6 +24,13 @@ class Decision:
     thought: str = ""
 
 
+class CannotGoOn(Exception):
+    """No further episode can be played, this one included: a budget is spent, a key is refused.
+
+    The run stops, and says the message; what has been played is kept.
+    """
+
+
 class Agent(Protocol):
     """Plays episodes: ``reset`` once for each, then ``act`` until the episode is over."""
 

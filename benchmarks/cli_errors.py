@@ -1,4 +1,4 @@
-"""How the command says that something was given wrongly: one line, exit code 2."""
+"""How the command says that something went wrong: one line on stderr, and its exit code."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ import contextlib
 from collections.abc import Iterator
 
 import click
+
+CRASHED, STOPPED, INTERRUPTED = 1, 3, 130
+"""Exit codes: episodes crashed; a run stopped before its end, as it was told to; Ctrl-C. And 2 is
+for what the user gave wrongly."""
 
 
 class BadInput(click.ClickException):
@@ -22,3 +26,8 @@ def bad_input(*more: type[Exception]) -> Iterator[None]:
         yield
     except known as error:
         raise BadInput(str(error)) from error
+
+
+def complain(message: str) -> None:
+    """Say something in one line on stderr."""
+    click.echo(f"er-gym: {' '.join(message.split())}", err=True)

@@ -3,9 +3,24 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+import sys
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+SCORER_CHOICES = ("both", "paper", "corrected")
+"""As in ``benchmarks.report``, which is too heavy to import for ``--help``; a test compares."""
+
+scorer_option = click.option(
+    "--scorer",
+    type=click.Choice(SCORER_CHOICES),
+    default="both",
+    show_default=True,
+    help="Which scorer the table shows; both: each where they differ.",
+)
 
 workers_option = click.option(
     "--workers",
@@ -32,3 +47,10 @@ class Span(click.ParamType):
             return start, (float(high) if high else None) if dash else start
         except ValueError:
             self.fail(f"{value!r} is no range; give a number, A-B, or A- for no end", param, ctx)
+
+
+def stdout() -> Console:
+    """Tables are as wide as the terminal, and as wide as they need to be in a file."""
+    from rich.console import Console
+
+    return Console(width=None if sys.stdout.isatty() else 240)

@@ -7,9 +7,7 @@ from typing import Any
 
 import click
 
-from benchmarks.cli_errors import BadInput, bad_input
-
-_INTERRUPTED = 130
+from benchmarks.cli_errors import INTERRUPTED, BadInput, bad_input, complain
 
 
 @click.command(name="train-rl")
@@ -58,11 +56,8 @@ def train_rl(config: str, overrides: tuple[str, ...], seed: int | None, out: Pat
     except (RuntimeError, EOFError) as error:
         raise click.ClickException(f"{error}; what has been learnt is in {run}") from error
     except KeyboardInterrupt:
-        click.echo(
-            f"er-gym: interrupted; what has been learnt is in {run}, the same command continues",
-            err=True,
-        )
-        return _INTERRUPTED
+        complain(f"interrupted; what has been learnt is in {run}, the same command continues")
+        return INTERRUPTED
     _say_result(run, model)
     return 0
 

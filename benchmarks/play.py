@@ -6,15 +6,24 @@ import hashlib
 import time
 import traceback
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
-from agents.base import Agent
+from agents.base import Agent, CannotGoOn
 from benchmarks.episode import ERROR, EpisodeRecord, StepRecord, record_episode
 from er_gym.tasks.task import Task
 from er_gym.tasks.verbs import INIT
 
-if TYPE_CHECKING:
-    from er_gym.envs.embodied_env import EmbodiedEnv
+
+class Playable(Protocol):
+    """What is asked of an environment: an ``EmbodiedEnv``, here or in another process."""
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Begin an episode."""
+
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Do an action."""
 
 
 def episode_seed(seed: int, task_id: str) -> int:
@@ -26,7 +35,7 @@ def episode_seed(seed: int, task_id: str) -> int:
 
 
 def play_episode(
-    env: EmbodiedEnv,
+    env: Playable,
     agent: Agent,
     task: Task,
     seed: int,
@@ -47,6 +56,10 @@ def play_episode(
         seed: passed to ``env.reset``.
         agent_name: how the record names the agent; its class name by default.
         max_steps: the step limit if ``env`` was made with one; the task's own by default.
+
+    Raises:
+        CannotGoOn: the agent says that no further episode can be played; there is no record of
+            this one.
     """
     steps: list[StepRecord] = []
     info: Mapping[str, Any] = {}
@@ -62,6 +75,8 @@ def play_episode(
             obs, reward, terminated, truncated, info = env.step(decision.action)
             steps.append(_stepped(info, float(reward), decision.thought))
             over = terminated or truncated
+    except CannotGoOn:
+        raise
     except Exception as caught:  # agents are anybody's code; one must not end the run
         error = one_line(caught)
     return record_episode(

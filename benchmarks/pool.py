@@ -24,7 +24,7 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 _CONTEXT = multiprocessing.get_context("spawn")
-_GRACE = 5.0
+GRACE = 5.0
 """Seconds that a worker has for closing what it holds."""
 
 
@@ -63,7 +63,7 @@ class _Worker(Generic[Job, Result]):
         self.connection, theirs = _CONTEXT.Pipe()
         self.holds: _Try[Job] | None = None
         self.process = _CONTEXT.Process(target=_serve, args=(theirs, make), daemon=True)
-        with _interrupts_ignored():
+        with interrupts_ignored():
             self.process.start()
         # With our copy closed, the pipe ends when the process does.
         theirs.close()
@@ -89,7 +89,7 @@ class _Worker(Generic[Job, Result]):
     def stop(self) -> int | None:
         """End the process, killing it if it does not end by itself, and return its exit code."""
         self.dismiss()
-        self.process.join(_GRACE)
+        self.process.join(GRACE)
         if self.process.is_alive():
             self.process.kill()
             self.process.join()
@@ -156,7 +156,7 @@ def do_jobs(
 
 
 @contextlib.contextmanager
-def _interrupts_ignored() -> Iterator[None]:
+def interrupts_ignored() -> Iterator[None]:
     """Ignore Ctrl-C while a process is started: it inherits that, from its first instruction on."""
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set handlers, and only it gets interrupts
@@ -171,8 +171,8 @@ def _interrupts_ignored() -> Iterator[None]:
 def _serve(connection: Connection, make: Callable[[], Callable[[Job], Result]]) -> None:
     """The worker process: do what comes through the pipe until it is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _exit_cleanly)
-    threading.Thread(target=_follow_parent, daemon=True).start()
+    signal.signal(signal.SIGTERM, exit_cleanly)
+    threading.Thread(target=follow_parent, daemon=True).start()
     try:
         do = make()
     except Exception as error:  # whatever it is, the parent must hear of it
@@ -190,15 +190,16 @@ def _serve(connection: Connection, make: Callable[[], Callable[[Job], Result]]) 
             getattr(do, "close", lambda: None)()
 
 
-def _exit_cleanly(signum: int, frame: object) -> NoReturn:
+def exit_cleanly(signum: int, frame: object) -> NoReturn:
+    """A handler of signals that lets everything be closed first."""
     sys.exit(128 + signum)
 
 
-def _follow_parent() -> None:
+def follow_parent() -> None:
     """End this process once its parent has ended: first cleanly, then at once."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()
     os.kill(os.getpid(), signal.SIGTERM)
-    time.sleep(_GRACE)
+    time.sleep(GRACE)
     os._exit(1)

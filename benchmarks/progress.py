@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from types import TracebackType
 
 from rich.console import Console
@@ -35,11 +36,19 @@ class Progress:
         total: how many episodes there are.
         done: how many of them were there before.
         succeeded: how many of those were a success.
+        more: what else is to be said each time, such as what has been spent.
     """
 
     def __init__(
-        self, console: Console, title: str, total: int, done: int = 0, succeeded: int = 0
+        self,
+        console: Console,
+        title: str,
+        total: int,
+        done: int = 0,
+        succeeded: int = 0,
+        more: Callable[[], str] = lambda: "",
     ) -> None:
+        self._more = more
         self._console = console
         self._title = title
         self._total = total
@@ -81,4 +90,5 @@ class Progress:
             return "starting"
         played = self._done - self._before
         speed = played / max(time.monotonic() - self._start, 1e-9)
-        return f"{100 * self._succeeded / self._done:.1f} % success, {speed:.1f} episodes/s"
+        said = f"{100 * self._succeeded / self._done:.1f} % success, {speed:.1f} episodes/s"
+        return ", ".join(filter(None, (said, self._more())))

@@ -163,7 +163,7 @@ def run(
     crashed = []
     with closing(do_jobs(player, todo, workers=workers)) as results:
         for task, result in results:
-            episode = _lost(task, result, store) if isinstance(result, Lost) else result
+            episode = lost_episode(task, result, store) if isinstance(result, Lost) else result
             store.write(episode)
             if episode.error:
                 crashed.append(episode)
@@ -171,7 +171,8 @@ def run(
     return Outcome(len(todo), len(done), tuple(crashed))
 
 
-def _lost(task: Task, lost: Lost, store: RunStore) -> EpisodeRecord:
+def lost_episode(task: Task, lost: Lost, store: RunStore) -> EpisodeRecord:
+    """The record of an episode whose worker died every time."""
     return record_episode(
         task,
         agent=store.manifest.agent,

@@ -2,8 +2,10 @@
 
 ::
 
-    runs/x/run.json                 the manifest
-    runs/x/episodes/<task id>.json  an episode each
+    runs/x/run.json                      the manifest
+    runs/x/episodes/<task id>.json       an episode each
+    runs/x/conversations/<task id>.json  what was said in it, with an agent that speaks
+    runs/x/pictures/<task id>/           and shown
 
 Files are written beside their place and moved there, so that whatever is found under its name is
 whole; what a killed run left half-written has another name and is never read. Running again
@@ -16,17 +18,21 @@ import contextlib
 import hashlib
 import os
 import re
+import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from agents.vlm.record import ConversationRecord
 from benchmarks.episode import EpisodeRecord
 
 MANIFEST = "run.json"
 EPISODES = "episodes"
+CONVERSATIONS = "conversations"
+PICTURES = "pictures"
 
 _LONGEST_NAME = 120  # characters; file systems take 255 bytes, the temporary name among them
 
@@ -44,6 +50,7 @@ class Manifest(BaseModel):
         suite_digest: of its tasks' content.
         suite_size: how many tasks it has; a run need not have played them all.
         agent: the agent's spec.
+        agent_settings: of an agent that speaks, what decides what it says.
         env: the keyword arguments of the environment.
         seed: the run's; every episode's is derived from it.
         er_gym: the version of the package.
@@ -56,6 +63,7 @@ class Manifest(BaseModel):
     suite_digest: str
     suite_size: int
     agent: str
+    agent_settings: dict[str, Any] = {}
     env: dict[str, Any]
     seed: int
     er_gym: str
@@ -130,11 +138,35 @@ class RunStore:
         _write_whole(path, episode.model_dump_json(indent=1) + "\n")
         return path
 
+    def write_conversation(
+        self, conversation: ConversationRecord, pictures: Mapping[str, bytes]
+    ) -> None:
+        """Keep a conversation, in place of an earlier one of the same task.
+
+        Args:
+            conversation: what was said.
+            pictures: files by path from the run directory on, all in :func:`picture_folder`.
+        """
+        task_id = conversation.task_id
+        shutil.rmtree(self.path / picture_folder(task_id), ignore_errors=True)
+        for name, data in pictures.items():
+            path = self.path / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        place = self.path / CONVERSATIONS / f"{file_stem(task_id)}.json"
+        place.parent.mkdir(exist_ok=True)
+        _write_whole(place, conversation.model_dump_json(indent=1) + "\n")
+
     def episodes(self) -> Iterator[EpisodeRecord]:
         """Every episode there is, by file name; files that hold none are passed over."""
         for path in sorted((self.path / EPISODES).glob("*.json")):
             with contextlib.suppress(ValidationError, OSError):
                 yield EpisodeRecord.model_validate_json(path.read_bytes())
+
+
+def picture_folder(task_id: str) -> str:
+    """Where the pictures of a conversation are, from the run directory on."""
+    return f"{PICTURES}/{file_stem(task_id)}"
 
 
 def file_stem(task_id: str) -> str:

@@ -10,14 +10,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from agents import configs
 from er_gym.envs.instances import EXPLORE
-from er_gym.tasks.files import read_text, validated
-from er_gym.tasks.suites import config_directory
 from er_gym.tasks.types import BY_NAME
 
+_WHAT = "training run"
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Positive = Annotated[int, Field(gt=0)]
 Rate = Annotated[float, Field(gt=0)]
@@ -222,7 +221,7 @@ class TrainConfig(_Model):
 
 def config_names() -> tuple[str, ...]:
     """The names of the runs that come with er-gym, in alphabetical order."""
-    return tuple(sorted(file.stem for file in config_directory("rl").glob("*.yaml")))
+    return configs.names("rl")
 
 
 def config_file(name: str) -> Path:
@@ -231,54 +230,16 @@ def config_file(name: str) -> Path:
     Raises:
         ValueError: there is none; the message lists those that come with er-gym.
     """
-    if name in config_names():
-        return config_directory("rl") / f"{name}.yaml"
-    if not Path(name).is_file():
-        raise ValueError(
-            f"there is no training run {name!r}; give a YAML file, or one of: "
-            f"{', '.join(config_names())}"
-        )
-    return Path(name)
+    return configs.file_of("rl", name, _WHAT)
 
 
 def load_config(
     file: Path, overrides: Sequence[str] = (), more: Mapping[str, Any] | None = None
 ) -> TrainConfig:
-    """Read a run's YAML.
-
-    Args:
-        file: its path.
-        overrides: ``"env.types=[single_search]"``: a field's path and its value in YAML.
-        more: fields by name, overruling these in turn.
+    """Read a run's YAML, see :func:`agents.configs.load`.
 
     Raises:
         ValueError: an override is none, or has no such field; what is given does not fit.
         TaskFileError: the file cannot be read. (It is a ValueError.)
     """
-    try:
-        data = yaml.safe_load(read_text(file))
-    except yaml.YAMLError as error:
-        raise ValueError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
-    if not isinstance(data, dict):
-        raise ValueError(f"{file}: a training run is a table of settings, not {data!r:.60}")
-    for text in overrides:
-        path, equals, value = text.partition("=")
-        if not (equals and path):
-            raise ValueError(f"{text!r} is no override; give NAME=VALUE, such as total_steps=1000")
-        _put(data, path.split("."), yaml.safe_load(value), text)
-    return validated(TrainConfig, {**data, **(more or {})}, f"{file}: the training run")
-
-
-def _put(data: dict[str, Any], path: Sequence[str], value: Any, text: str) -> None:
-    *way, last = path
-    for name in way:
-        inner = data.setdefault(name, {})
-        if not isinstance(inner, dict):
-            raise ValueError(f"override {text!r}: {name!r} is {inner!r}, which has no fields")
-        data = inner
-    data[last] = value
-
-
-def dump(config: TrainConfig) -> str:
-    """The run's YAML, with every default written out."""
-    return yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False)
+    return configs.load(TrainConfig, file, _WHAT, overrides, more)

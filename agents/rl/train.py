@@ -24,6 +24,7 @@ from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 from torch.distributions import Distribution
 
+from agents.configs import dump
 from agents.rl import dqn, ppo
 from agents.rl.callbacks import (
     MODEL,
@@ -35,7 +36,7 @@ from agents.rl.callbacks import (
     Threads,
 )
 from agents.rl.cloning import clone, watch
-from agents.rl.config import Episodes, Evaluation, TrainConfig, WarmStart, dump, load_config
+from agents.rl.config import Episodes, Evaluation, TrainConfig, WarmStart, load_config
 from agents.rl.envs import for_evaluation, make_env
 from agents.rl.vec import WorkerVecEnv
 

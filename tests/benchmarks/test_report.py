@@ -7,7 +7,7 @@ import json
 import pytest
 from rich.console import Console
 
-from benchmarks import cli, report
+from benchmarks import cli_options, report
 from benchmarks.report import load_run
 from benchmarks.store import RunStore
 from benchmarks.tables import as_markdown, print_tables, tables
@@ -216,4 +216,4 @@ def test_a_narrow_terminal_turns_the_results(run):
 
 
 def test_the_command_offers_the_scorers_there_are():
-    assert cli.SCORER_CHOICES == report.SCORER_CHOICES
+    assert cli_options.SCORER_CHOICES == report.SCORER_CHOICES

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from agents.rl.config import config_file, config_names, dump, load_config
+from agents.configs import dump
+from agents.rl.config import config_file, config_names, load_config
 
 
 @pytest.fixture

@@ -1,0 +1,240 @@
+"""The agent that looks, thinks and acts by way of a model: one conversation an episode."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from agents.base import Decision
+from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture
+from agents.vlm.matching import Matcher
+from agents.vlm.parsing import Parsed, parse
+from agents.vlm.pictures import encode
+from agents.vlm.prompts import PromptSet, parts_of
+from agents.vlm.record import (
+    ConversationRecord,
+    MessageRecord,
+    PictureRecord,
+    RoundRecord,
+    ThoughtRecord,
+    plain_settings,
+    tokens,
+)
+from agents.vlm.settings import AgentSettings
+from er_gym.envs.actions import Action, applies
+from er_gym.tasks import verbs
+from er_gym.tasks.task import Task
+
+_NO_ACTION = "(no action) "
+"""What is handed to the environment begins with this where a reply has no usable action; whatever
+follows, it names none."""
+_LONGEST_QUOTE = 200
+
+
+class VLMAgent:
+    """Plays one episode after another; keeps the conversation of the last.
+
+    What has been sent is never changed afterwards, so that a server can go on from what it
+    remembers; only pictures beyond ``settings.pictures.keep`` are left out.
+
+    Args:
+        client: gives the model's turns.
+        settings: of the agent.
+        prompts: the words that the model is given.
+        matcher: what object types the names stand for that it writes.
+        seed: of the episode; the client's.
+        name: its spec, for the record.
+    """
+
+    def __init__(
+        self,
+        client: Client,
+        settings: AgentSettings,
+        prompts: PromptSet,
+        matcher: Matcher,
+        seed: int = 0,
+        name: str = "",
+    ) -> None:
+        self.obs_mode = settings.obs_mode
+        self._client, self._settings, self._prompts = client, settings, prompts
+        self._matcher, self._seed, self._name = matcher, seed, name
+        self._task: Task | None = None
+
+    # -- the agent's protocol --------------------------------------------------------------------
+
+    def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        """Begin an episode."""
+        self._task = task
+        system = self._prompts.system(decide=self._settings.decide, sees=self._settings.sees)
+        self._messages = [Message("system", (system,))] if system else []
+        self._rounds: list[RoundRecord] = []
+
+    def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
+        """Say what has come of the last action, and do what the model decides.
+
+        Raises:
+            ModelError: the model gives no reply.
+            CannotGoOn: nor will it ever.
+        """
+        self._messages.append(self._turn(obs, info))
+        reply = self._client.reply(self._history(), self._seed)
+        parsed = parse(reply.text, reply.call, self._settings.decide)
+        action, problem, matched = self._understand(parsed, info)
+        said = "\n".join(filter(None, (reply.text, reply.call))) or "(nothing)"
+        self._messages.append(Message("assistant", (said,), reply.reasoning))
+        thoughts = [ThoughtRecord(kind=each.kind, text=each.text) for each in parsed.thoughts]
+        self._rounds.append(
+            RoundRecord(
+                message=len(self._messages) - 1,
+                thoughts=thoughts,
+                action=str(action or ""),
+                name=parsed.name,
+                matched=matched,
+                rules=list(parsed.rules),
+                problem=problem,
+                seconds=reply.seconds,
+                cost=reply.cost,
+                finish=reply.finish,
+                model=reply.model,
+                kept=reply.kept,
+                **tokens(reply.usage),
+            )
+        )
+        thought = "\n".join(f"{each.kind}: {each.text}" for each in parsed.thoughts)
+        return Decision(action or _NO_ACTION + said[:_LONGEST_QUOTE], thought)
+
+    # -- what is said to the model ---------------------------------------------------------------
+
+    def _turn(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Message:
+        """The user's next turn: the task, or what came of the last action."""
+        assert self._task is not None
+        pictures = self._pictures(obs, info)
+        common: dict[str, Any] = {
+            "task": self._task.instruction,
+            "decide": self._settings.decide,
+            "sees": self._settings.sees,
+            "scene_text": obs.get("text", ""),
+            "steps": info["steps"],
+            "max_steps": self._task.max_steps,
+        }
+        if not self._rounds:
+            return Message("user", parts_of(self._prompts.first(**common), pictures))
+        last = self._rounds[-1] = self._rounds[-1].model_copy(
+            update={"feedback": info["feedback"], "success": bool(info["action_success"])}
+        )
+        if last.problem:
+            told = self._prompts.feedback(problem=last.problem, decide=self._settings.decide)
+            return Message("user", (told,))
+        text = self._prompts.next(
+            action=last.action,
+            feedback=last.feedback,
+            success=last.success,
+            pictures=len(pictures),
+            **common,
+        )
+        return Message("user", parts_of(text, pictures))
+
+    def _pictures(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> list[Picture]:
+        """What is seen: after an ``observe`` the views to the right, behind and left, as many as
+        the prompts have words for; and what is ahead."""
+        if self._settings.sees == "text":
+            return []
+        shown = [obs["rgb"]]
+        views = list(info.get("views", {}).values())
+        if views and self._settings.pictures.views:
+            wanted = self._prompts.after_observe
+            shown = {1: shown, len(views): views}.get(wanted or 0, [*views, *shown])
+        return [encode(picture, self._settings.pictures) for picture in shown]
+
+    def _history(self) -> list[Message]:
+        """The conversation as it is sent."""
+        messages = self._messages
+        if not self._settings.reasoning.in_history:
+            messages = [replace(message, reasoning="") for message in messages]
+        keep = self._settings.pictures.keep
+        return messages if keep is None else _with_last_pictures(messages, keep)
+
+    # -- what the model says ---------------------------------------------------------------------
+
+    def _understand(
+        self, parsed: Parsed, info: Mapping[str, Any]
+    ) -> tuple[Action | None, str, str]:
+        """The action, or None and what is wrong; and how a name became a type."""
+        if parsed.problem or parsed.verb in verbs.BARE_VERBS:
+            return (None if parsed.problem else Action(parsed.verb)), parsed.problem, ""
+        at_hand = (*info["interactable"], *info["navigable"])
+        match = self._matcher.match(parsed.name, prefer=at_hand)
+        if not match.object_type:
+            return None, match.problem, match.how
+        if not applies(parsed.verb, match.object_type):
+            article = "an" if match.object_type[0] in "AEIOU" else "a"
+            problem = f"One cannot {parsed.verb} {article} {match.object_type}."
+            return None, problem, match.how
+        return Action(parsed.verb, match.object_type), "", match.how
+
+    # -- the record ------------------------------------------------------------------------------
+
+    def conversation(
+        self, folder: str, feedback: str = "", success: bool = False, error: str = ""
+    ) -> tuple[ConversationRecord, dict[str, bytes]] | None:
+        """The record of the episode, and its pictures by path; None if it never began.
+
+        Args:
+            folder: where its pictures are to be, such as ``pictures/TASK``.
+            feedback, success: the environment's answer to the last action.
+            error: what the episode crashed with.
+        """
+        if self._task is None:
+            return None
+        files: dict[str, bytes] = {}
+        rounds = list(self._rounds)
+        if rounds and not rounds[-1].feedback:
+            answer = {"feedback": feedback, "success": success}
+            rounds[-1] = rounds[-1].model_copy(update=answer)
+        record = ConversationRecord(
+            task_id=self._task.id,
+            scene=self._task.scene,
+            instruction=self._task.instruction,
+            agent=self._name,
+            settings=plain_settings(self._settings),
+            prompts=self._prompts.name,
+            prompts_digest=self._prompts.digest,
+            messages=[_kept(message, folder, files) for message in self._messages],
+            rounds=rounds,
+            prompt_tokens=sum(each.prompt_tokens for each in rounds),
+            completion_tokens=sum(each.completion_tokens for each in rounds),
+            cost=sum(each.cost for each in rounds),
+            error=error,
+        )
+        return record, files
+
+
+def _kept(message: Message, folder: str, files: dict[str, bytes]) -> MessageRecord:
+    """A message as it is kept; its pictures go into ``files``."""
+    parts: list[str | PictureRecord] = []
+    for part in message.parts:
+        if isinstance(part, str):
+            parts.append(part)
+            continue
+        path = f"{folder}/{len(files):03}.{part.media_type.removeprefix('image/')}"
+        files[path] = part.data
+        parts.append(
+            PictureRecord(path=path, digest=part.digest, width=part.width, height=part.height)
+        )
+    return MessageRecord(role=message.role, parts=parts, reasoning=message.reasoning)
+
+
+def _with_last_pictures(messages: Sequence[Message], keep: int) -> list[Message]:
+    """The messages with all pictures left out but those of the last and a few before it."""
+    *before, last = messages
+    left = sum(isinstance(part, Picture) for message in before for part in message.parts) - keep
+    shown = []
+    for message in before:
+        parts: list[Part] = []
+        for part in message.parts:
+            gone = isinstance(part, Picture) and left > 0
+            left -= gone
+            parts.append(LEFT_OUT if gone else part)
+        shown.append(replace(message, parts=tuple(parts)))
+    return [*shown, last]

@@ -1,0 +1,127 @@
+"""Clients without a model: one that says what a function says, one that says it all again."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from pydantic import ValidationError
+
+from agents.vlm.chat import LEFT_OUT, Message, ModelError, Picture, Reply
+from agents.vlm.record import ConversationRecord, PictureRecord
+
+
+class ScriptedClient:
+    """Replies with what a function makes of the conversation: a text, or a whole reply.
+
+    Args:
+        say: called with the messages; from many threads at once, as clients are.
+    """
+
+    identity = '{"client":"scripted"}'
+
+    def __init__(self, say: Callable[[Sequence[Message]], str | Reply]) -> None:
+        self._say = say
+
+    def reply(self, messages: Sequence[Message], seed: int) -> Reply:
+        """What the function says."""
+        said = self._say(messages)
+        return said if isinstance(said, Reply) else Reply(said, model="scripted")
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+class RecordedClient:
+    """Replays the conversations of a run directory.
+
+    A turn is recognised by all that was said before it and by the pictures that came with the last
+    message, so that the environment has to show what it showed then.
+
+    Args:
+        run: the run directory; or a single conversation's file.
+
+    Raises:
+        ValueError: there are no conversations in it, or one cannot be read.
+    """
+
+    def __init__(self, run: Path) -> None:
+        files = [run] if run.is_file() else sorted((run / "conversations").glob("*.json"))
+        if not files:
+            raise ValueError(
+                f"{run} holds no conversations; give a run directory of er-gym bench with an agent "
+                "that speaks, or the file of one conversation"
+            )
+        self._run = run
+        self._replies: dict[str, Reply] = {}
+        for file in files:
+            self._replies |= _replies(_read(file))
+        everything = "".join(sorted(self._replies))
+        self.identity = f'{{"recorded":"{hashlib.sha256(everything.encode()).hexdigest()}"}}'
+
+    def reply(self, messages: Sequence[Message], seed: int) -> Reply:
+        """What was said then.
+
+        Raises:
+            ModelError: nothing was said to this.
+        """
+        turns = [_Turn.of(message.role, message.parts) for message in messages]
+        reply = self._replies.get(_key(turns))
+        if reply is None:
+            raise ModelError(
+                f"no conversation in {self._run} has this turn (number {len(messages)}); the task, "
+                "the prompts or the pictures are not those of the recording"
+            )
+        return reply
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+class _Turn(NamedTuple):
+    """A message as it is recognised: ``seen`` has digests for pictures, ``said`` the texts alone,
+    since a picture that is no longer sent has not been said."""
+
+    role: str
+    seen: tuple[str, ...]
+    said: str
+
+    @staticmethod
+    def of(role: str, parts: Iterable[str | Picture | PictureRecord]) -> _Turn:
+        parts = tuple(parts)
+        texts = (part for part in parts if isinstance(part, str) and part != LEFT_OUT)
+        seen = tuple(part if isinstance(part, str) else part.digest for part in parts)
+        return _Turn(role, seen, "\n".join(texts))
+
+
+def _key(turns: Iterable[_Turn]) -> str:
+    *before, last = turns
+    said = [*(f"{turn.role}\x1f{turn.said}" for turn in before), "\x1f".join(last.seen)]
+    return hashlib.sha256("\x1e".join(said).encode()).hexdigest()
+
+
+def _read(file: Path) -> ConversationRecord:
+    try:
+        return ConversationRecord.model_validate_json(file.read_bytes())
+    except (OSError, ValidationError) as error:
+        raise ValueError(
+            f"{file} cannot be read as a conversation: {str(error).splitlines()[0]}"
+        ) from None
+
+
+def _replies(kept: ConversationRecord) -> Mapping[str, Reply]:
+    turns = [_Turn.of(message.role, message.parts) for message in kept.messages]
+    return {
+        _key(turns[: each.message]): Reply(
+            text=turns[each.message].said,
+            reasoning=kept.messages[each.message].reasoning,
+            usage=each.usage,
+            cost=each.cost,
+            finish=each.finish,
+            model=each.model,
+            kept=True,
+        )
+        for each in kept.rounds
+    }

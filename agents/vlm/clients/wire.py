@@ -1,0 +1,195 @@
+"""A chat completion over the wire: a conversation becomes bytes, bytes become a reply."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from agents.vlm.chat import Message, Picture, Reply, Usage
+from agents.vlm.settings import Prices
+
+# A conversation is sent again with every turn: each picture is put into letters once, and
+# forgotten when the conversation is.
+_ENCODED: WeakKeyDictionary[Picture, bytes] = WeakKeyDictionary()
+
+
+# -- what is sent ----------------------------------------------------------------------------------
+
+
+def request_body(
+    fields: Mapping[str, Any], messages: Sequence[Message], with_reasoning: bool
+) -> bytes:
+    """A request as JSON; the same bytes for the same request.
+
+    It is put together from ready pieces: the SDK's typed way takes ten times as long over a
+    conversation with 20 pictures.
+
+    Args:
+        fields: all but the messages; at least one.
+        messages: the conversation.
+        with_reasoning: whether earlier thoughts are given back.
+    """
+    head = json.dumps(fields).encode()[:-1]
+    turns = b",".join(_message(message, with_reasoning) for message in messages)
+    return b'%b,"messages":[%b]}' % (head, turns)
+
+
+def _message(message: Message, with_reasoning: bool) -> bytes:
+    thoughts = message.reasoning if with_reasoning and message.role == "assistant" else ""
+    more = b',"reasoning_content":%b' % _text(thoughts) if thoughts else b""
+    return b'{"role":"%b","content":%b%b}' % (message.role.encode(), _content(message), more)
+
+
+def _content(message: Message) -> bytes:
+    if any(isinstance(part, Picture) for part in message.parts):
+        return b"[%b]" % b",".join(map(_part, message.parts))
+    return _text("\n".join(part for part in message.parts if isinstance(part, str)))
+
+
+def _part(part: str | Picture) -> bytes:
+    if isinstance(part, Picture):
+        return _picture(part)
+    return b'{"type":"text","text":%b}' % _text(part)
+
+
+def _text(text: str) -> bytes:
+    return json.dumps(text).encode()
+
+
+def _picture(picture: Picture) -> bytes:
+    done = _ENCODED.get(picture)
+    if done is None:
+        head, letters = picture.media_type.encode(), base64.b64encode(picture.data)
+        url = b'{"type":"image_url","image_url":{"url":"data:%b;base64,%b"}}'
+        done = _ENCODED[picture] = url % (head, letters)
+    return done
+
+
+# -- what comes back -------------------------------------------------------------------------------
+
+
+class _Wire(BaseModel):
+    """Servers leave out fields, send null for them, and add their own."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+class _Function(_Wire):
+    arguments: str | None = None
+
+
+class _Call(_Wire):
+    function: _Function | None = None
+
+
+class _Said(_Wire):
+    content: str | None = None
+    refusal: str | None = None
+    reasoning_content: str | None = None  # vLLM, SGLang, DeepSeek
+    reasoning: str | None = None  # Ollama, OpenRouter, later vLLM
+    tool_calls: tuple[_Call, ...] | None = None
+
+
+class _Choice(_Wire):
+    message: _Said
+    finish_reason: str | None = None
+
+
+class _Details(_Wire):
+    cached_tokens: int | None = None
+    reasoning_tokens: int | None = None
+
+
+class _Usage(_Wire):
+    prompt_tokens: int | None = None
+    completion_tokens: int | None = None
+    prompt_tokens_details: _Details | None = None
+    completion_tokens_details: _Details | None = None
+
+
+class Completion(_Wire):
+    """What a server answers, as far as we read it."""
+
+    choices: tuple[_Choice, ...] = Field(min_length=1)
+    model: str | None = None
+    usage: _Usage | None = None
+
+
+def read_completion(body: bytes) -> Completion:
+    """The answer in a body.
+
+    Raises:
+        ValueError: it is not JSON, or there is no choice in it; the message is one line.
+    """
+    try:
+        return Completion.model_validate_json(body)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        where = ".".join(map(str, first["loc"])) or "the body"
+        raise ValueError(f"{where}: {first['msg']}; it says: {server_words(body)}") from None
+
+
+def reply_of(completion: Completion, prices: Prices) -> Reply:
+    """The reply that an answer holds. A refusal is one too: its words are the text."""
+    choice = completion.choices[0]
+    said = choice.message
+    thought, text = _without_thoughts(said.content or said.refusal or "")
+    calls = [call.function for call in said.tool_calls or () if call.function]
+    usage = _usage_of(completion.usage or _Usage())
+    return Reply(
+        text=text,
+        reasoning="\n".join(filter(None, (said.reasoning_content or said.reasoning, thought))),
+        call=(calls[0].arguments or "") if calls else "",
+        usage=usage,
+        cost=cost_of(usage, prices),
+        finish=choice.finish_reason or "",
+        model=completion.model or "",
+    )
+
+
+def _without_thoughts(text: str) -> tuple[str, str]:
+    """The thoughts that a text begins with, and the rest.
+
+    The opening tag may be missing, since some templates put it into the prompt; so may the closing
+    one, if the thoughts were cut off.
+    """
+    before, closed, after = text.partition("</think>")
+    opened = before.lstrip().startswith("<think>")
+    if opened or (closed and "<think>" not in before):
+        return before.strip().removeprefix("<think>").strip(), after.strip()
+    return "", text
+
+
+def _usage_of(usage: _Usage) -> Usage:
+    return Usage(
+        prompt=usage.prompt_tokens or 0,
+        completion=usage.completion_tokens or 0,
+        cached=(usage.prompt_tokens_details or _Details()).cached_tokens or 0,
+        reasoning=(usage.completion_tokens_details or _Details()).reasoning_tokens or 0,
+    )
+
+
+def cost_of(usage: Usage, prices: Prices) -> float:
+    """US dollars. Tokens thought are among those of the completion, tokens remembered among those
+    of the prompt."""
+    remembered = prices.prompt if prices.cached_prompt is None else prices.cached_prompt
+    fresh = usage.prompt - usage.cached
+    paid = fresh * prices.prompt + usage.cached * remembered + usage.completion * prices.completion
+    return paid / 1_000_000
+
+
+def server_words(body: bytes) -> str:
+    """What a server says in the body of an error, in one line, however long."""
+    try:
+        said = json.loads(body)
+    except (ValueError, RecursionError):
+        said = body.decode("utf-8", "replace")
+    for name in ("error", "message", "detail"):
+        if isinstance(said, dict) and said.get(name):
+            said = said[name]
+    return " ".join(str(said).split()) or "(nothing)"

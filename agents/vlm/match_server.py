@@ -1,0 +1,100 @@
+"""Matching over HTTP, for clients in other languages than Python. For this machine alone.
+
+::
+
+    POST /match   {"name": "couch"}                                  a match
+    POST /match   {"names": ["couch", "table"], "prefer": ["Desk"]}  {"matches": [a match, …]}
+    GET  /health                                                     {"status": "ok"}
+
+A match is ``{"name", "object_type", "how", "score", "near"}``, as
+:class:`~agents.vlm.matching.Match` has them. Whatever is wrong is answered by ``{"error": …}``, of
+one line, and a status of 4xx or 5xx.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+from flask import Flask, jsonify, request
+from flask.typing import ResponseReturnValue
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from werkzeug.exceptions import HTTPException
+from werkzeug.serving import make_server
+
+from agents.vlm.matching import Matcher
+
+HOST = "127.0.0.1"
+_LARGEST_BODY = 1 << 20  # bytes
+_MOST_NAMES = 1_000
+
+_Names = Annotated[list[str], Field(max_length=_MOST_NAMES)]
+
+
+class MatchRequest(BaseModel):
+    """A name, or names, to be matched; see :meth:`~agents.vlm.matching.Matcher.match_many`."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    name: str | None = None
+    names: _Names | None = None
+    prefer: _Names = []
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> MatchRequest:
+        if (self.name is None) == (self.names is None):
+            raise ValueError("give either 'name', a string, or 'names', a list of strings")
+        return self
+
+
+def make_app(matcher: Matcher) -> Flask:
+    """The application."""
+    app = Flask(__name__)
+    app.config["MAX_CONTENT_LENGTH"] = _LARGEST_BODY
+
+    @app.get("/health")
+    def health() -> ResponseReturnValue:
+        return jsonify(status="ok")
+
+    @app.post("/match")
+    def match() -> ResponseReturnValue:
+        try:
+            asked = MatchRequest.model_validate_json(request.get_data())
+        except ValidationError as error:
+            return jsonify(error=_one_line(error)), 400
+        names = asked.names if asked.name is None else [asked.name]
+        matches = [asdict(each) for each in matcher.match_many(names or [], asked.prefer)]
+        return jsonify(matches[0] if asked.name is not None else {"matches": matches})
+
+    @app.errorhandler(HTTPException)
+    def refused(error: HTTPException) -> ResponseReturnValue:
+        return jsonify(error=f"{error.name}: {error.description}"), error.code or 500
+
+    @app.errorhandler(ValueError)
+    def failed(error: ValueError) -> ResponseReturnValue:
+        return jsonify(error=str(error)), 500
+
+    return app
+
+
+def _one_line(error: ValidationError) -> str:
+    first = error.errors(include_url=False)[0]
+    where = ".".join(map(str, first["loc"])) or "the body"
+    return f"{where}: {' '.join(first['msg'].removeprefix('Value error, ').split())}"
+
+
+def serve(matcher: Matcher, port: int) -> None:
+    """Answer requests until interrupted; the first line that it prints says where.
+
+    Args:
+        matcher: answers; what it has to load is loaded before.
+        port: of this machine; any free one for 0.
+
+    Raises:
+        ValueError: the matcher's model cannot be loaded.
+        SystemExit: the port cannot be had; the reason has been printed.
+    """
+    matcher.prepare()
+    server = make_server(HOST, port, make_app(matcher), threaded=True)
+    print(f"http://{HOST}:{server.server_port}", flush=True)
+    server.serve_forever()

@@ -1,0 +1,246 @@
+"""What a model writes, read as a decision and the thoughts before it.
+
+The normal form is ``<Observation>…</Observation><Planning>…</Planning><DecisionMaking>navigate to
+Fridge</DecisionMaking>``; or, where it is asked for, a tool call or a JSON object. Models differ
+from it in many ways; those that are understood are listed in
+:data:`agents.vlm.parsing_rules.RULES`, and a reply tells which it needed. Nothing is guessed beyond
+them: any other reply has a problem, in words for the model.
+
+Where a reply decides more than once, the last decision counts, because models weigh before they
+choose; where one decision has several actions, the first, because they are done in order.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from agents.vlm.parsing_decision import (
+    FENCE,
+    MOST,
+    Words,
+    find_fields,
+    read_decision,
+    read_fields,
+)
+from agents.vlm.parsing_json import Found
+from agents.vlm.parsing_rules import RULES, label
+from agents.vlm.parsing_tags import Layout, TaggedDecision, Thought, take_apart
+from agents.vlm.parsing_words import THOUGHT_TAGS
+from er_gym.tasks import verbs
+
+LONGEST = 200_000
+"""Characters of a reply that are read, from its end."""
+_LONGEST_BARE, _LONGEST_BARE_LINE = 8, 120
+"""Words and characters of an action that stands in no tags and after no label."""
+_LONGEST_LABELLED = 1_000
+_LONGEST_QUOTE = 60
+_EXAMPLE = f"'{verbs.NAVIGATE} Fridge'"
+
+
+@dataclass(frozen=True)
+class Parsed:
+    """A reply, read.
+
+    Attributes:
+        verb: canonical, see :mod:`er_gym.tasks.verbs`; "" where there is a problem.
+        name: what the model calls the object, as it wrote it; "" for a bare verb.
+        thoughts: in order. Text outside of tags is a thought where no tags hold any.
+        rules: names of the tolerances that were needed, of
+            :data:`~agents.vlm.parsing_rules.RULES`, in its order.
+        problem: what is wrong and what to write instead; "" where there is a verb.
+    """
+
+    verb: str = ""
+    name: str = ""
+    thoughts: tuple[Thought, ...] = ()
+    rules: tuple[str, ...] = ()
+    problem: str = ""
+
+
+def parse(text: str, call: str = "", decide: Literal["tags", "tools", "json"] = "tags") -> Parsed:
+    """Read a reply. Whatever it is, nothing is raised.
+
+    Args:
+        text: of the reply.
+        call: the arguments of a tool call, as JSON; "" where there is none. It counts before what
+            the text says.
+        decide: what the model was asked for. For ``json``, a text that is a JSON object needs no
+            rule; all else is understood alike.
+    """
+    layout = take_apart(text[-LONGEST:])
+    if len(text) > LONGEST:
+        layout.rules.append("long")
+    chosen = _chosen(layout, call[-LONGEST:])
+    if chosen is None:
+        problem = "has no decision" if text.strip() else "is empty"
+        return Parsed(
+            thoughts=layout.all_thoughts(layout.outside),
+            rules=_in_order(layout.rules),
+            problem=f"The reply {problem}. Decide on one action, such as {_EXAMPLE}.",
+        )
+    words = chosen.words
+    rules = [*layout.rules, *chosen.rules, *words.rules]
+    if _is_json(call) if call.strip() else decide == "json" and _is_json(text):
+        rules = [rule for rule in rules if rule != "json"]
+    problem = _problem(words, chosen.said)
+    return Parsed(
+        verb="" if problem else words.verb,
+        name="" if problem else words.name,
+        thoughts=layout.all_thoughts(chosen.before, chosen.thoughts),
+        rules=_in_order(rules),
+        problem=problem,
+    )
+
+
+def _in_order(rules: Iterable[str]) -> tuple[str, ...]:
+    needed = {*rules}
+    return tuple(rule.name for rule in RULES if rule.name in needed)
+
+
+def _problem(words: Words, said: str) -> str:
+    """What to tell the model of a decision that cannot be done; "" if it can."""
+    if not words.verb:
+        said = " ".join(said[: 4 * _LONGEST_QUOTE].split())
+        quote = said if len(said) <= _LONGEST_QUOTE else said[: _LONGEST_QUOTE - 1] + "…"
+        return (
+            f"'{quote}' is no action. With an object, there are: {', '.join(verbs.OBJECT_VERBS)}; "
+            f"without: {', '.join(verbs.BARE_VERBS)}. Write one, such as "
+            f"{_EXAMPLE}."
+        )
+    if words.verb in verbs.OBJECT_VERBS and not words.name:
+        return f"'{words.verb}' needs an object. Name one, such as in '{words.verb} Fridge'."
+    return ""
+
+
+# -- where the decision is -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """A decision.
+
+    Attributes:
+        words: what it says.
+        said: the same as it was written.
+        before: the text outside of tags that was written first.
+        rules: that were needed to find it.
+        thoughts: that came with it.
+    """
+
+    words: Words
+    said: str
+    before: Iterable[str] = ()
+    rules: tuple[str, ...] = ()
+    thoughts: tuple[Thought, ...] = ()
+
+
+def _chosen(layout: Layout, call: str) -> _Chosen | None:
+    """The decision of a reply, readable or not."""
+    if call.strip():
+        return _from_call(call, layout)
+    if layout.decisions:
+        return _from_tags(layout.decisions, layout.outside)
+    outside = _from_outside(layout.outside)
+    if outside and outside.words.verb:
+        return outside
+    last_resort = (
+        _from_tags(layout.weighed, ()) if layout.weighed else _from_outside([layout.last_open])
+    )
+    if last_resort:
+        return outside or replace(last_resort, rules=(*last_resort.rules, "in thoughts"))
+    return outside
+
+
+def _from_call(call: str, layout: Layout) -> _Chosen:
+    found = find_fields(call)
+    thoughts = _thoughts_in(found) if found else ()
+    return _Chosen(read_decision(call), call, layout.outside, thoughts=thoughts)
+
+
+def _is_json(text: str) -> bool:
+    try:
+        return isinstance(json.loads(text), dict)
+    except (ValueError, RecursionError):
+        return False
+
+
+def _from_tags(decisions: Sequence[TaggedDecision], outside: Sequence[str]) -> _Chosen:
+    last = decisions[-1]
+    several = len({" ".join(each.body.split()) for each in decisions}) > 1
+    rules = (*last.rules, *(("several decisions",) if several else ()))
+    return _Chosen(read_decision(last.body), last.body, outside[: last.before], rules)
+
+
+def _from_outside(pieces: Sequence[str]) -> _Chosen | None:
+    """From text without tags: the first way that finds an action, else the first that finds more
+    than nothing."""
+    text = "\n".join(pieces)
+    first = None
+    for way in (_json_in, _labelled_in, _bare_in):
+        found = way(text)
+        if found and found.words.verb:
+            return found
+        first = first or found
+    return first
+
+
+def _json_in(text: str) -> _Chosen | None:
+    found = find_fields(text)
+    if found is None:
+        return None
+    before, fence, _ = text[: found.start].rpartition(FENCE)
+    rules = ("json", "code fence") if fence else ("json",)
+    return _Chosen(
+        read_fields(found.fields),
+        text[found.start :],
+        [before if fence else text[: found.start]],
+        rules,
+        _thoughts_in(found),
+    )
+
+
+def _thoughts_in(found: Found) -> tuple[Thought, ...]:
+    """Fields of a JSON object that are named as thoughts are."""
+    return tuple(
+        Thought(THOUGHT_TAGS[name], text)
+        for name, text in found.fields.items()
+        if name in THOUGHT_TAGS and text
+    )
+
+
+def _labelled_in(text: str) -> _Chosen | None:
+    lines = text.splitlines()
+    for number in range(len(lines) - 1, -1, -1):
+        line = lines[number][:_LONGEST_LABELLED]
+        if found := label(line):
+            said = line[found.end() :]
+            if not said.strip():  # a heading
+                said = next(filter(str.strip, lines[number + 1 :]), "")
+            return _Chosen(read_decision(said), said, lines[:number], ("no tags",))
+    return None
+
+
+def _bare_in(text: str) -> _Chosen | None:
+    """The first of the lines at the end that are actions and nothing else."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    rules = ["no tags"]
+    if any(line.lstrip().startswith(FENCE) for line in lines):
+        lines = [line for line in lines if not line.lstrip().startswith(FENCE)]
+        rules.append("code fence")
+    actions: list[Words] = []
+    for line in lines[: -1 - MOST : -1]:
+        if len(line) > _LONGEST_BARE_LINE or len(line.split()) > _LONGEST_BARE:
+            break
+        words = read_decision(line)
+        if not words.verb or "lead-in" in words.rules:
+            break
+        actions.append(words)
+    if not actions:
+        return None
+    if len(actions) > 1:
+        rules.append("several actions")
+    first = len(lines) - len(actions)
+    return _Chosen(actions[-1], lines[first], lines[:first], tuple(rules))

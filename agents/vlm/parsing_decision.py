@@ -1,0 +1,243 @@
+"""From the words of a decision to a verb and a name."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from agents.vlm.parsing_json import Found, fields_in, objects_in
+from agents.vlm.parsing_rules import RULES
+from agents.vlm.parsing_words import (
+    ALONE,
+    ARTICLE,
+    CLAUSE,
+    EDGES,
+    FILLER,
+    NO_NAME,
+    OBJECT_FIELDS,
+    PLACE_FIELDS,
+    VERB_FIELDS,
+    VERBS,
+    plain,
+)
+from er_gym.tasks import verbs
+
+FENCE = "```"
+MOST = 20
+"""How many lines, or objects, are tried."""
+_LONGEST_LINE = 300
+
+
+@dataclass(frozen=True)
+class Words:
+    """What a decision says.
+
+    Attributes:
+        verb: canonical; "" where there is none.
+        name: of the object; "" where there is none.
+        rules: that were needed to see it.
+    """
+
+    verb: str
+    name: str = ""
+    rules: tuple[str, ...] = ()
+
+
+# -- a line ----------------------------------------------------------------------------------------
+
+_REWRITES = tuple((rule.name, rule.rewrite) for rule in RULES if rule.rewrite)
+_BY_PLAIN = {plain(phrase): phrase for phrase in VERBS}
+
+
+def _any_of(phrases: list[str]) -> str:
+    """A pattern for phrases however their words are joined, the longest first."""
+    longest_first = sorted(phrases, key=len, reverse=True)
+    return "|".join(phrase.replace(" ", r"[\s_-]{0,3}") for phrase in longest_first)
+
+
+_OURS = _any_of([phrase for phrase in VERBS if phrase.isascii()])
+_THEIRS = _any_of([phrase for phrase in VERBS if not phrase.isascii()])
+_VERB = re.compile(
+    # Behind Latin letters a word has to end, or the next to begin with a capital.
+    rf"\s*(?:((?i:{_OURS}))(?:(?![A-Za-z0-9])|(?<=[a-z])(?=[A-Z]))|({_THEIRS}))"
+)
+_PUT = re.compile(
+    r"(?:put|place|set|lay|drop|insert|store|throw|toss)(?:\s(?:in|down|back|away))?(?![^\W_])"
+    r"(?P<what>.*?)(?<![^\W_])"
+    r"(?:in\sto|into|inside\sof|inside|in|onto|on\stop\sof|on\sto|on|atop|within)(?![^\W_])"
+    r"(?P<name>.*)",
+    re.IGNORECASE,
+)
+_PARTED: tuple[tuple[str, str, re.Pattern[str]], ...] = (
+    ("put form", verbs.PUT, _PUT),
+    (
+        "put form",
+        verbs.PUT,
+        re.compile(r"[把将](?P<what>.+?)放(?:进|入|到|在|置在|置到|回)去?(?P<name>.+)"),
+    ),
+    (
+        "verb parted",
+        verbs.TOGGLE,
+        re.compile(r"(?:turn|switch|toggle|power)\s(?P<name>\S.*?)\s(?:on|off)\W*$", re.IGNORECASE),
+    ),
+    (
+        "verb parted",
+        verbs.PICKUP,
+        re.compile(r"(?:pick|take)\s(?P<name>\S.*?)\s(?:up|out)\W*$", re.I),
+    ),
+    *(
+        ("verb parted", verb, re.compile(rf"[把将](?P<name>.+?)(?:{phrase})(?:起来|了)?\W*$"))
+        for phrase, verb in sorted(VERBS.items(), key=lambda row: -len(row[0]))
+        if verb in verbs.OBJECT_VERBS and not phrase.isascii()
+    ),
+)
+"""Verbs whose words stand around a name: the rule, the verb, and what they look like."""
+_CALL = re.compile(r"\s*([A-Za-z][A-Za-z_ -]{0,40})\((.*?)\)?\W*$")
+_NAMED = re.compile(r"\s*(\w+)\s?=\s?")
+
+
+def read_line(line: str) -> Words:
+    """A verb and a name from a line; no verb where it is no action."""
+    narrow = unicodedata.normalize("NFKC", line[:_LONGEST_LINE])
+    needed = [] if narrow == line[:_LONGEST_LINE] else ["full width"]
+    line = " ".join(narrow.split())
+    if words := _called(line):
+        return Words(words.verb, words.name, (*needed, *words.rules))
+    for name, rewrite in _REWRITES:
+        changed = rewrite(line)
+        if changed != line:
+            needed.append(name)
+            line = changed
+    words = _called(line) or _parted(line) or _said(line)
+    return Words(words.verb, words.name, (*needed, *words.rules))
+
+
+def _called(line: str) -> Words | None:
+    """``navigate_to("Fridge")``, ``act(action="open", object="Fridge")``."""
+    call = _CALL.match(line)
+    if call is None:
+        return None
+    phrase = _BY_PLAIN.get(plain(call[1]), "")
+    if "=" in call[2] and call[1].isidentifier():
+        fields = fields_in(_NAMED.sub(r" \1: ", call[2]))
+        words = read_fields({**fields, VERB_FIELDS[0]: phrase})
+        if words.name or words.verb in verbs.BARE_VERBS:
+            return Words(words.verb, words.name, ("call form", *words.rules))
+    if not phrase:
+        return None
+    # Without names: what is put comes before what it is put in.
+    verb = VERBS[phrase]
+    given = [_NAMED.sub("", each, count=1) for each in call[2].split(",") if each.strip(EDGES)]
+    name, rules = clean_name(given[-1 if verb == verbs.PUT else 0]) if given else ("", ())
+    if verb in verbs.BARE_VERBS:
+        name, rules = "", ("words after",) if name else ()
+    return Words(verb, name, ("call form", *(rule for rule in rules if rule != "marks")))
+
+
+def _parted(line: str) -> Words | None:
+    spaced = line.replace("_", " ")  # of the same length, so that names can be had as written
+    for rule, verb, pattern in _PARTED:
+        if found := pattern.match(spaced):
+            name, more = clean_name(line[slice(*found.span("name"))])
+            if f"{spaced} ".casefold().startswith("put in ") and not found["what"].strip():
+                rule = "" if spaced == line else "verb spelling"
+            return Words(verb, name, (*filter(None, [rule]), *more))
+    return None
+
+
+def _said(line: str) -> Words:
+    """A verb, then the name."""
+    found = _VERB.match(line)
+    if found is None:
+        return Words("")
+    said, rest = found[0].strip(), line[found.end() :]
+    phrase = _BY_PLAIN[plain(said)]
+    verb = VERBS[phrase]
+    rules: tuple[str, ...] = ()
+    if " ".join(said.casefold().split()) != verb:
+        spelt = plain(verb).startswith(plain(said))  # "put" and "navigate" are cut short
+        rules = ("verb spelling" if spelt else "verb synonym",)
+    if verb in verbs.BARE_VERBS:
+        after = [plain(word) for word in rest.split() if plain(word)]
+        if phrase in ALONE and not FILLER.issuperset(after):
+            return Words("")
+        more = ("words after",) if after else ("marks",) if rest.strip() else ()
+        return Words(verb, rules=(*rules, *more))
+    name, needed = clean_name(rest)
+    return Words(verb, name, (*rules, *needed))
+
+
+def clean_name(text: str) -> tuple[str, tuple[str, ...]]:
+    """A name without what stands around it, and the rules that this took."""
+    name = text.strip(EDGES)
+    rules = ["marks"] if name != text.strip() else []
+    if found := ARTICLE.match(name):
+        name = name[found.end() :]
+        rules.append("article")
+    if found := CLAUSE.search(name):
+        name = name[: found.start()].strip(EDGES)
+        rules.append("clause")
+    return ("" if name.casefold() in NO_NAME else name), tuple(rules)
+
+
+# -- a decision ------------------------------------------------------------------------------------
+
+_NEXT_ACTION = re.compile(
+    r"[\n;；]|\.?\s(?:and )?then\s|\s?(?:->|=>|→)\s?|\s\d{1,2}[.)、]\s|然后|[,，。]再", re.I
+)
+
+
+def _unfenced(text: str) -> str:
+    """What is in the last code fence that has anything in it; the text itself where none has."""
+    inside = [
+        # A word alone in the first line says which language it is.
+        re.sub(r"\A(?:\w{1,12}\n|json\b|text\b)", "", block.lstrip(" ")).strip()
+        for block in text.split(FENCE)[1::2]
+    ]
+    return next((block for block in reversed(inside) if block), text.replace(FENCE, "").strip())
+
+
+def read_decision(text: str) -> Words:
+    """A verb and a name from what a decision's tag holds; no verb where it is no action."""
+    needed: tuple[str, ...] = ()
+    if FENCE in text:
+        needed, text = ("code fence",), _unfenced(text)
+    if found := find_fields(text):
+        words = read_fields(found.fields)
+        return Words(words.verb, words.name, (*needed, "json", *words.rules))
+    lines = [line for line in _NEXT_ACTION.split(text) if line.strip(EDGES)]
+    for line in lines[:MOST]:
+        words = read_line(line)
+        if words.verb:
+            more = ("several actions",) if len(lines) > 1 else ()
+            return Words(words.verb, words.name, (*needed, *more, *words.rules))
+    return Words("", rules=needed)
+
+
+def find_fields(text: str) -> Found | None:
+    """The last JSON object, or list of objects, that has an action, or at least a field for one."""
+    found = objects_in(text, MOST)
+    found = [each for each in found if not each.fields.keys().isdisjoint(VERB_FIELDS)]
+    read = (each for each in reversed(found) if read_fields(each.fields).verb)
+    return next(read, found[-1] if found else None)
+
+
+def read_fields(fields: Mapping[str, str]) -> Words:
+    """A verb and a name from the fields of a JSON object."""
+    for field in VERB_FIELDS:
+        words = read_line(fields.get(field, ""))
+        if not words.verb:
+            continue
+        order = (*PLACE_FIELDS, *OBJECT_FIELDS)
+        if words.verb != verbs.PUT:
+            order = (*OBJECT_FIELDS, *PLACE_FIELDS)
+        names = (clean_name(fields.get(name, "")) for name in order if name != field)
+        name, rules = next((found for found in names if found[0]), ("", ()))
+        if words.verb in verbs.BARE_VERBS:
+            return Words(words.verb, "", (*words.rules, *(("words after",) if name else ())))
+        if words.name:
+            return words
+        return Words(words.verb, name, (*words.rules, *rules))
+    return Words("")

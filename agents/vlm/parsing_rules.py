@@ -1,0 +1,93 @@
+"""The ways in which a reply may differ from the normal form and be understood."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A way in which a reply may differ from the normal form and be understood.
+
+    Attributes:
+        name: as :class:`~agents.vlm.parsing.Parsed` lists it.
+        about: what is let pass.
+        rewrite: makes a line of a decision more normal, if that is all it takes; applied in the
+            order of :data:`RULES`, and needed if it changes something.
+    """
+
+    name: str
+    about: str
+    rewrite: Callable[[str], str] | None = None
+
+
+_LABEL = re.compile(
+    r"[\W\d]{0,8}(?:(?:my|the|final|next|chosen)\s){0,2}"
+    r"(?:decision[ _-]?making|decision|action|answer|command|决策|决定|行动|动作|下一步)"
+    r"(?:\s(?:is|to take))?[\s*_\])】]{0,4}(?:[:：]|(?<=[\])】*])|$)[\s*_]{0,4}",
+    re.IGNORECASE,
+)
+_LIST_MARK = re.compile(r"(?:[-+•]\s|(?:step\s?)?\(?\d{1,2}[.):、]\s?)+", re.IGNORECASE)
+_LEAD_IN = re.compile(
+    r"(?:(?:so|now|next|then|first|finally|therefore|please|ok|okay),?\s)*"
+    r"(?:(?:i|we)(?:\s(?:will|should|shall|must|can|choose to|decide to|need to|want to|have to|"
+    r"am going to)|['’]ll|['’]m going to)\s|let(?:\sme|\sus|['’]s)\s)?"
+    r"(?:(?:now|first|next|then)\s)?"
+    r"(?:(?:现在|接下来|下一步|首先|然后|因此),?)?(?:我们?(?:将|要|会|应该|需要|决定|选择)?|请|让我)?先?",
+    re.IGNORECASE,
+)
+_MARKS = re.compile(
+    # What ends a turn, a tag or half of one; LaTeX's box; what stands around words.
+    r"<\|[^<>|]{1,30}\|>|</\w{0,30}(?:>|$)|\\(?:boxed|text)(?!\w)"
+    r"|[\[\]{}<>*`\"“”「」『』《》【】]+|(?<!\w)['‘’]|['‘’](?!\w)"
+)
+
+
+def label(line: str) -> re.Match[str] | None:
+    """What stands before an action in a line such as ``**Action:** open Fridge``."""
+    return _LABEL.match(line)
+
+
+def _off_the_front(pattern: re.Pattern[str]) -> Callable[[str], str]:
+    """Takes off what matches at a line's beginning, unless nothing would be left."""
+
+    def rewrite(line: str) -> str:
+        found = pattern.match(line)
+        return line[found.end() :].lstrip() or line if found else line
+
+    return rewrite
+
+
+def _without_marks(line: str) -> str:
+    return " ".join(_MARKS.sub(" ", line).split())
+
+
+RULES: tuple[Rule, ...] = (
+    Rule("long", "only the end of a very long reply is read"),
+    Rule("no end tag", "a tag ends at the next tag, or at the end of the reply"),
+    Rule("no start tag", "what stands before an end tag that has no start tag belongs to it"),
+    Rule("tag spelling", "<Decision>, <Action>, <decision_making>, full-width brackets …"),
+    Rule("tool call", "a tool call in the text: <tool_call>{…}</tool_call>"),
+    Rule("several decisions", "the last of several decisions counts"),
+    Rule("no tags", "'Action: …', or an action alone, in the last line of a reply without tags"),
+    Rule("in thoughts", "the decision is among the thoughts, and nowhere else"),
+    Rule("code fence", "``` around a decision"),
+    Rule("json", "a JSON object with the action, even a broken one"),
+    Rule("full width", "full-width letters and punctuation"),
+    Rule("several actions", "the first of several actions or lines counts"),
+    Rule("label", "'Action:' before an action", _off_the_front(_LABEL)),
+    Rule("marks", "quotes, brackets, asterisks and punctuation", _without_marks),
+    Rule("list", "a bullet, or a number", _off_the_front(_LIST_MARK)),
+    Rule("lead-in", "'I will', 'let me' … before an action", _off_the_front(_LEAD_IN)),
+    Rule("call form", "navigate_to(Fridge)"),
+    Rule("verb spelling", "navigate_to, NavigateTo, pick up, put"),
+    Rule("verb synonym", "go to, grab, turn on …"),
+    Rule("verb parted", "pick the Mug up, turn the DeskLamp on"),
+    Rule("put form", "put Apple into Fridge, place it on DiningTable: the receptacle counts"),
+    Rule("article", "the Fridge"),
+    Rule("clause", "more is said behind the name: Egg from Fridge, Fridge (it is closed)"),
+    Rule("words after", "words behind a verb that needs none: observe the room"),
+)
+"""Every tolerance there is."""

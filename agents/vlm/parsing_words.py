@@ -1,0 +1,121 @@
+"""The words by which replies are read: tags, verbs, fields, and what stands around a name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from er_gym.tasks import verbs
+
+DECISION = "DecisionMaking"
+"""The tag that an action stands in."""
+THINK = "think"
+"""The tag of reasoning models: decisions that are weighed in it are not made."""
+TOOL_CALL = "toolcall"
+
+THOUGHT_TAGS: Mapping[str, str] = {
+    name: kind
+    for kind, names in {
+        "Observation": "observation situationanalysis observations 观察 情况分析 现状分析",
+        "Planning": "planning taskplanning plan 规划 任务规划 计划",
+        "Thinking": f"thinking spatialreasoning reasoning thought thoughts {THINK} 思考 空间推理",
+        "Reflection": "reflection selfreflection 反思 自我反思",
+        "Verification": "verification doubleverification 验证 双重验证",
+    }.items()
+    for name in names.split()
+}
+"""How a tag or a field is called, as :func:`plain` has it, to the kind of thought."""
+
+DECISION_TAGS = frozenset(
+    {
+        "decisionmaking", "decision", "decisions", "finaldecision", "action", "actions",
+        "nextaction", "finalaction", "answer", "finalanswer", "决策", "决定", "行动", "动作",
+    }
+)  # fmt: skip
+CALL_TAGS = frozenset({TOOL_CALL, "toolcalls", "functioncall", "tooluse"})
+
+VERB_FIELDS = (
+    "decisionmaking", "decision", "action", "nextaction", "verb", "command", "act", "answer",
+    "tool", "function", "toolname", "functionname", "name", "决策", "动作",
+)  # fmt: skip
+"""Fields of a JSON object that may hold the verb; the first that does counts. ``name`` is a tool's
+where it is a verb, else perhaps the object's."""
+PLACE_FIELDS = (
+    "receptacle", "container", "destination", "place", "location", "where", "target",
+    "targetobject",
+)  # fmt: skip
+"""Fields that hold what something is put in, rather than what is put; the first that does."""
+OBJECT_FIELDS = (
+    "objecttype", "object", "objectid", "objectname", "target", "targetobject", "item", "thing",
+    "name", "argument", "arguments", "args", "arg", "parameter", "input", "物体", "对象", "目标",
+)  # fmt: skip
+
+_PHRASES: Mapping[str, str] = {
+    verbs.NAVIGATE: "navigate to/navigate towards/navigate toward/navigate/go to/go towards/"
+    "go toward/go over to/go back to/walk to/walk towards/walk toward/walk over to/move to/"
+    "move towards/move toward/move over to/head to/head towards/head toward/"
+    "head over to/get to/get closer to/move closer to/return to/travel to/approach/"
+    "导航到/导航至/导航去/前往/走到/走向/走去/移动到/去到/去往",
+    verbs.PICKUP: "pick up/pick up object/pick/grab/grasp/take/take out/get/collect/"
+    "拿起/捡起/拾取/拾起/拿取/取出/拿出/抓起/抓取/拿",
+    verbs.PUT: "put in/put into/put/put down/put object/place/place in/"
+    "放入/放进/放到/放在/放置在/放置到/放下",
+    verbs.OPEN: "open/open up/open object/打开",
+    verbs.CLOSE: "close/close object/shut/关闭/关上/合上",
+    verbs.TOGGLE: "toggle/toggle on/toggle off/toggle object/toggle object on/toggle object off/"
+    "turn on/turn off/switch/switch on/switch off/power on/power off/activate/deactivate/"
+    "开关/切换/启动/开启/按下",
+    verbs.SLICE: "slice/slice up/slice object/cut/cut up/chop/切/切开/切片/切割",
+    verbs.OBSERVE: "observe/look around/look about/look at/look/take a look/"
+    "take a look around/scan/观察/环顾/环视/查看/环顾四周",
+    verbs.MOVE_FORWARD: "move forward/move forwards/move ahead/move straight/go forward/go ahead/"
+    "walk forward/walk ahead/step forward/forward/前进/向前移动/向前走/往前走",
+    verbs.END: "end/end task/end episode/finish/finished/done/stop/complete/completed/terminate/"
+    "exit/quit/task completed/task complete/task finished/task done/task is completed/"
+    "task is complete/task is done/task is finished/the task is complete/the task is completed/"
+    "the task is done/the task is finished/mission accomplished/"
+    "结束/完成/停止/任务完成/任务已完成/任务已经完成/完成了任务/任务结束/结束任务/完成任务",
+}
+VERBS: Mapping[str, str] = {
+    phrase: verb for verb, phrases in _PHRASES.items() for phrase in phrases.split("/")
+}
+"""Every way of saying a verb, in lower case with single spaces, to the verb."""
+ALONE = frozenset(phrase for phrase, verb in VERBS.items() if verb == verbs.END) | {"look"}
+"""Phrases that mean their verb only if nothing but :data:`FILLER` follows: who would "stop the
+Microwave" does not want the episode to end."""
+FILLER = frozenset(
+    {
+        "the", "this", "my", "our", "a", "task", "tasks", "episode", "mission", "search", "job",
+        "game", "now", "here", "all", "done", "action", "it", "successfully", "任务", "本次任务",
+        "搜索", "了",
+    }
+)  # fmt: skip
+
+ARTICLE = re.compile(
+    r"(?:(?:the|an?|this|that|these|those|my|your|some|any|another|nearest|closest|nearby)\s+"
+    r"|[那这一][个台张把只扇盏]\s*)+",
+    re.IGNORECASE,
+)
+CLAUSE = re.compile(
+    r"\s+(?:from|out of|off|inside|into|in|onto|on|at|with|using|to|and|then|next to|near|beside|"
+    r"behind|under|over|by|for|so|because|since|which|that|where|if|while|again|now|first)(?!\w)"
+    r"|[,;:(){}<>\[\]、。]|\.\s|\s[-–—]\s|[里上中](?:面|边)?$|(?<=[^\x00-\x7f])内$",
+    re.IGNORECASE,
+)
+"""Where a name ends and more is said: ``Egg from the Fridge``, ``Fridge, which is closed``."""
+NO_NAME = frozenset(
+    {
+        "it", "them", "this", "that", "one", "there", "object", "objects", "something", "nothing",
+        "none", "null", "the", "a", "an",
+    }
+)  # fmt: skip
+"""What stands where a name should and names nothing."""
+EDGES = " \t\r\n.,;:!?\"'`*_~=()[]{}<>-。、…“”‘’"
+"""What may stand around a name."""
+
+_NOT_IN_WORDS = re.compile(r"[\W_]+")
+
+
+def plain(name: str) -> str:
+    """A tag's or field's name without case, spaces, hyphens and underscores."""
+    return _NOT_IN_WORDS.sub("", name).casefold()

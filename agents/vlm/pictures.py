@@ -1,0 +1,73 @@
+"""Pictures as they are sent: of a size that suits Qwen's models, as JPEG or PNG."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from math import ceil, floor, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from agents.vlm.chat import Picture
+from agents.vlm.settings import Pictures
+
+FACTOR = 28
+"""Qwen2-VL and Qwen2.5-VL see a picture in squares of so many pixels: one token each."""
+_LONGEST = 200
+"""More times as long as wide, and their processors refuse a picture."""
+
+
+def fitted(width: int, height: int, settings: Pictures) -> tuple[int, int]:
+    """The width and height at which a picture is sent, pixels.
+
+    A picture within ``min_pixels`` and ``max_pixels`` stays as it is; the model's own processor
+    rounds its sides. Any other gets sides that are multiples of :data:`FACTOR`: the nearest to its
+    own where these are within the bounds, else as much smaller or larger as needed, at about the
+    same aspect ratio. This is ``smart_resize`` of qwen-vl-utils, except that no side becomes 0.
+
+    Raises:
+        ValueError: a side is 0, or one is more than 200 times as long as the other.
+    """
+    if min(width, height) < 1 or max(width, height) > _LONGEST * min(width, height):
+        raise ValueError(
+            f"a picture of {width} x {height} pixels cannot be shown: give it at least 1 x 1, and "
+            f"no side more than {_LONGEST} times as long as the other"
+        )
+    pixels = width * height
+    if settings.min_pixels <= pixels <= settings.max_pixels:
+        return width, height
+    sides = width, height
+    wide, high = (round(side / FACTOR) or 1 for side in sides)
+    if wide * high * FACTOR**2 > settings.max_pixels:
+        shrink = sqrt(pixels / settings.max_pixels)
+        wide, high = (floor(side / shrink / FACTOR) or 1 for side in sides)
+    elif wide * high * FACTOR**2 < settings.min_pixels:
+        grow = sqrt(settings.min_pixels / pixels)
+        wide, high = (ceil(side * grow / FACTOR) for side in sides)
+    return wide * FACTOR, high * FACTOR
+
+
+def encode(rgb: NDArray[np.uint8], settings: Pictures) -> Picture:
+    """A picture as a file; the same picture always gives the same bytes.
+
+    Args:
+        rgb: (height, width, 3) uint8.
+
+    Raises:
+        ValueError: it is of another shape or type, or cannot be shown (:func:`fitted`).
+    """
+    if rgb.dtype != np.uint8 or rgb.ndim != 3 or rgb.shape[2] != 3:
+        raise ValueError(
+            f"a picture is (height, width, 3) of uint8, not {rgb.shape} of {rgb.dtype}"
+        )
+    height, width, _ = rgb.shape
+    size = fitted(width, height, settings)
+    image = Image.fromarray(rgb)
+    if size != image.size:
+        image = image.resize(size, Image.Resampling.LANCZOS)
+    options: dict[str, Any] = {"quality": settings.quality} if settings.format == "jpeg" else {}
+    file = BytesIO()
+    image.save(file, settings.format, **options)
+    return Picture(file.getvalue(), f"image/{settings.format}", *size)

@@ -1,0 +1,142 @@
+"""What is kept of a conversation: a wire format, pictures by path.
+
+A change that an older reader would misread takes a new ``format``. There is never a key in it: none
+is in the settings either, and of a server's address only the part without user and password.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+from urllib.parse import urlsplit, urlunsplit
+
+from pydantic import BaseModel, ConfigDict
+
+from agents.vlm.chat import Role, Usage
+from agents.vlm.settings import AgentSettings
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class PictureRecord(_Record):
+    """A picture that was shown.
+
+    Attributes:
+        path: of the file, from the run directory on.
+        digest: sha256 of its bytes, in hex.
+        width, height: pixels.
+    """
+
+    path: str
+    digest: str
+    width: int
+    height: int
+
+
+class MessageRecord(_Record):
+    """A turn, as it was when it was said: later requests may leave out its pictures."""
+
+    role: Role
+    parts: list[str | PictureRecord]
+    reasoning: str = ""
+
+
+class ThoughtRecord(_Record):
+    """A thought, and of which kind: Observation, Planning, Thinking, Reflection, Verification."""
+
+    kind: str
+    text: str
+
+
+class RoundRecord(_Record):
+    """A reply and what came of it.
+
+    Attributes:
+        message: which of the conversation's messages the reply is.
+        thoughts: what it says before the decision.
+        action: what was done, in the environment's words; "" where no action could be read.
+        name: what the model called the object; ``matched`` how that became a type: ``exact``,
+            ``alias``, ``fuzzy``, ``meaning``.
+        rules: which tolerances were needed to read the reply.
+        problem: what was wrong with it, as the model was told.
+        feedback, success: the environment's answer.
+        seconds, prompt_tokens, completion_tokens, cached_tokens, reasoning_tokens, cost, finish,
+        model: see :class:`agents.vlm.chat.Reply`; cost in US dollars.
+        kept: whether it was kept from an earlier request, which paid for it.
+    """
+
+    message: int
+    thoughts: list[ThoughtRecord] = []
+    action: str = ""
+    name: str = ""
+    matched: str = ""
+    rules: list[str] = []
+    problem: str = ""
+    feedback: str = ""
+    success: bool = False
+    seconds: float = 0.0
+    prompt_tokens: int = 0
+    completion_tokens: int = 0
+    cached_tokens: int = 0
+    reasoning_tokens: int = 0
+    cost: float = 0.0
+    finish: str = ""
+    model: str = ""
+    kept: bool = False
+
+    @property
+    def usage(self) -> Usage:
+        """Its tokens."""
+        return Usage(
+            self.prompt_tokens, self.completion_tokens, self.cached_tokens, self.reasoning_tokens
+        )
+
+
+class ConversationRecord(_Record):
+    """The conversation of one episode.
+
+    Attributes:
+        task_id, scene, instruction: the task's.
+        agent: its spec, such as ``openai:MODEL``.
+        settings: :class:`~agents.vlm.settings.AgentSettings`, less what an address might give away.
+        prompts, prompts_digest: the name of the set of prompts, and sha256 of its templates.
+        messages: from the system's to the last reply.
+        rounds: one for each reply.
+        prompt_tokens, completion_tokens, cost: over all rounds, whenever they were paid for.
+        error: what the episode crashed with, in one line; "" if it did not.
+    """
+
+    format: Literal["er-gym/conversation/1"] = "er-gym/conversation/1"
+    task_id: str
+    scene: str
+    instruction: str
+    agent: str
+    settings: dict[str, Any]
+    prompts: str
+    prompts_digest: str
+    messages: list[MessageRecord]
+    rounds: list[RoundRecord]
+    prompt_tokens: int
+    completion_tokens: int
+    cost: float
+    error: str = ""
+
+
+def plain_settings(settings: AgentSettings) -> dict[str, Any]:
+    """Settings as they may be kept: a server's address without user, password and query."""
+    kept = settings.model_dump(mode="json")
+    url = urlsplit(settings.server.base_url)
+    place = url.netloc.rpartition("@")[2]
+    kept["server"]["base_url"] = urlunsplit((url.scheme, place, url.path, "", ""))
+    return kept
+
+
+def tokens(usage: Usage) -> dict[str, int]:
+    """The token counts of a round, under the names of :class:`RoundRecord`."""
+    return {
+        "prompt_tokens": usage.prompt,
+        "completion_tokens": usage.completion,
+        "cached_tokens": usage.cached,
+        "reasoning_tokens": usage.reasoning,
+    }

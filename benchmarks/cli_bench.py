@@ -1,0 +1,269 @@
+"""``er-gym bench``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
+from functools import reduce
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from benchmarks.cli_errors import CRASHED, INTERRUPTED, STOPPED, BadInput, bad_input, complain
+from benchmarks.cli_options import scorer_option, split, stdout
+
+if TYPE_CHECKING:
+    from benchmarks.episode import EpisodeRecord
+    from benchmarks.runner import Outcome
+    from benchmarks.spoken import Voice
+    from benchmarks.store import RunStore
+    from er_gym.tasks.suites import Suite
+    from er_gym.tasks.task import Task
+
+    OnEpisode = Callable[[EpisodeRecord], None]
+
+_existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
+_directory = click.Path(file_okay=False, path_type=Path)
+
+
+@dataclass(frozen=True)
+class Spoken:
+    """The options of agents that speak, as they are on the command line."""
+
+    agent_config: str | None
+    overrides: tuple[str, ...]
+    base_url: str | None
+    prompts_from: Path | None
+    concurrency: int | None
+    max_usd: float | None
+    max_tokens: int | None
+    max_minutes: float | None
+
+
+_SPOKEN_OPTIONS = (
+    click.option("--agent-config", metavar="FILE", help="Its settings, in YAML, or their name."),
+    click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="NAME=VALUE",
+        help="Overrule a setting, such as sampling.temperature=0.7; again and again.",
+    ),
+    click.option("--base-url", metavar="URL", help="Where its server is."),
+    click.option(
+        "--prompts-from",
+        type=_existing_file,
+        metavar="DATASET",
+        help="Take the prompts from a training file in the paper's format.",
+    ),
+    click.option(
+        "--concurrency",
+        type=click.IntRange(min=1),
+        help="How many conversations at once.  [default: 8]",
+    ),
+    click.option("--max-usd", type=click.FloatRange(min=0), help="Stop when so much is spent."),
+    click.option("--max-tokens", type=click.IntRange(min=1), help="Stop at so many tokens."),
+    click.option("--max-minutes", type=click.FloatRange(min=0), help="Stop after so long."),
+)
+"""For agents that speak; the budgets are of the run, however often it is continued, and the minutes
+of this command."""
+
+
+def _spoken_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Gives a command these options; it gets them as one ``spoken``."""
+
+    def with_spoken(**given: Any) -> Any:
+        spoken = Spoken(**{name: given.pop(name) for name in Spoken.__dataclass_fields__})
+        return command(spoken=spoken, **given)
+
+    with_spoken.__doc__ = command.__doc__
+    return reduce(lambda made, option: option(made), reversed(_SPOKEN_OPTIONS), with_spoken)
+
+
+@click.command(name="bench")
+@click.option("--suite", help="A bundled suite; `er-gym suites` lists them.")
+@click.option("--tasks-file", type=_existing_file, help="Tasks in the paper's file format.")
+@click.option("--poses", type=_existing_file, help="Exact poses, in the paper's file format.")
+@click.option(
+    "--agent", required=True, help="Who plays: oracle, random, searcher, rl:RUN, openai:MODEL …"
+)
+@click.option("--out", type=_directory, help="The run directory.  [default: runs/SUITE-AGENT]")
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True)
+@click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
+@click.option("--task-ids", multiple=True, metavar="ID,…", help="Play these; may be repeated.")
+@click.option("--shard", metavar="I/N", help="Play the I-th of N parts, such as 2/8.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--backend", help="The engine: embedded or unity.  [default: the suite's]")
+@click.option("--instances", help="What a type name stands for.  [default: the suite's]")
+@scorer_option
+@_spoken_options
+def bench(
+    suite: str | None,
+    tasks_file: Path | None,
+    poses: Path | None,
+    agent: str,
+    out: Path | None,
+    workers: int,
+    limit: int | None,
+    task_ids: tuple[str, ...],
+    shard: str | None,
+    seed: int,
+    backend: str | None,
+    instances: str | None,
+    scorer: str,
+    spoken: Spoken,
+) -> int:
+    """Play a suite with an agent and print the result table.
+
+    The same command again continues: episodes that are done are not played again. The options from
+    --agent-config on are for agents that speak, such as openai:MODEL.
+    """
+    from rich.console import Console
+
+    from agents.base import CannotGoOn
+    from benchmarks.metrics import CORRECTED, SCORERS, score_episode
+    from benchmarks.pool import WorkerSetupError
+    from benchmarks.progress import Progress
+    from benchmarks.report import load_run
+    from benchmarks.runner import Shard, finished, select
+    from benchmarks.store import Manifest, RunStore, file_stem
+    from benchmarks.tables import print_tables, tables
+    from er_gym import __version__
+    from er_gym.tasks.resolve import resolve_tasks
+    from er_gym.thor import BackendError
+
+    terminal = Console(stderr=True)
+    with bad_input(BackendError):
+        part = Shard.parse(shard) if shard else None
+        asked = _load_suite(suite, tasks_file, poses)
+        voice = _voice(agent, spoken)
+        env = _env_kwargs(asked, agent, seed, voice, backend=backend, instances=instances)
+        all_tasks, notes = resolve_tasks(asked.tasks, env["backend"])
+        chosen = select(all_tasks, task_ids=split(*task_ids), shard=part, limit=limit)
+        out = out or Path("runs") / f"{file_stem(asked.name)}-{file_stem(agent)}"
+        manifest = Manifest(
+            suite=asked.name,
+            suite_digest=asked.digest,
+            suite_size=len(all_tasks),
+            agent=agent,
+            agent_settings=voice.consequential if voice else {},
+            env=env,
+            seed=seed,
+            er_gym=__version__,
+        )
+        store = RunStore.create(out, manifest)
+    for note in notes:
+        terminal.print(note, style="dim", markup=False, highlight=False, soft_wrap=True)
+
+    judge = SCORERS.get(scorer, CORRECTED)
+    before = finished(store, chosen)
+    succeeded = sum(score_episode(episode, judge).success for episode in before)
+    try:
+        with _player(store, chosen, workers, voice) as (play, spent):
+            progress = Progress(
+                terminal, f"{asked.name}, {agent}", len(chosen), len(before), succeeded, spent
+            )
+            with progress:
+                outcome = play(
+                    lambda episode: progress.episode(score_episode(episode, judge).success)
+                )
+            bill = spent()
+    except (WorkerSetupError, OSError) as error:  # OSError: the disk is full, the share is gone
+        raise click.ClickException(f"{error}; the episodes done are in {out}") from error
+    except (KeyboardInterrupt, CannotGoOn) as error:
+        why = str(error) if isinstance(error, CannotGoOn) else "interrupted"
+        complain(
+            f"{why}: {len(finished(store, chosen))} of {len(chosen)} episodes are in {out}; "
+            "the same command continues"
+        )
+        return STOPPED if isinstance(error, CannotGoOn) else INTERRUPTED
+    print_tables(tables([load_run(out)], scorer=scorer), stdout())
+    if bill:
+        terminal.print(bill, highlight=False, markup=False)
+    if outcome.crashed:
+        first = outcome.crashed[0]
+        complain(
+            f"{len(outcome.crashed)} of {outcome.played} episodes crashed, the first of them "
+            f"{first.task_id}: {first.error}; the same command plays them again"
+        )
+        return CRASHED
+    return 0
+
+
+@contextmanager
+def _player(
+    store: RunStore, chosen: Sequence[Task], workers: int, voice: Voice | None
+) -> Iterator[tuple[Callable[[OnEpisode], Outcome], Callable[[], str]]]:
+    """How the chosen tasks are played, and how to hear what that has cost."""
+    from agents.base import CannotGoOn
+    from benchmarks.runner import run
+
+    if voice is None:
+        yield lambda on_episode: run(store, chosen, workers=workers, on_episode=on_episode), str
+        return
+    with bad_input(CannotGoOn):  # no key, no such model
+        speaker = voice.speaker(store.path)
+    with closing(speaker):
+        yield (
+            lambda on_episode: voice.play(speaker, store, chosen, workers, on_episode),
+            lambda: speaker.spent,
+        )
+
+
+def _load_suite(name: str | None, tasks_file: Path | None, poses: Path | None) -> Suite:
+    from er_gym.tasks.jsonl_format import digest
+    from er_gym.tasks.paper_format import read_poses, with_poses
+    from er_gym.tasks.suites import load_suite, suite_from_file, suite_names
+
+    if (name is None) == (tasks_file is None):
+        raise BadInput(f"give either --suite (one of: {', '.join(suite_names())}) or --tasks-file")
+    if name is not None:
+        if poses is not None:
+            raise BadInput("--poses goes with --tasks-file; a suite has its own")
+        return load_suite(name)
+    assert tasks_file is not None
+    suite = suite_from_file(tasks_file)
+    if poses is None:
+        return suite
+    tasks = tuple(with_poses(suite.tasks, read_poses(poses)))
+    return replace(suite, tasks=tasks, digest=digest(tasks))
+
+
+def _env_kwargs(
+    suite: Suite, agent: str, seed: int, voice: Voice | None, **given: str | None
+) -> dict[str, Any]:
+    """The environment's arguments: the suite's, overruled by the options that were given, and the
+    observations that the agent needs. Agent and environment are made once, to hear of what is wrong
+    with them before any worker is started."""
+    from agents import make_agent
+    from er_gym.envs.embodied_env import EmbodiedEnv
+    from er_gym.thor import BACKENDS
+
+    env = {"backend": "embedded", **suite.env}
+    env |= {name: value for name, value in given.items() if value is not None}
+    if env["backend"] not in BACKENDS:
+        raise ValueError(
+            f"unknown backend {env['backend']!r}; choose one of: {', '.join(BACKENDS)}"
+        )
+    if voice is None:
+        env["obs_mode"] = make_agent(agent, seed=seed).obs_mode
+    else:
+        env |= voice.env
+    EmbodiedEnv((), **env)
+    return env
+
+
+def _voice(agent: str, spoken: Spoken) -> Voice | None:
+    """What an agent that speaks is made of; None for others, which take none of these options."""
+    from agents.vlm.speaker import speaks
+    from benchmarks.spoken import Voice
+
+    if speaks(agent):
+        return Voice.of(agent, **vars(spoken))
+    given = [name for name, value in vars(spoken).items() if value]
+    if given:
+        option = "--set" if given[0] == "overrides" else f"--{given[0].replace('_', '-')}"
+        raise BadInput(f"{option} is for agents that speak, such as openai:MODEL, not for {agent}")
+    return None

@@ -1,0 +1,117 @@
+"""How many decisions a second agents make that ask a server, with pictures.
+
+    python -m benchmarks.perf.conversations [--concurrency 8 --workers 2 --latency 0.1]
+
+The server is the tests' own, in a process of its own on the same machine: it answers after the
+given time with the tasks' key actions. Nothing but this machine's cores and that time is in the
+figure, whose upper bound is concurrency / latency.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import multiprocessing
+import tempfile
+import time
+from contextlib import closing
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import click
+
+from benchmarks.spoken import Voice
+from benchmarks.store import Manifest, RunStore
+from er_gym import __version__
+from er_gym.tasks import Task, load_suite
+
+_SERVER = Path(__file__).resolve().parents[2] / "tests" / "agents" / "vlm" / "naughty_server.py"
+
+
+class Answers:
+    """Says the next key action of the task that a conversation is about."""
+
+    def __init__(self, tasks: list[Task]) -> None:
+        self._ways = {
+            task.instruction: [f"{key.verb} {key.actual_type}".strip() for key in task.key_actions]
+            for task in tasks
+        }
+
+    def __call__(self, messages: list[dict[str, Any]]) -> str:
+        first = next(message["content"] for message in messages if message["role"] == "user")
+        told = first if isinstance(first, str) else "".join(part.get("text", "") for part in first)
+        way = next(way for instruction, way in self._ways.items() if instruction in told)
+        said = sum(message["role"] == "assistant" for message in messages)
+        action = way[min(said, len(way) - 1)]
+        return f"<Thinking>Next.</Thinking><DecisionMaking>{action}</DecisionMaking>"
+
+
+def serve(pipe: Connection, tasks: list[Task], latency: float) -> None:
+    """The server's process."""
+    spec = importlib.util.spec_from_file_location("naughty_server", _SERVER)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    import sys
+
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    server = module.NaughtyServer(Answers(tasks), latency=latency, keep_bodies=False)
+    pipe.send(server.url)
+    pipe.recv()  # until nobody holds the other end
+
+
+@click.command()
+@click.option("--episodes", default=150, show_default=True)
+@click.option("--concurrency", default=8, show_default=True)
+@click.option("--workers", default=2, show_default=True)
+@click.option("--latency", default=0.1, show_default=True, help="Seconds.")
+@click.option("--size", default=300, show_default=True, help="Pixels, both ways.")
+def main(episodes: int, concurrency: int, workers: int, latency: float, size: int) -> None:
+    """Measure, and print."""
+    suite = load_suite("er-1k")
+    tasks = list({task.instruction: task for task in suite.tasks}.values())[:episodes]
+    ours, theirs = multiprocessing.get_context("spawn").Pipe()
+    process = multiprocessing.get_context("spawn").Process(
+        target=serve, args=(theirs, tasks, latency), daemon=True
+    )
+    process.start()
+    theirs.close()
+    voice = Voice.of(
+        "openai:naughty-1",
+        base_url=ours.recv(),
+        overrides=[f"pictures.width={size}", f"pictures.height={size}"],
+        concurrency=concurrency,
+    )
+    env = {**suite.env, **voice.env}
+    ended: list[tuple[float, int]] = []
+    with tempfile.TemporaryDirectory() as place:
+        manifest = Manifest(
+            suite=suite.name, suite_digest=suite.digest, suite_size=len(suite.tasks),
+            agent=voice.name, env=env, seed=0, er_gym=__version__,
+        )  # fmt: skip
+        store = RunStore.create(Path(place), manifest)
+        began = time.perf_counter()
+        with closing(voice.speaker(store.path)) as speaker:
+            outcome = voice.play(
+                speaker,
+                store,
+                tasks,
+                workers,
+                lambda episode: ended.append((time.perf_counter(), len(episode.steps) - 1)),
+            )
+    ours.close()
+    process.join(5)
+    whole = ended[-1][0] - began
+    decisions = sum(count for _, count in ended)
+    tenth = len(ended) // 10
+    steady = sum(count for _, count in ended[tenth:]) / (ended[-1][0] - ended[tenth - 1][0])
+    click.echo(
+        f"{decisions} decisions in {outcome.played} episodes, {len(outcome.crashed)} crashed, "
+        f"{whole:.1f} s: {decisions / whole:.1f} decisions/s with the start of the processes, "
+        f"{steady:.1f} after the first tenth (at most {concurrency / latency:.0f})"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,268 @@
+"""The agent's loop: what it sends, how it reads replies, and what it keeps of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from agents.vlm.agent import VLMAgent
+from agents.vlm.chat import LEFT_OUT, Message, ModelError, Picture, Reply, Usage
+from agents.vlm.clients.scripted import RecordedClient, ScriptedClient
+from agents.vlm.matching import Matcher
+from agents.vlm.prompts import load_prompts
+from agents.vlm.settings import AgentSettings
+from benchmarks.play import play_episode
+from benchmarks.store import picture_folder
+from er_gym import EmbodiedEnv
+from er_gym.tasks import Task, load_suite
+
+PICKUP = next(
+    task for task in load_suite("mini").tasks if task.type.name == "single_pickup_from_closerep"
+)
+WAY = [str(f"{key.verb} {key.actual_type}").strip() for key in PICKUP.key_actions]
+
+
+def settings(**given: Any) -> AgentSettings:
+    return AgentSettings.model_validate({"sees": "text", **given})
+
+
+class Script:
+    """Says one text after the other, and remembers what it was sent."""
+
+    def __init__(self, *replies: str | Reply) -> None:
+        self.replies = replies
+        self.sent: list[list[Message]] = []
+
+    def __call__(self, messages: Sequence[Message]) -> str | Reply:
+        self.sent.append(list(messages))
+        return self.replies[min(len(self.sent), len(self.replies)) - 1]
+
+
+def decided(*actions: str) -> list[str]:
+    return [
+        f"<Observation>round {number}</Observation><DecisionMaking>{action}</DecisionMaking>"
+        for number, action in enumerate(actions)
+    ]
+
+
+@pytest.fixture
+def env() -> Iterator[Callable[..., EmbodiedEnv]]:
+    made: list[EmbodiedEnv] = []
+
+    def make(obs_mode: str = "text") -> EmbodiedEnv:
+        made.append(EmbodiedEnv((), obs_mode=obs_mode, width=96, height=64))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+def agent_of(client: Any, options: AgentSettings) -> VLMAgent:
+    matcher = Matcher(options.matching)
+    return VLMAgent(client, options, load_prompts(options.prompts), matcher, 7, "scripted:x")
+
+
+def play(env: EmbodiedEnv, script: Any, options: AgentSettings, task: Task = PICKUP) -> Any:
+    agent = agent_of(ScriptedClient(script), options)
+    return agent, play_episode(env, agent, task, 0)
+
+
+def texts(message: Message) -> str:
+    return "\n".join(part for part in message.parts if isinstance(part, str))
+
+
+def pictures(messages: Sequence[Message]) -> list[Picture]:
+    return [part for message in messages for part in message.parts if isinstance(part, Picture)]
+
+
+# -- the loop --------------------------------------------------------------------------------------
+
+
+def test_a_model_that_knows_the_way_solves_the_task(env: Callable[..., EmbodiedEnv]) -> None:
+    script = Script(*decided(*WAY))
+    _, episode = play(env(), script, settings())
+    assert episode.success
+    assert not episode.error
+    assert [step.text for step in episode.steps[1:]] == WAY
+    assert episode.steps[1].thought == "Observation: round 0"
+    assert PICKUP.instruction in texts(script.sent[0][-1])
+    assert "You see:" in texts(script.sent[0][-1])
+
+
+def test_what_was_sent_is_sent_again_unchanged(env: Callable[..., EmbodiedEnv]) -> None:
+    script = Script(*decided(*WAY))
+    play(env("rgb"), script, settings(sees="pictures"))
+    for before, after in zip(script.sent, script.sent[1:], strict=False):
+        assert after[: len(before)] == before
+        assert [message.role for message in after[len(before) :]] == ["assistant", "user"]
+    assert len(pictures(script.sent[-1])) == len(script.sent)
+
+
+def test_observing_shows_what_is_on_all_sides(env: Callable[..., EmbodiedEnv]) -> None:
+    script = Script(*decided("observe", "end"))
+    play(env("rgb"), script, settings(sees="pictures"))
+    first, seen = pictures(script.sent[0]), pictures(script.sent[1][-1:])
+    assert (len(first), len(seen)) == (1, 4)
+    assert seen[-1] == first[0]  # straight ahead, as before
+    assert len({picture.digest for picture in seen}) == 4
+
+    script = Script(*decided("observe", "end"))
+    play(env("rgb"), script, settings(sees="pictures", pictures={"views": False}))
+    assert len(pictures(script.sent[1])) == 2
+
+
+def test_only_the_last_pictures_are_kept_where_that_is_asked_for(
+    env: Callable[..., EmbodiedEnv],
+) -> None:
+    script = Script(*decided("observe", *WAY))
+    play(env("rgb"), script, settings(sees="pictures", pictures={"keep": 2}))
+    numbers = [len(pictures(sent)) for sent in script.sent]
+    assert numbers == [1, 1 + 4, 2 + 1, 2 + 1, *[2 + 1] * (len(numbers) - 4)]
+    left_out = [sum(part == LEFT_OUT for m in sent for part in m.parts) for sent in script.sent]
+    assert left_out == [0, 0, 3, 4, *range(5, len(left_out) + 1)]
+
+
+@pytest.mark.parametrize("given_back", [True, False])
+def test_thoughts_of_reasoning_models_go_back_if_asked(
+    env: Callable[..., EmbodiedEnv], given_back: bool
+) -> None:
+    script = Script(*(Reply(text, reasoning="hm") for text in decided("observe", "end")))
+    agent, _ = play(env(), script, settings(reasoning={"in_history": given_back}))
+    said = [message for message in script.sent[1] if message.role == "assistant"]
+    assert [message.reasoning for message in said] == ["hm" if given_back else ""]
+    record, _ = agent.conversation("pictures/x")
+    assert [m.reasoning for m in record.messages if m.role == "assistant"] == ["hm", "hm"]
+
+
+# -- replies that are not as they should be --------------------------------------------------------
+
+
+def test_three_replies_without_an_action_end_the_episode(env: Callable[..., EmbodiedEnv]) -> None:
+    script = Script("I would rather not.", "", "Really.")
+    _, episode = play(env(), script, settings())
+    assert episode.end_reason == "no known action"
+    assert len(script.sent) == 3
+    assert "no decision" in texts(script.sent[1][-1])
+    assert script.sent[2][-2].parts == ("(nothing)",)
+    assert [step.verb for step in episode.steps] == ["init", "error", "error", "error"]
+
+
+def test_a_usable_reply_begins_the_count_anew(env: Callable[..., EmbodiedEnv]) -> None:
+    script = Script("No.", "No.", *decided("observe"), "No.", "No.", *decided("end"))
+    _, episode = play(env(), script, settings())
+    assert episode.end_reason == "end"
+
+
+def test_even_a_reply_that_reads_like_an_action_is_not_done_if_it_has_a_problem(
+    env: Callable[..., EmbodiedEnv],
+) -> None:
+    script = Script(*decided("fly to Fridge", "end"))
+    _, episode = play(env(), script, settings())
+    assert [step.verb for step in episode.steps] == ["init", "error", "end"]
+    assert "'fly to Fridge' is no action" in texts(script.sent[1][-1])
+
+
+def test_names_are_matched_to_types(env: Callable[..., EmbodiedEnv]) -> None:
+    script = Script(*decided("go to the refrigerator", "navigate to Unobtainium", "end"))
+    agent, episode = play(env(), script, settings())
+    assert episode.steps[1].text == "navigate to Fridge"
+    record, _ = agent.conversation("pictures/x")
+    first, second, _ = record.rounds
+    assert (first.name, first.matched, first.action) == (
+        "refrigerator",
+        "alias",
+        "navigate to Fridge",
+    )
+    assert "no object type" in second.problem
+    assert second.problem in texts(script.sent[2][-1])
+
+
+def test_what_cannot_be_done_with_a_type_is_said(env: Callable[..., EmbodiedEnv]) -> None:
+    script = Script(*decided("open Apple", "end"))
+    play(env(), script, settings())
+    assert "One cannot open an Apple." in texts(script.sent[1][-1])
+
+
+def test_a_tool_call_decides(env: Callable[..., EmbodiedEnv]) -> None:
+    calls = [
+        Reply("", call='{"action": "observe", "object": ""}'),
+        Reply("", call='{"action":"end"}'),
+    ]
+    script = Script(*calls)
+    _, episode = play(env(), script, settings(decide="tools"))
+    assert [step.verb for step in episode.steps] == ["init", "observe", "end"]
+    assert '"observe"' in texts(script.sent[1][-2])
+
+
+def test_a_model_that_gives_no_reply_fails_the_episode(env: Callable[..., EmbodiedEnv]) -> None:
+    def silent(messages: Sequence[Message]) -> str:
+        raise ModelError("no reply after 6 tries")
+
+    agent, episode = play(env(), silent, settings())
+    assert episode.error.startswith("agents.vlm.chat.ModelError: no reply after 6 tries")
+    record, _ = agent.conversation("pictures/x", error=episode.error)
+    assert record.rounds == []
+    assert record.error == episode.error
+
+
+# -- the record ------------------------------------------------------------------------------------
+
+
+def test_the_record_has_it_all(env: Callable[..., EmbodiedEnv]) -> None:
+    usage = Usage(prompt=100, completion=10, cached=60, reasoning=4)
+    replies = [Reply(text, usage=usage, cost=0.25, model="m-1") for text in decided(*WAY)]
+    options = settings(
+        sees="pictures", server={"base_url": "http://user:secret@127.0.0.1:1/v1?key=secret"}
+    )
+    agent, episode = play(env("rgb"), Script(*replies), options)
+    last = episode.steps[-1]
+    record, files = agent.conversation(
+        picture_folder(PICKUP.id), feedback=last.feedback, success=last.success
+    )
+    assert [each.action for each in record.rounds] == WAY
+    assert [each.feedback for each in record.rounds] == [s.feedback for s in episode.steps[1:]]
+    assert all(each.success for each in record.rounds)
+    assert [each.thoughts[0].kind for each in record.rounds] == ["Observation"] * len(WAY)
+    assert record.cost == pytest.approx(0.25 * len(WAY))
+    assert record.prompt_tokens == 100 * len(WAY)
+    assert {each.model for each in record.rounds} == {"m-1"}
+    assert len(files) == len(WAY)
+    shown = [p.path for m in record.messages for p in m.parts if not isinstance(p, str)]
+    assert shown == list(files)
+    assert all(path.startswith(f"pictures/{PICKUP.id}/") for path in files)
+    assert "secret" not in record.model_dump_json()
+    assert record.settings["server"]["base_url"] == "http://127.0.0.1:1/v1"
+    again = type(record).model_validate_json(record.model_dump_json())
+    assert again == record
+
+
+@pytest.mark.parametrize("keep", [None, 0])
+def test_a_recorded_conversation_is_replayed(
+    env: Callable[..., EmbodiedEnv], tmp_path: Path, keep: int | None
+) -> None:
+    options = settings(sees="pictures", pictures={"keep": keep})
+    agent, episode = play(env("rgb"), Script("Nothing.", *decided("observe", *WAY)), options)
+    record, _ = agent.conversation("pictures/x")
+    (tmp_path / "conversations").mkdir()
+    (tmp_path / "conversations" / "x.json").write_text(record.model_dump_json())
+
+    replay = agent_of(RecordedClient(tmp_path), options)
+    again = play_episode(env("rgb"), replay, PICKUP, 0)
+    assert not again.error
+    assert [step.text for step in again.steps] == [step.text for step in episode.steps]
+
+    other = next(task for task in load_suite("mini").tasks if task.scene != PICKUP.scene)
+    stranger = play_episode(env("rgb"), agent_of(RecordedClient(tmp_path), options), other, 0)
+    assert "no conversation in" in stranger.error
+
+
+def test_a_directory_without_conversations_is_told(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="holds no conversations"):
+        RecordedClient(tmp_path)
+    (tmp_path / "x.json").write_text("{}")
+    with pytest.raises(ValueError, match="cannot be read as a conversation"):
+        RecordedClient(tmp_path / "x.json")

@@ -1,0 +1,281 @@
+"""Agents that speak, end to end: the command, a server that misbehaves, engines in processes."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("openai", reason="needs the extra vlm")
+
+from click.testing import CliRunner
+
+from agents.vlm.record import ConversationRecord
+from benchmarks.cli import cli
+from benchmarks.store import RunStore
+from er_gym.tasks import load_suite
+
+_HELPERS = Path(__file__).parents[1] / "agents" / "vlm"
+_spec = importlib.util.spec_from_file_location("naughty", _HELPERS / "naughty_server.py")
+assert _spec is not None
+assert _spec.loader is not None
+naughty = importlib.util.module_from_spec(_spec)
+sys.modules["naughty"] = naughty
+_spec.loader.exec_module(naughty)
+
+TASKS = load_suite("er-1k").tasks[:200]
+PRICES = ("--set", "prices.prompt=1", "--set", "prices.completion=10")
+PATIENCE = ("--set", "server.timeout=2", "--set", "server.tries=12")
+
+
+def short(messages: list[dict[str, Any]]) -> str:
+    """Looks round once, says something in vain, and ends."""
+    said = sum(message["role"] == "assistant" for message in messages)
+    actions = ("observe", "fly", "end")
+    return f"<Planning>{said}</Planning><DecisionMaking>{actions[min(said, 2)]}</DecisionMaking>"
+
+
+def command(url: str, out: Path, *more: str) -> list[str]:
+    return [
+        "bench", "--suite", "er-1k", "--agent", "openai:naughty-1", "--base-url", url,
+        "--agent-config", "text", "--out", str(out), *PATIENCE, *more,
+    ]  # fmt: skip
+
+
+def bench(url: str, out: Path, *more: str) -> Any:
+    return CliRunner().invoke(cli, command(url, out, *more), standalone_mode=False)
+
+
+def ledger(out: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (out / "spending.jsonl").read_text().splitlines()]
+
+
+def conversations(out: Path) -> list[ConversationRecord]:
+    return [
+        ConversationRecord.model_validate_json(file.read_bytes())
+        for file in sorted((out / "conversations").glob("*.json"))
+    ]
+
+
+def assert_whole(out: Path, tasks: int) -> None:
+    """As many episodes and conversations as tasks, none crashed, and the costs add up."""
+    episodes = list(RunStore.open(out).episodes())
+    assert len(episodes) == tasks
+    assert {each.error for each in episodes} == {""}
+    talks = conversations(out)
+    assert [each.task_id for each in talks] == [each.task_id for each in episodes]
+    for talk, episode in zip(talks, episodes, strict=True):
+        assert len(talk.rounds) == len(episode.steps) - 1
+        assert [each.feedback for each in talk.rounds] == [s.feedback for s in episode.steps[1:]]
+    paid = sum(entry["cost"] for entry in ledger(out))
+    assert sum(talk.cost for talk in talks) == pytest.approx(paid)
+    assert sum(t.prompt_tokens for t in talks) == sum(entry["prompt"] for entry in ledger(out))
+
+
+def test_two_hundred_episodes_with_a_server_that_misbehaves(tmp_path: Path) -> None:
+    mixture = {
+        "ok": 60, "429": 3, "500": 3, "503": 1, "reset": 3, "half": 1, "truncated": 2, "html": 1,
+        "empty_choices": 2, "refusal": 2, "no_content": 2, "wrong_tags": 2, "huge": 1, "drip": 0.3,
+    }  # fmt: skip
+    with naughty.NaughtyServer(short, mixture=mixture, seed=1, keep_bodies=False) as server:
+        result = bench(server.url, tmp_path, "--limit", "200", "--workers", "2", *PRICES)
+    assert result.return_value == 0, result.output
+    assert_whole(tmp_path, len(TASKS))
+    assert server.count > len(ledger(tmp_path))  # what went wrong was asked again
+    ends = Counter(each.end_reason for each in RunStore.open(tmp_path).episodes())
+    assert set(ends) <= {"end", "no known action"}
+    assert ends["end"] > 150
+
+
+def test_a_budget_stops_within_the_replies_under_way(tmp_path: Path) -> None:
+    with naughty.NaughtyServer(short, keep_bodies=False) as server:
+        more = ("--limit", "12", "--concurrency", "3")
+        result = bench(server.url, tmp_path, *more, *PRICES, "--max-usd", "0.01")
+        assert result.return_value == 3
+        entries = ledger(tmp_path)
+        within = [sum(entry["cost"] for entry in entries[:n]) for n in range(len(entries) + 1)]
+        first_over = next(n for n, cost in enumerate(within) if cost >= 0.01)
+        assert len(entries) <= first_over + 2  # three at once
+        assert server.count == len(entries)
+        again = bench(server.url, tmp_path, *more, *PRICES, "--max-usd", "0.01")
+        assert again.return_value == 3
+        assert server.count == len(entries)  # nothing was asked
+
+        done = bench(server.url, tmp_path, *more, *PRICES, "--max-usd", "10")
+        assert done.return_value == 0, done.output
+        assert server.count == len(ledger(tmp_path)) == 12 * 3  # and nothing was paid for twice
+    assert_whole(tmp_path, 12)
+
+
+def test_a_key_that_is_refused_stops_the_run(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
+    with naughty.NaughtyServer(script=["401"] * 50) as server:
+        result = bench(server.url, tmp_path, "--limit", "6")
+    assert result.return_value == 3
+    assert list(RunStore.open(tmp_path).episodes()) == []
+    everything = b"".join(file.read_bytes() for file in tmp_path.rglob("*") if file.is_file())
+    assert b"very-secret" not in everything
+    assert "very-secret" not in result.output
+
+
+def test_pictures_are_kept_beside_the_conversation(tmp_path: Path) -> None:
+    size = ("--set", "sees=pictures", "--set", "pictures.width=64", "--set", "pictures.height=48")
+    with naughty.NaughtyServer(short) as server:
+        result = bench(server.url, tmp_path, "--limit", "2", *size)
+    assert result.return_value == 0, result.output
+    for talk in conversations(tmp_path):
+        shown = [p for m in talk.messages for p in m.parts if not isinstance(p, str)]
+        assert len(shown) == 1 + 4  # at first, and after looking round
+        assert all((tmp_path / each.path).read_bytes()[:2] == b"\xff\xd8" for each in shown)
+    bodies = [seen.json for seen in server.seen]
+    assert sum("data:image/jpeg;base64," in json.dumps(body) for body in bodies) == len(bodies)
+
+
+def test_a_recorded_run_is_played_again_without_a_server(tmp_path: Path) -> None:
+    with naughty.NaughtyServer(short) as server:
+        bench(server.url, tmp_path / "a", "--limit", "4")
+    again = command("", tmp_path / "b", "--limit", "4")
+    again[again.index("--agent") + 1] = f"recorded:{tmp_path / 'a'}"
+    del again[again.index("--base-url") : again.index("--base-url") + 2]
+    result = CliRunner().invoke(cli, again, standalone_mode=False)
+    assert result.return_value == 0, result.output
+    played = [
+        [
+            [step.text for step in episode.steps]
+            for episode in RunStore.open(tmp_path / x).episodes()
+        ]
+        for x in "ab"
+    ]
+    assert played[0] == played[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--agent", "oracle", "--concurrency", "4"), "--concurrency is for agents that speak"),
+        (("--agent", "openai:m", "--agent-config", "genius"), "there is no agent 'genius'"),
+        (("--agent", "openai:m", "--set", "sees=nothing"), "wrong field 'sees'"),
+        (("--agent", "openai:m"), "there is no key: set OPENAI_API_KEY"),
+        (
+            ("--agent", "openai:m", "--base-url", "http://127.0.0.1:1/v1", "--max-usd", "1"),
+            "--max-usd needs prices",
+        ),
+        (("--agent", "recorded:nowhere"), "holds no conversations"),
+        (("--agent", "openai:m", "--set", "prompts.profile=x"), "there are no prompts 'x'"),
+    ],
+)
+def test_what_is_given_wrongly_is_told(
+    arguments: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    asked = ["bench", "--suite", "mini", "--out", str(tmp_path), "--limit", "1"]
+    result = CliRunner().invoke(cli, [*asked, *arguments])
+    assert result.exit_code == 2
+    assert message in result.output
+
+
+# -- SIGKILL ---------------------------------------------------------------------------------------
+
+
+class Process:
+    """``er-gym bench`` or the server as a process of its own."""
+
+    def __init__(self, *argv: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, *argv], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait()
+
+    def end(self) -> tuple[int, str]:
+        said, _ = self.process.communicate(timeout=120)
+        return self.process.returncode, said
+
+
+@pytest.fixture
+def server() -> Iterator[Any]:
+    began: list[Process] = []
+
+    def start(port: int = 0) -> tuple[Process, str]:
+        script = str(_HELPERS / "naughty_server.py")
+        say = "<DecisionMaking>end</DecisionMaking>"
+        began.append(Process(script, "--port", str(port), "--latency", "0.2", "--say", say))
+        assert began[-1].process.stdout is not None
+        return began[-1], began[-1].process.stdout.readline().strip()
+
+    yield start
+    for each in began:
+        each.kill()
+
+
+def run(url: str, out: Path, *more: str) -> Process:
+    return Process("-m", "benchmarks.cli", *command(url, out, "--concurrency", "2", *more))
+
+
+def until(out: Path, episodes: int) -> None:
+    """Wait until so many episodes are in a run directory."""
+    deadline = time.monotonic() + 60
+    while len(list((out / "episodes").glob("*.json"))) < episodes:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def children(pid: int) -> list[int]:
+    tasks = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(child) for file in tasks for child in file.read_text().split()]
+
+
+def test_the_runner_is_killed_and_goes_on(server: Any, tmp_path: Path) -> None:
+    _, url = server()
+    killed = run(url, tmp_path, "--limit", "12")
+    until(tmp_path, 3)
+    killed.kill()
+    before = len(list((tmp_path / "episodes").glob("*.json")))
+    assert before < 12
+    code, said = run(url, tmp_path, "--limit", "12").end()
+    assert code == 0, said
+    assert_whole(tmp_path, 12)
+
+
+def test_a_worker_is_killed_and_nothing_is_lost(server: Any, tmp_path: Path) -> None:
+    _, url = server()
+    running = run(url, tmp_path, "--limit", "12")
+    until(tmp_path, 3)
+    workers = [
+        child
+        for child in children(running.process.pid)
+        if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()
+    ]
+    assert workers
+    os.kill(workers[0], signal.SIGKILL)
+    code, said = running.end()
+    assert code == 0, said
+    assert_whole(tmp_path, 12)
+
+
+def test_the_server_is_killed_and_comes_back(server: Any, tmp_path: Path) -> None:
+    process, url = server()
+    quick = ("--limit", "8", "--set", "server.tries=2")
+    running = run(url, tmp_path, *quick)
+    until(tmp_path, 2)
+    process.kill()
+    code, said = running.end()
+    assert code == 1, said
+    assert "the same command plays them again" in said
+    port = int(url.rpartition(":")[2].partition("/")[0])
+    server(port)
+    code, said = run(url, tmp_path, *quick).end()
+    assert code == 0, said
+    assert_whole(tmp_path, 8)
