@@ -18,7 +18,8 @@ from er_gym.thor.player import Release, vulkan_is_there
 EXTRAS = {
     "rl": ("sb3-contrib", "stable-baselines3", "tensorboard", "torch", "tqdm"),
     "trl": ("torch", "transformers", "trl"),
-    "vlm": ("torch", "transformers", "qwen-vl-utils", "openai"),
+    "vlm": ("diskcache", "jinja2", "openai", "rapidfuzz"),
+    "local": ("accelerate", "peft", "torch", "transformers"),
     "match": ("sentence-transformers",),
 }
 """Extra to the packages that it brings, as in pyproject.toml; a test compares."""

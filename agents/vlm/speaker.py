@@ -116,9 +116,10 @@ class Speaker:
                 self._metered = budgets.Metered(self._client, asked, directory / SPENDING)
                 self._client = Kept(self._metered, directory / REPLIES)
         except ImportError as error:
+            extra = "local" if kind == "hf" else "vlm"
             raise ValueError(
                 f"agent {name} needs {error.name}, which is not installed: "
-                "pip install 'er-gym[vlm]'"
+                f"pip install 'er-gym[{extra}]'"
             ) from error
 
     def agent(self, seed: int) -> VLMAgent:

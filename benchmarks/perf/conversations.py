@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import importlib.util
 import multiprocessing
+import sys
 import tempfile
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -52,13 +53,12 @@ def serve(pipe: Connection, tasks: list[Task], latency: float) -> None:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    import sys
-
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     server = module.NaughtyServer(Answers(tasks), latency=latency, keep_bodies=False)
     pipe.send(server.url)
-    pipe.recv()  # until nobody holds the other end
+    with suppress(EOFError):
+        pipe.recv()  # until nobody holds the other end
 
 
 @click.command()

@@ -1,0 +1,187 @@
+"""A model's directory, read with transformers: the model, its tokenizer, its eyes, its format."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import transformers
+from transformers.processing_utils import ProcessorMixin
+
+from agents.vlm.settings import AgentSettings, Local
+
+_MODEL_FILES = {".json", ".jinja", ".txt", ".model", ".safetensors", ".bin"}
+_LONGEST_WORDS = 300  # characters of a library's, in an error
+_NAMES_OF_2024 = {
+    r"^visual\.": "model.visual.",
+    r"^model\.(?!language_model\.|visual\.)": "model.language_model.",
+}
+"""What adapters for Qwen2-VL and Qwen2.5-VL call the weights, if trained with transformers 4.51 or
+older, and what these are called since. For whole models transformers knows that itself."""
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A model that can be talked to.
+
+    Attributes:
+        model: generates, in evaluation mode; its ``generation_config`` is what the settings say.
+        tokenizer: of its words.
+        eyes: its image processor, which makes patches of pictures; None where it sees none.
+        template: of a conversation; None for the tokenizer's own.
+        ends: the tokens that end a reply.
+        identity: all that decides what it says, as JSON.
+    """
+
+    model: Any
+    tokenizer: Any
+    eyes: Any
+    template: str | None
+    ends: frozenset[int]
+    identity: str
+
+
+def load(path: str, settings: AgentSettings) -> Checkpoint:
+    """Load a model, from a directory without any network.
+
+    Args:
+        path: a directory that ``save_pretrained`` wrote, or a model's name on the Hugging Face hub.
+        settings: of the agent.
+
+    Raises:
+        ValueError: there is no such model or adapter, it is broken, or does not fit the settings.
+    """
+    local, sees = settings.local, settings.sees == "pictures"
+    is_here = Path(path).is_dir()
+    if not is_here and (path.startswith(("/", ".", "~")) or path.count("/") > 1):
+        raise ValueError(
+            f"there is no directory {path}; give one with a model in it, or a model's name on the "
+            "Hugging Face hub"
+        )
+    where = {"local_files_only": is_here}
+    with _plainly(f"{path} cannot be loaded"):
+        config = transformers.AutoConfig.from_pretrained(path, **where)
+        tokenizer = transformers.AutoTokenizer.from_pretrained(path, **where)
+        # Some have a template that knows of pictures beside their tokenizer's; where it comes in
+        # several kinds, the tokenizer knows which is meant for talking.
+        template = ProcessorMixin.get_processor_dict(path, **where)[0].get("chat_template")
+        template = template if isinstance(template, str) else None
+    has_eyes = getattr(config, "vision_config", None) is not None
+    if sees and not has_eyes:
+        raise ValueError(f"{path} has no eyes; let the agent's setting sees be text")
+    if not (template or tokenizer.chat_template):
+        raise ValueError(f"{path} has no chat template, so that it cannot be talked to")
+    with _plainly(f"{path} cannot be loaded"):
+        # By Pillow: a whole AutoProcessor wants torchvision, for the sake of videos.
+        eyes = (
+            transformers.AutoImageProcessor.from_pretrained(path, backend="pil", **where)
+            if sees
+            else None
+        )
+    if sees and not (hasattr(eyes, "merge_size") and hasattr(config, "image_token_id")):
+        raise ValueError(
+            f"{path} does not see as Qwen's models do ({type(eyes).__name__}); let a server run it"
+        )
+    with _plainly(f"{path} cannot be loaded"):
+        model = _model(path, has_eyes, local, where)
+    ends, pad = _ends(model, tokenizer), tokenizer.pad_token_id
+    model.generation_config = transformers.GenerationConfig(
+        do_sample=False,
+        max_new_tokens=settings.sampling.max_tokens,
+        eos_token_id=sorted(ends),
+        pad_token_id=min(ends, default=None) if pad is None else pad,
+        repetition_penalty=model.generation_config.repetition_penalty,
+    )
+    if local.adapter:
+        model = _adapted(model, local.adapter)
+    identity = _identity(path, settings, model)
+    return Checkpoint(model.eval(), tokenizer, eyes, template, ends, identity)
+
+
+def one_line(error: Exception) -> str:
+    """What a library's error says, in one line that is not too long."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"[:_LONGEST_WORDS]
+
+
+def _model(path: str, has_eyes: bool, local: Local, where: dict[str, bool]) -> Any:
+    maker = (
+        transformers.AutoModelForImageTextToText if has_eyes else transformers.AutoModelForCausalLM
+    )
+    model, found = maker.from_pretrained(
+        path,
+        dtype=local.dtype,
+        device_map=local.device_map,
+        attn_implementation=local.attention or None,
+        output_loading_info=True,
+        **where,
+    )
+    if missing := sorted(found["missing_keys"]):  # transformers would make random ones, and go on
+        raise ValueError(f"{len(missing)} of its weights are not there, such as {missing[0]}")
+    return model
+
+
+def _ends(model: Any, tokenizer: Any) -> frozenset[int]:
+    theirs = model.generation_config.eos_token_id
+    ends = {*(theirs if isinstance(theirs, list) else [theirs]), tokenizer.eos_token_id}
+    return frozenset(ends - {None})
+
+
+def _adapted(model: Any, adapter: str) -> Any:
+    try:
+        import peft
+    except ImportError:
+        raise ValueError("local.adapter needs peft: pip install 'er-gym[local]'") from None
+    if not (Path(adapter) / "adapter_config.json").is_file():
+        raise ValueError(
+            f"local.adapter {adapter} is no adapter; give a directory with adapter_config.json"
+        )
+    with _plainly(f"local.adapter {adapter} does not fit the model"), warnings.catch_warnings():
+        # peft only warns of an adapter that lacks some of what it says it has.
+        warnings.filterwarnings("error", message="Found missing adapter keys")
+        names = _NAMES_OF_2024 if model.config.model_type in ("qwen2_vl", "qwen2_5_vl") else None
+        return peft.PeftModel.from_pretrained(model, adapter, key_mapping=names)
+
+
+def _identity(path: str, settings: AgentSettings, model: Any) -> str:
+    """See :class:`Checkpoint`. Files count by size and time: to read them would take long."""
+    what = {
+        "client": "transformers",
+        "model": _files(path) or [[path, getattr(model.config, "_commit_hash", None)]],
+        "adapter": _files(settings.local.adapter) if settings.local.adapter else None,
+        "dtype": str(model.dtype),
+        "attention": settings.local.attention,
+        "settings": settings.model_dump(
+            mode="json",
+            include={
+                "seed": True,
+                "sampling": True,
+                "reasoning": True,
+                "pictures": {"min_pixels", "max_pixels"},
+            },
+        ),
+    }
+    return json.dumps(what, sort_keys=True)
+
+
+def _files(path: str) -> list[list[Any]]:
+    """Name, size and time of what a model or an adapter is read from."""
+    directory = Path(path)
+    if not directory.is_dir():
+        return []
+    files = (each.resolve() for each in directory.iterdir() if each.suffix in _MODEL_FILES)
+    stats = ((str(each), each.stat()) for each in files)
+    return sorted([name, stat.st_size, stat.st_mtime_ns] for name, stat in stats)
+
+
+@contextmanager
+def _plainly(what: str) -> Iterator[None]:
+    """Whatever a broken checkpoint makes the libraries raise becomes a ValueError of one line."""
+    try:
+        yield
+    except Exception as error:
+        raise ValueError(f"{what}: {one_line(error)}") from None

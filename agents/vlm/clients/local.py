@@ -1,0 +1,330 @@
+"""A model that transformers runs in this process: Qwen2-VL, Qwen2.5-VL, Qwen3-VL and what is tuned
+from them; for agents that see text alone, any language model with a chat template.
+
+The conversation is worked through anew for each reply: nothing that the model computed for an
+earlier turn is kept. A server that remembers (vLLM, SGLang) is faster over long episodes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from io import BytesIO
+from typing import Any
+
+import jinja2
+import torch
+import transformers
+from PIL import Image
+
+from agents.base import CannotGoOn
+from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
+from agents.vlm.clients.batching import Batcher
+from agents.vlm.clients.checkpoint import load, one_line
+from agents.vlm.settings import AgentSettings
+
+_THINK, _THOUGHT = "<think>", "</think>"
+_CLOSED = "the model has been closed"
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A conversation as the model takes it.
+
+    Attributes:
+        ids: of its tokens; a picture is as many as the model sees of it.
+        pixels: (patches of all pictures, values of a patch); None without pictures.
+        grids: (pictures, 3): patches in time, height and width.
+        seed: of what is drawn for it.
+        thinking: whether the model is in the middle of a thought where it begins.
+    """
+
+    ids: list[int]
+    pixels: torch.Tensor | None
+    grids: torch.Tensor | None
+    seed: int
+    thinking: bool
+
+
+class LocalClient:
+    """Replies with what a model says that is loaded here.
+
+    Conversations that wait at the same time are worked out together, ``settings.local.batch`` of
+    them; that changes nothing in what is said, up to the arithmetic's rounding: each is masked from
+    the others and draws from a seed of its own. Pictures are resized by the rule of qwen-vl-utils,
+    within ``settings.pictures``, so that each takes as many tokens as that package says.
+
+    How words are chosen is what ``settings.sampling`` says; of the model's own generation_config,
+    its repetition penalty holds as well, as it does with servers.
+
+    Args:
+        path: a directory that ``save_pretrained`` wrote, which needs no network; or a model's name
+            on the Hugging Face hub.
+        settings: of the agent.
+
+    Attributes:
+        identity: all that decides what it says, as JSON.
+
+    Raises:
+        ValueError: there is no such model or adapter, it cannot be loaded, or does not fit the
+            settings.
+    """
+
+    def __init__(self, path: str, settings: AgentSettings) -> None:
+        if settings.decide == "tools":
+            raise ValueError(
+                "decide: tools needs a server; a model in this process takes tags or json"
+            )
+        self._name, self._settings = path, settings
+        loaded = load(path, settings)
+        self.identity = loaded.identity
+        self._model, self._ends = loaded.model, loaded.ends
+        self._tokenizer, self._template, self._eyes = loaded.tokenizer, loaded.template, loaded.eyes
+        config = self._model.config
+        self._place = getattr(config, "image_token_id", None)  # the token where a picture goes
+        self._longest = getattr(config.get_text_config(), "max_position_embeddings", sys.maxsize)
+        self._words = threading.Lock()  # a tokenizer is for one thread at a time
+        self._closing = threading.Event()
+        local = settings.local
+        self._batcher: Batcher[_Row, Reply] = Batcher(self._replies, local.batch, local.wait)
+
+    def reply(self, messages: Sequence[Message], seed: int) -> Reply:
+        """What the model says next.
+
+        At a temperature above 0, the seed, ``settings.seed`` and the number of messages decide what
+        is drawn; without ``settings.seed`` every draw is another.
+
+        Raises:
+            ModelError: the conversation is too long for the model or for the memory, or a picture
+                cannot be read.
+            CannotGoOn: the model's chat template does not take such conversations, the device
+                fails, or :meth:`close` has been called.
+        """
+        if self._closing.is_set():
+            raise CannotGoOn(_CLOSED)
+        start = time.monotonic()
+        reply = self._batcher.do(self._row(messages, seed))
+        return replace(reply, seconds=time.monotonic() - start)
+
+    def close(self) -> None:
+        """Stop at the next word, and let go of the model; whoever waits gets CannotGoOn."""
+        self._closing.set()
+        self._batcher.close()
+        self._model = None
+
+    # -- a conversation becomes numbers, in the thread of whoever asks ---------------------------
+
+    def _row(self, messages: Sequence[Message], seed: int) -> _Row:
+        text = self._prompt(messages)
+        ids = self._ids(text)
+        pixels = grids = None
+        pictures = [part for each in messages for part in each.parts if isinstance(part, Picture)]
+        if pictures:
+            pixels, grids = self._seen(pictures)
+        ids = self._with_room(ids, grids)
+        most = self._settings.sampling.max_tokens
+        if len(ids) + most > self._longest:
+            raise ModelError(
+                f"the conversation has {len(ids)} tokens, which with sampling.max_tokens {most} is "
+                f"more than the {self._longest} of {self._name}; let pictures.keep be fewer"
+            )
+        thinking = text.rstrip().endswith(_THINK)
+        return _Row(ids, pixels, grids, self._seed(seed, len(messages)), thinking)
+
+    def _prompt(self, messages: Sequence[Message]) -> str:
+        """The conversation in the model's format, up to where it is to speak."""
+        effort = self._settings.reasoning.effort
+        thinks = {"enable_thinking": effort != "none"} if effort else {}
+        try:
+            text: str = self._tokenizer.apply_chat_template(
+                [self._turn(message) for message in messages],
+                chat_template=self._template,
+                tokenize=False,
+                add_generation_prompt=True,
+                **thinks,
+            )
+        except (jinja2.TemplateError, TypeError) as error:
+            raise CannotGoOn(
+                f"{self._name}: its chat template does not take this conversation: "
+                f"{one_line(error)}"
+            ) from None
+        return text
+
+    def _turn(self, message: Message) -> dict[str, Any]:
+        parts = list(message.parts)
+        if message.reasoning and self._settings.reasoning.in_history:
+            # In the words: templates differ in how they would have it apart, and most know nothing
+            # of it. Those that leave earlier thoughts out find them here too.
+            parts.insert(0, f"{_THINK}\n{message.reasoning}\n{_THOUGHT}\n")
+        if any(isinstance(part, Picture) for part in parts):
+            return {"role": message.role, "content": [_part(part) for part in parts]}
+        return {"role": message.role, "content": "\n".join(map(str, parts))}
+
+    def _seen(self, pictures: Sequence[Picture]) -> tuple[torch.Tensor, torch.Tensor]:
+        if self._eyes is None:
+            raise CannotGoOn(
+                f"{self._name} was loaded without eyes, since the agent's setting sees is text, "
+                "and is shown a picture"
+            )
+        bounds = self._settings.pictures
+        try:
+            seen = self._eyes(
+                [Image.open(BytesIO(each.data)).convert("RGB") for each in pictures],
+                size={"shortest_edge": bounds.min_pixels, "longest_edge": bounds.max_pixels},
+                return_tensors="pt",
+            )
+        except (OSError, ValueError) as error:
+            raise ModelError(f"a picture cannot be seen: {one_line(error)}") from None
+        return seen["pixel_values"], seen["image_grid_thw"]
+
+    def _with_room(self, ids: Sequence[int], grids: torch.Tensor | None) -> list[int]:
+        """The tokens, with that of each picture as often as the model sees patches of it."""
+        counts: list[int] = []
+        if grids is not None:
+            counts = (grids.prod(dim=1) // self._eyes.merge_size**2).tolist()
+        if ids.count(self._place) != len(counts):
+            raise ModelError(
+                f"the conversation has {len(counts)} pictures and {ids.count(self._place)} places "
+                "for them; no words of it may be the model's own marks"
+            )
+        left = iter(counts)
+        return [one for each in ids for one in [each] * (next(left) if each == self._place else 1)]
+
+    def _seed(self, episode: int, messages: int) -> int:
+        """Of one reply. Were it the episode's, each turn would be drawn by the same numbers."""
+        if self._settings.seed is None:
+            return secrets.randbits(63)
+        text = f"{self._settings.seed} {episode} {messages}"
+        return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
+
+    # -- numbers become replies, in the batcher's thread -----------------------------------------
+
+    def _replies(self, rows: Sequence[_Row]) -> list[Reply]:
+        try:
+            spoken = self._spoken(rows)
+        except RuntimeError as error:
+            raise _plainer(error, rows) from None
+        if self._closing.is_set():
+            raise CannotGoOn(_CLOSED)
+        return [self._reply(row, said) for row, said in zip(rows, spoken, strict=True)]
+
+    def _spoken(self, rows: Sequence[_Row]) -> list[list[int]]:
+        """The tokens that the model adds to each row, up to its end or to the limit."""
+        longest = max(len(row.ids) for row in rows)
+        gaps = [longest - len(row.ids) for row in rows]
+        # Filled on the left, with any token: it is masked out.
+        filled = [row.ids[:1] * gap + row.ids for row, gap in zip(rows, gaps, strict=True)]
+        ids = torch.tensor(filled)  # (rows, longest)
+        inputs = {
+            "input_ids": ids,
+            "attention_mask": torch.tensor([[0] * gap + [1] * (longest - gap) for gap in gaps]),
+        }
+        if any(row.pixels is not None for row in rows):
+            inputs |= {
+                "pixel_values": torch.cat([row.pixels for row in rows if row.pixels is not None]),
+                "image_grid_thw": torch.cat([row.grids for row in rows if row.grids is not None]),
+                "mm_token_type_ids": ids.eq(self._place).int(),
+            }
+        sampling = self._settings.sampling
+        choices = []
+        if sampling.temperature > 0:
+            choices = [_Draw(sampling.temperature, sampling.top_p, [row.seed for row in rows])]
+
+        def closing(input_ids: torch.Tensor, scores: Any, **more: Any) -> torch.Tensor:
+            return torch.full((len(rows),), self._closing.is_set(), device=input_ids.device)
+
+        device = self._model.device
+        out = self._model.generate(
+            **{name: each.to(device) for name, each in inputs.items()},
+            generation_config=self._model.generation_config,
+            logits_processor=choices,
+            stopping_criteria=[closing],
+        )
+        return [self._until_end(each) for each in out[:, longest:].tolist()]
+
+    def _until_end(self, said: list[int]) -> list[int]:
+        """Without what stands where a row is done and others are not."""
+        ends = (place for place, each in enumerate(said, start=1) if each in self._ends)
+        return said[: next(ends, None)]
+
+    def _reply(self, row: _Row, said: Sequence[int]) -> Reply:
+        with self._words:
+            text = self._tokenizer.decode(
+                said, skip_special_tokens=True, clean_up_tokenization_spaces=False
+            )
+        thought, text = _without_thought(text, row.thinking)
+        return Reply(
+            text=text,
+            reasoning=thought,
+            usage=Usage(
+                prompt=len(row.ids),
+                completion=len(said),
+                reasoning=min(len(said), len(self._ids(thought))) if thought else 0,
+            ),
+            finish="stop" if said[-1] in self._ends else "length",
+            model=self._name,
+        )
+
+    def _ids(self, text: str) -> list[int]:
+        with self._words:
+            ids: list[int] = self._tokenizer(text, add_special_tokens=False)["input_ids"]
+        return ids
+
+
+class _Draw:
+    """Draws the next token of each row by the row's own seed, whoever else is in the batch.
+
+    ``generate`` would draw all rows from one source of numbers, so that what is said depended on
+    which conversations happened to wait at the same time. Here each row's logits get noise of its
+    own, such that the largest is any token with just the probability that they give it (Gumbel's
+    trick); ``generate`` then takes the largest.
+    """
+
+    def __init__(self, temperature: float, top_p: float, seeds: Sequence[int]) -> None:
+        self._temperature = temperature
+        self._likeliest = transformers.TopPLogitsWarper(top_p) if top_p < 1 else None
+        self._seeds = seeds
+        self._sources: list[torch.Generator] = []
+
+    def __call__(self, input_ids: torch.Tensor, scores: torch.Tensor) -> torch.Tensor:
+        """Scores with noise; both (rows, words)."""
+        scores = scores / self._temperature
+        if self._likeliest is not None:
+            scores = self._likeliest(input_ids, scores)
+        if not self._sources:  # only now is it known which device the words come from
+            self._sources = [torch.Generator(scores.device).manual_seed(s) for s in self._seeds]
+        noise = torch.empty_like(scores)
+        for row, source in zip(noise, self._sources, strict=True):
+            row.exponential_(generator=source)
+        return scores - noise.log()
+
+
+def _part(part: str | Picture) -> dict[str, str]:
+    return {"type": "text", "text": part} if isinstance(part, str) else {"type": "image"}
+
+
+def _without_thought(text: str, thinking: bool) -> tuple[str, str]:
+    """What was thought, and what was said; ``thinking`` where the first word is thought already."""
+    thought, found, words = text.partition(_THOUGHT)
+    begun = thought.lstrip().startswith(_THINK)
+    if not (found or begun or thinking):
+        return "", text
+    return thought.strip().removeprefix(_THINK).strip(), words.lstrip()
+
+
+def _plainer(error: RuntimeError, rows: Sequence[_Row]) -> Exception:
+    """What torch raises, as the batcher knows it."""
+    if isinstance(error, torch.cuda.OutOfMemoryError) or "DefaultCPUAllocator" in str(error):
+        tokens = max(len(row.ids) for row in rows)
+        return MemoryError(
+            f"{len(rows)} conversations of up to {tokens} tokens do not fit; let local.batch or "
+            "pictures.keep be fewer"
+        )
+    if isinstance(error, getattr(torch, "AcceleratorError", ())):
+        return CannotGoOn(f"the device fails, and this process with it: {one_line(error)}")
+    return error
