@@ -11,7 +11,7 @@ from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture
 from agents.vlm.matching import Matcher
 from agents.vlm.parsing import Parsed, parse
 from agents.vlm.pictures import encode
-from agents.vlm.prompts import PromptSet, parts_of
+from agents.vlm.prompt_set import PromptSet, parts_of
 from agents.vlm.record import (
     ConversationRecord,
     MessageRecord,

@@ -19,7 +19,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TextIO
 
-from agents.vlm.prompts import IMAGE, MARK, Decide, PromptSet, Sees
+from agents.vlm.prompt_set import IMAGE, MARK, Decide, PromptSet, Sees
 from er_gym.envs.actions import parse
 from er_gym.tasks import verbs
 
@@ -27,7 +27,7 @@ ENOUGH = 500
 """So many conversations show what all of them have in common."""
 
 _TASK, _ACTION, _FEEDBACK = "\ufdd1", "\ufdd2", "\ufdd3"
-"""Where these go in a text: no characters, just as :data:`~agents.vlm.prompts.MARK` is none."""
+"""Where these go in a text: no characters, just as :data:`~agents.vlm.prompt_set.MARK` is none."""
 _RESERVED = re.compile(f"[{MARK}{_TASK}{_ACTION}{_FEEDBACK}]")
 _STOPS = ".!?。！？"
 _SLOT = re.compile(f"([{_TASK}{_ACTION}{_FEEDBACK}])([{_STOPS}]?)")

@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from agents.vlm.paper_prompts import ENOUGH, DerivedPrompts
-from agents.vlm.prompts import MARK, load_prompts
+from agents.vlm.prompt_set import MARK
+from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import Prompts
 
 TASKS = (

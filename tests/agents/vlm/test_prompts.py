@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from agents.vlm.chat import Picture
-from agents.vlm.prompts import MARK, THOUGHTS, Decide, PromptSet, Sees, load_prompts, parts_of
+from agents.vlm.prompt_set import MARK, THOUGHTS, Decide, PromptSet, Sees, parts_of
+from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import Prompts
 from er_gym.tasks import verbs
 from er_gym.tasks.suites import config_directory

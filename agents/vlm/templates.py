@@ -1,0 +1,250 @@
+"""Prompts that are Jinja templates: ``configs/prompts``, or a directory like those.
+
+``configs/prompts/README.md`` says what templates there are and what they can use.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import traceback
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+import yaml
+
+from agents.vlm.prompt_set import IMAGE, MARK, THOUGHTS, Decide, Sees, unmarked
+from er_gym.tasks import verbs
+from er_gym.tasks.files import read_text
+from er_gym.tasks.suites import config_directory
+
+if TYPE_CHECKING:
+    from jinja2.sandbox import SandboxedEnvironment
+
+_TEMPLATES = ("system.jinja", "first.jinja", "next.jinja", "feedback.jinja")
+_ACTIONS = "actions.yaml"
+
+
+@dataclass(frozen=True)
+class ActionRow:
+    """An action as templates list it: ``form`` is such as ``navigate to <object>``."""
+
+    form: str
+    meaning: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Templates:
+    """Words that are Jinja templates; a :class:`~agents.vlm.prompt_set.PromptSet`.
+
+    Attributes:
+        files: the name of each template to its path.
+        actions: what can be done.
+    """
+
+    name: str
+    digest: str
+    about: str
+    files: Mapping[str, Path] = field(repr=False)
+    actions: tuple[ActionRow, ...] = field(repr=False)
+    after_observe: int | None = field(default=None, init=False)
+    environment: SandboxedEnvironment = field(repr=False, compare=False)
+
+    def system(self, *, decide: Decide, sees: Sees) -> str:
+        """See :class:`~agents.vlm.prompt_set.PromptSet`."""
+        return self._render("system.jinja", decide=decide, sees=sees)
+
+    def first(
+        self,
+        *,
+        task: str,
+        decide: Decide,
+        sees: Sees,
+        scene_text: str = "",
+        steps: int = 1,
+        max_steps: int = 0,
+    ) -> str:
+        """See :class:`~agents.vlm.prompt_set.PromptSet`."""
+        return self._render(
+            "first.jinja",
+            pictures=int(sees == "pictures"),
+            task=task,
+            decide=decide,
+            sees=sees,
+            scene_text=scene_text,
+            steps=steps,
+            max_steps=max_steps,
+        )
+
+    def next(
+        self,
+        *,
+        task: str,
+        action: str,
+        decide: Decide,
+        sees: Sees,
+        success: bool = True,
+        feedback: str = "",
+        scene_text: str = "",
+        pictures: int = 0,
+        steps: int = 1,
+        max_steps: int = 0,
+    ) -> str:
+        """See :class:`~agents.vlm.prompt_set.PromptSet`."""
+        return self._render(
+            "next.jinja",
+            pictures=pictures,
+            task=task,
+            action=action,
+            decide=decide,
+            sees=sees,
+            success=success,
+            feedback=feedback,
+            scene_text=scene_text,
+            steps=steps,
+            max_steps=max_steps,
+        )
+
+    def feedback(self, *, problem: str, decide: Decide) -> str:
+        """See :class:`~agents.vlm.prompt_set.PromptSet`."""
+        return self._render("feedback.jinja", problem=problem, decide=decide)
+
+    def _render(self, template: str, *, pictures: int = 0, **variables: Any) -> str:
+        given = {
+            name: unmarked(value) if isinstance(value, str) else value
+            for name, value in variables.items()
+        }
+        try:
+            text = self.environment.get_template(template).render(
+                **given, pictures=pictures, actions=self.actions, thoughts=THOUGHTS
+            )
+        except Exception as error:  # a template can raise anything
+            raise ValueError(
+                f"{self._place(error, template)}: {type(error).__name__}: "
+                f"{' '.join(str(error).split())}"
+            ) from None
+        text = text.strip()
+        if text.count(MARK) != pictures:
+            raise ValueError(
+                f"{self.files[template]}: {IMAGE} comes {text.count(MARK)} times, but the "
+                f"pictures are {pictures}; write it once for each of {{{{ pictures }}}}"
+            )
+        return text
+
+    def _place(self, error: Exception, template: str) -> str:
+        """The file, and the line where there is one, in which a template failed."""
+        places = {str(path) for path in self.files.values()}
+        lines = [
+            f"{frame.filename}:{frame.lineno}"
+            for frame in traceback.extract_tb(error.__traceback__)
+            if frame.filename in places
+        ]
+        return lines[-1] if lines else str(self.files[template])
+
+
+def directory_of(profile: str, language: str) -> Path:
+    """Where the templates of a profile are in a language."""
+    bundled = config_directory("prompts")
+    profiles = sorted({file.parents[1].name for file in bundled.glob("*/*/system.jinja")})
+    root = bundled / profile if profile in profiles else Path(profile)
+    languages = sorted(file.parent.name for file in root.glob("*/system.jinja"))
+    if not languages:
+        raise ValueError(
+            f"there are no prompts {profile!r}; give a directory that has LANGUAGE/system.jinja, "
+            f"or one of: {', '.join(profiles)}"
+        )
+    if language not in languages:
+        raise ValueError(
+            f"the prompts {profile!r} are not there in {language!r}; "
+            f"choose one of: {', '.join(languages)}"
+        )
+    return root / language
+
+
+def load_templates(directory: Path) -> Templates:
+    """Read the templates of a directory, and try each out."""
+    files = {file.name: file for file in sorted(directory.glob("*.jinja"))}
+    missing = {*_TEMPLATES} - files.keys()
+    if missing:
+        raise ValueError(f"{directory} lacks {min(missing)}; copy it from another set of prompts")
+    listed = directory / _ACTIONS
+    sources = {file.name: read_text(file) for file in (*files.values(), listed)}
+    digest = hashlib.sha256(repr(sorted(sources.items())).encode())
+    templates = Templates(
+        name=f"{directory.parent.name}/{directory.name}",
+        digest=digest.hexdigest(),
+        about=f"prompts of {directory}",
+        files=files,
+        actions=_rows(sources[_ACTIONS], listed),
+        environment=_environment(files, sources),
+    )
+    _try_out(templates)
+    return templates
+
+
+def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> SandboxedEnvironment:
+    """Of templates that were read once: what is rendered is what the digest is of."""
+    try:
+        from jinja2 import FunctionLoader, StrictUndefined, TemplateSyntaxError
+        from jinja2.sandbox import SandboxedEnvironment
+    except ImportError as error:
+        raise ValueError(
+            f"prompts need {error.name}, which is not installed: pip install 'er-gym[vlm]'"
+        ) from error
+
+    def source(name: str) -> tuple[str, str, None] | None:
+        if name not in files:
+            return None
+        return unmarked(sources[name]).replace(IMAGE, MARK), str(files[name]), None
+
+    environment = SandboxedEnvironment(
+        loader=FunctionLoader(source),
+        undefined=StrictUndefined,
+        autoescape=False,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    for name, file in files.items():
+        try:
+            environment.get_template(name)
+        except TemplateSyntaxError as error:
+            problem = " ".join((error.message or "").split())
+            raise ValueError(f"{file}:{error.lineno}: no template: {problem}") from None
+    return environment
+
+
+def _rows(text: str, file: Path) -> tuple[ActionRow, ...]:
+    """The actions and what they mean, in the file's order."""
+    known = (*verbs.OBJECT_VERBS, *verbs.BARE_VERBS)
+    try:
+        meanings = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ValueError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(meanings, dict) or {*meanings} != {*known}:
+        raise ValueError(f"{file}: say what each of these means, and no other: {', '.join(known)}")
+    return tuple(
+        ActionRow(f"{verb} <object>" if verb in verbs.OBJECT_VERBS else verb, unmarked(str(words)))
+        for verb, words in meanings.items()
+    )
+
+
+def _try_out(templates: Templates) -> None:
+    """Render everything once, so that what is wrong shows before an episode is begun."""
+    shown: dict[Sees, tuple[int, ...]] = {"pictures": (1, 4), "text": (0,)}
+    for decide in get_args(Decide):
+        templates.feedback(problem="It names no action.", decide=decide)
+        for sees, numbers in shown.items():
+            templates.system(decide=decide, sees=sees)
+            templates.first(task="Find a Mug.", decide=decide, sees=sees, max_steps=20)
+            for pictures, success in itertools.product(numbers, (True, False)):
+                templates.next(
+                    task="Find a Mug.",
+                    action="navigate to Fridge",
+                    decide=decide,
+                    sees=sees,
+                    success=success,
+                    pictures=pictures,
+                    max_steps=20,
+                )
