@@ -15,9 +15,11 @@ import click
 
 from benchmarks.cli_bench import bench
 from benchmarks.cli_errors import INTERRUPTED, BadInput, bad_input, complain
+from benchmarks.cli_inspect import inspect
 from benchmarks.cli_options import scorer_option, stdout
 from benchmarks.cli_player import doctor, player
 from benchmarks.cli_render import play, render
+from benchmarks.cli_serve import match_server, serve
 from benchmarks.cli_tasks import tasks
 from benchmarks.cli_train import train_rl
 
@@ -63,6 +65,9 @@ cli.add_command(render)
 cli.add_command(play)
 cli.add_command(tasks)
 cli.add_command(train_rl)
+cli.add_command(serve)
+cli.add_command(match_server)
+cli.add_command(inspect)
 
 
 @cli.command()

@@ -1,0 +1,290 @@
+"""Which existing server runs a model, and how it is told to fit agents that speak.
+
+Nothing here starts a server: :func:`command_for` makes a command line of a model, what is wanted
+and what the machine has.
+
+Sources: ``vllm serve`` of vLLM 0.33, ``transformers serve`` of transformers 5.23, and
+``llama_cpp.server`` of llama-cpp-python 0.3.36.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from agents.vlm.settings import Pictures
+
+HOST = "127.0.0.1"
+"""The only address that a server listens on: none of them asks who is there."""
+
+_ONE_AT_A_TIME = ("--concurrency", "1")
+"""For servers that do not work out several replies at once: conversations that wait for each other
+run into the time-out of a reply."""
+_EYES = "--clip_model_path"
+"""The argument of llama.cpp's server without which a model sees nothing."""
+_SECONDS = 30
+"""How long a program that is asked what there is may take to say so."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """How a model is to be served.
+
+    Attributes:
+        port: of :data:`HOST`.
+        engine: one of :data:`ENGINES`; the fitting one for "".
+        name: what requests call the model; the engine's own choice for "".
+        pictures: how many a conversation may have.
+        context: how many tokens a conversation may have; the engine's own limit here for None.
+        gpus: how many the model is shared out over; all of NVIDIA's that there are for None.
+        more: further arguments of the server, as it takes them.
+    """
+
+    port: int
+    engine: str = ""
+    name: str = ""
+    pictures: int = 40
+    context: int | None = None
+    gpus: int | None = None
+    more: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What there is to serve with.
+
+    Attributes:
+        python: the path of the interpreter that runs the server.
+        packages: which of those that an engine needs it has.
+        gpus: how many of NVIDIA's may be used.
+    """
+
+    python: str
+    packages: frozenset[str]
+    gpus: int
+
+
+@dataclass(frozen=True)
+class Command:
+    """A server's command.
+
+    Attributes:
+        engine: one of :data:`ENGINES`.
+        argv: the command.
+        environment: variables that it needs besides those there are.
+        name: what requests call the model.
+        base_url: where the OpenAI-compatible interface will be.
+        ready_url: answers with 200 once the model is loaded.
+        bench_options: options of ``er-gym bench`` that it calls for.
+    """
+
+    engine: str
+    argv: tuple[str, ...]
+    environment: Mapping[str, str]
+    name: str
+    base_url: str
+    ready_url: str
+    bench_options: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Engine:
+    """A kind of server.
+
+    Attributes:
+        start: what its command begins with, after the interpreter.
+        arguments: of the model, what is wanted and the number of GPUs.
+        name: what requests call a model unless another name is wanted.
+        ready: the path that answers once the model is loaded.
+        needs: packages, by the names they are imported by.
+        install: what brings them.
+        cannot: which of what may be wanted it has no setting for.
+        bench: options of ``er-gym bench`` that it calls for, of what is wanted.
+        environment: of the port.
+    """
+
+    start: tuple[str, ...]
+    arguments: Callable[[str, Wanted, int], list[str]]
+    name: Callable[[str], str]
+    ready: str
+    needs: frozenset[str]
+    install: str
+    cannot: tuple[str, ...] = ()
+    bench: Callable[[Wanted], tuple[str, ...]] = lambda wanted: _ONE_AT_A_TIME
+    environment: Callable[[int], dict[str, str]] = field(default=lambda port: {})
+
+
+def _vllm(model: str, wanted: Wanted, gpus: int) -> list[str]:
+    bounds = Pictures()
+    pixels = {"min_pixels": bounds.min_pixels, "max_pixels": bounds.max_pixels}
+    return [
+        model,
+        *("--host", HOST, "--port", str(wanted.port)),
+        *("--served-model-name", wanted.name or model),
+        *("--max-model-len", str(wanted.context or 32_768)),
+        *("--tensor-parallel-size", str(max(gpus, 1))),
+        # What is said at a turn is what was said at the last, and a little more.
+        "--enable-prefix-caching",
+        # Models without eyes ignore both. No video: memory would be kept for the longest there is.
+        *("--limit-mm-per-prompt", json.dumps({"image": wanted.pictures, "video": 0})),
+        *("--mm-processor-kwargs", json.dumps(pixels)),
+    ]
+
+
+def _transformers(model: str, wanted: Wanted, gpus: int) -> list[str]:
+    return [model, "--host", HOST, "--port", str(wanted.port)]
+
+
+def _llama_cpp(model: str, wanted: Wanted, gpus: int) -> list[str]:
+    return [
+        *("--model", model, "--model_alias", wanted.name or Path(model).stem),
+        *("--host", HOST, "--port", str(wanted.port)),
+        *("--n_ctx", str(wanted.context or 8_192)),
+        *("--n_gpu_layers", "-1" if gpus else "0"),
+        # Otherwise it keeps a number for each token of the context and word of the vocabulary.
+        *("--logits_all", "false"),
+    ]
+
+
+def _bench_of_llama_cpp(wanted: Wanted) -> tuple[str, ...]:
+    blind = () if _EYES in wanted.more else ("--agent-config", "text")
+    return (*_ONE_AT_A_TIME, *blind)
+
+
+ENGINES: dict[str, _Engine] = {
+    "vllm": _Engine(
+        ("-m", "vllm.entrypoints.cli.main", "serve"),
+        _vllm,
+        name=str,
+        ready="/health",
+        needs=frozenset({"vllm"}),
+        install="vllm",
+        bench=lambda wanted: (),
+    ),
+    "transformers": _Engine(
+        ("-m", "transformers.cli.transformers", "serve"),
+        _transformers,
+        name=str,
+        ready="/health",
+        needs=frozenset({"transformers", "fastapi", "uvicorn", "openai", "torch"}),
+        install="'transformers[serving]>=5.13' torchvision",
+        cannot=("name", "context"),
+        # Otherwise it looks on the internet for a newer version of itself.
+        environment=lambda port: {"HF_HUB_DISABLE_UPDATE_CHECK": "1"},
+    ),
+    "llama_cpp": _Engine(
+        ("-m", "llama_cpp.server"),
+        _llama_cpp,
+        name=lambda model: Path(model).stem,
+        ready="/v1/models",
+        needs=frozenset({"llama_cpp", "fastapi", "uvicorn", "sse_starlette", "starlette_context"}),
+        install="'llama-cpp-python[server]'",
+        bench=_bench_of_llama_cpp,
+        # These overrule its arguments, and a shell may have them for another reason.
+        environment=lambda port: {"HOST": HOST, "PORT": str(port)},
+    ),
+}
+"""The servers that are known, by name."""
+
+
+def command_for(model: str, wanted: Wanted, machine: Machine) -> Command:
+    """The command that serves a model.
+
+    A ``.gguf`` file is for llama.cpp; any other model for vLLM where that and a GPU are there, and
+    otherwise for transformers.
+
+    Args:
+        model: a directory, a ``.gguf`` file, or a name on a model hub.
+        wanted: how.
+        machine: what is there to serve with.
+
+    Raises:
+        ValueError: nothing that is installed can serve it, or not so.
+    """
+    gpus = machine.gpus if wanted.gpus is None else wanted.gpus
+    name = wanted.engine or _fitting(model, machine.packages, gpus)
+    if name not in ENGINES:
+        raise ValueError(f"unknown engine {name!r}; choose one of: {', '.join(ENGINES)}")
+    engine = ENGINES[name]
+    lacking = engine.needs - machine.packages
+    if lacking:
+        raise ValueError(
+            f"{model} is for {name} to serve, and {machine.python} lacks "
+            f"{', '.join(sorted(lacking))}: {machine.python} -m pip install {engine.install}, or "
+            "name another Python that has it"
+        )
+    for setting in engine.cannot:
+        if getattr(wanted, setting):
+            raise ValueError(
+                f"{name} has no setting for the {setting} {getattr(wanted, setting)!r}; leave it "
+                "out, or choose another engine"
+            )
+    origin = f"http://{HOST}:{wanted.port}"
+    return Command(
+        engine=name,
+        argv=(
+            machine.python,
+            *engine.start,
+            *engine.arguments(model, wanted, gpus),
+            *wanted.more,
+        ),
+        environment=engine.environment(wanted.port),
+        name=wanted.name or engine.name(model),
+        base_url=f"{origin}/v1",
+        ready_url=f"{origin}{engine.ready}",
+        bench_options=engine.bench(wanted),
+    )
+
+
+def _fitting(model: str, packages: frozenset[str], gpus: int) -> str:
+    if model.lower().endswith(".gguf"):
+        return "llama_cpp"
+    return "vllm" if gpus and "vllm" in packages else "transformers"
+
+
+def look_around(python: str, environment: Mapping[str, str] = os.environ) -> Machine:
+    """What this machine has to serve with.
+
+    Args:
+        python: the path of an interpreter. A server often has a virtual environment of its own.
+        environment: the environment's variables.
+
+    Raises:
+        ValueError: it is no interpreter that runs.
+    """
+    asked = sorted(set().union(*(engine.needs for engine in ENGINES.values())))
+    question = f"import importlib.util as u; print(*filter(u.find_spec, {asked!r}))"
+    try:
+        has = _said([python, "-c", question])
+    except (OSError, subprocess.SubprocessError) as error:
+        raise ValueError(
+            f"{python} does not run as a Python ({error}); give the path of one, such as "
+            "venv/bin/python"
+        ) from error
+    return Machine(python, frozenset(has.split()), _gpus(environment))
+
+
+def _gpus(environment: Mapping[str, str]) -> int:
+    """How many GPUs there are by ``nvidia-smi``, or as many as ``CUDA_VISIBLE_DEVICES`` leaves."""
+    program = shutil.which("nvidia-smi", path=environment.get("PATH", os.defpath))
+    if program is None:
+        return 0
+    try:
+        there = _said([program, "-L"]).count("GPU ")
+    except (OSError, subprocess.SubprocessError):
+        return 0
+    visible = environment.get("CUDA_VISIBLE_DEVICES")
+    if visible is None:
+        return there
+    return min(there, len([each for each in visible.split(",") if each.strip() not in ("", "-1")]))
+
+
+def _said(argv: list[str]) -> str:
+    return subprocess.run(
+        argv, capture_output=True, text=True, timeout=_SECONDS, check=True
+    ).stdout.strip()

@@ -1,0 +1,57 @@
+"""Runs a command, and ends it with all that it started once standard input ends.
+
+``python guard.py COMMAND…``: whoever starts this holds the other end of a pipe as its input.
+However the holder ends, SIGKILL included, the kernel closes that end, so that nothing stays behind.
+Run by its path, it needs nothing but the standard library.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+GRACE = 15.0
+"""Seconds that the command has for ending by itself."""
+
+
+def main(argv: list[str]) -> int:
+    """Run the command until it ends or is to end.
+
+    Returns:
+        Its exit code; 128 and the signal's number if a signal ended it; 127 if it cannot be run.
+    """
+    try:
+        child = subprocess.Popen(argv, stdin=subprocess.DEVNULL, start_new_session=True)
+    except OSError as error:
+        print(f"{argv[0]} cannot be run: {error}", file=sys.stderr)
+        return 127
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, lambda *_: _signal(child.pid, signal.SIGTERM))
+    threading.Thread(target=_end_with_input, args=(child.pid,), daemon=True).start()
+    # Not reaped yet, its number is its group's and nobody else's.
+    os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT)
+    _signal(child.pid, signal.SIGKILL)
+    code = child.wait()
+    return code if code >= 0 else 128 - code
+
+
+def _end_with_input(group: int) -> None:
+    while os.read(0, 1024):
+        pass
+    _signal(group, signal.SIGTERM)
+    time.sleep(GRACE)
+    _signal(group, signal.SIGKILL)
+
+
+def _signal(group: int, number: signal.Signals) -> None:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(group, number)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
