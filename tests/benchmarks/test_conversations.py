@@ -141,6 +141,37 @@ def test_pictures_are_kept_beside_the_conversation(tmp_path: Path) -> None:
     assert sum("data:image/jpeg;base64," in json.dumps(body) for body in bodies) == len(bodies)
 
 
+def test_the_words_of_a_training_file_are_used(tmp_path: Path) -> None:
+    def sample(task: str) -> dict[str, Any]:
+        return {
+            "messages": [
+                {"role": "system", "content": "You were trained."},
+                {"role": "user", "content": f"<image>Look. Your job: {task} Go."},
+                {
+                    "role": "assistant",
+                    "content": "<DecisionMaking>navigate to Bed</DecisionMaking>",
+                },
+                {"role": "user", "content": "<image>That was: navigate to Bed. And now?"},
+                {"role": "assistant", "content": "<DecisionMaking>end</DecisionMaking>"},
+            ]
+        }
+
+    dataset = tmp_path / "train.json"
+    dataset.write_text(
+        json.dumps([sample("Find the Mug."), sample("Open a Fridge."), sample("X.")])
+    )
+    size = ("--set", "pictures.width=64", "--set", "pictures.height=48", "--set", "sees=pictures")
+    with naughty.NaughtyServer("<DecisionMaking>end</DecisionMaking>") as server:
+        more = ("--limit", "1", "--prompts-from", str(dataset), *size)
+        result = bench(server.url, tmp_path / "run", *more)
+    assert result.return_value == 0, result.output
+    system, user = server.seen[0].json["messages"]
+    assert system["content"] == "You were trained."
+    picture, words = user["content"]
+    assert picture["type"] == "image_url"
+    assert words["text"] == f"Look. Your job: {TASKS[0].instruction} Go."
+
+
 def test_a_recorded_run_is_played_again_without_a_server(tmp_path: Path) -> None:
     with naughty.NaughtyServer(short) as server:
         bench(server.url, tmp_path / "a", "--limit", "4")
