@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 from stable_baselines3.common.callbacks import BaseCallback
 
+from agents.configs import dump
 from agents.rl.callbacks import MODEL, read_curve
-from agents.rl.config import TrainConfig, dump
+from agents.rl.config import TrainConfig
 from agents.rl.train import RunConflict, load_last, train
 
 Make = Callable[..., TrainConfig]
