@@ -11,7 +11,7 @@ from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture
 from agents.vlm.matching import Matcher
 from agents.vlm.parsing import Parsed, parse
 from agents.vlm.pictures import encode
-from agents.vlm.prompt_set import PromptSet, parts_of
+from agents.vlm.prompt_set import Did, Now, PromptSet, parts_of
 from agents.vlm.record import (
     ConversationRecord,
     MessageRecord,
@@ -110,30 +110,29 @@ class VLMAgent:
         """The user's next turn: the task, or what came of the last action."""
         assert self._task is not None
         pictures = self._pictures(obs, info)
-        common: dict[str, Any] = {
-            "task": self._task.instruction,
-            "decide": self._settings.decide,
-            "sees": self._settings.sees,
-            "scene_text": obs.get("text", ""),
-            "steps": info["steps"],
-            "max_steps": self._task.max_steps,
-        }
+        now = Now(
+            task=self._task.instruction,
+            decide=self._settings.decide,
+            sees=self._settings.sees,
+            scene_text=obs.get("text", ""),
+            steps=info["steps"],
+            max_steps=self._task.max_steps,
+        )
         if not self._rounds:
-            return Message("user", parts_of(self._prompts.first(**common), pictures))
+            return Message("user", parts_of(self._prompts.first(now), pictures))
         last = self._rounds[-1] = self._rounds[-1].model_copy(
             update={"feedback": info["feedback"], "success": bool(info["action_success"])}
         )
         if last.problem:
             told = self._prompts.feedback(problem=last.problem, decide=self._settings.decide)
             return Message("user", (told,))
-        text = self._prompts.next(
+        did = Did(
             action=last.action,
-            feedback=last.feedback,
             success=last.success,
+            feedback=last.feedback,
             pictures=len(pictures),
-            **common,
         )
-        return Message("user", parts_of(text, pictures))
+        return Message("user", parts_of(self._prompts.next(now, did), pictures))
 
     def _pictures(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> list[Picture]:
         """What is seen: after an ``observe`` the views to the right, behind and left, as many as

@@ -19,7 +19,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TextIO
 
-from agents.vlm.prompt_set import IMAGE, MARK, Decide, PromptSet, Sees
+from agents.vlm.prompt_set import IMAGE, MARK, Decide, Did, Now, PromptSet, Sees
 from er_gym.envs.actions import parse
 from er_gym.tasks import verbs
 
@@ -110,39 +110,17 @@ class DerivedPrompts:
             )
         return self.words.system
 
-    def first(
-        self,
-        *,
-        task: str,
-        decide: Decide,
-        sees: Sees,
-        scene_text: str = "",
-        steps: int = 1,
-        max_steps: int = 0,
-    ) -> str:
+    def first(self, now: Now) -> str:
         """See :class:`PromptSet`."""
-        return _with_pictures(_filled(self.words.first, {_TASK: task}), 1)
+        return _with_pictures(_filled(self.words.first, {_TASK: now.task}), 1)
 
-    def next(
-        self,
-        *,
-        task: str,
-        action: str,
-        decide: Decide,
-        sees: Sees,
-        success: bool = True,
-        feedback: str = "",
-        scene_text: str = "",
-        pictures: int = 0,
-        steps: int = 1,
-        max_steps: int = 0,
-    ) -> str:
+    def next(self, now: Now, did: Did) -> str:
         """See :class:`PromptSet`. Where no action of the file fails, feedback stands at the end."""
-        text = self.words.after.get(_verb(action), self.words.usual)
-        if not success:
+        text = self.words.after.get(_verb(did.action), self.words.usual)
+        if not did.success:
             text = self.words.failed or f"{text}\n{_FEEDBACK}"
-        values = {_TASK: task, _ACTION: action, _FEEDBACK: feedback}
-        return _with_pictures(_filled(text, values), pictures)
+        values = {_TASK: now.task, _ACTION: did.action, _FEEDBACK: did.feedback}
+        return _with_pictures(_filled(text, values), did.pictures)
 
     def feedback(self, *, problem: str, decide: Decide) -> str:
         """See :class:`PromptSet`. The paper's files have no such turn: er-gym's own words."""

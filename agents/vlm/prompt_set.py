@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal, Protocol, TypeAlias
 
 from agents.vlm.chat import Part, Picture
@@ -17,6 +18,41 @@ IMAGE = "<image>"
 MARK = "\ufdd0"
 """The same in rendered text. It is no character, so that nobody writes it: an ``<image>`` in the
 words of a task is just that."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Now:
+    """What a turn is about.
+
+    Attributes:
+        task: its instruction.
+        decide, sees: as :class:`~agents.vlm.settings.AgentSettings` has them.
+        scene_text: the environment's observation ``text``, for ``sees="text"``.
+        steps: taken so far; ``max_steps``: of the episode, 0 where it is not known.
+    """
+
+    task: str
+    decide: Decide
+    sees: Sees
+    scene_text: str = ""
+    steps: int = 1
+    max_steps: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Did:
+    """What was done last.
+
+    Attributes:
+        action: such as ``navigate to Fridge``.
+        success, feedback: the environment's answer.
+        pictures: how many it shows.
+    """
+
+    action: str
+    success: bool = True
+    feedback: str = ""
+    pictures: int = 0
 
 
 class PromptSet(Protocol):
@@ -43,45 +79,11 @@ class PromptSet(Protocol):
     def system(self, *, decide: Decide, sees: Sees) -> str:
         """What the model is and how it replies; "" where there is no such message."""
 
-    def first(
-        self,
-        *,
-        task: str,
-        decide: Decide,
-        sees: Sees,
-        scene_text: str = "",
-        steps: int = 1,
-        max_steps: int = 0,
-    ) -> str:
-        """The first turn: the task, and what is seen, in one picture or in words.
+    def first(self, now: Now) -> str:
+        """The first turn: the task, and what is seen, in one picture or in words."""
 
-        Args:
-            task: its instruction.
-            scene_text: the environment's observation ``text``, for ``sees="text"``.
-            steps: taken so far; ``max_steps``: of the episode, 0 where it is not known.
-        """
-
-    def next(
-        self,
-        *,
-        task: str,
-        action: str,
-        decide: Decide,
-        sees: Sees,
-        success: bool = True,
-        feedback: str = "",
-        scene_text: str = "",
-        pictures: int = 0,
-        steps: int = 1,
-        max_steps: int = 0,
-    ) -> str:
-        """The turn after an action.
-
-        Args:
-            action: what was done, such as ``navigate to Fridge``.
-            success, feedback: the environment's answer.
-            pictures: how many are shown.
-        """
+    def next(self, now: Now, did: Did) -> str:
+        """The turn after an action."""
 
     def feedback(self, *, problem: str, decide: Decide) -> str:
         """The turn after a reply that names no action that can be taken; without a picture.

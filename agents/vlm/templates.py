@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import yaml
 
-from agents.vlm.prompt_set import IMAGE, MARK, THOUGHTS, Decide, Sees, unmarked
+from agents.vlm.prompt_set import IMAGE, MARK, THOUGHTS, Decide, Did, Now, Sees, unmarked
 from er_gym.tasks import verbs
 from er_gym.tasks.files import read_text
 from er_gym.tasks.suites import config_directory
@@ -56,56 +56,13 @@ class Templates:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
         return self._render("system.jinja", decide=decide, sees=sees)
 
-    def first(
-        self,
-        *,
-        task: str,
-        decide: Decide,
-        sees: Sees,
-        scene_text: str = "",
-        steps: int = 1,
-        max_steps: int = 0,
-    ) -> str:
+    def first(self, now: Now) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
-        return self._render(
-            "first.jinja",
-            pictures=int(sees == "pictures"),
-            task=task,
-            decide=decide,
-            sees=sees,
-            scene_text=scene_text,
-            steps=steps,
-            max_steps=max_steps,
-        )
+        return self._render("first.jinja", pictures=int(now.sees == "pictures"), **vars(now))
 
-    def next(
-        self,
-        *,
-        task: str,
-        action: str,
-        decide: Decide,
-        sees: Sees,
-        success: bool = True,
-        feedback: str = "",
-        scene_text: str = "",
-        pictures: int = 0,
-        steps: int = 1,
-        max_steps: int = 0,
-    ) -> str:
+    def next(self, now: Now, did: Did) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
-        return self._render(
-            "next.jinja",
-            pictures=pictures,
-            task=task,
-            action=action,
-            decide=decide,
-            sees=sees,
-            success=success,
-            feedback=feedback,
-            scene_text=scene_text,
-            steps=steps,
-            max_steps=max_steps,
-        )
+        return self._render("next.jinja", **vars(now), **vars(did))
 
     def feedback(self, *, problem: str, decide: Decide) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
@@ -237,14 +194,8 @@ def _try_out(templates: Templates) -> None:
         templates.feedback(problem="It names no action.", decide=decide)
         for sees, numbers in shown.items():
             templates.system(decide=decide, sees=sees)
-            templates.first(task="Find a Mug.", decide=decide, sees=sees, max_steps=20)
+            now = Now(task="Find a Mug.", decide=decide, sees=sees, max_steps=20)
+            templates.first(now)
             for pictures, success in itertools.product(numbers, (True, False)):
-                templates.next(
-                    task="Find a Mug.",
-                    action="navigate to Fridge",
-                    decide=decide,
-                    sees=sees,
-                    success=success,
-                    pictures=pictures,
-                    max_steps=20,
-                )
+                did = Did(action="navigate to Fridge", success=success, pictures=pictures)
+                templates.next(now, did)

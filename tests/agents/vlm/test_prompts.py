@@ -6,12 +6,13 @@ import itertools
 import re
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from agents.vlm.chat import Picture
-from agents.vlm.prompt_set import MARK, THOUGHTS, Decide, PromptSet, Sees, parts_of
+from agents.vlm.prompt_set import MARK, THOUGHTS, Decide, Did, Now, PromptSet, Sees, parts_of
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import Prompts
 from er_gym.tasks import verbs
@@ -51,21 +52,17 @@ def written(profile: Path, template: str, text: str) -> PromptSet:
 def said(prompts: PromptSet, decide: Decide, sees: Sees) -> list[str]:
     """Everything that a set says."""
     scene, pictures = ("You see: Fridge.", 0) if sees == "text" else ("", 1)
-    first = prompts.first(
-        task=TASK, decide=decide, sees=sees, scene_text=scene, steps=1, max_steps=30
-    )
+    now = Now(task=TASK, decide=decide, sees=sees, scene_text=scene, steps=1, max_steps=30)
+    first = prompts.first(now)
     turns = [
         prompts.next(
-            task=TASK,
-            action=action,
-            decide=decide,
-            sees=sees,
-            success=success,
-            feedback="You cannot.",
-            scene_text=scene,
-            pictures=4 if pictures and action == verbs.OBSERVE else pictures,
-            steps=7,
-            max_steps=max_steps,
+            replace(now, steps=7, max_steps=max_steps),
+            Did(
+                action=action,
+                success=success,
+                feedback="You cannot.",
+                pictures=4 if pictures and action == verbs.OBSERVE else pictures,
+            ),
         )
         for action in ("navigate to Fridge", verbs.OBSERVE)
         for success in (True, False)
@@ -114,7 +111,7 @@ def test_how_to_reply(prompts: PromptSet) -> None:
 
 
 def test_every_action_is_explained(prompts: PromptSet) -> None:
-    text = prompts.first(task=TASK, decide="tags", sees="pictures")
+    text = prompts.first(Now(task=TASK, decide="tags", sees="pictures"))
     lines = text.splitlines()
     for verb in ALL_VERBS:
         form = f"- {verb} <object>" if verb in verbs.OBJECT_VERBS else f"- {verb}"
@@ -124,16 +121,10 @@ def test_every_action_is_explained(prompts: PromptSet) -> None:
 
 def test_what_came_of_an_action(prompts: PromptSet) -> None:
     def turn(success: bool) -> str:
+        now = Now(task=TASK, decide="tags", sees="pictures", steps=7, max_steps=30)
+        feedback = "It is open already."
         return prompts.next(
-            task=TASK,
-            action="open Fridge",
-            decide="tags",
-            sees="pictures",
-            success=success,
-            feedback="It is open already.",
-            pictures=1,
-            steps=7,
-            max_steps=30,
+            now, Did(action="open Fridge", success=success, feedback=feedback, pictures=1)
         )
 
     for success in (True, False):
@@ -145,10 +136,8 @@ def test_what_came_of_an_action(prompts: PromptSet) -> None:
 
 def test_words_instead_of_pictures(prompts: PromptSet) -> None:
     scene = "Task: Find it.\nStep 3 of 9.\nYou see: Fridge."
-    first = prompts.first(task=TASK, decide="tags", sees="text", scene_text=scene)
-    later = prompts.next(
-        task=TASK, action="open Fridge", decide="tags", sees="text", scene_text=scene
-    )
+    now = Now(task=TASK, decide="tags", sees="text", scene_text=scene)
+    first, later = prompts.first(now), prompts.next(now, Did(action="open Fridge"))
     assert scene in first
     assert scene in later
 
@@ -211,10 +200,8 @@ def test_marks_without_pictures(text: str, pictures: int) -> None:
 @pytest.mark.parametrize("odd", ["<image>", MARK, "{{ task }}", "{% for %}", "<image><image>"])
 def test_a_task_may_say_anything(prompts: PromptSet, odd: str) -> None:
     task = f"Find the {odd} Mug."
-    for text in (
-        prompts.first(task=task, decide="tags", sees="pictures"),
-        prompts.next(task=task, action="end", decide="tags", sees="pictures", pictures=1),
-    ):
+    now = Now(task=task, decide="tags", sees="pictures")
+    for text in (prompts.first(now), prompts.next(now, Did(action="end", pictures=1))):
         parts = parts_of(text, [ONE])
         assert parts.count(ONE) == 1
         assert f"Find the {odd.replace(MARK, '')} Mug." in "".join(
