@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import anyio
 import anyio.to_thread
@@ -52,7 +52,6 @@ from benchmarks.engines import Engines
 from benchmarks.episode import EpisodeRecord
 from benchmarks.metrics import CORRECTED, METRICS, score_episode
 from benchmarks.play import episode_seed, play_episode
-from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
@@ -133,6 +132,7 @@ def episode(
 ) -> Solver:
     """Plays the sample's task with the model, in an environment in a process of its own."""
     prompts, matcher = load_prompts(settings.prompts), Matcher(settings.matching)
+    matcher.prepare()
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
         model, line = get_model(), _Line()
@@ -144,7 +144,7 @@ def episode(
             try:
                 with Engines(1, 1, env) as engines:
                     return play_episode(
-                        cast(EmbodiedEnv, engines.env(0)),  # reset and step are all that is asked
+                        engines.env(0),
                         agent,
                         played,
                         number,
