@@ -85,8 +85,8 @@ def test_uninstalling_nothing_is_bad_input(er_gym):
 
 def lines(out: str) -> dict[str, str]:
     """A part's name to its whole line."""
-    parts = ["embedded engine", "renderer", "player", "Unity build", "GPU", "extra rl", "extra trl"]
-    parts += ["extra vlm", "extra match"]
+    parts = ["embedded engine", "renderer", "player", "Unity build", "GPU"]
+    parts += [f"extra {name}" for name in doctor.EXTRAS]
     found = {part: line for line in out.splitlines() for part in parts if line[4:].startswith(part)}
     assert list(found) == parts
     assert len(out.splitlines()) == len(parts)
