@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli_errors import CRASHED, INTERRUPTED, STOPPED, BadInput, bad_input, complain
-from benchmarks.cli_options import scorer_option, split, stdout
+from benchmarks.cli_options import (
+    agent_config_option,
+    overrides_option,
+    scorer_option,
+    split,
+    stdout,
+)
 
 if TYPE_CHECKING:
     from benchmarks.episode import EpisodeRecord
@@ -43,14 +49,8 @@ class Spoken:
 
 
 _SPOKEN_OPTIONS = (
-    click.option("--agent-config", metavar="FILE", help="Its settings, in YAML, or their name."),
-    click.option(
-        "--set",
-        "overrides",
-        multiple=True,
-        metavar="NAME=VALUE",
-        help="Overrule a setting, such as sampling.temperature=0.7; again and again.",
-    ),
+    agent_config_option,
+    overrides_option("sampling.temperature=0.7"),
     click.option("--base-url", metavar="URL", help="Where its server is."),
     click.option(
         "--prompts-from",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli_errors import CRASHED, BadInput, bad_input, complain
+from benchmarks.cli_options import agent_config_option, overrides_option
 
 if TYPE_CHECKING:
     from inspect_ai.log import EvalLog
@@ -18,14 +19,8 @@ if TYPE_CHECKING:
     "--model", required=True, help="As Inspect names it: openai/gpt-4o, vllm/…, mockllm/model."
 )
 @click.option("--model-base-url", metavar="URL", help="Where the model's server is.")
-@click.option("--agent-config", metavar="FILE", help="The agent's settings, or their name.")
-@click.option(
-    "--set",
-    "overrides",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Overrule a setting, such as sees=text; again and again.",
-)
+@agent_config_option
+@overrides_option("sees=text")
 @click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option(

@@ -29,6 +29,21 @@ workers_option = click.option(
     help="How many processes.  [default: one for each processor]",
 )
 
+agent_config_option = click.option(
+    "--agent-config", metavar="FILE", help="An agent's settings, in YAML, or their name."
+)
+
+
+def overrides_option(example: str) -> Any:
+    """``--set NAME=VALUE``, which overrules settings of a file."""
+    return click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="NAME=VALUE",
+        help=f"Overrule a setting, such as {example}; again and again.",
+    )
+
 
 def split(*lists: str | None) -> list[str]:
     """The words of comma-separated lists."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli_errors import INTERRUPTED, BadInput, bad_input, complain
+from benchmarks.cli_options import agent_config_option, overrides_option
 
 if TYPE_CHECKING:
     from agents.vlm.serving import Command
@@ -108,14 +109,8 @@ def serve(
     show_default=True,
     help="0: a free one.",
 )
-@click.option("--agent-config", metavar="FILE", help="An agent's settings, or their name.")
-@click.option(
-    "--set",
-    "overrides",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Overrule a setting, such as matching.fuzzy=90; again and again.",
-)
+@agent_config_option
+@overrides_option("matching.fuzzy=90")
 def match_server(port: int, agent_config: str | None, overrides: tuple[str, ...]) -> int:
     """Tell over HTTP what object types names stand for, at /match.
 

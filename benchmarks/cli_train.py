@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from benchmarks.cli_errors import INTERRUPTED, BadInput, bad_input, complain
+from benchmarks.cli_options import overrides_option
 
 
 @click.command(name="train-rl")
@@ -17,14 +18,7 @@ from benchmarks.cli_errors import INTERRUPTED, BadInput, bad_input, complain
     metavar="FILE",
     help="A training run in YAML, or the name of one that comes with er-gym.",
 )
-@click.option(
-    "--set",
-    "overrides",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Overrule a setting, such as total_steps=20000 or env.types=[single_search]; again and "
-    "again.",
-)
+@overrides_option("total_steps=20000 or env.types=[single_search]")
 @click.option("--seed", type=click.IntRange(min=0), help="[default: the configuration's]")
 @click.option(
     "--out",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,16 +60,14 @@ def speaks(name: str) -> bool:
     return kind in CLIENTS and bool(colon and rest)
 
 
-def load_settings(
-    name: str | None, overrides: tuple[str, ...] = (), more: Mapping[str, Any] | None = None
-) -> AgentSettings:
+def load_settings(name: str | None, overrides: Sequence[str] = ()) -> AgentSettings:
     """The settings of an agent: a file of ``configs/agents`` by name, or any by path.
 
     Raises:
         ValueError: there is no such file, or it does not fit, or an override does not.
     """
     file = configs.file_of("agents", name, _WHAT) if name else None
-    return configs.load(AgentSettings, file, _WHAT, overrides, more)
+    return configs.load(AgentSettings, file, _WHAT, overrides)
 
 
 class Speaker:

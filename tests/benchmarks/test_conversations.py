@@ -188,6 +188,7 @@ def test_a_recorded_run_is_played_again_without_a_server(tmp_path: Path) -> None
         for x in "ab"
     ]
     assert played[0] == played[1]
+    assert ledger(tmp_path / "b") == []  # what is replayed has been paid for
 
 
 @pytest.mark.parametrize(
