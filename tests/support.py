@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from er_gym.tasks.task import KeyAction, Task, type_of_id
@@ -24,3 +25,20 @@ def make_task(
         KeyAction(verb, object_id, type_of_id(object_id)) for verb, object_id in key_actions
     )
     return Task("test", task_type(kind), scene, instruction, (*keys, KeyAction("end")), **fields)
+
+
+def no_directory(folder: Path) -> Path:
+    return folder / "none" / "here"
+
+
+def empty_directory(folder: Path) -> Path:
+    return folder
+
+
+def damaged_model(folder: Path) -> Path:
+    (folder / "modules.json").write_text("[{", encoding="utf-8")
+    return folder
+
+
+NO_MODELS = (no_directory, empty_directory, damaged_model)
+"""Each makes, in a folder, what is no model of sentence-transformers."""

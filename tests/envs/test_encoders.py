@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import NO_MODELS
 
 from er_gym.envs.wrappers import make_encoder
 from er_gym.tasks.suites import load_suite
@@ -196,20 +197,7 @@ def test_a_real_model_knows_what_words_mean(minilm: str) -> None:
     assert pickle.loads(pickle.dumps(encoder)) is encoder
 
 
-def no_directory(folder: Path) -> Path:
-    return folder / "none" / "here"
-
-
-def empty_directory(folder: Path) -> Path:
-    return folder
-
-
-def damaged_model(folder: Path) -> Path:
-    (folder / "modules.json").write_text("[{", encoding="utf-8")
-    return folder
-
-
-@pytest.mark.parametrize("make", [no_directory, empty_directory, damaged_model])
+@pytest.mark.parametrize("make", NO_MODELS)
 def test_a_real_directory_without_a_model(
     make: Callable[[Path], Path], tmp_path: Path, minilm: str
 ) -> None:

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from support import NO_MODELS
 
 from agents.vlm import matching
 from agents.vlm.matching import Match, Matcher
@@ -321,20 +322,7 @@ def test_the_same_from_many_threads_and_in_whatever_company(by_meaning: Matcher)
     assert [by_meaning.match(name) for name in reversed(names)] == together[::-1]
 
 
-def no_directory(folder: Path) -> Path:
-    return folder / "none" / "here"
-
-
-def empty_directory(folder: Path) -> Path:
-    return folder
-
-
-def damaged_model(folder: Path) -> Path:
-    (folder / "modules.json").write_text("[{", encoding="utf-8")
-    return folder
-
-
-@pytest.mark.parametrize("make", [no_directory, empty_directory, damaged_model])
+@pytest.mark.parametrize("make", NO_MODELS)
 def test_a_model_that_cannot_be_loaded(
     make: Callable[[Path], Path], tmp_path: Path, model: str
 ) -> None:
