@@ -80,10 +80,10 @@ def _in_order(world: World, agent: Agent, feet: np.ndarray) -> bool:
 
 
 def clashes(world: World, i: int, receptacle: int) -> list[int]:
-    """What object i overlaps by more than a touch, in all three axes.
+    """What object i overlaps by more than a touch, whichever way one looks.
 
-    Loose and moveable things count, less those that it lies in and the furniture that its
-    receptacle is part of, as a drawer is of a dresser.
+    Loose and moveable things count, the loose ones by their oriented boxes, less those that it lies
+    in and the furniture that its receptacle is part of, as a drawer is of a dresser.
     """
     middle = (world.low[receptacle] + world.high[receptacle]) / 2
     aside = {i, *world.inside(i), *world.ancestors(i)}
@@ -99,9 +99,28 @@ def clashes(world: World, i: int, receptacle: int) -> list[int]:
         else:
             continue
         depth = np.minimum(boxes[:, 1], world.high[i]) - np.maximum(boxes[:, 0], world.low[i])
-        if (depth > _TOUCH).all(axis=1).any():
+        if (depth > _TOUCH).all(axis=1).any() and not (
+            world.has(k, "pickupable") and _apart(world, i, k)
+        ):
             found.append(k)
     return found
+
+
+def _apart(world: World, i: int, k: int) -> bool:
+    """Whether a plumb line on the floor plan parts the oriented boxes of two things, but for a
+    touch: one that runs along an edge of either."""
+    plans = [corners[:, [0, 2]] for j in (i, k) if (corners := world.obb_corners(j)) is not None]
+    if len(plans) < 2:
+        return False
+    for plan in plans:
+        for edge in plan[[1, 3, 4]] - plan[0]:
+            across = np.array([-edge[1], edge[0]])
+            length = np.linalg.norm(across)
+            if length > _TOUCH:
+                one, other = (corners @ across / length for corners in plans)
+                if min(one.max(), other.max()) - max(one.min(), other.min()) <= _TOUCH:
+                    return True
+    return False
 
 
 def _in_view(world: World, agent: Agent, points: np.ndarray) -> np.ndarray:

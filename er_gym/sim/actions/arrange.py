@@ -194,9 +194,12 @@ def initial_random_spawn(
 
 
 def _spawn(world: World, i: int, receptacle: int, random: np.random.Generator) -> bool:
-    """Put object i at the free spot nearest to a random point of a receptacle, if it has any."""
+    """Put object i at the free spot nearest to a random point of a receptacle, if it has any.
+
+    A receptacle that is nearly full counts as full: there are others.
+    """
     point = random.uniform(world.low[receptacle], world.high[receptacle])[[0, 2]]
-    for yaw, foot in islice(free_spots(world, i, receptacle, point), 1):
+    for yaw, foot in islice(free_spots(world, i, receptacle, point, squeeze=False), 1):
         put_down(world, i, yaw, foot, [receptacle])
         return True
     return False

@@ -41,7 +41,7 @@ _SIDE_BY_SIDE = _Manner()
 _STEP = 0.05
 """Spacing of the spots that are tried, metres."""
 _FINE_STEP = 0.02
-"""The same in what is made for one thing, metres."""
+"""The same in what is made for one thing, and where space is tight, metres."""
 _SKIN = 0.005
 """Gap that is left between things, metres."""
 _GIVE = 0.02
@@ -99,10 +99,14 @@ def free_spots(
     receptacle: int,
     near: NDArray[np.float64],
     seen_by: Agent | None = None,
+    squeeze: bool = True,
 ) -> Iterator[tuple[float, NDArray[np.float64]]]:
     """Spots for object i in or on a receptacle, nearest to a (2,) x, z point first.
 
-    With ``seen_by``, spots in that agent's picture come before all others.
+    Args:
+        seen_by: spots in this agent's picture come before all others.
+        squeeze: where no spot of the usual grid is free, look into the gaps between things, too
+            (:func:`_tight_spots`).
 
     Yields:
         The heading in degrees at which it fits, and the (3,) centre of its box's underside.
@@ -111,7 +115,7 @@ def free_spots(
         yield from _in_vessel(world, i, receptacle)
         return
     height, tall = surface_height(world, receptacle), _height(world, i)
-    obstacles = _obstacles(world, receptacle, i, height)
+    obstacles, loose = _obstacles(world, receptacle, i, height)
     free: list[NDArray[np.float64]] = [np.empty((0, 3))]  # heading, x, z
     heaps: list[tuple[float, float, NDArray[np.float64]]] = []
     heaping, places = _manner(world, receptacle).heaps, _places(world, receptacle)
@@ -125,6 +129,8 @@ def free_spots(
         clear = spots[_free(spots, half, height, tall, obstacles)]
         free.append(np.column_stack([np.full(len(clear), yaw), clear]))
     found = np.concatenate(free)
+    if squeeze and not len(found):
+        found = _tight_spots(world, _headings(world, i), places, height, tall, obstacles, loose)
     order: list[NDArray[Any]] = [_distance(found[:, 1:], near)]
     if seen_by is not None:
         order.append(~_in_picture(world, seen_by, found[:, 1:], height))
@@ -160,7 +166,7 @@ def _in_vessel(
     if inside and not _manner(world, receptacle).heaps:
         return
     base = max([surface_height(world, receptacle), *(float(world.high[c, 1]) for c in inside)])
-    obstacles, tall = _obstacles(world, receptacle, i, base), _height(world, i)
+    (obstacles, _), tall = _obstacles(world, receptacle, i, base), _height(world, i)
     places = np.array([[world.low[receptacle], world.high[receptacle]]])[:, :, [0, 2]]
     offcentre = _spots(places, np.zeros(2), _FINE_STEP)
     offcentre = offcentre[np.argsort(np.linalg.norm(offcentre - places.mean(axis=1), axis=1))]
@@ -214,8 +220,13 @@ def _spots(
     return np.concatenate(found)
 
 
-def _obstacles(world: World, receptacle: int, i: int, height: float) -> NDArray[np.float64]:
-    """(Q, 2, 3) boxes that may be in the way of object i there: loose things and fixed parts.
+def _obstacles(
+    world: World, receptacle: int, i: int, height: float
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """What may be in the way of object i there: loose things and fixed parts.
+
+    Returns:
+        (Q, 2, 3) boxes, and the (L,) rows of the loose things, whose boxes come first.
 
     Loose things count wherever they are, for they could be anywhere; fixed ones only on top of
     things, for the boxes of what holds a room overlap with those of its neighbours.
@@ -232,7 +243,7 @@ def _obstacles(world: World, receptacle: int, i: int, height: float) -> NDArray[
     around = (world.low <= middle).all(axis=1) & (middle <= world.high).all(axis=1)
     close &= loose | ~around
     close[list(aside)] = False
-    things = close & loose
+    things = np.flatnonzero(close & loose)
     boxes = [np.stack([world.low[things], world.high[things]], axis=1)]
     for k in np.flatnonzero(close & ~loose).tolist():
         if on_top and world.types[k] in _HOLES:
@@ -243,7 +254,7 @@ def _obstacles(world: World, receptacle: int, i: int, height: float) -> NDArray[
             parts = world.shape(k).boxes
             rises = _SKIN if world.has(k, "moveable") else _RISES
             boxes.append(parts[parts[:, 1, 1] > height + rises])
-    return np.concatenate(boxes)
+    return np.concatenate(boxes), things
 
 
 def _free(
@@ -254,10 +265,92 @@ def _free(
     obstacles: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
     """(S,) which spots overlap none of the obstacles' boxes."""
-    low, high = obstacles[:, 0], obstacles[:, 1]
-    same_height = (low[:, 1] < height + tall) & (high[:, 1] > height + _SKIN)
-    low, high = low[same_height][:, [0, 2]], high[same_height][:, [0, 2]]
+    same_height = _at_height(obstacles, height, tall)
+    low, high = obstacles[same_height][:, :, [0, 2]].swapaxes(0, 1)
     return np.asarray(~_overlap(spots, half + _SKIN, low, high).any(axis=1))
+
+
+def _at_height(obstacles: NDArray[np.float64], height: float, tall: float) -> NDArray[np.bool_]:
+    """(Q,) which boxes reach into the air that a thing standing at a height takes up."""
+    return np.asarray((obstacles[:, 0, 1] < height + tall) & (obstacles[:, 1, 1] > height + _SKIN))
+
+
+def _tight_spots(
+    world: World,
+    headings: list[tuple[float, NDArray[np.float64]]],
+    places: NDArray[np.float64],
+    height: float,
+    tall: float,
+    obstacles: NDArray[np.float64],
+    loose: NDArray[np.intp],
+) -> NDArray[np.float64]:
+    """(S, 3) heading, x and z of the spots that a person would find among the clutter.
+
+    If a thing fits anywhere between upright boxes, it fits where it touches one of them, or an
+    edge, in x and one in z; so that is where to look, besides a fine grid. Loose things take up
+    their oriented boxes here, not the larger boxes along the axes around these.
+
+    Args:
+        headings: see :func:`_headings`.
+        places: (R, 2, 2), see :func:`_places`.
+        obstacles, loose: see :func:`_obstacles`.
+    """
+    beside = _at_height(obstacles, height, tall)
+    low, high = obstacles[beside][:, :, [0, 2]].swapaxes(0, 1)
+    turned = [_footprint(world, k) for k in loose[beside[: len(loose)]].tolist()]
+    found = [np.empty((0, 3))]
+    for yaw, half in headings:
+        wide = half + _SKIN
+        for place in places:
+            if (2 * half > place[1] - place[0] + _GIVE).any():
+                continue
+            first, last = np.minimum(place[0] + wide, place.mean(axis=0)), place[1] - wide
+            lines = []
+            for axis in (0, 1):
+                # Where it just touches is not free, by the last digit of a float.
+                touching = np.concatenate(
+                    [low[:, axis] - wide[axis] - 1e-9, high[:, axis] + wide[axis] + 1e-9]
+                )
+                inside = (first[axis] < touching) & (touching < last[axis])
+                end = max(last[axis], first[axis])
+                grid = np.arange(first[axis], end, _FINE_STEP)
+                lines.append(np.concatenate([grid, [end], touching[inside]]))
+            spots = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 2)
+            taken = _overlap(spots, wide, low, high)
+            for k, (middle, edges) in enumerate(turned):
+                taken[:, k] &= _overlap_turned(spots, wide, middle, edges)
+            clear = spots[~taken.any(axis=1)]
+            found.append(np.column_stack([np.full(len(clear), yaw), clear]))
+    return np.concatenate(found)
+
+
+def _footprint(world: World, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Object k's box seen from above: its middle, (2,) x and z, and its (E, 2) edges."""
+    middle = ((world.low[k] + world.high[k]) / 2)[[0, 2]]
+    edges = world.obb[k, 1:] @ unity_rotation(world.rotation[k]).T
+    if np.isnan(edges).any():
+        return middle, np.diag((world.high[k] - world.low[k])[[0, 2]])
+    return middle, edges[:, [0, 2]]
+
+
+def _overlap_turned(
+    spots: NDArray[np.float64],
+    half: NDArray[np.float64],
+    middle: NDArray[np.float64],
+    edges: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """(S,) at which spots a thing of half-size (2,) is not beside any of a footprint's edges.
+
+    It overlaps a :func:`_footprint` if it also overlaps the box along the axes around it.
+    """
+    met = np.ones(len(spots), dtype=bool)
+    for edge in edges:
+        length = float(np.hypot(*edge))
+        if length > _SKIN:
+            across = np.array([-edge[1], edge[0]]) / length
+            reach = np.abs(edges @ across).sum() / 2 + np.abs(across) @ half
+            met &= np.abs((spots - middle) @ across) < reach
+    return met
 
 
 def _overlap(
