@@ -59,7 +59,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
       own ``navigable_objects``.
     - ``pickup``, ``put in``, ``open``, ``close``, ``toggle``, ``slice`` need the object to be plain
       to see now, or visible and of a type that lies in the receptacle last navigated to; ``slice``,
-      which the paper does not have, needs a knife in the hand.
+      which the paper does not have, needs a knife in the hand. A stove burner can be toggled, too,
+      where what stands on it and hides it is in reach.
     - ``observe`` looks right, behind and left; ``info["views"]`` has the pictures.
     - ``end`` says that the task is done.
 

@@ -97,6 +97,7 @@ _HAND: Mapping[str, Callable[[ObjectTable], bool]] = {
 """What verbs ask of the hand."""
 _BARE = [INDEX[Action(verb)] for verb in verbs.BARE_VERBS]
 _NUMBER = {verb: number for number, verb in enumerate(verbs.INTERACTIONS)}
+_TOGGLE_BURNER = INDEX[Action(verbs.TOGGLE, "StoveBurner")]
 _INTERACTION_INDICES = np.stack([INDICES[verb] for verb in verbs.INTERACTIONS], axis=1)
 
 
@@ -109,12 +110,14 @@ class Affordances:
             what is in the hand, and for the floor.
         actions: (N, len(INTERACTIONS)) index of the action that does each verb to each object; -1
             where it cannot be done in the object's present state, and that of the hand.
+        on_burners: (2, C) rows of what stands on a stove burner, and of the burner under each.
         alike: row of a receptacle to (N,) bool, which objects are of types that lie in it; less the
             floor and what is in the hand. Filled as it is asked for.
     """
 
     within: NDArray[np.float64]
     actions: NDArray[np.intp]
+    on_burners: NDArray[np.intp]
     alike: dict[int, NDArray[np.bool_]] = field(default_factory=dict)
 
     @staticmethod
@@ -131,7 +134,14 @@ class Affordances:
         return Affordances(
             within=within,
             actions=np.where(possible, _INTERACTION_INDICES[table.kinds], -1),
+            on_burners=_on_burners(table),
         )
+
+
+def _on_burners(table: ObjectTable) -> NDArray[np.intp]:
+    burners = np.flatnonzero(_BURNER[table.kinds]).tolist()
+    pairs = [(row, burner) for burner in burners for row in table.contents[burner]]
+    return np.array(pairs, dtype=np.intp).reshape(-1, 2).T
 
 
 def affordances(table: ObjectTable) -> Affordances:
@@ -150,11 +160,14 @@ class Surroundings:
         objects: all of the scene.
         navigable: rows of objects that are plain enough to see to be walked to.
         interactable: rows of objects that may be interacted with; the navigable are among them.
+        covered: rows of the stove burners that are under one of these. Whether a pan hides its
+            burner or not, the knob of that burner can be turned.
     """
 
     objects: ObjectTable
     navigable: NDArray[np.intp]
     interactable: NDArray[np.intp]
+    covered: NDArray[np.intp]
 
     @cached_property
     def interactable_types(self) -> NDArray[np.bool_]:
@@ -178,15 +191,22 @@ def surroundings(percept: Percept, at: str = "") -> Surroundings:
     can = affordances(table)
     distance = np.hypot(table.centre[:, 0] - percept.pose.x, table.centre[:, 2] - percept.pose.z)
     plain = visible & (distance < can.within)
-    navigable = interactable = plain.nonzero()[0]
+    reach = plain
     row = table.row.get(at)
     if row is not None and table.contents[row]:
         alike = can.alike.get(row)
         if alike is None:
             kinds = marked(table.kinds[list(table.contents[row])])
             alike = can.alike[row] = kinds[table.kinds] & (can.within > 0)
-        interactable = (plain | (visible & alike)).nonzero()[0]
-    return Surroundings(table, navigable, interactable)
+        reach = plain | (visible & alike)
+    navigable = plain.nonzero()[0]
+    standing, burners = can.on_burners
+    return Surroundings(
+        objects=table,
+        navigable=navigable,
+        interactable=navigable if reach is plain else reach.nonzero()[0],
+        covered=burners[reach[standing]],
+    )
 
 
 class Known:
@@ -221,12 +241,15 @@ class Known:
 
 
 def suited(action: Action, around: Surroundings) -> list[int]:
-    """Rows of the interactable objects that an interaction can be done to as things are now."""
-    actions = affordances(around.objects).actions[around.interactable, _NUMBER[action.verb]]
+    """Rows of the objects that an interaction can be done to as things are now."""
+    rows = around.interactable
+    if action.verb == verbs.TOGGLE and len(around.covered):
+        rows = np.union1d(rows, around.covered)
+    actions = affordances(around.objects).actions[rows, _NUMBER[action.verb]]
     index = INDEX.get(action)
     return [
         row
-        for row, possible in zip(around.interactable.tolist(), actions.tolist(), strict=True)
+        for row, possible in zip(rows.tolist(), actions.tolist(), strict=True)
         if possible == index
     ]
 
@@ -268,6 +291,8 @@ def legal_actions(around: Surroundings, known: Known) -> NDArray[np.int8]:
     legal = known.legal.copy()
     interactions = affordances(around.objects).actions[around.interactable]
     legal[interactions[interactions >= 0]] = 1
+    if len(around.covered):
+        legal[_TOGGLE_BURNER] = 1
     return legal
 
 

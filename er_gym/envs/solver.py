@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from er_gym.envs.actions import INDEX, STANDS_FOR, Action
 from er_gym.envs.reward import same_type
 from er_gym.tasks import verbs
-from er_gym.tasks.task import KeyAction
+from er_gym.tasks.task import KeyAction, type_of_id
 
 
 class Solver:
     """Does a task's key actions in their order, and what it takes to be able to.
 
     It goes where a key action leads; if the place is not in sight it looks round, then walks to one
-    thing after another that is, until the place is too. It opens what is closed before it puts
-    something in. What it knows beforehand are the key actions; all else it reads from ``info`` as
+    thing after another that is, until the place is too. What it cannot reach it walks to, then to
+    what that lies in, then a step nearer. It opens what is closed before it puts something in. What it knows beforehand are the key actions; all else it reads from ``info`` as
     any agent may. One solver plays one episode.
     """
 
@@ -57,10 +57,9 @@ class Solver:
             to_open = Action(verbs.OPEN, name)
             if _legal(to_open, info):
                 return to_open
-        if name in info["navigable"] and self._tried.get(key, 0) < 2:
-            self._tried[key] = self._tried.get(key, 0) + 1
-            return Action(verbs.NAVIGATE, name)
-        return self._explore(info)
+        tried = self._tried[key] = self._tried.get(key, -1) + 1
+        nearer = list(_nearer(key, name, info))
+        return nearer[tried] if tried < len(nearer) else self._explore(info)
 
     def _explore(self, info: Mapping[str, Any]) -> Action:
         """Look round once, then go from thing to thing, those not visited yet first."""
@@ -72,6 +71,37 @@ class Solver:
             return Action(verbs.MOVE_FORWARD)
         self._went.append(fresh[0])
         return Action(verbs.NAVIGATE, fresh[0])
+
+
+def _nearer(key: KeyAction, name: str, info: Mapping[str, Any]) -> Iterator[Action]:
+    """What may bring something of a type within reach: what can be tried, in this order.
+
+    Small things can be out of reach from where one sees them best. Then it helps to go to the
+    receptacle, for what lies in that may be handled wherever it is visible.
+    """
+    if name in info["navigable"]:
+        yield Action(verbs.NAVIGATE, name)
+        for holder in _holders(key, info["key_actions_done"]):
+            holder = _name_in(holder, info["navigable"])
+            if holder in info["navigable"]:
+                yield Action(verbs.NAVIGATE, holder)
+        yield Action(verbs.NAVIGATE, name)
+        yield Action(verbs.MOVE_FORWARD)
+
+
+def _holders(key: KeyAction, done: Sequence[KeyAction]) -> Iterator[str]:
+    """The types of what an object lies in, as far as it has been put there, innermost first."""
+    lies_in: dict[str, str] = {}
+    held = ""
+    for earlier in done:
+        if earlier.verb == verbs.PICKUP:
+            held = earlier.object_id
+        elif earlier.verb == verbs.PUT:
+            lies_in[held] = earlier.object_id
+    holder = lies_in.get(key.object_id)
+    while holder:
+        yield type_of_id(holder)
+        holder = lies_in.pop(holder, "")
 
 
 def _name_in(wanted: str, *lists: Sequence[str]) -> str:
