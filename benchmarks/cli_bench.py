@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from benchmarks.cli_errors import CRASHED, INTERRUPTED, STOPPED, BadInput, bad_input, complain
+from benchmarks.cli_errors import (
+    CRASHED,
+    INTERRUPTED,
+    STOPPED,
+    BadInput,
+    bad_input,
+    complain,
+    tell_left_out,
+)
 from benchmarks.cli_options import (
     agent_config_option,
     overrides_option,
@@ -117,7 +125,8 @@ def bench(
 ) -> int:
     """Play a suite with an agent and print the result table.
 
-    The same command again continues: episodes that are done are not played again. The options from
+    The same command again continues: episodes that are done are not played again. A task that
+    cannot be played is set aside and named; the others are played. The options from
     --agent-config on are for agents that speak, such as openai:MODEL.
     """
     from rich.console import Console
@@ -131,6 +140,7 @@ def bench(
     from benchmarks.store import Manifest, RunStore, file_stem
     from benchmarks.tables import print_tables, tables
     from er_gym import __version__
+    from er_gym.tasks.errors import in_short
     from er_gym.tasks.resolve import resolve_tasks
     from er_gym.thor import BackendError
 
@@ -140,21 +150,29 @@ def bench(
         asked = _load_suite(suite, tasks_file, poses)
         voice = _voice(agent, spoken)
         env = _env_kwargs(asked, agent, seed, voice, backend=backend, instances=instances)
-        all_tasks, notes = resolve_tasks(asked.tasks, env["backend"])
-        chosen = select(all_tasks, task_ids=split(*task_ids), shard=part, limit=limit)
+        fitted = resolve_tasks(asked.tasks, env["backend"])
+        aside = (*asked.set_aside, *fitted.set_aside)
+        if aside and not fitted.tasks:
+            raise BadInput(f"{asked.name}: no task can be played: {in_short(aside)}")
+        chosen = select(
+            fitted.tasks, task_ids=split(*task_ids), shard=part, limit=limit, set_aside=aside
+        )
         out = out or Path("runs") / f"{file_stem(asked.name)}-{file_stem(agent)}"
         manifest = Manifest(
             suite=asked.name,
             suite_digest=asked.digest,
-            suite_size=len(all_tasks),
+            suite_size=len(fitted.tasks),
             agent=agent,
             agent_settings=voice.consequential if voice else {},
             env=env,
             seed=seed,
             er_gym=__version__,
+            set_aside=aside,
+            taken=fitted.taken,
         )
         store = RunStore.create(out, manifest)
-    for note in notes:
+    tell_left_out(asked.name, aside, fitted.taken)
+    for note in fitted.notes:
         terminal.print(note, style="dim", markup=False, highlight=False, soft_wrap=True)
 
     judge = SCORERS.get(scorer, CORRECTED)
@@ -227,7 +245,7 @@ def _load_suite(name: str | None, tasks_file: Path | None, poses: Path | None) -
     suite = suite_from_file(tasks_file)
     if poses is None:
         return suite
-    tasks = tuple(with_poses(suite.tasks, read_poses(poses)))
+    tasks = tuple(with_poses(suite.tasks, read_poses(poses), suite.places))
     return replace(suite, tasks=tasks, digest=digest(tasks))
 
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from er_gym.tasks.errors import SetAside, Taken
 
 CRASHED, STOPPED, INTERRUPTED = 1, 3, 130
 """Exit codes: episodes crashed; a run stopped before its end, as it was told to; Ctrl-C. And 2 is
@@ -31,3 +35,13 @@ def bad_input(*more: type[Exception]) -> Iterator[None]:
 def complain(message: str) -> None:
     """Say something in one line on stderr."""
     click.echo(f"er-gym: {' '.join(message.split())}", err=True)
+
+
+def tell_left_out(suite: str, set_aside: Iterable[SetAside], taken: Iterable[Taken] = ()) -> None:
+    """Say which of a suite's tasks are left out, and what is taken for what the scenes lack."""
+    from er_gym.tasks.errors import told_once
+
+    for line in told_once(taken):
+        complain(f"{suite}: {line}")
+    for one in set_aside:
+        complain(f"{suite}: set aside: {one}")

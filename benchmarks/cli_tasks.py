@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from benchmarks.cli_errors import BadInput, bad_input
+from benchmarks.cli_errors import BadInput, bad_input, tell_left_out
 from benchmarks.cli_generate import generate
 from benchmarks.cli_options import split, workers_option
 
@@ -30,8 +30,9 @@ tasks.add_command(generate)
 def verify(suites: tuple[str, ...], workers: int) -> int:
     """Play every task with the solver, and say which cannot be done.
 
-    Exit code 1 if there is one. The solver knows the key actions; it must succeed from the task's
-    own start, within the step limit, and earn the whole reward.
+    Exit code 1 if there is one, or one that is set aside since it does not fit its scene. The
+    solver knows the key actions; it must succeed from the task's own start, within the step limit,
+    and earn the whole reward.
     """
     from contextlib import closing
 
@@ -40,6 +41,7 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
     from benchmarks.pool import Lost, do_jobs
     from benchmarks.progress import Progress
     from er_gym.envs.verify import Verifier
+    from er_gym.tasks.errors import in_short
     from er_gym.tasks.resolve import resolve_tasks
 
     console = Console(stderr=True)
@@ -47,7 +49,13 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
     for name in suites:
         with bad_input():
             suite = _suite(name)
-            todo, _ = resolve_tasks(suite.tasks)
+            fitted = resolve_tasks(suite.tasks)
+            todo, aside = fitted.tasks, (*suite.set_aside, *fitted.set_aside)
+            if aside and not todo:
+                raise BadInput(f"{suite.name}: no task can be played: {in_short(aside)}")
+        tell_left_out(suite.name, (), fitted.taken)
+        for one in aside:
+            click.echo(f"{suite.name}: set aside: {one}")
         solved = 0
         with (
             Progress(console, suite.name, len(todo)) as progress,
@@ -60,8 +68,10 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
                 if problem:
                     detail = "" if isinstance(verdict, Lost) else f": {verdict.detail}"
                     click.echo(f"{suite.name}: {task.id}: {problem}{detail}")
-        failed += len(todo) - solved
-        click.echo(f"{suite.name}: {solved} of {len(todo)} tasks can be done")
+        every = len(todo) + len(aside)
+        failed += every - solved
+        told = f"; {len(aside)} set aside" if aside else ""
+        click.echo(f"{suite.name}: {solved} of {every} tasks can be done{told}")
     return 1 if failed else 0
 
 
@@ -81,14 +91,18 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
     from dataclasses import fields
 
     from er_gym.tasks.difficulty import Difficulty
+    from er_gym.tasks.errors import in_short
     from er_gym.tasks.resolve import resolve_tasks
     from er_gym.tasks.show import describe
     from er_gym.tasks.types import BY_NAME, task_type
 
     with bad_input():
-        every = _suite(suite).tasks
+        found = _suite(suite)
+        every, aside = found.tasks, list(found.set_aside)
         if ids:
             known = {task.id: task for task in every}
+            aside = [one for one in aside if one.task in ids]
+            ids = tuple(i for i in ids if i not in {one.task for one in aside})
             unknown = [i for i in ids if i not in known]
             if unknown:
                 some = ", ".join(list(known)[:3])
@@ -98,10 +112,14 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
             kinds = [task_type(name) for name in split(types)] or list(BY_NAME.values())
             by_kind = [[task for task in every if task.type is kind] for kind in kinds]
             chosen = [task for of_kind in by_kind for task in of_kind[:limit]]
-        fitted, _ = resolve_tasks(chosen)
+        fitted = resolve_tasks(chosen)
+        aside += fitted.set_aside
+        if aside and not fitted.tasks:
+            raise BadInput(f"{suite}: no task to show: {in_short(aside)}")
+    tell_left_out(suite, aside, fitted.taken)
     names = [field.name for field in fields(Difficulty)]
     pages = []
-    for task in fitted:
+    for task in fitted.tasks:
         told = task.extra.get("difficulty")  # whoever wrote the file may mean something else by it
         known = isinstance(told, Mapping) and all(name in told for name in names)
         figures = Difficulty(**{name: told[name] for name in names}) if known else None
@@ -122,6 +140,7 @@ def stats(suite: str, out: Path | None) -> None:
 
     with bad_input(ImportError):
         found = _suite(suite)
+        tell_left_out(found.name, found.set_aside)
         print_counts(found.tasks, {}, by_scene=True)
         if out is not None:
             from benchmarks.charts import draw_charts
@@ -134,17 +153,21 @@ def stats(suite: str, out: Path | None) -> None:
 @click.argument("suite", metavar="SUITE|FILE|FOLDER")
 @click.argument("out", metavar="FILE|FOLDER", type=click.Path(path_type=Path))
 def convert(suite: str, out: Path) -> None:
-    """Write tasks in another format, without loss.
+    """Write tasks in another format, without loss; one that cannot be read is left out and named.
 
     FILE.json is the paper's test file, FILE.jsonl or FILE.jsonl.gz our own; a folder holds the
     paper's generator files, one for each scene and type, and is read and written as a whole.
     """
     from er_gym.tasks import jsonl_format, paper_format
-    from er_gym.tasks.paper_generator import read_generator_tasks, write_generator_tasks
+    from er_gym.tasks.errors import in_short
+    from er_gym.tasks.paper_generator import read_generated, write_generator_tasks
 
     with bad_input():
-        folder = Path(suite).is_dir()
-        found = read_generator_tasks(suite) if folder else list(_suite(suite).tasks)
+        read = read_generated(suite) if Path(suite).is_dir() else _suite(suite)
+        found, aside = list(read.tasks), read.set_aside
+        if aside and not found:
+            raise BadInput(f"{suite}: no task can be read: {in_short(aside)}")
+        tell_left_out(suite, aside)
         if out.name.endswith((".jsonl", ".jsonl.gz")):
             jsonl_format.write_tasks(out, found)
         elif out.suffix == ".json":

@@ -90,7 +90,7 @@ def er_gym(
         **{name: value for name, value in size.items() if value is not None},
         "obs_mode": settings.obs_mode,
     }
-    tasks, _ = resolve_tasks(asked.tasks, env["backend"])
+    tasks = resolve_tasks(asked.tasks, env["backend"]).tasks
     chosen = {each.id: each for each in tasks[:limit]}
     return InspectTask(
         dataset=MemoryDataset([_sample(each) for each in chosen.values()], name=asked.name),

@@ -24,6 +24,7 @@ from benchmarks.metrics import (
     summarise_by,
 )
 from benchmarks.store import Manifest, RunStore
+from er_gym.tasks.errors import told_once
 from er_gym.tasks.types import BY_NAME, GROUPS
 
 BOTH = "both"
@@ -82,6 +83,18 @@ class RunReport:
         """Every episode without success, and why."""
         pairs = zip(self.episodes, self.scores[CORRECTED.name], strict=True)
         return tuple(_miss(episode, each) for episode, each in pairs if not each.success)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """In words: what the figures do not count, and what was taken for what a scene lacks."""
+        aside = [
+            f"{len(self.manifest.set_aside)} of the suite's tasks set aside and not counted"
+        ] * bool(self.manifest.set_aside)
+        return (
+            *aside,
+            *(f"set aside: {one}" for one in self.manifest.set_aside),
+            *told_once(self.manifest.taken),
+        )
 
     @property
     def crashed(self) -> int:
@@ -146,7 +159,8 @@ def by_type(scores: Sequence[Score]) -> dict[str, Summary]:
 
 
 def as_json(runs: Sequence[RunReport]) -> str:
-    """Everything: manifests, every slice's means and intervals, every episode's scores, misses."""
+    """Everything: manifests, which tell what was set aside, every slice's means and intervals,
+    every episode's scores, misses."""
     return json.dumps({"format": "er-gym/report/1", "runs": [_run(run) for run in runs]}, indent=2)
 
 
@@ -179,7 +193,8 @@ def _run(run: RunReport) -> dict[str, Any]:
 def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = False) -> str:
     """One line per run, scorer and slice (overall and groups; task types if asked for).
 
-    Rates are fractions; a missing interval is empty.
+    Rates are fractions; a missing interval is empty. A task that was set aside, or an object that
+    stands for one that a scene lacks, has a line without figures.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -194,4 +209,10 @@ def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = Fal
                 estimates = [dataclasses.astuple(summary[metric]) for metric in METRICS]
                 numbers = [number for estimate in estimates for number in estimate]
                 writer.writerow([*head, name, level, part, summary.n, *numbers])
+        for level, lines in (
+            ("set aside", map(str, run.manifest.set_aside)),
+            ("taken", told_once(run.manifest.taken)),
+        ):
+            for line in lines:
+                writer.writerow([*head, "", level, line, 0, *[""] * len(columns)])
     return out.getvalue()

@@ -15,6 +15,7 @@ from benchmarks.play import episode_seed, one_line, play_episode
 from benchmarks.pool import Lost, do_jobs
 from benchmarks.store import RunStore
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.tasks.errors import SetAside, in_short
 from er_gym.tasks.task import Task
 
 
@@ -49,15 +50,19 @@ def select(
     task_ids: Iterable[str] = (),
     shard: Shard | None = None,
     limit: int | None = None,
+    set_aside: Iterable[SetAside] = (),
 ) -> list[Task]:
     """The tasks to play, in the suite's order: those named, of these the shard's, of these the
-    first ``limit``.
+    first ``limit``. Of tasks that were set aside none is played, named or not.
 
     Raises:
-        ValueError: the suite has no task of a given id.
+        ValueError: the suite has no task of a given id, or all that were named are set aside.
     """
     wanted = set(task_ids)
-    unknown = wanted.difference(task.id for task in tasks)
+    aside = [one for one in set_aside if one.task in wanted]
+    unknown = wanted.difference((task.id for task in tasks), (one.task for one in aside))
+    if aside and len(aside) == len(wanted):
+        raise ValueError(f"no task to play: {in_short(aside)}")
     if unknown:
         some = ", ".join(task.id for task in tasks[:3])
         raise ValueError(f"no task with the id {min(unknown)!r}; ids here are such as {some}")

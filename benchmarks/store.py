@@ -28,6 +28,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from agents.vlm.record import ConversationRecord
 from benchmarks.episode import EpisodeRecord
+from er_gym.tasks.errors import SetAside, Taken
 
 MANIFEST = "run.json"
 EPISODES = "episodes"
@@ -48,12 +49,14 @@ class Manifest(BaseModel):
         format: the version of this layout.
         suite: the suite's name.
         suite_digest: of its tasks' content.
-        suite_size: how many tasks it has; a run need not have played them all.
+        suite_size: how many tasks it has that can be played; a run need not have played them all.
         agent: the agent's spec.
         agent_settings: of an agent that speaks, what decides what it says.
         env: the keyword arguments of the environment.
         seed: the run's; every episode's is derived from it.
         er_gym: the version of the package.
+        set_aside: the suite's tasks that cannot be played, and why; they are not in its size.
+        taken: what stands for objects that tasks name and their scenes lack.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -67,6 +70,8 @@ class Manifest(BaseModel):
     env: dict[str, Any]
     seed: int
     er_gym: str
+    set_aside: tuple[SetAside, ...] = ()
+    taken: tuple[Taken, ...] = ()
 
 
 class RunStore:

@@ -121,7 +121,7 @@ def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple
 
 
 def _notes(run: RunReport) -> list[str]:
-    notes = []
+    notes = [f"{run.path}: {note}" for note in run.left_out]
     if run.differ:
         ids = ", ".join(run.differ[:_IDS_SHOWN])
         more = f" and {len(run.differ) - _IDS_SHOWN} more" if len(run.differ) > _IDS_SHOWN else ""

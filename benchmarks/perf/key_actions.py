@@ -85,7 +85,7 @@ def compare(tasks: Iterable[Task]) -> list[Comparison]:
 @click.argument("path", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 def main(path: Path) -> None:
     """Print the differences and how many agree."""
-    tasks, _ = resolve_tasks(read_tasks(path))
+    tasks = resolve_tasks(read_tasks(path)).tasks
     compared = compare(t for t in tasks if t.type.group != COMPOSITE or t.type.ordered)
     for one in compared:
         if not one.same:

@@ -16,8 +16,9 @@ class Solver:
 
     It goes where a key action leads; if the place is not in sight it looks round, then walks to one
     thing after another that is, until the place is too. What it cannot reach it walks to, then to
-    what that lies in, then a step nearer. It opens what is closed before it puts something in. What it knows beforehand are the key actions; all else it reads from ``info`` as
-    any agent may. One solver plays one episode.
+    what that lies in, then a step nearer. It opens what is closed before it puts something in. What
+    it knows beforehand are the key actions; all else it reads from ``info`` as any agent may. One
+    solver plays one episode.
     """
 
     def __init__(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import defaultdict
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
@@ -10,6 +11,8 @@ from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
+from er_gym.tasks.errors import TaskFileError, in_short, told_once
+from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite, suite_file, suite_from_file
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TaskType
@@ -100,6 +103,9 @@ class TaskList:
 def make_source(source: Source) -> EpisodeSource:
     """What :class:`~er_gym.envs.embodied_env.EmbodiedEnv` draws from.
 
+    Of a file, tasks that cannot be used, or that do not fit their scenes, are not drawn; a warning
+    names them.
+
     Args:
         source: a list of tasks, the name of a suite, the path of a task file (``.json``, ``.jsonl``
             or ``.jsonl.gz``), ``"generate"``, or an :class:`EpisodeSource`.
@@ -117,7 +123,10 @@ def make_source(source: Source) -> EpisodeSource:
         is_file = "/" in name or name.endswith((".json", ".jsonl", ".jsonl.gz"))
         path = Path(name).resolve() if is_file else suite_file(name)
         changed = path.stat().st_mtime_ns if path.exists() else 0
-        return _read(str(path) if is_file else name, is_file, changed)
+        found, remarks = _read(str(path) if is_file else name, is_file, changed)
+        if remarks:
+            warnings.warn(remarks, stacklevel=3)
+        return found
     if isinstance(source, EpisodeSource):
         return source
     if isinstance(source, Sequence):
@@ -131,7 +140,18 @@ def make_source(source: Source) -> EpisodeSource:
 
 
 @lru_cache(maxsize=16)
-def _read(name: str, is_file: bool, changed: int) -> TaskList:
-    """The tasks of a suite or file, read once as long as it does not change."""
+def _read(name: str, is_file: bool, changed: int) -> tuple[TaskList, str]:
+    """The tasks of a suite or file, read once as long as it does not change, and what is odd."""
     suite = suite_from_file(name) if is_file else load_suite(name)
-    return TaskList(suite.tasks, f"the suite {suite.name}")
+    if not is_file:
+        return TaskList(suite.tasks, f"the suite {suite.name}"), ""
+    fitted = resolve_tasks(suite.tasks, arrange=False)
+    aside = (*suite.set_aside, *fitted.set_aside)
+    if aside and not fitted.tasks:
+        raise TaskFileError(f"{name}: no task can be played: {in_short(aside)}")
+    remarks = told_once(fitted.taken)
+    if aside:
+        every = len(fitted.tasks) + len(aside)
+        remarks.insert(0, f"{len(aside)} of {every} tasks set aside: {in_short(aside)}")
+    told = f"{name}: {'; '.join(remarks)}" if remarks else ""
+    return TaskList(fitted.tasks, f"the suite {suite.name}"), told

@@ -6,15 +6,15 @@ import gzip
 import json
 import re
 import zlib
-from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from er_gym.tasks import verbs
-from er_gym.tasks.errors import TaskFileError
+from er_gym.tasks.errors import SetAside, TaskFileError
 from er_gym.tasks.rooms import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, TaskType
@@ -102,18 +102,72 @@ def known_verb(name: str, where: str) -> str:
     return verb
 
 
-def checked_ids(tasks: Iterable[Task], path: Path) -> list[Task]:
-    """The tasks as a list, their ids unique and fit for file names, else a TaskFileError."""
-    tasks = list(tasks)
-    for task_id, count in Counter(task.id for task in tasks).items():
-        if count > 1:
-            raise TaskFileError(f"{path}: {count} tasks have the id {task_id!r}; it must be unique")
-        if not _FILE_NAME_SAFE.fullmatch(task_id):
-            raise TaskFileError(
-                f"{path}: the task id {task_id!r} cannot be a file name; "
+@dataclass(frozen=True)
+class TaskFile:
+    """What a task file holds.
+
+    Attributes:
+        tasks: those that can be used, in the file's order; their ids are unique and fit for file
+            names.
+        places: where each of them stands among all tasks of the file, from 1.
+        set_aside: the others, and why.
+    """
+
+    tasks: tuple[Task, ...]
+    places: tuple[int, ...] = ()
+    set_aside: tuple[SetAside, ...] = ()
+
+    def all_or_none(self, path: Path) -> list[Task]:
+        """The tasks; a :class:`TaskFileError` says what is wrong with the first set aside."""
+        if self.set_aside:
+            raise TaskFileError(f"{path}: {self.set_aside[0].reason}")
+        return list(self.tasks)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A task in a file that is not understood yet.
+
+    Attributes:
+        where: its place, for messages.
+        stated_id: the id that it states, if that can be told.
+        read: makes the task, or raises a :class:`TaskFileError` that begins with ``where``.
+    """
+
+    where: str
+    stated_id: str
+    read: Callable[[], Task]
+
+
+def read_entries(entries: Iterable[Entry]) -> TaskFile:
+    """Read one task after another; what is wrong with one does not keep the others from use.
+
+    Of several tasks with one id the first is used.
+    """
+    tasks: dict[str, Task] = {}
+    places: list[int] = []
+    set_aside: list[SetAside] = []
+    first: dict[str, str] = {}
+    for place, entry in enumerate(entries, 1):
+        try:
+            task = entry.read()
+        except TaskFileError as error:
+            set_aside.append(SetAside(entry.stated_id or entry.where, str(error)))
+            continue
+        problem = ""
+        if not _FILE_NAME_SAFE.fullmatch(task.id):
+            problem = (
+                f"has the task id {task.id!r}, which cannot be a file name; "
                 "use letters, digits and any of + = . _ -"
             )
-    return tasks
+        elif task.id in tasks:
+            problem = f"has the id {task.id!r}, as {first[task.id]} has; it must be unique"
+        if problem:
+            set_aside.append(SetAside(entry.where, f"{entry.where} {problem}"))
+        else:
+            tasks[task.id], first[task.id] = task, entry.where
+            places.append(place)
+    return TaskFile(tuple(tasks.values()), tuple(places), tuple(set_aside))
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -22,11 +22,13 @@ from pydantic import BaseModel, ConfigDict
 
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import (
-    checked_ids,
+    Entry,
+    TaskFile,
     known_scene,
     known_type,
     known_verb,
     parse_json,
+    read_entries,
     read_text,
     validated,
 )
@@ -40,7 +42,7 @@ FORMAT = "er-gym/tasks/1"
 class _Strict(BaseModel):
     """A misspelled field is a mistake worth hearing of."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class KeyActionRecord(_Strict):
@@ -128,18 +130,28 @@ def read_tasks(path: str | Path) -> list[Task]:
     """Read a task file.
 
     Raises:
-        TaskFileError: the file cannot be used; one line says where and why.
+        TaskFileError: the file cannot be used, or one of its tasks cannot; one line says where and
+            why.
+    """
+    return read_file(path).all_or_none(Path(path))
+
+
+def read_file(path: str | Path) -> TaskFile:
+    """Read what can be used of a task file.
+
+    Raises:
+        TaskFileError: the file as a whole cannot be used.
     """
     path = Path(path)
     lines = read_text(path).splitlines()
     header = _header(lines, path)
-    tasks = checked_ids(_tasks(lines[1:], path), path)
-    if len(tasks) != header.tasks:
+    entries = list(_entries(lines[1:], path))
+    if len(entries) != header.tasks:
         raise TaskFileError(
             f"{path}: cut short or edited: its header says {header.tasks} tasks, "
-            f"and it has {len(tasks)}"
+            f"and it has {len(entries)}"
         )
-    return tasks
+    return read_entries(entries)
 
 
 def write_tasks(path: str | Path, tasks: Iterable[Task], **made: object) -> None:
@@ -192,22 +204,30 @@ def _header(lines: list[str], path: Path) -> Header:
     return header
 
 
-def _tasks(lines: list[str], path: Path) -> Iterator[Task]:
+def _entries(lines: list[str], path: Path) -> Iterator[Entry]:
     layouts: dict[str, dict[str, ObjectPose]] = {}
     for number, line in enumerate(lines, 2):
         if not line.strip():
             continue
-        where, data = f"{path}: the task in line {number}", parse_json(line, path, number)
+        data = parse_json(line, path, number)
         if isinstance(data, dict) and "layout" in data and "id" not in data:
             layout = validated(LayoutRecord, data, f"{path}: the layout in line {number}")
             layouts[layout.layout] = {
                 name: ObjectPose(*pose) for name, pose in layout.poses.items()
             }
-            continue
+        else:
+            yield _entry(data, f"the task in line {number}", dict(layouts))
+
+
+def _entry(data: object, where: str, layouts: Mapping[str, Mapping[str, ObjectPose]]) -> Entry:
+    def read() -> Task:
         record = validated(TaskRecord, data, where)
         if record.layout and record.layout not in layouts:
             raise TaskFileError(f"{where} begins with a layout that no line before it tells")
-        yield _task(record, layouts.get(record.layout, {}), where)
+        return _task(record, layouts.get(record.layout, {}), where)
+
+    stated = data.get("id") if isinstance(data, dict) else None
+    return Entry(where, stated if isinstance(stated, str) else "", read)
 
 
 def _task(record: TaskRecord, poses: Mapping[str, ObjectPose], where: str) -> Task:

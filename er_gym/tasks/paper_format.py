@@ -23,10 +23,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import (
-    checked_ids,
+    Entry,
+    TaskFile,
     known_scene,
     known_type,
     parse_json,
+    read_entries,
     read_text,
     validated,
 )
@@ -46,6 +48,8 @@ from er_gym.tasks.task import AgentPose, Task
 
 
 class _Vector(BaseModel):
+    model_config = ConfigDict(allow_inf_nan=False)
+
     x: float
     y: float
     z: float
@@ -53,6 +57,8 @@ class _Vector(BaseModel):
 
 class PaperPose(BaseModel):
     """A pose of the agent as the paper's files write it: metres and degrees, AI2-THOR's frame."""
+
+    model_config = ConfigDict(allow_inf_nan=False)
 
     agent_teleport_position: _Vector
     agent_cameraHorizon: float
@@ -78,7 +84,17 @@ def read_tasks(path: str | Path) -> list[Task]:
         Tasks in the file's order, with ids such as ``paper-57`` where the file states no other.
 
     Raises:
-        TaskFileError: the file cannot be used; one line says where and why.
+        TaskFileError: the file cannot be used, or one of its tasks cannot; one line says where and
+            why.
+    """
+    return read_file(path).all_or_none(Path(path))
+
+
+def read_file(path: str | Path) -> TaskFile:
+    """Read what can be used of a test file of the paper; see :func:`read_tasks`.
+
+    Raises:
+        TaskFileError: the file as a whole cannot be used.
     """
     path = Path(path)
     data = parse_json(read_text(path), path)
@@ -87,12 +103,21 @@ def read_tasks(path: str | Path) -> list[Task]:
             f"{path}: not a list of tasks but {json_kind(data)}; "
             'the paper\'s task files look like [{"scene": …, "tasktype": …}, …]'
         )
-    if any(isinstance(item, dict) and {"scene", "task_metadata"}.isdisjoint(item) for item in data):
+    if data and all(
+        isinstance(item, dict) and {"scene", "task_metadata"}.isdisjoint(item) for item in data
+    ):
         raise TaskFileError(
-            f"{path}: not a test file: a task has neither scene nor task_metadata; if the paper's "
+            f"{path}: not a test file: no task has a scene or task_metadata; if the paper's "
             "generator wrote it, read it with er_gym.tasks.paper_generator.read_generator_tasks"
         )
-    return checked_ids((_read_task(item, path, n) for n, item in enumerate(data, 1)), path)
+    return read_entries(_entry(item, number) for number, item in enumerate(data, 1))
+
+
+def _entry(data: object, number: int) -> Entry:
+    identity = data.get("identity") if isinstance(data, dict) else None
+    stated = isinstance(identity, int | str) and not isinstance(identity, bool)
+    where = f"task {number}" + (f" (identity {identity})" if stated else "")
+    return Entry(where, f"paper-{identity}" if stated else "", lambda: _read_task(data, where))
 
 
 def write_tasks(path: str | Path, tasks: Iterable[Task]) -> None:
@@ -158,32 +183,38 @@ def write_poses(path: str | Path, tasks: Iterable[Task]) -> None:
     write_json(Path(path), entries)
 
 
-def with_poses(tasks: Iterable[Task], poses: Mapping[str, Mapping[str, AgentPose]]) -> list[Task]:
+def with_poses(
+    tasks: Iterable[Task],
+    poses: Mapping[str, Mapping[str, AgentPose]],
+    places: Sequence[int] = (),
+) -> list[Task]:
     """The same tasks, each with the poses that a pose file states for its identity.
 
-    Tasks without an identity have the one that :func:`write_tasks` gives them, so that the list
-    must be the whole of what a file holds.
+    Args:
+        places: where each task stands in its file, from 1, if some of the file's tasks are missing:
+            a task without an identity has the one that :func:`write_tasks` gives to its place.
     """
     return [
         replace(task, poses={**task.poses, **poses.get(str(identity), {})})
-        for task, identity in _with_identities(list(tasks))
+        for task, identity in _with_identities(list(tasks), places)
     ]
 
 
-def _with_identities(tasks: Sequence[Task]) -> list[tuple[Task, object]]:
+def _with_identities(
+    tasks: Sequence[Task], places: Sequence[int] = ()
+) -> list[tuple[Task, object]]:
+    places = places or range(1, len(tasks) + 1)
     taken = {str(task.extra["identity"]) for task in tasks if "identity" in task.extra}
     found: list[tuple[Task, object]] = []
-    for place, task in enumerate(tasks, 1):
+    for place, task in zip(places, tasks, strict=True):
         number = place
         while str(number) in taken:
-            number += len(tasks)
+            number += places[-1]
         found.append((task, task.extra.get("identity", number)))
     return found
 
 
-def _read_task(data: object, path: Path, number: int) -> Task:
-    identity = data.get("identity") if isinstance(data, dict) else None
-    where = f"{path}: task {number}" + (f" (identity {identity})" if identity is not None else "")
+def _read_task(data: object, where: str) -> Task:
     paper = validated(PaperTask, data, where)
     actions = paper.task_metadata.actions
     task = Task(
@@ -221,7 +252,7 @@ def _task_record(task: Task, identity: object, path: Path, number: int) -> dict[
         "navigable_objects": list(task.navigable_objects),
         **extra,
     }
-    plain = _read_task(record, path, number)
+    plain = _read_task(record, f"{path}: task {number} (identity {identity})")
     return record | own_fields(replace(task, poses={}), plain)
 
 

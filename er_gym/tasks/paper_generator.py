@@ -18,10 +18,12 @@ from typing import Any
 
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import (
-    checked_ids,
+    Entry,
+    TaskFile,
     known_scene,
     known_type,
     parse_json,
+    read_entries,
     read_text,
     validated,
 )
@@ -57,6 +59,15 @@ def read_generator_tasks(path: str | Path) -> list[Task]:
     Raises:
         TaskFileError: a file cannot be used, or there is none; one line says where and why.
     """
+    return read_generated(path).all_or_none(Path(path))
+
+
+def read_generated(path: str | Path) -> TaskFile:
+    """Read what can be used of what the paper's generator wrote; see :func:`read_generator_tasks`.
+
+    Raises:
+        TaskFileError: one of the files as a whole cannot be used, or there is none.
+    """
     path = Path(path)
     files = sorted(path.rglob(f"*{_ENDING}"), key=_order) if path.is_dir() else [path]
     if not files:
@@ -64,7 +75,7 @@ def read_generator_tasks(path: str | Path) -> list[Task]:
             f"{path}: no file of the paper's generator in this folder or below; "
             f"their names end in {_ENDING}"
         )
-    return checked_ids((task for file in files for task in _read_file(file)), path)
+    return read_entries(entry for file in files for entry in _entries(file, path))
 
 
 def write_generator_tasks(folder: str | Path, tasks: Iterable[Task]) -> list[Path]:
@@ -92,7 +103,7 @@ def write_generator_tasks(folder: str | Path, tasks: Iterable[Task]) -> list[Pat
     return list(records)
 
 
-def _read_file(path: Path) -> list[Task]:
+def _entries(path: Path, top: Path) -> list[Entry]:
     data = parse_json(read_text(path), path)
     if not isinstance(data, list):
         raise TaskFileError(
@@ -104,11 +115,16 @@ def _read_file(path: Path) -> list[Task]:
         raise TaskFileError(
             f"{path}: this is a test file; read it with er_gym.tasks.paper_format.read_tasks"
         )
-    return [_read_task(item, path, number) for number, item in enumerate(data, 1)]
+    name = "" if path == top else f"{path.relative_to(top)}: "
+
+    def entry(item: object, number: int) -> Entry:
+        where = f"{name}task {number}"
+        return Entry(where, "", lambda: _read_task(item, path, number, where))
+
+    return [entry(item, number) for number, item in enumerate(data, 1)]
 
 
-def _read_task(data: object, path: Path, number: int) -> Task:
-    where = f"{path}: task {number}"
+def _read_task(data: object, path: Path, number: int, where: str) -> Task:
     paper = validated(PaperGenerated, data, where)
     scene, kind = _scene(paper.metadatapath, path, where), known_type(paper.tasktype, where)
     metadata = unknown(paper)
@@ -139,7 +155,7 @@ def _record(task: Task, path: Path, number: int) -> dict[str, Any]:
     # What a test file repeated of them need not fit the task: in one of the paper's it does not.
     record["tasktype"] = task.type.name
     record.pop("er_gym", None)
-    return record | own_fields(task, _read_task(record, path, number))
+    return record | own_fields(task, _read_task(record, path, number, f"{path}: task {number}"))
 
 
 def _scene(metadatapath: str, path: Path, where: str) -> str:

@@ -39,7 +39,7 @@ class OwnFields(BaseModel):
         poses: object id to the agent's pose; a test file has its pose file instead.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     id: str | None = None
     type: str | None = None
@@ -66,7 +66,7 @@ _ALIKE = (
 class _PaperModel(BaseModel):
     """Keeps fields that it does not know, so that they can be written again."""
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
 
 
 class PaperAction(_PaperModel):

@@ -17,7 +17,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.tasks import jsonl_format, paper_format
-from er_gym.tasks.errors import TaskFileError
+from er_gym.tasks.errors import SetAside, TaskFileError, in_short
 from er_gym.tasks.files import read_text, validated
 from er_gym.tasks.making import Making
 from er_gym.tasks.task import Task
@@ -25,9 +25,9 @@ from er_gym.tasks.task import Task
 _PACKAGE = Path(__file__).resolve().parents[1]
 _DATA = _PACKAGE / "tasks" / "data"
 _READERS = {
-    ".json": paper_format.read_tasks,
-    ".jsonl": jsonl_format.read_tasks,
-    ".jsonl.gz": jsonl_format.read_tasks,
+    ".json": paper_format.read_file,
+    ".jsonl": jsonl_format.read_file,
+    ".jsonl.gz": jsonl_format.read_file,
 }
 
 
@@ -41,6 +41,8 @@ class Suite:
         digest: sha256, in hex, of the tasks; two runs compare only if theirs are equal.
         env: keyword arguments of ``EmbodiedEnv`` that belong to the suite.
         description: a sentence for people.
+        set_aside: tasks of the file that cannot be used, and why.
+        places: where in the file each of the tasks stands, from 1; none for a bundled suite.
     """
 
     name: str
@@ -48,6 +50,8 @@ class Suite:
     digest: str
     env: Mapping[str, Any] = field(default_factory=dict)
     description: str = ""
+    set_aside: tuple[SetAside, ...] = ()
+    places: tuple[int, ...] = ()
 
 
 class SuiteConfig(BaseModel):
@@ -131,8 +135,10 @@ def suite_home() -> Path:
 def suite_from_file(path: str | Path) -> Suite:
     """Make a suite of a task file: the paper's ``.json`` or our own ``.jsonl`` or ``.jsonl.gz``.
 
+    What is wrong with one task sets that one aside (``Suite.set_aside``).
+
     Raises:
-        TaskFileError: the file cannot be used; one line says where and why.
+        TaskFileError: the file cannot be used, or none of its tasks; one line says where and why.
     """
     path = Path(path)
     ending = next((end for end in _READERS if path.name.lower().endswith(end)), "")
@@ -141,8 +147,16 @@ def suite_from_file(path: str | Path) -> Suite:
             f"{path}: a task file ends in .json (the paper's format), "
             ".jsonl or .jsonl.gz (er-gym's)"
         )
-    tasks = tuple(_READERS[ending](path))
-    return Suite(path.name[: -len(ending)], tasks, jsonl_format.digest(tasks))
+    found = _READERS[ending](path)
+    if found.set_aside and not found.tasks:
+        raise TaskFileError(f"{path}: no task can be used: {in_short(found.set_aside)}")
+    return Suite(
+        name=path.name[: -len(ending)],
+        tasks=found.tasks,
+        digest=jsonl_format.digest(found.tasks),
+        set_aside=found.set_aside,
+        places=found.places,
+    )
 
 
 def config_directory(kind: str) -> Path:

@@ -389,3 +389,35 @@ def test_check_env_has_nothing_to_say_of_a_rearranged_task(obs_mode: str) -> Non
         warnings.simplefilter("error")
         check_env(env, skip_render_check=True)
     env.close()
+
+
+# -- files of which some tasks are no use ----------------------------------------------------------
+
+
+def ghostly(task: Task) -> Task:
+    ghost = replace(task.key_actions[0], object_id="Mug|+09.00|+09.00|+09.00")
+    return replace(task, id=f"ghost-{task.id}", key_actions=(ghost, *task.key_actions[1:]))
+
+
+def test_what_does_not_fit_its_scene_is_not_drawn(
+    make: Callable[..., EmbodiedEnv], tmp_path: Path
+) -> None:
+    file = tmp_path / "some.jsonl"
+    jsonl_format.write_tasks(file, [ghostly(PICKUPS[0]), PICKUPS[1], REARRANGED])
+    with pytest.warns(UserWarning, match=r"some\.jsonl: 1 of 3 tasks set aside: ghost-.*no object"):
+        env = make(str(file))
+    assert {drawn(env, seed).id for seed in range(12)} == {PICKUPS[1].id, REARRANGED.id}
+    with pytest.raises(ValueError, match="no task 'ghost-"):
+        drawn(env, task=ghostly(PICKUPS[0]).id)
+    with pytest.warns(UserWarning, match="1 of 3 tasks set aside"):
+        gymnasium.make("ER-SinglePickup-v0", episode_source=file, obs_mode="state").close()
+    jsonl_format.write_tasks(file, [ghostly(PICKUPS[0])])
+    with pytest.raises(ValueError, match=r"some\.jsonl: no task can be played: ghost-"):
+        make(file)
+
+
+def test_a_good_file_warns_of_nothing(make: Callable[..., EmbodiedEnv], tmp_path: Path) -> None:
+    jsonl_format.write_tasks(tmp_path / "good.jsonl", [PICKUPS[1], REARRANGED])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        make(tmp_path / "good.jsonl")

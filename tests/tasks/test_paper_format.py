@@ -274,10 +274,13 @@ WRONG = {
     "task type": ([paper_task(tasktype="dance")], "unknown tasktype 'dance'; choose one of: "),
     "scene": ([paper_task(scene="FloorPlan31")], "unknown scene 'FloorPlan31'; choose one "),
     "verb": ([with_action(action="hop")], "unknown action 'hop'; choose one of: navigate to"),
-    "same identity": ([paper_task(), paper_task()], "2 tasks have the id 'paper-57'"),
+    "same identity": (
+        [paper_task(), paper_task()],
+        "task 2 (identity 57) has the id 'paper-57', as task 1 (identity 57) has",
+    ),
     "the generator's": (
         [paper_task()["task_metadata"]],
-        "not a test file: a task has neither scene nor task_metadata; if the paper's generator",
+        "not a test file: no task has a scene or task_metadata; if the paper's generator",
     ),
     "own: no object": (
         [paper_task(er_gym=[])],
@@ -289,7 +292,7 @@ WRONG = {
     "own: short pose": (
         with_own(layout_poses={"Mug_1": [1, 2, 3]}), "lacks field 'er_gym.layout_poses.Mug_1[3]'",
     ),
-    "own: id": (with_own(id="a/b"), "the task id 'a/b' cannot be a file name"),
+    "own: id": (with_own(id="a/b"), "the task id 'a/b', which cannot be a file name"),
     "own: type": (with_own(type="dance"), "unknown tasktype 'dance'; choose one of: "),
     "own: scene": (with_own(scene="Home"), "unknown scene 'Home'; choose one of FloorPlan1-30"),
     "bad identity": ([paper_task(identity="../x")], "cannot be a file name"),

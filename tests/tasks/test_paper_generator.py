@@ -232,7 +232,7 @@ WRONG: dict[str, tuple[object, str]] = {
     ),
     "task type": ([generated(tasktype="dance")], "unknown tasktype 'dance'; choose one of: "),
     "own": ([generated(er_gym={"gaol": []})], "task 1 has a wrong field 'er_gym.gaol'"),
-    "same id": ([generated(er_gym={"id": "a"})] * 2, "2 tasks have the id 'a'"),
+    "same id": ([generated(er_gym={"id": "a"})] * 2, "task 2 has the id 'a', as task 1 has"),
 }
 
 
