@@ -287,6 +287,33 @@ def test_toggling_a_burner_turns_its_knob(env: EmbodiedEnv, play: Play) -> None:
     assert [knob["isToggled"] for knob in knobs] == [True]
 
 
+def test_the_burner_under_a_pan_is_toggled_though_the_pan_hides_it(
+    env: EmbodiedEnv, play: Play
+) -> None:
+    pan, burner = "Pan|-01.29|+00.90|-01.35", "StoveBurner|+01.77|+00.90|+00.82"
+    task = make_task(
+        "pickup_and_put",
+        ("pickup", pan),
+        ("put in", burner),
+        ("toggle", burner),
+        scene="FloorPlan2",
+        navigable_objects=("CounterTop", "Pan", "StoveBurner"),
+    )
+    *_, before, after = play(
+        task,
+        *("navigate to Pan", "pickup Pan", "navigate to StoveBurner", "put in StoveBurner"),
+        *("navigate to Pan", "toggle StoveBurner"),
+    )
+    assert before["action_mask"][INDEX[Action("toggle", "StoveBurner")]]
+    assert after["object_id"] == burner
+    objects = {entry["objectId"]: entry for entry in env.objects}
+    assert not objects[burner]["visible"]
+    knobs = [o for o in env.objects if burner in (o["controlledObjects"] or ())]
+    assert [knob["isToggled"] for knob in knobs] == [True]
+    far = play(task, "observe")[-1]
+    assert not far["action_mask"][INDEX[Action("toggle", "StoveBurner")]]
+
+
 def test_a_type_with_no_object_left_is_answered_not_raised(env: EmbodiedEnv, play: Play) -> None:
     task = make_task("single_pickup", ("pickup", APPLE), navigable_objects=("Boots",))
     infos = play(task, "navigate to Boots")
