@@ -1,6 +1,7 @@
 """How fast the player answers the official client, and what bounds it.
 
     python -m benchmarks.perf.player [--seconds 2] [--rounds 3] [--width 300] [--height 300]
+                                        [--server fifo|wsgi]
 
 Each sort of step is timed through the official client, which is then asked how much of the time its
 own work took; the player's is read from the kernel. What neither took is waiting: the pipes, the
@@ -89,9 +90,18 @@ def measure(step: Callable[[], object], pid: int, seconds: float) -> Rate:
 @click.option("--rounds", default=3, show_default=True, type=click.IntRange(1))
 @click.option("--width", default=300, show_default=True, type=click.IntRange(1))
 @click.option("--height", default=300, show_default=True, type=click.IntRange(1))
-def main(seconds: float, rounds: int, width: int, height: int) -> None:
+@click.option(
+    "--server",
+    default="fifo",
+    show_default=True,
+    type=click.Choice(["fifo", "wsgi"]),
+    help="The client's server class; WSGI knows whole messages only.",
+)
+def main(seconds: float, rounds: int, width: int, height: int, server: str) -> None:
     """Measure, and print one table: of each sort of step the median round."""
     from ai2thor.controller import Controller
+    from ai2thor.fifo_server import FifoServer
+    from ai2thor.wsgi_server import WsgiServer
 
     import er_gym
 
@@ -99,6 +109,7 @@ def main(seconds: float, rounds: int, width: int, height: int) -> None:
     controller = Controller(
         local_executable_path=er_gym.thor_executable(),
         x_display=":0",
+        server_class={"fifo": FifoServer, "wsgi": WsgiServer}[server],
         scene="FloorPlan1",
         width=width,
         height=height,
@@ -119,7 +130,7 @@ def main(seconds: float, rounds: int, width: int, height: int) -> None:
             found[name].append(Rate(rate.per_second * each, rate.client / each, rate.player / each))
     controller.stop()
     medians = {name: _median(rates) for name, rates in found.items()}
-    _show(medians, ready, f"{width}×{height}")
+    _show(medians, ready, server, f"{width}×{height}")
 
 
 def _median(rates: list[Rate]) -> Rate:
@@ -127,21 +138,21 @@ def _median(rates: list[Rate]) -> Rate:
     return next(rate for rate in rates if rate.per_second == middle)
 
 
-def _show(medians: dict[str, Rate], ready: float, size: str) -> None:
+def _show(medians: dict[str, Rate], ready: float, server: str, size: str) -> None:
     console = Console(width=None if sys.stdout.isatty() else 120)
     cores = os.cpu_count()
-    table = Table(title=f"er-gym's player, FloorPlan1, {size}, {cores} cores")
+    table = Table(title=f"er-gym's player, FloorPlan1, {server.upper()}, {size}, {cores} cores")
     for heading in ("step", "steps/s", "client ms", "player ms", "waiting ms", "bound by"):
         table.add_column(heading, justify="left" if heading in ("step", "bound by") else "right")
     for name, rate in medians.items():
         times = (f"{value:.2f}" for value in (rate.client, rate.player, rate.waiting))
         table.add_row(name, f"{rate.per_second:.0f}", *times, rate.bound)
     console.print(table)
-    first = next(iter(medians.values()))
-    verdict = "reached" if first.per_second >= _GOAL else "MISSED"
-    console.print(
-        f"ready to step {ready:.2f} s after launch; goal of {_GOAL:.0f} Pass/s: {verdict}"
-    )
+    console.print(f"ready to step {ready:.2f} s after launch")
+    if server == "fifo":  # WSGI is bounded by the client
+        first = next(iter(medians.values()))
+        verdict = "reached" if first.per_second >= _GOAL else "MISSED"
+        console.print(f"goal of {_GOAL:.0f} Pass/s: {verdict}")
 
 
 if __name__ == "__main__":

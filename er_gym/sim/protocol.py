@@ -1,8 +1,9 @@
-"""The framing of AI2-THOR's FIFO protocol, as the official client ``ai2thor==5.0.0`` reads it.
+"""What goes over the wire to AI2-THOR's client, as ``ai2thor==5.0.0`` reads it.
 
-A message is a row of fields, each a header (one byte of type, four bytes of big-endian length) and
-its body, and ends with an empty field of type 255. The client sends one JSON field; the player
-answers with metadata in msgpack and then images, bottom row first. Facts measured with a stub.
+Over FIFO a message is a row of fields, each a header (one byte of type, four bytes of big-endian
+length) and its body, and ends with an empty field of type 255. The client sends one JSON field; the
+player answers with metadata in msgpack and then images. Over WSGI the metadata is JSON and the
+images are parts of a form. Images go bottom row first. Facts measured with a stub.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import json
 import os
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 from typing import IO, Any
 
@@ -40,6 +41,17 @@ class Field(IntEnum):
     END = 255
 
 
+FORM_NAMES = {
+    Field.RGB: "image",
+    Field.DEPTH: "image_depth",
+    Field.CLASSES: "image_classes",
+    Field.INSTANCES: "image_ids",
+    Field.THIRD_PARTY_RGB: "image-thirdParty-camera",
+    Field.THIRD_PARTY_DEPTH: "image_thirdParty_depth",
+    Field.THIRD_PARTY_INSTANCES: "image_thirdParty_image_ids",
+    Field.THIRD_PARTY_CLASSES: "image_thirdParty_classes",
+}
+"""What the client's WSGI server calls the pictures."""
 _END = _HEADER.pack(Field.END, 0)
 _FIELDS = {
     "rgb": (Field.RGB, Field.THIRD_PARTY_RGB),
@@ -96,13 +108,36 @@ def rgba(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.pad(colours, ((0, 0), (0, 0), (0, 1)), constant_values=255)
 
 
+class ObjectCache:
+    """Encoded objects; one that says the same as last time is not encoded again.
+
+    Args:
+        encode: from an object's metadata to what is sent of it.
+    """
+
+    def __init__(self, encode: Callable[[dict[str, Any]], bytes]) -> None:
+        self._encode = encode
+        self._kept: dict[str, tuple[dict[str, Any], bytes]] = {}
+
+    def __call__(self, entry: dict[str, Any]) -> bytes:
+        """One object, encoded."""
+        kept = self._kept.get(entry["objectId"])
+        if kept is None or kept[0] != entry:
+            kept = self._kept[entry["objectId"]] = entry, self._encode(entry)
+        return kept[1]
+
+    def forget(self) -> None:
+        """Drop everything: another scene comes."""
+        self._kept.clear()
+
+
 class MetadataPacker:
-    """Metadata as msgpack; objects that say the same as last time are not packed again."""
+    """Metadata as msgpack, as FIFO sends it."""
 
     def __init__(self) -> None:
         # A lone surrogate in a string cannot be sent, and must not end the player.
         self._packer = msgpack.Packer(unicode_errors="replace")
-        self._kept: dict[str, tuple[dict[str, Any], bytes]] = {}
+        self.objects = ObjectCache(self._packer.pack)
 
     def __call__(self, metadata: dict[str, Any], sequence_id: int) -> bytes:
         """The message's metadata: that of the one agent, and what the client keeps beside it."""
@@ -134,16 +169,33 @@ class MetadataPacker:
             yield pack(name)
             if name == "objects":
                 yield self._packer.pack_array_header(len(value))
-                yield from map(self._object, value)
+                yield from map(self.objects, value)
             else:
                 yield pack(value)
 
-    def _object(self, entry: dict[str, Any]) -> bytes:
-        kept = self._kept.get(entry["objectId"])
-        if kept is None or kept[0] != entry:
-            kept = self._kept[entry["objectId"]] = entry, self._packer.pack(entry)
-        return kept[1]
 
-    def forget(self) -> None:
-        """Drop what is kept: another scene comes."""
-        self._kept.clear()
+class MetadataJson:
+    """Metadata as JSON, as WSGI sends it."""
+
+    def __init__(self) -> None:
+        self.objects = ObjectCache(_json)
+
+    def __call__(self, metadata: dict[str, Any], sequence_id: int) -> bytes:
+        """The same as :class:`MetadataPacker` says."""
+        cameras = _json(metadata["thirdPartyCameras"])
+        agent = b",".join(
+            b"%b:%b" % (_json(name), self._objects(value) if name == "objects" else _json(value))
+            for name, value in metadata.items()
+        )
+        return b'{"sequenceId":%d,"activeAgentId":0,"thirdPartyCameras":%b,"agents":[{%b}]}' % (
+            sequence_id,
+            cameras,
+            agent,
+        )
+
+    def _objects(self, entries: Sequence[dict[str, Any]]) -> bytes:
+        return b"[%b]" % b",".join(map(self.objects, entries))
+
+
+def _json(value: Any) -> bytes:
+    return json.dumps(value).encode()
