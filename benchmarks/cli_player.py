@@ -21,30 +21,45 @@ def path() -> None:
 
 
 @player.command()
-@click.option("--force", is_flag=True, help="Set a real Unity build aside; uninstall restores it.")
+@click.option("--force", is_flag=True, help="Set real Unity builds aside; uninstall restores them.")
 def install(force: bool) -> None:
-    """Put the player where Controller(platform=CloudRendering) finds it, offline."""
+    """Make Controller(scene=…) start the player: offline, without a GPU or an X server.
+
+    The player takes the place of Unity's builds in ~/.ai2thor, for the platforms Linux64 (the
+    client's default) and CloudRendering, and of the file in which the client looks up GPUs. In the
+    site-packages of this Python a hook spares programs the client's tests for an X server and for
+    Vulkan. Repeat it after moving Python, and in each environment that runs AI2-THOR programs.
+    """
+    from benchmarks.doctor import version_of_client
     from er_gym.thor import player as players
 
     with bad_input(players.PlayerError):
-        release = players.install(force=force)
-    click.echo(f"installed in {release.folder}")
-    if not players.vulkan_is_there():
+        installed = players.install(force=force)
+    for release in installed.releases:
+        click.echo(f"{release.platform}: {release.path}")
+    click.echo(f"for {version_of_client()}; programs on another version of it are not served")
+    if installed.hook is not None:
+        click.echo(f"hook: {installed.hook}")
+    else:
         click.echo(
-            "AI2-THOR's client asks for a Vulkan library before it starts CloudRendering, and "
-            "there is none: on Debian or Ubuntu, sudo apt install libvulkan1 (no GPU is needed)"
+            "no hook, for the site-packages of this Python cannot be written: AI2-THOR's client "
+            "still asks for an X server or a Vulkan library; er-gym doctor says what to do"
         )
+    for build in installed.pruned:
+        click.echo(f"AI2-THOR's client keeps three builds: at its next start it deletes {build}")
 
 
 @player.command()
 def uninstall() -> None:
-    """Remove what install has put there, and nothing else."""
+    """Remove what install has put there, and bring back what it has set aside."""
     from er_gym.thor import player as players
+    from er_gym.thor.places import client_home
 
     with bad_input(players.PlayerError):
-        release = players.uninstall()
-    restored = "; Unity's build is there again" if release.is_unity else ""
-    click.echo(f"removed from {release.folder}{restored}")
+        unity = players.uninstall()
+    click.echo(f"removed from {client_home()}")
+    for release in unity:
+        click.echo(f"Unity's build is there again: {release.path}")
 
 
 @click.command()

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shlex
 import shutil
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
+from ctypes.util import find_library
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from er_gym.thor import SCENE_NAMES, make_controller, thor_executable
-from er_gym.thor.player import Release, vulkan_is_there
+from er_gym.thor.places import GpuMapping, Release
 
 EXTRAS = {
     "rl": ("sb3-contrib", "stable-baselines3", "tensorboard", "torch", "tqdm"),
@@ -46,7 +49,7 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Look at every part, in the order in which they matter."""
-    return [*_engine(), _player(), _unity(), _gpu(), *_extras()]
+    return [*_engine(), _player(), *_programs(), _unity(), _gpu(), *_extras()]
 
 
 def _engine() -> Iterator[Finding]:
@@ -86,14 +89,71 @@ def _launched() -> str:
     done = subprocess.run(shlex.split(program), capture_output=True, text=True, timeout=60)
     if done.returncode != 2:  # it says who is to start it
         raise RuntimeError(f"{program} ended with {done.returncode}: {done.stderr.strip()}")
-    release = Release()
-    return program + (f"; installed as {release.platform}" if release.is_ours else "")
+    return program
+
+
+_ASK_THE_CLIENT = """
+import json, os
+from ai2thor import platform
+request = platform.Request("Linux", 300, 300, os.environ.get("DISPLAY"), False)
+names = ("Linux64", "CloudRendering")
+print(json.dumps({name: getattr(platform, name).validate(request) for name in names}))
+"""
+"""A program as a user's: what AI2-THOR's client misses on this machine, for each platform."""
+_MENDS = {
+    "Linux64": "an X server with GLX: xvfb-run -s '-screen 0 1280x1024x24' python PROGRAM",
+    "CloudRendering": "a Vulkan library: sudo apt install libvulkan1 (no GPU is needed)",
+}
+"""What the client wants for a platform where nothing spares it its test."""
+
+
+def _programs() -> Iterator[Finding]:
+    """Whether AI2-THOR programs get the player without saying so."""
+    calls = {"Linux64": "Controller(scene=…)", "CloudRendering": "platform=CloudRendering"}
+    try:
+        program = [sys.executable, "-c", _ASK_THE_CLIENT]
+        done = subprocess.run(program, capture_output=True, text=True, timeout=60, check=True)
+        missing: dict[str, list[str]] = json.loads(done.stdout)
+    except (subprocess.SubprocessError, ValueError) as error:
+        yield Finding("Controller(scene=…)", False, _words(error), "pip install ai2thor==5.0.0")
+        return
+    for platform, call in calls.items():
+        release = Release(platform)
+        if not release.is_ours:
+            there = "Unity's build is there" if release.is_unity else "no build"
+            mend = "er-gym player install" + (" --force" if release.is_unity else "")
+            yield Finding(call, release.is_unity and not missing[platform], there, mend)
+        elif missing[platform]:
+            says = f"the player is installed, but AI2-THOR's client says: {missing[platform][0]}"
+            mend = f"er-gym player install, in this Python's environment; else {_MENDS[platform]}"
+            yield Finding(call, False, says, mend)
+        else:
+            yield Finding(call, True, f"starts the player; {version_of_client()}")
+    mapped = GpuMapping().path.exists()
+    says = "any number will do" if GpuMapping().is_ours else "the client has its own list of GPUs"
+    if mapped:
+        yield Finding("gpu_device=…", True, says)
+    else:
+        says = "the client asks vulkaninfo and nvidia-smi"
+        yield Finding("gpu_device=…", False, says, "er-gym player install")
+
+
+def version_of_client() -> str:
+    """The client that the player takes a build's place for, in words."""
+    from ai2thor._builds import COMMIT_ID
+
+    there = _version("ai2thor")
+    known = "" if there == _CLIENT else f" (er-gym was written for {_CLIENT})"
+    return f"ai2thor {there}{known}, commit_id {COMMIT_ID[:7]}"
+
+
+_CLIENT = "5.0.0"
 
 
 def _unity() -> Finding:
     """Whether AI2-THOR's own build is here, and can be started."""
     cloud, desktop = Release("CloudRendering"), Release("Linux64")
-    display, vulkan = "DISPLAY" in os.environ, vulkan_is_there()
+    display, vulkan = "DISPLAY" in os.environ, find_library("vulkan") is not None
     found = [
         f"{name} {'found' if there else 'missing'}"
         for name, there in (
@@ -104,10 +164,10 @@ def _unity() -> Finding:
     ]
     works = (cloud.is_unity and vulkan) or (desktop.is_unity and display)
     mends = []
+    if cloud.is_ours or desktop.is_ours:
+        mends.append("er-gym's player is in its place: er-gym player uninstall")
     if not (cloud.is_unity or desktop.is_unity):
         mends.append("AI2-THOR's client downloads the build at first use, from the network")
-    if cloud.is_ours:
-        mends.append("er-gym's player is in its place: er-gym player uninstall")
     if not vulkan and not display:
         mends.append("apt install libvulkan1 with a GPU's driver, or start an X server with GLX")
     return Finding("Unity build", works, ", ".join(found), "; ".join(mends) if not works else "")

@@ -3,9 +3,9 @@
 from er_gym.sim.compatibility import accepts, placement_table
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError
 from er_gym.thor.backends import BACKENDS, BackendError, make_controller
+from er_gym.thor.launcher import thor_executable
 from er_gym.thor.object_types import OBJECT_TYPES, ObjectType
 from er_gym.thor.objects import ObjectTable, objects_of
-from er_gym.thor.player import thor_executable
 
 __all__ = [
     "BACKENDS",

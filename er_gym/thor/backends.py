@@ -6,6 +6,8 @@ import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from er_gym.thor.places import Release
+
 if TYPE_CHECKING:
     from ai2thor.controller import Controller  # half a second to import
 
@@ -32,6 +34,15 @@ def _unity(arguments: dict[str, Any]) -> Controller:
         arguments.setdefault("platform", CloudRendering)
     from ai2thor.controller import Controller
 
+    if "local_executable_path" not in arguments:
+        platform = arguments.get("platform", "Linux64")
+        release = Release(platform if isinstance(platform, str) else platform.__name__)
+        if release.is_ours:
+            raise BackendError(
+                f"er-gym's player is installed in place of Unity's build ({release.path}), so "
+                "backend 'unity' would be the embedded engine again; er-gym player uninstall "
+                "removes it"
+            )
     try:
         return Controller(**arguments)
     except Exception as error:  # whatever the client raises here means: no Unity on this machine

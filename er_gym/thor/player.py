@@ -1,172 +1,203 @@
-"""Where the official client finds the player: by a path, or as its own CloudRendering build."""
+"""Installs the player where AI2-THOR's client looks for its own builds, and removes it again."""
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import json
 import os
 import shlex
-import shutil
-import sys
-import tempfile
+import site
+import sysconfig
+from collections.abc import Iterator
 from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import Path
 
-_START = Path(__file__).with_name("start_player.py")
-_SERVER_TYPES = {"server_types": ["FIFO"]}
-"""What the client reads from a build's metadata.json: how the build can be spoken to."""
-MARKER = "installed-by-er-gym.json"
-"""A file in a release folder that says: er-gym may remove this folder."""
+from er_gym.thor import client_hook
+from er_gym.thor.launcher import write_whole
+from er_gym.thor.places import GpuMapping, Place, Release, client_home
+
+RELEASES = tuple(Release(platform) for platform in client_hook.PLATFORMS)
+_PLACES: tuple[Place, ...] = (*RELEASES, GpuMapping())
+_HOOK = "er_gym_player_hook"
+"""The name of er_gym.thor.client_hook where it is copied to."""
 
 
 class PlayerError(RuntimeError):
     """The player cannot be installed or uninstalled; the message says why and what to do."""
 
 
-def thor_executable() -> str:
-    """What ``Controller(local_executable_path=…, x_display=":0")`` launches to get our engine.
-
-    It is the path of a launcher for this Python and this er-gym, which is written to the user's
-    cache (``$XDG_CACHE_HOME`` or ``~/.cache``) when it is not there yet. The client splits it as a
-    shell would, so that a path with spaces comes quoted. Where nothing can be written it is the
-    command that the launcher would run.
-    """
-    text = _launcher()
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "er-gym"
-    path = cache / f"player-{sha256(text.encode()).hexdigest()[:12]}"
-    try:
-        if not (os.access(path, os.X_OK) and path.read_text() == text):
-            cache.mkdir(parents=True, exist_ok=True)
-            _write_executable(path, text)
-    except OSError:
-        return shlex.join(_command())
-    return shlex.quote(str(path))
-
-
-def _command() -> list[str]:
-    return [sys.executable, str(_START)]
-
-
-def _launcher() -> str:
-    # A shell script: a `#!` line takes neither spaces nor more than some hundred characters. The
-    # shell is there at once, to see whose child it is; Python may come after the parent's death.
-    return (
-        "#!/bin/sh\n"
-        "# er-gym's player, which AI2-THOR's client starts in place of Unity's.\n"
-        f'exec {shlex.join(_command())} -parent "$PPID" "$@"\n'
-    )
-
-
-def _write_executable(path: Path, text: str) -> None:
-    """Write a program so that nobody ever finds half of it there."""
-    file, draft = tempfile.mkstemp(dir=path.parent, prefix=path.name)
-    with os.fdopen(file, "w") as stream:
-        stream.write(text)
-    os.chmod(draft, 0o755)
-    os.replace(draft, path)
-
-
 @dataclass(frozen=True)
-class Release:
-    """The place of a build of this client's version for one of its platforms."""
+class Installed:
+    """What :func:`install` has done.
 
-    platform: str = "CloudRendering"
+    Attributes:
+        releases: the builds whose place the player has taken.
+        hook: the file that spares this Python's programs the client's test of the machine; None
+            where it cannot be written.
+        pruned: other builds that the client, which keeps three, deletes at its next start.
+    """
 
-    @property
-    def home(self) -> Path:
-        """The folder of all that the client keeps."""
-        return Path("~/.ai2thor").expanduser()
-
-    @property
-    def name(self) -> str:
-        from ai2thor._builds import COMMIT_ID
-
-        return f"thor-{self.platform}-{COMMIT_ID}"
-
-    @property
-    def folder(self) -> Path:
-        return self.home / "releases" / self.name
-
-    @property
-    def executable(self) -> Path:
-        return self.folder / self.name
-
-    @property
-    def set_aside(self) -> Path:
-        """Where a real build waits; the client prunes only what is in ``releases``."""
-        return self.home / "set-aside-by-er-gym" / self.name
-
-    @property
-    def is_ours(self) -> bool:
-        """Whether er-gym has put its player there."""
-        return (self.folder / MARKER).is_file()
-
-    @property
-    def is_unity(self) -> bool:
-        """Whether something else is there: a real build."""
-        return self.folder.is_dir() and not self.is_ours
+    releases: tuple[Release, ...]
+    hook: Path | None
+    pruned: tuple[Path, ...]
 
 
-def install(*, force: bool = False) -> Release:
-    """Put the player where ``Controller(platform=CloudRendering)`` finds it, without a download.
+def install(*, force: bool = False) -> Installed:
+    """Put the player where ``Controller(…)`` finds it as its own build, without a download.
 
-    Again is harmless, and mends an installation whose Python has moved.
+    A second time is harmless, and mends an installation whose Python has moved.
 
     Args:
-        force: set a real build aside that is there; :func:`uninstall` brings it back.
+        force: set real builds aside that are there; :func:`uninstall` brings them back.
 
     Raises:
         PlayerError: a real build is there, or the client could not start the player from there.
     """
-    release = Release()
+    with _alone():
+        for release in RELEASES:
+            _check(release, force)
+        if GpuMapping().is_foreign and os.path.lexists(GpuMapping().set_aside):
+            raise _two_of(GpuMapping())
+        for place in _PLACES:
+            place.put()
+        return Installed(RELEASES, _write_hook(), tuple(_soon_pruned()))
+
+
+def _check(release: Release, force: bool) -> None:
     if shlex.split(str(release.executable)) != [str(release.executable)]:
         raise PlayerError(
             f"AI2-THOR's client splits the path {release.executable} at its spaces and quotes, so "
             "it cannot start anything there; use Controller(local_executable_path="
             "er_gym.thor_executable(), x_display=':0')"
         )
-    if release.is_unity:
+    if release.is_foreign:
         if not force:
             raise PlayerError(
-                f"{release.folder} holds a build that er-gym did not put there; --force sets it "
+                f"{release.path} holds a build that er-gym did not put there; --force sets it "
                 "aside, and uninstall brings it back"
             )
-        if release.set_aside.exists():
-            raise PlayerError(f"{release.set_aside} is set aside already; remove one of the two")
-        release.set_aside.parent.mkdir(parents=True, exist_ok=True)
-        release.folder.rename(release.set_aside)
-    release.folder.parent.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(dir=release.home, prefix="er-gym-"))
-    draft.chmod(0o755)
-    _write_executable(draft / release.name, _launcher())
-    (draft / "metadata.json").write_text(json.dumps(_SERVER_TYPES) + "\n")
-    (draft / MARKER).write_text(json.dumps({"python": sys.executable}) + "\n")
-    if release.is_ours:
-        shutil.rmtree(release.folder)
-    draft.rename(release.folder)
-    return release
+        if os.path.lexists(release.set_aside):
+            raise _two_of(release)
 
 
-def uninstall() -> Release:
+def _two_of(place: Place) -> PlayerError:
+    return PlayerError(
+        f"{place.path} is not er-gym's, and neither is {place.set_aside}, which is set aside "
+        "already; move one of the two away"
+    )
+
+
+def uninstall() -> tuple[Release, ...]:
     """Remove what :func:`install` has put there, and bring back what it had set aside.
+
+    Returns:
+        The builds of Unity's that are there now.
 
     Raises:
         PlayerError: nothing of er-gym's is there.
     """
-    release = Release()
-    if not release.is_ours:
-        found = "a build that er-gym did not put there" if release.is_unity else "nothing"
-        raise PlayerError(f"there is {found} in {release.folder}, so nothing is removed")
-    shutil.rmtree(release.folder)
-    if release.set_aside.is_dir():
-        release.set_aside.rename(release.folder)
-        if not any(release.set_aside.parent.iterdir()):
-            release.set_aside.parent.rmdir()
-    return release
+    unity = [str(release.path) for release in RELEASES if release.is_unity]
+    others = f", but builds that er-gym did not put there: {', '.join(unity)}" if unity else ""
+    nothing = PlayerError(f"nothing of er-gym's is in {client_home()}{others}")
+    if not client_home().is_dir():
+        raise nothing
+    with _alone():
+        cleared = [place.clear() for place in _PLACES]
+        hooks = _remove_hooks()
+    if not hooks and not any(cleared):
+        raise nothing
+    with contextlib.suppress(OSError):  # they are not empty: the client keeps its logs there
+        (client_home() / "releases").rmdir()
+        client_home().rmdir()
+    return tuple(release for release in RELEASES if release.is_unity)
 
 
-def vulkan_is_there() -> bool:
-    """Whether the client's own test for Vulkan, which CloudRendering has to pass, does."""
-    from ctypes.util import find_library
+@contextlib.contextmanager
+def _alone() -> Iterator[None]:
+    """Keep out another er-gym that does the same, and say in one line what the disk refuses."""
+    try:
+        client_home().mkdir(parents=True, exist_ok=True)
+        folder = os.open(client_home(), os.O_RDONLY)
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(folder)
+    except OSError as error:
+        raise PlayerError(
+            f"er-gym cannot write into {client_home()}, where AI2-THOR's client keeps everything "
+            f"({error}); make it writable, or set HOME to a folder that is"
+        ) from error
 
-    return find_library("vulkan") is not None
+
+# -- the hook --------------------------------------------------------------------------------------
+
+
+def hook_folders() -> list[Path]:
+    """The folders whose ``.pth`` files this Python reads as it starts, the preferred one first."""
+    folders = [sysconfig.get_path("purelib")]
+    if site.ENABLE_USER_SITE:
+        folders.append(site.getusersitepackages())
+    return [Path(folder) for folder in folders]
+
+
+def _write_hook() -> Path | None:
+    """See to it that this Python has the hook; where, or None."""
+    for folder in hook_folders():
+        if all(_says(folder / name, text) for name, text in _hook_files().items()):
+            return folder / f"{_HOOK}.pth"  # it is whose it is: only its owner removes it
+    for folder in hook_folders():
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            if os.access(folder, os.W_OK):
+                # First it is written down, so that uninstall finds what a kill leaves behind.
+                _record().write_text(json.dumps({"hooks": sorted({*_hooks(), str(folder)})}) + "\n")
+                for name, text in _hook_files().items():
+                    write_whole(folder / name, text)
+                return folder / f"{_HOOK}.pth"
+    return None
+
+
+def _hook_files() -> dict[str, str]:
+    # In this order: a .pth file that names no module is complained of whenever Python starts.
+    module = Path(client_hook.__file__).read_text(encoding="utf-8")
+    return {f"{_HOOK}.py": module, f"{_HOOK}.pth": f"import {_HOOK}; {_HOOK}.activate()\n"}
+
+
+def _says(path: Path, text: str) -> bool:
+    try:
+        return path.read_text(encoding="utf-8") == text
+    except (OSError, ValueError):
+        return False
+
+
+def _record() -> Path:
+    """The file that says in which folders er-gym has put hooks for this user."""
+    return client_home() / "hooks-by-er-gym.json"
+
+
+def _hooks() -> list[str]:
+    try:
+        found: list[str] = json.loads(_record().read_text(encoding="utf-8"))["hooks"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+    return found
+
+
+def _remove_hooks() -> bool:
+    """Remove the hooks of this user's; whether there were any."""
+    folders = [Path(folder) for folder in _hooks()]
+    for folder in folders:
+        (folder / f"{_HOOK}.pth").unlink(missing_ok=True)  # before the module that it names
+        for path in (*folder.glob(f"{_HOOK}.*"), *folder.glob(f"__pycache__/{_HOOK}.*")):
+            path.unlink(missing_ok=True)
+    _record().unlink(missing_ok=True)
+    return bool(folders)
+
+
+def _soon_pruned() -> list[Path]:
+    """Others' builds that the client deletes as it next starts: it keeps the newest three."""
+    folders = [path for path in RELEASES[0].path.parent.iterdir() if path.is_dir()]
+    newest_last = sorted(folders, key=lambda path: path.stat().st_mtime)
+    return [path for path in newest_last[:-3] if not (path / client_hook.MARKER).is_file()]

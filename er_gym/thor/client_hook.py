@@ -1,0 +1,74 @@
+"""Lets AI2-THOR's client start er-gym's player where no X server and no Vulkan library is.
+
+The client tests the machine for what Unity needs before it starts a build. Where er-gym's player is
+installed in a build's place there is nothing to test, and these tests pass; a real build is tested
+as ever. ``er-gym player install`` copies this file into the site-packages of its Python, where a
+``.pth`` file calls :func:`activate` as Python starts; so it needs nothing but the standard library
+and imports next to nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+MARKER = "installed-by-er-gym.json"
+"""A file in a release folder that says: er-gym has put its player here."""
+PLATFORMS = ("Linux64", "CloudRendering")
+"""Those of the client's platforms that er-gym's player takes the place of."""
+_TARGET = "ai2thor.platform"
+
+
+def activate() -> None:
+    """Adapt the client's module of platforms whenever it comes to be imported."""
+    if _Finder not in sys.meta_path:
+        sys.meta_path.insert(0, _Finder)
+
+
+class _Finder:
+    """Finds that one module as Python does, and adapts it once it is loaded."""
+
+    @classmethod
+    def find_spec(cls, name: str, path: Any = None, target: Any = None) -> Any:
+        if name != _TARGET:
+            return None
+        from importlib.machinery import PathFinder
+
+        spec = PathFinder.find_spec(name, path)
+        if spec is None or spec.loader is None:
+            return None
+        loader: Any = spec.loader
+        execute = loader.exec_module
+
+        def execute_and_adapt(module: Any) -> None:
+            execute(module)
+            for platform in PLATFORMS:
+                if hasattr(module, platform):
+                    _adapt(getattr(module, platform))
+
+        loader.exec_module = execute_and_adapt
+        return spec
+
+
+def _adapt(platform: Any) -> None:
+    validate, launch_env = platform.validate, platform.launch_env
+
+    def validate_unless_ours(cls: Any, request: Any) -> Any:
+        return [] if _is_ours(cls.__name__) else validate(request)
+
+    def launch_env_unless_ours(cls: Any, width: int, height: int, x_display: str | None) -> Any:
+        # With no display to name, the client would put None into the environment.
+        if x_display is None and _is_ours(cls.__name__):
+            return {}
+        return launch_env(width, height, x_display)
+
+    platform.validate = classmethod(validate_unless_ours)
+    platform.launch_env = classmethod(launch_env_unless_ours)
+
+
+def _is_ours(platform: str) -> bool:
+    from ai2thor._builds import COMMIT_ID
+
+    release = f"~/.ai2thor/releases/thor-{platform}-{COMMIT_ID}"
+    return os.path.isfile(os.path.join(os.path.expanduser(release), MARKER))

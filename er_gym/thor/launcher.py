@@ -1,0 +1,57 @@
+"""The program that starts the player, and that AI2-THOR's client is given to launch."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+import tempfile
+from hashlib import sha256
+from pathlib import Path
+
+EXECUTABLE = 0o755
+_START = Path(__file__).with_name("start_player.py")
+
+
+def thor_executable() -> str:
+    """What ``Controller(local_executable_path=…, x_display=":0")`` launches to get our engine.
+
+    It is the path of a launcher for this Python and this er-gym, which is written to the user's
+    cache (``$XDG_CACHE_HOME`` or ``~/.cache``) when it is not there yet. The client splits it as a
+    shell would, so that a path with spaces comes quoted. Where nothing can be written it is the
+    command that the launcher would run.
+    """
+    text = launcher()
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "er-gym"
+    path = cache / f"player-{sha256(text.encode()).hexdigest()[:12]}"
+    try:
+        if not (os.access(path, os.X_OK) and path.read_text() == text):
+            cache.mkdir(parents=True, exist_ok=True)
+            write_whole(path, text, EXECUTABLE)
+    except OSError:
+        return shlex.join(_command())
+    return shlex.quote(str(path))
+
+
+def _command() -> list[str]:
+    return [sys.executable, str(_START)]
+
+
+def launcher() -> str:
+    """The text of a program that starts the player with this Python and this er-gym."""
+    # A shell script: a `#!` line takes neither spaces nor more than some hundred characters. The
+    # shell is there at once, to see whose child it is; Python may come after the parent's death.
+    return (
+        "#!/bin/sh\n"
+        "# er-gym's player, which AI2-THOR's client starts in place of Unity's.\n"
+        f'exec {shlex.join(_command())} -parent "$PPID" "$@"\n'
+    )
+
+
+def write_whole(path: Path, text: str, mode: int = 0o644) -> None:
+    """Write a file so that nobody ever finds half of it there."""
+    file, draft = tempfile.mkstemp(dir=path.parent, prefix=path.name)
+    with os.fdopen(file, "w", encoding="utf-8") as stream:
+        stream.write(text)
+    os.chmod(draft, mode)
+    os.replace(draft, path)

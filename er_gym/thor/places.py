@@ -1,0 +1,168 @@
+"""The places in the client's folder that ``er-gym player install`` fills.
+
+Each holds nothing, what er-gym put there, or what is somebody else's. What is somebody else's is
+moved aside by a single rename and comes back by one, so that no kill in between loses it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from er_gym.thor.client_hook import MARKER
+from er_gym.thor.launcher import EXECUTABLE, launcher, write_whole
+
+_GPUS = 256
+"""As many device numbers as the mapping knows; no machine has more."""
+_OURS = {"-1": "installed by er-gym"}
+"""An entry of the mapping that the client never looks up: device numbers begin at 0."""
+
+
+def client_home() -> Path:
+    """The folder of all that the client keeps."""
+    return Path("~/.ai2thor").expanduser()
+
+
+class Place(ABC):
+    """One file or folder."""
+
+    @property
+    @abstractmethod
+    def path(self) -> Path:
+        """Where the client looks for it."""
+
+    @property
+    @abstractmethod
+    def is_ours(self) -> bool:
+        """Whether er-gym has put there what is there."""
+
+    @abstractmethod
+    def write(self, path: Path) -> None:
+        """Write what er-gym puts there, to some other path."""
+
+    @property
+    def is_foreign(self) -> bool:
+        """Whether something else is there."""
+        return os.path.lexists(self.path) and not self.is_ours
+
+    @property
+    def set_aside(self) -> Path:
+        """Where something else waits; the client prunes only what is in ``releases``."""
+        return client_home() / "set-aside-by-er-gym" / self.path.name
+
+    def put(self) -> None:
+        """Fill the place; what is foreign there is set aside."""
+        with _drafts() as drafts:
+            self.write(drafts / "new")
+            if self.is_foreign:
+                self.set_aside.parent.mkdir(exist_ok=True)
+                self.path.rename(self.set_aside)
+            elif self.is_ours:
+                self.path.rename(drafts / "old")  # deleted where it is, it might be left in halves
+            self.path.parent.mkdir(exist_ok=True)
+            (drafts / "new").rename(self.path)
+
+    def clear(self) -> bool:
+        """Remove what er-gym has put there and bring back what waits; whether there was either."""
+        ours = self.is_ours
+        if ours:
+            with _drafts() as drafts:
+                self.path.rename(drafts / "old")
+        back = os.path.lexists(self.set_aside) and not os.path.lexists(self.path)
+        if back:
+            self.set_aside.rename(self.path)
+            with contextlib.suppress(OSError):  # others wait there
+                self.set_aside.parent.rmdir()
+        return ours or back
+
+
+@contextlib.contextmanager
+def _drafts() -> Iterator[Path]:
+    """A folder on the same disk as the places, of which nothing is left: also not of a last time
+    that was killed."""
+    folder = client_home() / "er-gym-drafts"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder)
+
+
+@dataclass(frozen=True)
+class Release(Place):
+    """The place of a build of this client's version for one of its platforms."""
+
+    platform: str = "CloudRendering"
+
+    @property
+    def name(self) -> str:
+        """What the client calls the build, its folder and the program in it."""
+        from ai2thor._builds import COMMIT_ID
+
+        return f"thor-{self.platform}-{COMMIT_ID}"
+
+    @property
+    def path(self) -> Path:
+        return client_home() / "releases" / self.name
+
+    @property
+    def executable(self) -> Path:
+        """The program that the client starts."""
+        return self.path / self.name
+
+    @property
+    def is_ours(self) -> bool:
+        return (self.path / MARKER).is_file()
+
+    @property
+    def is_unity(self) -> bool:
+        """Whether a real build is there."""
+        return self.is_foreign and self.path.is_dir()
+
+    def write(self, path: Path) -> None:
+        path.mkdir()
+        write_whole(path / self.name, launcher(), EXECUTABLE)
+        # How the build can be spoken to; without this file the client goes to the network for it.
+        (path / "metadata.json").write_text(json.dumps({"server_types": ["FIFO", "WSGI"]}) + "\n")
+        (path / MARKER).write_text(json.dumps({"python": sys.executable}) + "\n")
+
+
+@dataclass(frozen=True)
+class GpuMapping(Place):
+    """The file in which the client notes which Vulkan device a CUDA device is.
+
+    Where it is missing and a program asks for a GPU (``gpu_device``, ``CUDA_VISIBLE_DEVICES``), the
+    client runs vulkaninfo and nvidia-smi. The player uses no GPU, so every number is mapped; those
+    that the user's own file maps keep their values, for real builds beside the player.
+    """
+
+    @property
+    def path(self) -> Path:
+        return client_home() / "cuda-vulkan-mapping.json"
+
+    @property
+    def is_ours(self) -> bool:
+        return _devices(self.path).items() >= _OURS.items()
+
+    def write(self, path: Path) -> None:
+        theirs = _devices(self.path if self.is_foreign else self.set_aside)
+        devices = {str(number): number for number in range(_GPUS)}
+        path.write_text(json.dumps({**_OURS, **devices, **theirs}) + "\n")
+
+
+def _devices(path: Path) -> dict[str, Any]:
+    """What a mapping file says; nothing where there is none, or it is damaged."""
+    try:
+        devices = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return devices if isinstance(devices, dict) else {}
