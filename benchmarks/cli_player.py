@@ -60,6 +60,8 @@ def uninstall() -> None:
     click.echo(f"removed from {client_home()}")
     for release in unity:
         click.echo(f"Unity's build is there again: {release.path}")
+    for path in players.still_aside():
+        click.echo(f"left where it is, for its place is taken: {path}")
 
 
 @click.command()

@@ -99,43 +99,53 @@ request = platform.Request("Linux", 300, 300, os.environ.get("DISPLAY"), False)
 names = ("Linux64", "CloudRendering")
 print(json.dumps({name: getattr(platform, name).validate(request) for name in names}))
 """
-"""A program as a user's: what AI2-THOR's client misses on this machine, for each platform."""
 _MENDS = {
-    "Linux64": "an X server with GLX: xvfb-run -s '-screen 0 1280x1024x24' python PROGRAM",
-    "CloudRendering": "a Vulkan library: sudo apt install libvulkan1 (no GPU is needed)",
+    "Linux64": "sudo apt install xvfb; xvfb-run -s '-screen 0 1280x1024x24' python PROGRAM",
+    "CloudRendering": "sudo apt install libvulkan1 (no GPU is needed)",
 }
-"""What the client wants for a platform where nothing spares it its test."""
+"""Platform to what satisfies the client's test of the machine."""
+_CLIENT = "5.0.0"
+"""The version of ai2thor whose protocol the player speaks."""
 
 
 def _programs() -> Iterator[Finding]:
     """Whether AI2-THOR programs get the player without saying so."""
     calls = {"Linux64": "Controller(scene=…)", "CloudRendering": "platform=CloudRendering"}
     try:
-        program = [sys.executable, "-c", _ASK_THE_CLIENT]
-        done = subprocess.run(program, capture_output=True, text=True, timeout=60, check=True)
-        missing: dict[str, list[str]] = json.loads(done.stdout)
+        missing = _missed_by_the_client()
     except (subprocess.SubprocessError, ValueError) as error:
-        yield Finding("Controller(scene=…)", False, _words(error), "pip install ai2thor==5.0.0")
+        yield Finding(calls["Linux64"], False, _words(error), f"pip install ai2thor=={_CLIENT}")
         return
     for platform, call in calls.items():
-        release = Release(platform)
-        if not release.is_ours:
-            there = "Unity's build is there" if release.is_unity else "no build"
-            mend = "er-gym player install" + (" --force" if release.is_unity else "")
-            yield Finding(call, release.is_unity and not missing[platform], there, mend)
-        elif missing[platform]:
-            says = f"the player is installed, but AI2-THOR's client says: {missing[platform][0]}"
-            mend = f"er-gym player install, in this Python's environment; else {_MENDS[platform]}"
-            yield Finding(call, False, says, mend)
-        else:
-            yield Finding(call, True, f"starts the player; {version_of_client()}")
-    mapped = GpuMapping().path.exists()
-    says = "any number will do" if GpuMapping().is_ours else "the client has its own list of GPUs"
-    if mapped:
-        yield Finding("gpu_device=…", True, says)
+        yield _program(call, Release(platform), missing[platform])
+    if GpuMapping().is_ours:
+        yield Finding("gpu_device=…", True, "any number will do")
+    elif GpuMapping().path.exists():
+        yield Finding("gpu_device=…", True, f"the numbers in {GpuMapping().path}")
     else:
         says = "the client asks vulkaninfo and nvidia-smi"
         yield Finding("gpu_device=…", False, says, "er-gym player install")
+
+
+def _missed_by_the_client() -> dict[str, list[str]]:
+    """Platform to what AI2-THOR's client misses on this machine, in a program as a user's."""
+    program = [sys.executable, "-c", _ASK_THE_CLIENT]
+    done = subprocess.run(program, capture_output=True, text=True, timeout=60, check=True)
+    missing: dict[str, list[str]] = json.loads(done.stdout)
+    return missing
+
+
+def _program(call: str, release: Release, missing: list[str]) -> Finding:
+    if release.is_unity:
+        mend = "" if not missing else _MENDS[release.platform]
+        return Finding(call, not missing, "starts Unity's build", mend)
+    if not release.is_ours:
+        return Finding(call, False, "no build is there", "er-gym player install")
+    if missing:
+        says = f"the player is installed, but AI2-THOR's client wants more: {missing[0]}"
+        mend = f"er-gym player install with this Python; or {_MENDS[release.platform]}"
+        return Finding(call, False, says, mend)
+    return Finding(call, True, f"starts the player; {version_of_client()}")
 
 
 def version_of_client() -> str:
@@ -145,9 +155,6 @@ def version_of_client() -> str:
     there = _version("ai2thor")
     known = "" if there == _CLIENT else f" (er-gym was written for {_CLIENT})"
     return f"ai2thor {there}{known}, commit_id {COMMIT_ID[:7]}"
-
-
-_CLIENT = "5.0.0"
 
 
 def _unity() -> Finding:

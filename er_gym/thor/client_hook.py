@@ -11,7 +11,10 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Any
+
+TYPE_CHECKING = False  # typing's own takes 10 ms to import, whenever a Python starts
+if TYPE_CHECKING:
+    from typing import Any
 
 MARKER = "installed-by-er-gym.json"
 """A file in a release folder that says: er-gym has put its player here."""

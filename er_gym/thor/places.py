@@ -86,15 +86,26 @@ class Place(ABC):
 
 @contextlib.contextmanager
 def _drafts() -> Iterator[Path]:
-    """A folder on the same disk as the places, of which nothing is left: also not of a last time
-    that was killed."""
-    folder = client_home() / "er-gym-drafts"
-    shutil.rmtree(folder, ignore_errors=True)
+    """An empty folder on the same disk as the places, removed afterwards."""
+    sweep()
+    folder = _drafts_folder()
     folder.mkdir(parents=True)
     try:
         yield folder
     finally:
-        shutil.rmtree(folder)
+        sweep()
+
+
+def sweep() -> bool:
+    """Remove drafts, also those that a kill has left; whether there were any."""
+    folder = _drafts_folder()
+    left = folder.exists()
+    shutil.rmtree(folder, ignore_errors=True)
+    return left
+
+
+def _drafts_folder() -> Path:
+    return client_home() / "er-gym-drafts"
 
 
 @dataclass(frozen=True)

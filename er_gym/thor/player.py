@@ -15,7 +15,7 @@ from pathlib import Path
 
 from er_gym.thor import client_hook
 from er_gym.thor.launcher import write_whole
-from er_gym.thor.places import GpuMapping, Place, Release, client_home
+from er_gym.thor.places import GpuMapping, Place, Release, client_home, sweep
 
 RELEASES = tuple(Release(platform) for platform in client_hook.PLATFORMS)
 _PLACES: tuple[Place, ...] = (*RELEASES, GpuMapping())
@@ -54,9 +54,11 @@ def install(*, force: bool = False) -> Installed:
     Raises:
         PlayerError: a real build is there, or the client could not start the player from there.
     """
+    for release in RELEASES:
+        _check_path(release)
     with _alone():
         for release in RELEASES:
-            _check(release, force)
+            _check_build(release, force)
         if GpuMapping().is_foreign and os.path.lexists(GpuMapping().set_aside):
             raise _two_of(GpuMapping())
         for place in _PLACES:
@@ -64,13 +66,16 @@ def install(*, force: bool = False) -> Installed:
         return Installed(RELEASES, _write_hook(), tuple(_soon_pruned()))
 
 
-def _check(release: Release, force: bool) -> None:
+def _check_path(release: Release) -> None:
     if shlex.split(str(release.executable)) != [str(release.executable)]:
         raise PlayerError(
             f"AI2-THOR's client splits the path {release.executable} at its spaces and quotes, so "
             "it cannot start anything there; use Controller(local_executable_path="
             "er_gym.thor_executable(), x_display=':0')"
         )
+
+
+def _check_build(release: Release, force: bool) -> None:
     if release.is_foreign:
         if not force:
             raise PlayerError(
@@ -103,14 +108,18 @@ def uninstall() -> tuple[Release, ...]:
     if not client_home().is_dir():
         raise nothing
     with _alone():
-        cleared = [place.clear() for place in _PLACES]
-        hooks = _remove_hooks()
-    if not hooks and not any(cleared):
+        removed = [sweep(), *(place.clear() for place in _PLACES), _remove_hooks()]
+    if not any(removed):
         raise nothing
     with contextlib.suppress(OSError):  # they are not empty: the client keeps its logs there
         (client_home() / "releases").rmdir()
         client_home().rmdir()
     return tuple(release for release in RELEASES if release.is_unity)
+
+
+def still_aside() -> list[Path]:
+    """What :func:`install` had set aside and could not come back, for its place is taken."""
+    return [place.set_aside for place in _PLACES if os.path.lexists(place.set_aside)]
 
 
 @contextlib.contextmanager
@@ -126,8 +135,8 @@ def _alone() -> Iterator[None]:
             os.close(folder)
     except OSError as error:
         raise PlayerError(
-            f"er-gym cannot write into {client_home()}, where AI2-THOR's client keeps everything "
-            f"({error}); make it writable, or set HOME to a folder that is"
+            f"er-gym cannot change what it has to ({error}); AI2-THOR's client keeps everything in "
+            f"{client_home()}: make that writable, or set HOME to a folder that is"
         ) from error
 
 
@@ -152,7 +161,8 @@ def _write_hook() -> Path | None:
             folder.mkdir(parents=True, exist_ok=True)
             if os.access(folder, os.W_OK):
                 # First it is written down, so that uninstall finds what a kill leaves behind.
-                _record().write_text(json.dumps({"hooks": sorted({*_hooks(), str(folder)})}) + "\n")
+                hooks = sorted({*_hooks(), str(folder)})
+                write_whole(_record(), json.dumps({"hooks": hooks}) + "\n")
                 for name, text in _hook_files().items():
                     write_whole(folder / name, text)
                 return folder / f"{_HOOK}.pth"
@@ -186,14 +196,15 @@ def _hooks() -> list[str]:
 
 
 def _remove_hooks() -> bool:
-    """Remove the hooks of this user's; whether there were any."""
-    folders = [Path(folder) for folder in _hooks()]
-    for folder in folders:
+    """Remove this user's hooks and the record of them; whether there was a record."""
+    for folder in map(Path, _hooks()):
         (folder / f"{_HOOK}.pth").unlink(missing_ok=True)  # before the module that it names
         for path in (*folder.glob(f"{_HOOK}.*"), *folder.glob(f"__pycache__/{_HOOK}.*")):
             path.unlink(missing_ok=True)
-    _record().unlink(missing_ok=True)
-    return bool(folders)
+    records = list(client_home().glob(f"{_record().name}*"))  # also what a kill has left
+    for path in records:
+        path.unlink(missing_ok=True)
+    return bool(records)
 
 
 def _soon_pruned() -> list[Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -9,14 +10,17 @@ from pathlib import Path
 import pytest
 
 from benchmarks import cli, doctor
-from er_gym.thor.player import Release
+from er_gym.thor import player as players
+from er_gym.thor.places import GpuMapping, Release
 
 
 @pytest.fixture(autouse=True)
 def home(monkeypatch, tmp_path):
+    """A home of its own; hooks go to a folder in it, not into this Python's packages."""
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr(players, "hook_folders", lambda: [tmp_path / "packages"])
     return tmp_path
 
 
@@ -33,10 +37,6 @@ def er_gym(capsys):
     return run
 
 
-def without_vulkan(monkeypatch):
-    monkeypatch.setattr("ctypes.util.find_library", lambda name: None)
-
-
 # -- player ----------------------------------------------------------------------------------------
 
 
@@ -46,32 +46,50 @@ def test_path_prints_a_program(er_gym):
     assert subprocess.run([out.strip()], capture_output=True).returncode == 2
 
 
-def test_install_says_where_and_what_the_client_still_lacks(er_gym, monkeypatch):
-    without_vulkan(monkeypatch)
+def test_install_says_what_it_has_put_where(er_gym, home):
     code, out, _ = er_gym("player", "install")
     assert code == 0
-    assert str(Release().folder) in out
-    assert "apt install libvulkan1" in out
+    for release in players.RELEASES:
+        assert f"{release.platform}: {release.path}\n" in out
+    assert "ai2thor 5.0.0, commit_id f082576" in out
+    assert f"hook: {home / 'packages'}" in out
+    assert "three builds" not in out
     assert er_gym("player", "uninstall")[0] == 0
-    assert not Release().folder.exists()
+    assert not any(release.path.exists() for release in players.RELEASES)
 
 
-def test_with_vulkan_nothing_is_lacking(er_gym, monkeypatch):
-    monkeypatch.setattr("ctypes.util.find_library", lambda name: f"lib{name}.so.1")
-    assert "Vulkan" not in er_gym("player", "install")[1]
+def test_install_says_what_it_could_not_do_and_what_the_client_will(er_gym, monkeypatch, home):
+    (home / "file").touch()
+    monkeypatch.setattr(players, "hook_folders", lambda: [home / "file" / "packages"])
+    for name in ("one", "two"):
+        (Release().path.parent / name).mkdir(parents=True)
+        os.utime(Release().path.parent / name, (1, 1))
+    out = er_gym("player", "install")[1]
+    assert "er-gym doctor says what to do" in out
+    assert out.count("it deletes") == 1
 
 
 def test_a_real_build_is_kept_unless_forced(er_gym):
-    release = Release()
-    release.folder.mkdir(parents=True)
+    release = Release("Linux64")
+    release.path.mkdir(parents=True)
     code, out, err = er_gym("player", "install")
     assert (code, out) == (2, "")
     assert "--force" in err
     assert err.count("\n") == 1
     assert er_gym("player", "install", "--force")[0] == 0
     assert release.is_ours
-    assert "Unity's build is there again" in er_gym("player", "uninstall")[1]
+    assert f"Unity's build is there again: {release.path}" in er_gym("player", "uninstall")[1]
     assert release.is_unity
+
+
+def test_what_cannot_come_back_is_named(er_gym):
+    mapping = GpuMapping()
+    mapping.path.parent.mkdir()
+    for text in ('{"0": 1}', '{"0": 2}'):
+        mapping.path.write_text(text)
+        if "1" in text:
+            er_gym("player", "install")
+    assert str(mapping.set_aside) in er_gym("player", "uninstall")[1]
 
 
 def test_uninstalling_nothing_is_bad_input(er_gym):
@@ -83,9 +101,12 @@ def test_uninstalling_nothing_is_bad_input(er_gym):
 # -- doctor ----------------------------------------------------------------------------------------
 
 
+PROGRAMS = ["Controller(scene=…)", "platform=CloudRendering", "gpu_device=…"]
+
+
 def lines(out: str) -> dict[str, str]:
     """A part's name to its whole line."""
-    parts = ["embedded engine", "renderer", "player", "Unity build", "GPU"]
+    parts = ["embedded engine", "renderer", "player", *PROGRAMS, "Unity build", "GPU"]
     parts += [f"extra {name}" for name in doctor.EXTRAS]
     found = {part: line for line in out.splitlines() for part in parts if line[4:].startswith(part)}
     assert list(found) == parts
@@ -93,31 +114,70 @@ def lines(out: str) -> dict[str, str]:
     return found
 
 
-def test_doctor_has_a_line_for_each_part(er_gym, monkeypatch):
-    without_vulkan(monkeypatch)
+@pytest.fixture
+def the_client(monkeypatch):
+    """Says what AI2-THOR's client misses; tests/programs has doctor ask the client itself."""
+
+    def misses(*what: str) -> None:
+        missing = {platform: list(what) for platform in ("Linux64", "CloudRendering")}
+        monkeypatch.setattr(doctor, "_missed_by_the_client", lambda: missing)
+        monkeypatch.setattr(doctor, "find_library", lambda name: None if what else f"lib{name}.so")
+
+    return misses
+
+
+def test_doctor_has_a_line_for_each_part(er_gym, the_client):
+    the_client("all sorts of things")
     code, out, err = er_gym("doctor")
     assert (code, err) == (0, "")
     line = lines(out)
     for part in ("embedded engine", "renderer", "player"):
         assert line[part].startswith("ok ")
+    for part in PROGRAMS:
+        assert line[part].startswith("--")
+        assert line[part].endswith("; er-gym player install")
     assert line["Unity build"].startswith("--")
     for lacking in ("build missing", "Vulkan missing", "display missing", "libvulkan1", "network"):
         assert lacking in line["Unity build"]
 
 
-def test_doctor_tells_the_player_from_unity(er_gym, monkeypatch):
-    monkeypatch.setattr("ctypes.util.find_library", lambda name: f"lib{name}.so.1")
+def test_doctor_tells_the_player_from_unity(er_gym, the_client):
+    the_client()
     er_gym("player", "install")
     line = lines(er_gym("doctor")[1])
-    assert "installed as CloudRendering" in line["player"]
+    for part in PROGRAMS:
+        assert line[part].startswith("ok ")
+    assert "starts the player; ai2thor 5.0.0, commit_id f082576" in line["Controller(scene=…)"]
     assert "build missing, Vulkan found" in line["Unity build"]
     assert "er-gym player uninstall" in line["Unity build"]
 
 
-def test_doctor_finds_a_build_that_can_run(er_gym, monkeypatch):
-    monkeypatch.setattr("ctypes.util.find_library", lambda name: f"lib{name}.so.1")
-    Release().folder.mkdir(parents=True)
-    assert lines(er_gym("doctor")[1])["Unity build"].startswith("ok ")
+def test_doctor_says_what_the_client_wants_beside_the_player(er_gym, the_client):
+    the_client("No valid X display found")
+    er_gym("player", "install")
+    line = lines(er_gym("doctor")[1])
+    for part, mend in zip(PROGRAMS, ("xvfb-run", "libvulkan1"), strict=False):
+        assert line[part].startswith("--")
+        assert "No valid X display found; er-gym player install with this Python" in line[part]
+        assert mend in line[part]
+
+
+def test_doctor_finds_builds_that_can_run(er_gym, the_client):
+    the_client()
+    for release in players.RELEASES:
+        release.path.mkdir(parents=True)
+    line = lines(er_gym("doctor")[1])
+    assert line["Unity build"].startswith("ok ")
+    for part in PROGRAMS[:2]:
+        assert line[part].startswith("ok ")
+        assert "Unity's build" in line[part]
+
+
+def test_doctor_says_that_the_client_is_of_another_version(er_gym, the_client, monkeypatch):
+    the_client()
+    er_gym("player", "install")
+    monkeypatch.setattr(doctor, "_CLIENT", "4.3.0")
+    assert "er-gym was written for 4.3.0" in lines(er_gym("doctor")[1])["Controller(scene=…)"]
 
 
 def test_doctor_fails_where_er_gym_does(er_gym, monkeypatch):

@@ -13,14 +13,15 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import ai2thor.controller
-import ai2thor.fifo_server
+import ai2thor.server
 import numpy as np
 import pytest
-from ai2thor.platform import CloudRendering
+from ai2thor.fifo_server import FifoServer
+from ai2thor.wsgi_server import WsgiServer
 
 import er_gym
 from er_gym.sim.controller import EmbeddedController
-from er_gym.thor import player as players
+from er_gym.thor import launcher
 
 PICTURES = ("frame", "depth_frame", "instance_segmentation_frame", "semantic_segmentation_frame")
 THIRD_PARTY = (
@@ -50,6 +51,12 @@ def launch(**arguments):
     return ai2thor.controller.Controller(
         local_executable_path=er_gym.thor_executable(), x_display=":0", **given
     )
+
+
+@pytest.fixture(params=[FifoServer, WsgiServer], ids=["FIFO", "WSGI"])
+def server(request):
+    """What the client speaks to the player with."""
+    return {"server_class": request.param}
 
 
 @pytest.fixture
@@ -142,9 +149,9 @@ def some_actions(seed: int, count: int, controller):
             yield dict(chance.choice(calls))
 
 
-def test_two_hundred_actions_give_the_same_events_as_in_process():
+def test_two_hundred_actions_give_the_same_events_as_in_process(server):
     settings = {**SMALL, "scene": "FloorPlan1"}
-    with launch(**settings) as played, EmbeddedController(**settings) as ours:
+    with launch(**settings, **server) as played, EmbeddedController(**settings) as ours:
         assert_same(played.last_event, ours.last_event)
         for controller in (played, ours):
             controller.step("AddThirdPartyCamera", **CORNER)
@@ -165,9 +172,9 @@ ALL_PICTURES = {
 }
 
 
-def test_all_pictures_of_all_cameras_are_the_same():
+def test_all_pictures_of_all_cameras_are_the_same(server):
     with (
-        launch(**ALL_PICTURES) as played,
+        launch(**ALL_PICTURES, **server) as played,
         EmbeddedController(scene="FloorPlan1", **SMALL, **ALL_PICTURES) as ours,
     ):
         for controller in (played, ours):
@@ -183,12 +190,12 @@ def test_all_pictures_of_all_cameras_are_the_same():
                 assert set(mine) == set(its) != set()
 
 
-def test_depth_comes_in_the_format_that_the_client_wants():
+def test_depth_comes_in_the_format_that_the_client_wants(server):
     """1.653 m to the fridge's front, see test_controller."""
     millimetres = ai2thor.server.DepthFormat.Millimeters
     wanted = {"depth_format": millimetres, "renderDepthImage": True}
     with (
-        launch(**wanted) as played,
+        launch(**wanted, **server) as played,
         EmbeddedController(scene="FloorPlan1", **SMALL, **wanted) as ours,
     ):
         pose = {"x": 1.0, "z": 1.25, "rotation": 270, "horizon": 0}
@@ -249,6 +256,21 @@ def test_wrong_calls_raise_value_error_and_the_player_lives(played, request_, na
     assert played.step("Pass").metadata["lastActionSuccess"]
 
 
+def test_what_is_odd_goes_over_either_transport(server):
+    """Three megabytes of request, NaN, characters that nothing can encode."""
+    with launch(headless=True, **server) as played:
+        for request, named in (
+            ({"action": "PickupObject", "objectId": "Mug|" + "9" * 3_000_000}, None),
+            ({"action": "RotateRight", "degrees": float("nan")}, "nan"),
+            ({"action": "Fly\ud800"}, "no action"),
+            ({"action": "--\r\nContent-Type: text/plain\r\n\r\n"}, "no action"),
+        ):
+            event, error = do(played, request)
+            assert not event, request
+            assert named is None or named in error
+        assert played.step("Pass")
+
+
 def test_a_refusal_is_falsy_or_raises(played):
     assert not played.step("DropHandObject")
     with pytest.raises(RuntimeError, match="empty"):
@@ -297,7 +319,7 @@ def test_the_player_does_without_the_client_and_gymnasium(played):
     assert "numpy" in maps
     program = (
         "import runpy, sys; sys.argv = ['player']\n"
-        f"try: runpy.run_path({str(players._START)!r}, run_name='__main__')\n"
+        f"try: runpy.run_path({str(launcher._START)!r}, run_name='__main__')\n"
         "except SystemExit: pass\n"
         "print([name for name in ('ai2thor', 'gymnasium', 'er_gym.envs') if name in sys.modules])"
     )
@@ -344,6 +366,46 @@ def test_end_of_file_on_either_pipe_ends_it_well(pipe):
         controller.server.send({"action": "Pass"})
     assert controller.server.unity_proc.wait(5) == 0
     controller.stop()
+
+
+def test_over_wsgi_it_ends_when_the_client_says_so_or_refuses_it():
+    """So the client stops; and so it answers a player that is another's."""
+    for end in ("stop", "refuse"):
+        controller = launch(headless=True, server_class=WsgiServer)
+        if end == "refuse":
+            controller.server.client_token = "another's"
+        controller.server.send({"action": "Pass"} if end == "refuse" else {})
+        assert controller.server.unity_proc.wait(5) == 0
+        controller.stop()
+
+
+@pytest.mark.parametrize(
+    ("variables", "code", "words"),
+    [
+        ({"AI2THOR_SERVER_TYPE": "WSGI", "AI2THOR_HOST": "127.0.0.1"}, 2, "AI2THOR_PORT"),
+        ({"AI2THOR_SERVER_TYPE": "pigeon"}, 2, "'pigeon'"),
+        (
+            {
+                "AI2THOR_SERVER_TYPE": "WSGI",
+                "AI2THOR_HOST": "127.0.0.1",
+                "AI2THOR_PORT": "1",  # nobody listens there
+            },
+            0,
+            "client is gone",
+        ),
+    ],
+)
+def test_what_the_environment_lacks_is_said(variables, code, words):
+    done = subprocess.run(
+        [er_gym.thor_executable()],
+        capture_output=True,
+        text=True,
+        env={**os.environ, **variables},
+        timeout=30,
+    )
+    assert done.returncode == code
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 PARENT = """
@@ -414,65 +476,3 @@ def test_twenty_side_by_side():
     for controller in fleet:
         controller.stop()
     assert all(ends(pid) for pid in pids)
-
-
-# -- as CloudRendering's build ---------------------------------------------------------------------
-
-
-@pytest.fixture
-def vulkan(monkeypatch):
-    """The client asks for the library's name only; without one the test says that there is one."""
-    if not players.vulkan_is_there():
-        monkeypatch.setattr("ctypes.util.find_library", lambda name: f"lib{name}.so.1")
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
-
-
-def test_cloud_rendering_finds_the_installed_player(vulkan):
-    release = players.install()
-    assert players.install() == release  # again
-    with ai2thor.controller.Controller(
-        platform=CloudRendering, scene="FloorPlan1", **SMALL
-    ) as controller:
-        assert controller.last_event.frame.shape == (48, 64, 3)
-        pid = controller.unity_pid
-    assert ends(pid)
-    players.uninstall()
-    assert not release.folder.exists()
-
-
-def test_a_real_build_is_not_touched_without_being_told(home):
-    release = players.Release()
-    release.folder.mkdir(parents=True)
-    release.executable.write_text("Unity")
-    before = files(home)
-    with pytest.raises(players.PlayerError, match="--force"):
-        players.install()
-    with pytest.raises(players.PlayerError, match="did not put there"):
-        players.uninstall()
-    assert files(home) == before
-    players.install(force=True)
-    assert release.is_ours
-    assert not release.is_unity
-    players.uninstall()
-    assert files(home) == before
-    assert release.is_unity
-
-
-def test_uninstalling_nothing_says_so(home):
-    with pytest.raises(players.PlayerError, match="nothing"):
-        players.uninstall()
-    assert files(home) == {}
-
-
-def test_a_home_whose_path_the_client_would_split_is_refused(monkeypatch, tmp_path):
-    monkeypatch.setenv("HOME", str(tmp_path / "two words"))
-    with pytest.raises(players.PlayerError, match="splits the path"):
-        players.install()
-    assert list(tmp_path.iterdir()) == []
