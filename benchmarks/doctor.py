@@ -143,7 +143,8 @@ def _program(call: str, release: Release, missing: list[str]) -> Finding:
         return Finding(call, False, "no build is there", "er-gym player install")
     if missing:
         says = f"the player is installed, but AI2-THOR's client wants more: {missing[0]}"
-        mend = f"er-gym player install with this Python; or {_MENDS[release.platform]}"
+        here = "er-gym player install in this Python, or in a virtual environment"
+        mend = f"{here}; or {_MENDS[release.platform]}"
         return Finding(call, False, says, mend)
     return Finding(call, True, f"starts the player; {version_of_client()}")
 

@@ -158,7 +158,7 @@ def test_doctor_says_what_the_client_wants_beside_the_player(er_gym, the_client)
     line = lines(er_gym("doctor")[1])
     for part, mend in zip(PROGRAMS, ("xvfb-run", "libvulkan1"), strict=False):
         assert line[part].startswith("--")
-        assert "No valid X display found; er-gym player install with this Python" in line[part]
+        assert "No valid X display found; er-gym player install in this Python" in line[part]
         assert mend in line[part]
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import sysconfig
 import venv
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -71,11 +70,12 @@ def make_user(folder: Path, repository: Path) -> User:
     home, environment = folder / "home", folder / "environment"
     home.mkdir(parents=True)
     venv.create(environment, symlinks=True)
-    packages = sysconfig.get_path("purelib", vars={"base": str(environment)})
+    user = User(home, environment / "bin" / "python")
+    (packages,) = user.run("import sysconfig; print(sysconfig.get_path('purelib'))")
     outside = [str(repository), *(path for path in sys.path if path.endswith("-packages"))]
     lines = [f"import site; site.addsitedir({path!r})\n" for path in outside]
     (Path(packages) / "packages.pth").write_text("".join(lines))
-    return User(home, environment / "bin" / "python")
+    return user
 
 
 @pytest.fixture
