@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import click
 
 from benchmarks.cli_errors import bad_input
@@ -22,19 +24,24 @@ def path() -> None:
 
 @player.command()
 @click.option("--force", is_flag=True, help="Set real Unity builds aside; uninstall restores them.")
-def install(force: bool) -> None:
+@click.option(
+    "--python",
+    type=click.Path(exists=True, dir_okay=False),
+    help="The Python that runs your AI2-THOR programs, if that is another.",
+)
+def install(force: bool, python: str | None) -> None:
     """Make Controller(scene=…) start the player: offline, without a GPU or an X server.
 
     The player takes the place of Unity's builds in ~/.ai2thor, for the platforms Linux64 (the
     client's default) and CloudRendering, and of the file in which the client looks up GPUs. In the
-    site-packages of this Python a hook spares programs the client's tests for an X server and for
-    Vulkan. Repeat it after moving Python, and in each environment that runs AI2-THOR programs.
+    site-packages of Python a hook spares programs the client's tests for an X server and Vulkan.
+    Repeat it after moving Python, and for each Python that runs AI2-THOR programs.
     """
     from benchmarks.doctor import version_of_client
     from er_gym.thor import player as players
 
     with bad_input(players.PlayerError):
-        installed = players.install(force=force)
+        installed = players.install(force=force, python=python or sys.executable)
     for release in installed.releases:
         click.echo(f"{release.platform}: {release.path}")
     click.echo(f"for {version_of_client()}; programs on another version of it are not served")
@@ -42,7 +49,7 @@ def install(force: bool) -> None:
         click.echo(f"hook: {installed.hook}")
     else:
         click.echo(
-            "no hook, for the site-packages of this Python cannot be written: AI2-THOR's client "
+            "no hook, for the site-packages of Python cannot be written: AI2-THOR's client "
             "still asks for an X server or a Vulkan library; er-gym doctor says what to do"
         )
     for build in installed.pruned:

@@ -7,10 +7,11 @@ import fcntl
 import json
 import os
 import shlex
-import site
-import sysconfig
-from collections.abc import Iterator
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 
 from er_gym.thor import client_hook
@@ -33,7 +34,7 @@ class Installed:
 
     Attributes:
         releases: the builds whose place the player has taken.
-        hook: the file that spares this Python's programs the client's test of the machine; None
+        hook: the file that spares Python's programs the client's test of the machine; None
             where it cannot be written.
         pruned: other builds that the client, which keeps three, deletes at its next start.
     """
@@ -43,19 +44,22 @@ class Installed:
     pruned: tuple[Path, ...]
 
 
-def install(*, force: bool = False) -> Installed:
+def install(*, force: bool = False, python: str = sys.executable) -> Installed:
     """Put the player where ``Controller(…)`` finds it as its own build, without a download.
 
     A second time is harmless, and mends an installation whose Python has moved.
 
     Args:
         force: set real builds aside that are there; :func:`uninstall` brings them back.
+        python: the interpreter whose programs the hook serves, if that is another.
 
     Raises:
-        PlayerError: a real build is there, or the client could not start the player from there.
+        PlayerError: a real build is there, the client could not start the player from there, or
+            the interpreter has no such client.
     """
     for release in RELEASES:
         _check_path(release)
+    folders = hook_folders(python)
     with _alone():
         for release in RELEASES:
             _check_build(release, force)
@@ -63,7 +67,7 @@ def install(*, force: bool = False) -> Installed:
             raise _two_of(GpuMapping())
         for place in _PLACES:
             place.put()
-        return Installed(RELEASES, _write_hook(), tuple(_soon_pruned()))
+        return Installed(RELEASES, _write_hook(folders), tuple(_soon_pruned()))
 
 
 def _check_path(release: Release) -> None:
@@ -143,20 +147,46 @@ def _alone() -> Iterator[None]:
 # -- the hook --------------------------------------------------------------------------------------
 
 
-def hook_folders() -> list[Path]:
-    """The folders whose ``.pth`` files this Python reads as it starts, the preferred one first."""
-    folders = [sysconfig.get_path("purelib")]
-    if site.ENABLE_USER_SITE:
-        folders.append(site.getusersitepackages())
-    return [Path(folder) for folder in folders]
+_ASK_PYTHON = """
+import json, site, sysconfig
+from ai2thor._builds import COMMIT_ID
+user = [site.getusersitepackages()] if site.ENABLE_USER_SITE else []
+print(json.dumps({"commit": COMMIT_ID, "folders": [sysconfig.get_path("purelib"), *user]}))
+"""
 
 
-def _write_hook() -> Path | None:
-    """See to it that this Python has the hook; where, or None."""
-    for folder in hook_folders():
+def hook_folders(python: str) -> list[Path]:
+    """The folders whose ``.pth`` files a Python reads as it starts, the preferred one first.
+
+    Raises:
+        PlayerError: it does not have the version of AI2-THOR's client that this Python has.
+    """
+    from ai2thor._builds import COMMIT_ID
+
+    try:
+        command = [python, "-c", _ASK_PYTHON]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        told = json.loads(done.stdout)
+    except (OSError, ValueError, subprocess.SubprocessError) as error:
+        reason = str(error) if isinstance(error, OSError) else "it cannot import ai2thor._builds"
+        raise PlayerError(
+            f"{python} runs no AI2-THOR programs: {reason}; pip install ai2thor=="
+            f"{version('ai2thor')} there, or name another Python"
+        ) from error
+    if told["commit"] != COMMIT_ID:
+        raise PlayerError(
+            f"the ai2thor of {python} starts the build {told['commit']}, which the player does not "
+            f"replace; pip install ai2thor=={version('ai2thor')} there (build {COMMIT_ID})"
+        )
+    return [Path(folder) for folder in told["folders"]]
+
+
+def _write_hook(folders: Sequence[Path]) -> Path | None:
+    """See to it that there is a hook in one of the folders; where, or None."""
+    for folder in folders:
         if all(_says(folder / name, text) for name, text in _hook_files().items()):
             return folder / f"{_HOOK}.pth"  # it is whose it is: only its owner removes it
-    for folder in hook_folders():
+    for folder in folders:
         with contextlib.suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
             if os.access(folder, os.W_OK):

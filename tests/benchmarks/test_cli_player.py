@@ -20,7 +20,7 @@ def home(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.setattr(players, "hook_folders", lambda: [tmp_path / "packages"])
+    monkeypatch.setattr(players, "hook_folders", lambda python: [tmp_path / "packages"])
     return tmp_path
 
 
@@ -60,7 +60,7 @@ def test_install_says_what_it_has_put_where(er_gym, home):
 
 def test_install_says_what_it_could_not_do_and_what_the_client_will(er_gym, monkeypatch, home):
     (home / "file").touch()
-    monkeypatch.setattr(players, "hook_folders", lambda: [home / "file" / "packages"])
+    monkeypatch.setattr(players, "hook_folders", lambda python: [home / "file" / "packages"])
     for name in ("one", "two"):
         (Release().path.parent / name).mkdir(parents=True)
         os.utime(Release().path.parent / name, (1, 1))

@@ -192,7 +192,7 @@ def test_an_environment_without_the_hook_is_told_what_to_do(user, new_user):
     assert line.startswith("--")
     assert "er-gym player install" in line
     assert "xvfb-run" in line
-    visitor.er_gym("player", "install")
+    user.er_gym("player", "install", "--python", str(visitor.python))
     assert visitor.run(CHOOSE) == ["Linux64"]
     hooks = json.loads((user.home / ".ai2thor" / "hooks-by-er-gym.json").read_text())["hooks"]
     assert len(hooks) == 2

@@ -35,7 +35,7 @@ def packages(monkeypatch, tmp_path):
     """Where hooks go: not into this Python's own packages."""
     folder = tmp_path / "packages"
     folder.mkdir()
-    monkeypatch.setattr(players, "hook_folders", lambda: [folder])
+    monkeypatch.setattr(players, "hook_folders", lambda python: [folder])
     return folder
 
 
@@ -245,7 +245,7 @@ def test_a_home_that_cannot_be_written_is_named(monkeypatch, home):
 
 def test_packages_that_cannot_be_written_are_done_without(monkeypatch, tmp_path):
     (tmp_path / "file").touch()
-    monkeypatch.setattr(players, "hook_folders", lambda: [tmp_path / "file" / "packages"])
+    monkeypatch.setattr(players, "hook_folders", lambda python: [tmp_path / "file" / "packages"])
     assert players.install().hook is None
     players.uninstall()
 
@@ -257,6 +257,34 @@ def test_anothers_hook_in_the_same_environment_is_used_and_left(monkeypatch, hom
     assert players.install().hook is not None
     players.uninstall()
     assert files(packages) == theirs
+
+
+@pytest.mark.parametrize(
+    ("client", "words"),
+    [
+        (None, "cannot import ai2thor"),
+        ("COMMIT_ID = 'abc'", "starts the build abc"),
+        ("1 / 0", "cannot import ai2thor"),
+    ],
+)
+def test_a_python_with_another_client_is_refused(home, monkeypatch, tmp_path, client, words):
+    monkeypatch.undo()
+    monkeypatch.setenv("HOME", str(home))
+    packages = tmp_path / "theirs" / "ai2thor"
+    packages.mkdir(parents=True)
+    if client is not None:
+        (packages / "__init__.py").touch()
+        (packages / "_builds.py").write_text(client)
+    python = tmp_path / "python"
+    python.write_text(
+        f'#!/bin/sh\nexport PYTHONPATH={packages.parent}\nexec {sys.executable} -S "$@"\n'
+    )
+    python.chmod(0o755)
+    with pytest.raises(players.PlayerError, match=words) as caught:
+        players.install(python=str(python))
+    assert "pip install ai2thor==5.0.0" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert files(home) == {}
 
 
 def test_builds_that_the_client_will_delete_are_named(home):
