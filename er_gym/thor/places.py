@@ -26,6 +26,10 @@ _OURS = {"-1": "installed by er-gym"}
 """An entry of the mapping that the client never looks up: device numbers begin at 0."""
 
 
+class PlayerError(RuntimeError):
+    """The player cannot be installed or uninstalled; the message says why and what to do."""
+
+
 def client_home() -> Path:
     """The folder of all that the client keeps."""
     return Path("~/.ai2thor").expanduser()
