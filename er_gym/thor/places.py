@@ -169,9 +169,11 @@ class GpuMapping(Place):
         return _devices(self.path).items() >= _OURS.items()
 
     def write(self, path: Path) -> None:
+        devices: dict[str, Any] = {str(number): number for number in range(_GPUS)}
         theirs = _devices(self.path if self.is_foreign else self.set_aside)
-        devices = {str(number): number for number in range(_GPUS)}
-        path.write_text(json.dumps({**_OURS, **devices, **theirs}) + "\n")
+        # The client reads every key as a number, and fails where one is none.
+        devices |= {number: device for number, device in theirs.items() if number.isdecimal()}
+        path.write_text(json.dumps(_OURS | devices) + "\n")
 
 
 def _devices(path: Path) -> dict[str, Any]:

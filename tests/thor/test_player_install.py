@@ -125,7 +125,9 @@ def test_a_build_that_is_set_aside_is_never_written_over(home):
     assert files(home) == before
 
 
-@pytest.mark.parametrize("text", ['{"0": 1, "1": 0}', "{}", "[]", "no JSON", '{"0": '])
+@pytest.mark.parametrize(
+    "text", ['{"0": 1, "1": 0}', "{}", "[]", "no JSON", '{"GPU": 7}', '{"0": ']
+)
 def test_a_mapping_of_the_users_own_comes_back_as_it_was(home, text):
     put_mapping(text)
     players.install()
