@@ -28,7 +28,7 @@ from agents import make_agent
 from agents.rl.callbacks import MODEL, read_curve
 from agents.rl.config import TrainConfig, load_config
 from benchmarks.curves import draw_curves
-from benchmarks.metrics import CORRECTED, Score, score_episode, wilson
+from benchmarks.metrics import Score, score_episode, wilson
 from benchmarks.progress import Progress
 from benchmarks.runner import finished, run
 from benchmarks.store import Manifest, RunStore, file_stem

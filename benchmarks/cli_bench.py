@@ -132,11 +132,12 @@ def bench(
     from rich.console import Console
 
     from agents.base import CannotGoOn
-    from benchmarks.metrics import CORRECTED, SCORERS, score_episode
+    from benchmarks.metrics import score_episode
     from benchmarks.pool import WorkerSetupError
     from benchmarks.progress import Progress
     from benchmarks.report import load_run
     from benchmarks.runner import Shard, finished, select
+    from benchmarks.scorers import CORRECTED, SCORERS
     from benchmarks.store import Manifest, RunStore, file_stem
     from benchmarks.tables import print_tables, tables
     from er_gym import __version__

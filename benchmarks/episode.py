@@ -10,6 +10,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from er_gym.tasks.paper_records import odd_spellings
 from er_gym.tasks.task import Task
 from er_gym.tasks.verbs import INIT
 
@@ -30,6 +31,8 @@ class KeyActionRecord(_Record):
         object_type: the type that the task file states, which may be empty or wrong.
         reward: what doing it is worth.
         exact: whether it must be done to that object, not just to one of its type.
+        spelled: the verb as the task's file spells it, ``""`` where it spells it as the paper's
+            files do.
     """
 
     verb: str
@@ -37,6 +40,7 @@ class KeyActionRecord(_Record):
     object_type: str = ""
     reward: float = 1.0
     exact: bool = False
+    spelled: str = ""
 
 
 class StepRecord(_Record):
@@ -53,6 +57,8 @@ class StepRecord(_Record):
         reward: what the step earned.
         thought: what the agent said to itself.
         text: the action as the agent gave it.
+        appended: whether the protocol took the step and not the agent: the ``end`` that the
+            paper's runner appends (:data:`er_gym.envs.protocol.PAPER`).
     """
 
     verb: str
@@ -65,6 +71,7 @@ class StepRecord(_Record):
     reward: float = 0.0
     thought: str = ""
     text: str = ""
+    appended: bool = False
 
 
 class EpisodeRecord(_Record):
@@ -107,7 +114,7 @@ class EpisodeRecord(_Record):
     @property
     def predicted(self) -> list[StepRecord]:
         """The steps that the agent asked for by naming a known action."""
-        return [step for step in self.steps if step.verb not in (INIT, ERROR)]
+        return [step for step in self.steps if step.verb not in (INIT, ERROR) and not step.appended]
 
     @property
     def num_steps(self) -> int:
@@ -146,8 +153,9 @@ def record_episode(
                 object_type=key.object_type,
                 reward=key.reward,
                 exact=key.object_id in task.named,
+                spelled=spelled,
             )
-            for key in task.key_actions
+            for key, spelled in zip(task.key_actions, odd_spellings(task), strict=True)
         ],
         max_steps=task.max_steps if max_steps is None else max_steps,
         agent=agent,

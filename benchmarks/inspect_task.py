@@ -50,7 +50,7 @@ from agents.vlm.settings import AgentSettings
 from agents.vlm.speaker import load_settings
 from benchmarks.engines import Engines
 from benchmarks.episode import EpisodeRecord
-from benchmarks.metrics import CORRECTED, METRICS, score_episode
+from benchmarks.metrics import METRICS, score_episode
 from benchmarks.play import episode_seed, play_episode
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite

@@ -1,17 +1,9 @@
 """What an episode is worth: pure functions over :class:`~benchmarks.episode.EpisodeRecord`.
 
 The definitions are those of the Embodied-Reasoner benchmark (arXiv 2503.21696) as its released
-scorer computes them, so that numbers compare with its table. An episode is walked through once
-(:func:`tally`); every metric is one small function of the tally and the episode;
+program computes them, so that numbers compare with its table. A scorer (:mod:`benchmarks.scorers`)
+walks through an episode once; every metric is one small function of its tally and the episode;
 :func:`score_episode` puts them side by side, and :func:`summarise` takes their means.
-
-Two scorers (:data:`SCORERS`) read the key actions differently and are the same in all else:
-
-* ``paper`` takes an action's object type as the task file states it. Some files leave the type of a
-  ``put`` empty; no step can match that, so those tasks cannot be done.
-* ``corrected`` takes the type from the key action's object id, and counts Sink and SinkBasin as one
-  type, because files name the one and give the id of the other. Where a task singles an object out,
-  it asks for that one; and a task's goal must hold for a success. The paper's files have neither.
 """
 
 from __future__ import annotations
@@ -21,130 +13,20 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from benchmarks.episode import EpisodeRecord, KeyActionRecord, StepRecord
-from er_gym.tasks.task import type_of_id
+from benchmarks.episode import EpisodeRecord
+from benchmarks.scorers import JUDGED_BY_NAME, Scorer, Tally
 from er_gym.tasks.types import task_type
-from er_gym.tasks.verbs import END, NAVIGATE, UNSCORED, canonical_verb
-
-_JUDGED_BY_NAME = "single_search"
-"""The one task type whose ``end`` scores only if the task's name was answered."""
+from er_gym.tasks.verbs import END, NAVIGATE
 
 _Z = 1.959963984540054  # the 97.5 % point of the normal distribution
 
 
-@dataclass(frozen=True)
-class Scorer:
-    """A reading of the object types.
-
-    Attributes:
-        name: as ``--scorer`` takes it.
-        key_type: the type that a key action asks for.
-        step_type: the type that a step counts as. It starts from the agent's word: the environment
-            found the object by it, so unlike a file it cannot name another type.
-        exact: whether it heeds which object a task singles out, and the task's goal.
-    """
-
-    name: str
-    key_type: Callable[[KeyActionRecord], str]
-    step_type: Callable[[StepRecord], str]
-    exact: bool = False
-
-
-def _one_sink(object_type: str) -> str:
-    return "SinkBasin" if object_type == "Sink" else object_type
-
-
-PAPER = Scorer("paper", lambda key: key.object_type, lambda step: step.object_type)
-CORRECTED = Scorer(
-    "corrected",
-    lambda key: _one_sink(type_of_id(key.object_id) or key.object_type),
-    lambda step: _one_sink(step.object_type),
-    exact=True,
-)
-SCORERS = {scorer.name: scorer for scorer in (PAPER, CORRECTED)}
-
-
-@dataclass(frozen=True)
-class Tally:
-    """The walk through an episode.
-
-    Attributes:
-        expected: the key actions that score, as ``"verb Type"``, in the order of the task.
-        scored: those that were done, in the order of the episode. ``end`` is left out where the
-            task's name decides about it.
-        points: how many scored, that ``end`` included.
-        routes: key actions done besides, which score nothing: navigations that the task lists.
-        goal_holds: whether the final state is as the task asks, where the scorer heeds that.
-    """
-
-    expected: tuple[str, ...]
-    scored: tuple[str, ...]
-    points: int
-    routes: int
-    goal_holds: bool = True
-
-
-def _label(verb: str, object_type: str) -> str:
-    return f"{canonical_verb(verb)} {object_type}".rstrip()
-
-
-def _key_label(key: KeyActionRecord, scorer: Scorer) -> str:
-    label = _label(key.verb, scorer.key_type(key))
-    return f"{label} {key.object_id}" if key.exact and scorer.exact else label
-
-
-def _search_answered(episode: EpisodeRecord, end: StepRecord, came_from_key_action: bool) -> bool:
-    """Whether ``end`` answers a search: a type within reach is named by the task, or the last look
-    or move was a key action (going to where the target is)."""
-    return any(kind in episode.name for kind in end.interactable) or came_from_key_action
-
-
-def tally(episode: EpisodeRecord, scorer: Scorer) -> Tally:
-    """Match an episode's steps with its task's key actions.
-
-    Failed steps count for nothing. Each key action is matched at most once, in any order. ``end``
-    scores, save in a ``single_search`` that it does not answer.
-    """
-    keys = [(key, _key_label(key, scorer)) for key in episode.key_actions]
-    expected = [label for key, label in keys if canonical_verb(key.verb) not in UNSCORED]
-    open_keys = Counter(label for _, label in keys)
-    every_key = frozenset(open_keys)
-    scored: list[str] = []
-    points = routes = 0
-    previous = ""
-    for step in episode.steps:
-        if not step.success:
-            continue
-        label = _label(step.verb, scorer.step_type(step))
-        if step.verb == END:
-            if label not in every_key:
-                break  # a task that does not ask for it
-            if episode.task_type != _JUDGED_BY_NAME:
-                scored.append(label)
-                points += 1
-            elif _search_answered(episode, step, previous in every_key):
-                points += 1
-            break
-        if open_keys[f"{label} {step.object_id}"] > 0:
-            label = f"{label} {step.object_id}"
-        # An object is needed: a key action whose type the file left empty has a label without one,
-        # and must stay unmatched.
-        if step.object_type and open_keys[label] > 0:
-            open_keys[label] -= 1
-            if step.verb in UNSCORED:
-                routes += 1
-            else:
-                scored.append(label)
-                points += 1
-        if step.verb in UNSCORED:
-            previous = label
-    goal_holds = not (scorer.exact and episode.goal_unmet)
-    return Tally(tuple(expected), tuple(scored), points, routes, goal_holds)
-
-
 def completeness(counted: Tally) -> float:
-    """The share of the scoring key actions that were done; 0 for a task that has none."""
-    return min(counted.points / len(counted.expected), 1.0) if counted.expected else 0.0
+    """The share of the scoring key actions that were done; 0 for a task that has none.
+
+    Above 1 under ``paper`` in a task that does not ask for the ``end`` that scored.
+    """
+    return counted.points / len(counted.expected) if counted.expected else 0.0
 
 
 def success(counted: Tally) -> bool:
@@ -153,12 +35,12 @@ def success(counted: Tally) -> bool:
 
 
 def search_efficiency(episode: EpisodeRecord, counted: Tally) -> float:
-    """(key actions + 1) / recorded steps for a success, else 0.
+    """(key actions + 1) / steps for a success, else 0.
 
     Navigations and ``end`` are among the key actions; ``init``, the one more, and ``end`` are among
     the steps. Above 1 if the agent found a shorter way than the task's.
     """
-    return (len(episode.key_actions) + 1) / episode.num_steps if success(counted) else 0.0
+    return (len(episode.key_actions) + 1) / counted.steps if success(counted) else 0.0
 
 
 def ordered_completeness(episode: EpisodeRecord, counted: Tally) -> float:
@@ -166,7 +48,7 @@ def ordered_completeness(episode: EpisodeRecord, counted: Tally) -> float:
 
     A ``single_search`` has nothing to order: its completeness.
     """
-    if episode.task_type == _JUDGED_BY_NAME or not counted.expected:
+    if episode.task_type == JUDGED_BY_NAME or not counted.expected:
         return completeness(counted)
     return _longest_common(counted.scored, counted.expected) / len(counted.expected)
 
@@ -174,12 +56,15 @@ def ordered_completeness(episode: EpisodeRecord, counted: Tally) -> float:
 def repeat_rate(episode: EpisodeRecord) -> float:
     """The share of navigations, failed ones too, that name a type navigated to before."""
     targets = [step.object_type for step in episode.steps if step.verb == NAVIGATE]
-    return 1 - len(set(targets)) / len(targets) if targets else 0.0
+    return (len(targets) - len(set(targets))) / len(targets) if targets else 0.0
 
 
 def steps_saved(episode: EpisodeRecord) -> float:
-    """(max_steps - steps) / max_steps, successful or not: another efficiency in circulation."""
-    return (episode.max_steps - episode.num_steps) / episode.max_steps
+    """(max_steps - steps) / max_steps, successful or not: another efficiency in circulation.
+
+    0 where the paper's protocol says ``end`` beyond the step limit.
+    """
+    return max(episode.max_steps - episode.num_steps, 0) / episode.max_steps
 
 
 def key_action_precision(episode: EpisodeRecord, counted: Tally) -> float:
@@ -239,7 +124,7 @@ METRICS = (
 
 def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
     """All metrics of one episode."""
-    counted = tally(episode, scorer)
+    counted = scorer.tally(episode)
     missing = Counter(counted.expected) - Counter(counted.scored)
     if counted.points > len(counted.scored):
         missing.pop(END, None)

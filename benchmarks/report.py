@@ -12,17 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.episode import EpisodeRecord
-from benchmarks.metrics import (
-    CORRECTED,
-    METRICS,
-    PAPER,
-    SCORERS,
-    Score,
-    Summary,
-    score_episode,
-    summarise,
-    summarise_by,
-)
+from benchmarks.metrics import METRICS, Score, Summary, score_episode, summarise, summarise_by
+from benchmarks.scorers import CORRECTED, PAPER, SCORERS
 from benchmarks.store import Manifest, RunStore
 from er_gym.tasks.errors import told_once
 from er_gym.tasks.types import BY_NAME, GROUPS

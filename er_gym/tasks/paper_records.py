@@ -12,7 +12,7 @@ The paper's own files have no such key and, read and written again, get none.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, astuple, replace
 from pathlib import Path
 from typing import Any
@@ -214,10 +214,25 @@ def write_json(path: Path, data: object) -> None:
     path.write_text(text + "\n", encoding="utf-8")
 
 
-def _action_records(task: Task) -> list[dict[str, Any]]:
+def odd_spellings(task: Task) -> list[str]:
+    """For each key action, the verb as the task's file spells it; "" where it is the usual way."""
+    spelled = (
+        _as_spelled(action.verb, more)
+        for action, more in zip(task.key_actions, _rest(task), strict=True)
+    )
+    usual = (_spelled(action.verb) for action in task.key_actions)
+    return ["" if one == other else one for one, other in zip(spelled, usual, strict=True)]
+
+
+def _rest(task: Task) -> Sequence[object]:
+    """What the task's file tells of each key action that :class:`KeyAction` does not."""
     rest = task.extra.get("actions")
     if not isinstance(rest, list) or len(rest) != len(task.key_actions):
-        rest = [{}] * len(task.key_actions)
+        return [{}] * len(task.key_actions)
+    return rest
+
+
+def _action_records(task: Task) -> list[dict[str, Any]]:
     return [
         {
             "action": _as_spelled(action.verb, more),
@@ -227,7 +242,7 @@ def _action_records(task: Task) -> list[dict[str, Any]]:
             "relatedObject": list(action.related_objects),
             **without(more, PaperAction),
         }
-        for action, more in zip(task.key_actions, rest, strict=True)
+        for action, more in zip(task.key_actions, _rest(task), strict=True)
     ]
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from agents import AGENTS, make_agent
-from benchmarks.metrics import CORRECTED, PAPER, score_episode
+from benchmarks.metrics import score_episode
+from benchmarks.scorers import CORRECTED, PAPER
 from benchmarks.play import episode_seed, play_episode
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks.paper_format import read_tasks

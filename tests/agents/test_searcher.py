@@ -10,7 +10,8 @@ import pytest
 from agents import make_agent
 from agents.scripted.searcher import words
 from agents.scripted.searcher.words import Goal, understand
-from benchmarks.metrics import CORRECTED, score_episode
+from benchmarks.metrics import score_episode
+from benchmarks.scorers import CORRECTED
 from benchmarks.play import episode_seed, play_episode
 from er_gym.envs.actions import STANDS_FOR
 from er_gym.envs.embodied_env import EmbodiedEnv

@@ -8,18 +8,15 @@ import math
 import pytest
 
 from benchmarks.metrics import (
-    CORRECTED,
     METRICS,
-    PAPER,
-    SCORERS,
     Score,
     normal,
     score_episode,
     summarise,
     summarise_by,
-    tally,
     wilson,
 )
+from benchmarks.scorers import CORRECTED, PAPER, SCORERS
 
 TRANSPORT = (
     "navigate to CounterTop",
@@ -78,9 +75,9 @@ def test_failed_steps_score_nothing(episode):
 
 def test_a_key_action_counts_once(episode):
     played = ("pickup Egg", "put in Bowl", "pickup Egg", "put in Bowl")
-    counted = tally(episode(TRANSPORT, played), PAPER)
+    counted = PAPER.tally(episode(TRANSPORT, played))
     assert counted.points == 2
-    assert counted.scored == ("pickup Egg", "put in Bowl")
+    assert counted.scored == ("pickup Egg", "put Bowl")
 
 
 def test_a_key_action_listed_twice_counts_twice(episode):
@@ -113,17 +110,37 @@ def test_end_is_needed(episode):
     assert scored.missing == ("end",)
 
 
-def test_end_counts_only_for_a_task_that_asks_for_it(episode):
-    scored = score_episode(episode(("pickup Egg",), ("end",)), PAPER)
-    assert scored.completeness == 0.0
-    assert not scored.success
+def test_end_counts_in_a_task_that_does_not_ask_for_it_only_to_the_paper(episode):
+    asks_for_two = episode(("pickup Egg", "open Fridge"), ("end",))
+    assert score_episode(asks_for_two, PAPER).completeness == pytest.approx(1 / 2)
+    assert score_episode(asks_for_two, CORRECTED).completeness == 0.0
+    assert score_episode(episode(("pickup Egg",), ("pickup Egg", "end")), PAPER).completeness == 2.0
 
 
-def test_errors_are_no_steps_and_no_actions(episode):
-    scored = score_episode(episode(TRANSPORT, ("!error", "!error", *TRANSPORT)), PAPER)
-    assert scored.search_efficiency == 1.0
-    assert scored.key_action_precision == 1.0
-    assert scored.steps_saved == pytest.approx(24 / 30)
+def test_replies_that_name_no_action_are_steps_to_the_paper(episode):
+    played = episode(TRANSPORT, ("!error", "!error", *TRANSPORT))
+    paper, corrected = score_episode(played, PAPER), score_episode(played, CORRECTED)
+    assert paper.search_efficiency == pytest.approx(6 / 8)
+    assert corrected.search_efficiency == 1.0
+    assert paper.key_action_precision == corrected.key_action_precision == 1.0
+    assert paper.steps_saved == corrected.steps_saved == pytest.approx(24 / 30)
+
+
+def test_an_end_that_the_protocol_appends_scores_but_is_no_prediction(episode, step):
+    end = step("end").model_copy(update={"appended": True})
+    scored = score_episode(episode(("pickup Egg", "end"), ("pickup Egg", end)), PAPER)
+    assert scored.success
+    assert scored.key_action_precision == 2.0  # two key actions done, one action predicted
+    beyond = episode(("pickup Egg", "end"), (*["observe"] * 30, end))
+    assert score_episode(beyond, PAPER).steps_saved == 0.0
+
+
+def test_the_paper_reads_verbs_as_the_task_file_spells_them(episode):
+    played = episode(("pickup Egg", "put in Bowl", "end"), ("pickup Egg", "put in Bowl", "end"))
+    keys = played.key_actions
+    odd = [keys[0], keys[1].model_copy(update={"spelled": "put in"}), keys[2]]
+    assert score_episode(played, PAPER).success
+    assert not score_episode(played.model_copy(update={"key_actions": odd}), PAPER).success
 
 
 def test_nothing_was_played(episode):
@@ -157,22 +174,32 @@ def test_a_search_is_answered_by_having_gone_where_the_task_says(episode, step):
     assert scored.key_action_precision == 1.0
 
 
-def test_what_is_done_in_between_does_not_make_it_forget_where_it_went(episode, step):
+@pytest.mark.parametrize(
+    ("between", "paper", "corrected"),
+    [
+        (("open Drawer",), False, True),  # the paper forgets where it went
+        (("!navigate to Shelf",), True, True),
+        (("observe",), False, False),
+    ],
+    ids=["interaction", "failure", "look"],
+)
+def test_what_is_remembered_of_where_it_went(episode, step, between, paper, corrected):
     end = step("end", interactable=("Mug",))
-    steps = ("navigate to CounterTop", "open Drawer", "!navigate to Shelf", end)
-    assert score_episode(search(episode, steps), PAPER).success
-    steps = ("navigate to CounterTop", "observe", end)
-    assert not score_episode(search(episode, steps), PAPER).success
+    played = search(episode, ("navigate to CounterTop", *between, end))
+    assert score_episode(played, PAPER).success is paper
+    assert score_episode(played, CORRECTED).success is corrected
 
 
-def test_a_type_within_reach_must_be_named_as_it_is_spelled(episode, step):
-    """ "CreditCards" has a Card in it but no card, and "open" no Pen."""
-    end = step("end", interactable=("Pen",))
-    steps = ("navigate to Shelf", end)
-    opened = search(episode, steps, name="open the room and look for the CreditCard")
-    assert not score_episode(opened, PAPER).success
+def test_the_paper_finds_a_type_in_any_part_of_the_name_whatever_the_case(episode, step):
+    """ "open" has a Pen in it, and "spot" a Pot; "Pencil" has one in both spellings."""
+    steps = ("navigate to Shelf", step("end", interactable=("Pen", "Pot")))
+    for name in ("open the room and look for the CreditCard", "spot the Lettuce"):
+        named = search(episode, steps, name=name)
+        assert score_episode(named, PAPER).success
+        assert not score_episode(named, CORRECTED).success
     pencil = search(episode, steps, name="Look for the Pencil in the room.")
-    assert score_episode(pencil, PAPER).success  # the paper's scorer looks no closer
+    assert score_episode(pencil, PAPER).success
+    assert score_episode(pencil, CORRECTED).success
 
 
 @pytest.mark.parametrize(
@@ -212,7 +239,7 @@ def test_an_empty_type_is_never_matched_by_the_paper_scorer(episode):
     paper, corrected = score_episode(played, PAPER), score_episode(played, CORRECTED)
     assert not paper.success
     assert paper.completeness == pytest.approx(2 / 3)
-    assert paper.missing == ("put in",)
+    assert paper.missing == ("put",)
     assert corrected.success
     untyped = episode(keys, ("pickup Egg", "put in", "end"))
     assert not score_episode(untyped, PAPER).success

@@ -14,7 +14,8 @@ import pytest
 from agents import Decision, make_agent
 from benchmarks import runner
 from benchmarks.episode import EpisodeRecord
-from benchmarks.metrics import CORRECTED, score_episode
+from benchmarks.metrics import score_episode
+from benchmarks.scorers import CORRECTED
 from benchmarks.play import episode_seed, play_episode
 from benchmarks.pool import Lost
 from benchmarks.runner import Outcome, Shard, run, select
