@@ -31,6 +31,7 @@ from benchmarks.curves import draw_curves
 from benchmarks.metrics import Score, score_episode, wilson
 from benchmarks.progress import Progress
 from benchmarks.runner import finished, run
+from benchmarks.scorers import CORRECTED
 from benchmarks.store import Manifest, RunStore, file_stem
 from er_gym import __version__
 from er_gym.tasks import jsonl_format, load_suite

@@ -52,6 +52,7 @@ from benchmarks.engines import Engines
 from benchmarks.episode import EpisodeRecord
 from benchmarks.metrics import METRICS, score_episode
 from benchmarks.play import episode_seed, play_episode
+from benchmarks.scorers import CORRECTED
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from agents.base import Agent, CannotGoOn
 from benchmarks.episode import ERROR, EpisodeRecord, StepRecord, record_episode
 from er_gym.tasks.task import Task
-from er_gym.tasks.verbs import INIT
+from er_gym.tasks.verbs import END, INIT
 
 
 class Playable(Protocol):
@@ -74,6 +74,8 @@ def play_episode(
             decision = agent.act(obs, info)
             obs, reward, terminated, truncated, info = env.step(decision.action)
             steps.append(_stepped(info, float(reward), decision.thought))
+            if info.get("end_appended"):
+                steps.append(_appended(steps[-1]))
             over = terminated or truncated
     except CannotGoOn:
         raise
@@ -107,6 +109,17 @@ def _placed(info: Mapping[str, Any]) -> StepRecord:
         feedback=info["feedback"],
         navigable=list(info["navigable"]),
         interactable=list(info["interactable"]),
+    )
+
+
+def _appended(last: StepRecord) -> StepRecord:
+    """The ``end`` that the protocol appends; what it earned is in the last step's reward."""
+    return StepRecord(
+        verb=END,
+        success=True,
+        navigable=last.navigable,
+        interactable=last.interactable,
+        appended=True,
     )
 
 

@@ -22,13 +22,10 @@ from agents.vlm.record import (
     tokens,
 )
 from agents.vlm.settings import AgentSettings
-from er_gym.envs.actions import Action, applies
+from er_gym.envs.actions import NO_ACTION, Action, applies
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 
-_NO_ACTION = "(no action) "
-"""What is handed to the environment begins with this where a reply has no usable action; whatever
-follows, it names none."""
 _LONGEST_QUOTE = 200
 
 
@@ -102,7 +99,7 @@ class VLMAgent:
             )
         )
         thought = "\n".join(f"{each.kind}: {each.text}" for each in parsed.thoughts)
-        return Decision(action or _NO_ACTION + said[:_LONGEST_QUOTE], thought)
+        return Decision(action or NO_ACTION + said[:_LONGEST_QUOTE], thought)
 
     # -- what is said to the model ---------------------------------------------------------------
 

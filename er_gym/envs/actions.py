@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import gymnasium
 import numpy as np
@@ -31,6 +31,10 @@ class Action:
         return f"{self.verb} {self.object_type}".rstrip()
 
 
+AnyAction: TypeAlias = Action | str | int | np.integer[Any]
+"""What an environment takes: an action, its text, or its index in :data:`ACTIONS`."""
+NO_ACTION = "(no action) "
+"""A text that begins with this names no action, whatever follows."""
 _PROPERTY_FOR = {
     verbs.PICKUP: "pickupable",
     verbs.PUT: "receptacle",
@@ -86,21 +90,26 @@ def parse(text: str) -> Action | None:
     return None
 
 
-def understand(action: Action | str | int | np.integer[Any]) -> tuple[Action | None, str]:
+def understand(action: AnyAction) -> tuple[Action | None, str]:
     """The action meant, None if a text names none; and the text.
 
-    Args:
-        action: an index, an :class:`Action` or its text.
+    Raises:
+        gymnasium.error.InvalidAction: it is neither text nor an action nor its index.
+    """
+    text = text_of(action)
+    return parse(text), text
+
+
+def text_of(action: AnyAction) -> str:
+    """An action's text.
 
     Raises:
-        gymnasium.error.InvalidAction: it is none of these, or an index that is out of range.
+        gymnasium.error.InvalidAction: it is neither text nor an action nor its index.
     """
-    if isinstance(action, str):
-        return parse(action), action
-    if isinstance(action, Action):
-        return parse(str(action)), str(action)
+    if isinstance(action, str | Action):
+        return str(action)
     if isinstance(action, int | np.integer | np.ndarray) and 0 <= int(action) < len(ACTIONS):
-        return ACTIONS[int(action)], str(ACTIONS[int(action)])
+        return str(ACTIONS[int(action)])
     raise gymnasium.error.InvalidAction(
         f"{action!r} is no action: give an index from 0 to {len(ACTIONS) - 1}, an Action, or text "
         "such as 'navigate to Fridge'"

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from er_gym.envs import instances as which
 from er_gym.envs import skills
-from er_gym.envs.actions import ACTIONS, Action, understand
-from er_gym.envs.legality import Known, legal_actions, objection, suited, surroundings
+from er_gym.envs.actions import ACTIONS, Action, AnyAction
+from er_gym.envs.conduct import Setting
+from er_gym.envs.legality import Known
 from er_gym.envs.observations import (
     MAX_REPEATS,
     OBSERVATIONS,
@@ -25,6 +26,7 @@ from er_gym.envs.observations import (
     parse_obs_mode,
 )
 from er_gym.envs.percept import Percept
+from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.reward import Progress, search_targets
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.tasks import verbs
@@ -37,6 +39,8 @@ from er_gym.thor.objects import ENTRY_KEYS
 
 MAX_UNKNOWN = 3
 """So many replies in a row that name no known action end the episode."""
+_CUT_OFF = frozenset({"step limit", "no known action"})
+"""Why an episode ends that the agent does not end."""
 
 
 class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
@@ -105,6 +109,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     - ``instances``: ``"target"``: a type name stands for the task's object of that type first, as
       in the paper; ``"explore"``: for the nearest not yet visited (navigation) or the nearest
       (interaction), whatever the task.
+    - ``protocol``: ``"default"``, or ``"paper"`` to play by the rules of the paper's evaluation
+      program (:mod:`er_gym.envs.protocol`).
     - ``max_steps``: default: the task type's own.
     - ``render_device``: what the embedded engine draws with, one for all environments of a process:
       ``"cpu"``, or ``"gpu"`` where there is one with EGL.
@@ -129,6 +135,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         grid_size: float = 0.1,
         visibility_distance: float = 20.0,
         instances: str = which.TARGET,
+        protocol: str = DEFAULT.name,
         max_steps: int | None = None,
         step_penalty: float = 0.0,
         illegal_penalty: float = 0.0,
@@ -139,13 +146,19 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         EzPickle.__init__(
             self, episode_source, task_type=task_type, obs_mode=obs_mode, backend=backend,
             width=width, height=height, field_of_view=field_of_view, grid_size=grid_size,
-            visibility_distance=visibility_distance, instances=instances, max_steps=max_steps,
-            step_penalty=step_penalty, illegal_penalty=illegal_penalty, annotate=annotate,
-            render_device=render_device, render_mode=render_mode,
+            visibility_distance=visibility_distance, instances=instances, protocol=protocol,
+            max_steps=max_steps, step_penalty=step_penalty, illegal_penalty=illegal_penalty,
+            annotate=annotate, render_device=render_device, render_mode=render_mode,
         )  # fmt: skip
         if instances not in which.POLICIES:
             raise ValueError(
                 f"unknown instances {instances!r}; choose one of: {', '.join(which.POLICIES)}"
+            )
+        self._protocol = protocol_named(protocol)
+        if self._protocol.chooses_instances and instances != which.TARGET:
+            raise ValueError(
+                f"the {protocol} protocol decides itself what a type name stands for; "
+                f"leave out instances={instances!r}"
             )
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"unknown render_mode {render_mode!r}; choose 'rgb_array' or None")
@@ -190,15 +203,14 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self.task = self._choose(**_checked(options or {}))
         controller = self._started_controller(self.task.scene)
         bounds = begin(controller, self.task.scene, self.task.start).metadata["sceneBounds"]
-        self._floor = skills.reachable(
-            controller, (self._backend, self.task.scene, self._grid_size)
-        )
-        pose = skills.start_pose(bounds, self._floor)
+        floor = skills.reachable(controller, (self._backend, self.task.scene, self._grid_size))
+        pose = skills.start_pose(bounds, floor)
         self._memory = Memory(pose, goal_row(self.task.instruction))
         self._progress = Progress.start(self.task)
         self._known = Known(self.task.navigable_objects)
-        self._at = ""  # id of the object last navigated to
-        self._visited: dict[str, list[str]] = {}
+        self._conduct = self._protocol.conduct(
+            Setting(self.task, controller, floor, pose, self._grid_size, self._instances)
+        )
         self._steps = 1
         self._limit = self._max_steps or self.task.max_steps
         self._unknown = 0
@@ -211,9 +223,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             None, "", placed.success, "", "You look around the room."
         )
 
-    def step(
-        self, action: Action | str | int | np.integer[Any]
-    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: AnyAction) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Do an action: an index, an :class:`~er_gym.envs.actions.Action` or its text.
 
         Raises:
@@ -223,7 +233,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         """
         if self._controller is None or self._end_reason:
             raise gymnasium.error.ResetNeeded("call reset() first: no episode is under way")
-        understood, text = understand(action)
+        understood, text = self._protocol.understand(action, self._percept.objects)
         if understood is None:
             return self._not_understood(text)
         self._unknown = 0
@@ -231,13 +241,16 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             self._end_reason = "repeated action"
             times = self._memory.repeats + 1
             feedback = f"You have tried to {understood} {times} times in a row; that is it."
-            return self._reply(understood, text, False, "", feedback, 0.0)
-        self._steps += 1
-        refused = objection(understood, self._around, self._known)
+            said = self._protocol.repeated or understood
+            return self._reply(said, text, False, "", feedback, 0.0)
+        self._steps += understood.verb != verbs.END or self._protocol.end_is_step
+        refused = self._conduct.objection(understood, self._around, self._known)
         if refused:
             object_id, outcome = "", skills.Outcome(None, False, refused)
         else:
-            object_id, outcome = self._do(understood)
+            object_id, outcome = self._conduct.do(
+                understood, self._percept, self._around, self._progress.left
+            )
         self._memory.act(understood, outcome.success)
         self._take_in(outcome)
         reward = self._judge(understood, outcome, object_id) - self._step_penalty
@@ -254,7 +267,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     def action_masks(self) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
-        return legal_actions(self._around, self._known)
+        return self._conduct.legal(self._around, self._known)
 
     @property
     def agent_pose(self) -> AgentPose:
@@ -325,7 +338,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         for percept in (*outcome.views.values(), outcome.percept):
             if percept is not None:
                 self._percept = percept
-                self._around = surroundings(percept, self._at)
+                self._around = self._conduct.around(percept)
                 self._known.add(percept.objects.kinds[self._around.navigable])
                 self._memory.look(percept, self._at_kind)
 
@@ -333,52 +346,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _at_kind(self) -> int | None:
         """The type of what was last navigated to, if that is still there."""
         objects = self._percept.objects
-        row = objects.row.get(self._at)
+        row = objects.row.get(self._conduct.at)
         return None if row is None else int(objects.kinds[row])
-
-    def _do(self, action: Action) -> tuple[str, skills.Outcome]:
-        if action.verb == verbs.OBSERVE:
-            return "", skills.observe(self._controller)
-        if action.verb == verbs.MOVE_FORWARD:
-            return "", skills.move_forward(self._controller, self._grid_size)
-        if action.verb == verbs.END:
-            return "", skills.Outcome(None, True)
-        if action.verb == verbs.NAVIGATE:
-            return self._navigate(action.object_type)
-        objects = self._percept.objects
-        able = suited(action, self._around)
-        if self._instances == which.TARGET:
-            chosen = which.by_task(self.task, self._progress.left, action.verb, able, objects)
-        else:
-            chosen = which.nearest(able, objects, self._percept.pose)
-        done = skills.interact(self._controller, action.verb, objects, chosen)
-        return objects.ids[chosen], done
-
-    def _navigate(self, object_type: str) -> tuple[str, skills.Outcome]:
-        objects = self._percept.objects
-        able = objects.of_type(object_type)
-        if not able:
-            return "", skills.Outcome(None, False, f"there is no {object_type} any more")
-        if self._instances == which.TARGET:
-            goal = which.by_task(self.task, self._progress.left, verbs.NAVIGATE, able, objects)
-            aim = which.redirected(self.task, goal, objects)
-        else:
-            visited = self._visited.setdefault(object_type, [])
-            if len(visited) >= len(able):
-                visited.clear()
-            aim = goal = which.nearest(able, objects, self._percept.pose, visited)
-            visited.append(objects.ids[goal])
-        goal_id = objects.ids[goal]
-        pose = self.task.poses.get(goal_id)
-        if pose is not None:
-            outcome = skills.place(self._controller, pose)
-        else:
-            container = which.container_in_the_way(aim, objects)
-            aim = aim if container is None else container
-            outcome = skills.navigate(self._controller, self._percept, aim, self._floor)
-        if outcome.success:
-            self._at = goal_id
-        return goal_id, outcome
 
     def _judge(self, action: Action, outcome: skills.Outcome, object_id: str) -> float:
         """The reward that an action earned; decides success at ``end``."""
@@ -411,6 +380,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self, text: str
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         self._unknown += 1
+        if self._protocol.unknown_breaks_runs:
+            self._memory.forget_last()
         if self._unknown >= MAX_UNKNOWN:
             self._end_reason = "no known action"
         feedback = (
@@ -433,7 +404,11 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         truncated = self._end_reason == "step limit"
         terminated = bool(self._end_reason) and not truncated
+        appended = self._protocol.appends_end and self._end_reason in _CUT_OFF
+        if appended:
+            reward += self._judge(Action(verbs.END), skills.Outcome(None, True), "")
         info = self._info(action, text, success, object_id, feedback)
+        info["end_appended"] = appended
         if views:
             info["views"] = {name: view.picture for name, view in views.items()}
         return self._observation(feedback, success), reward, terminated, truncated, info

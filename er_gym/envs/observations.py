@@ -131,6 +131,10 @@ class Memory:
                 weights[objects.kinds[objects.held]] = 0.0
             self.found[at] = max(self.found[at], weights.max())
 
+    def forget_last(self) -> None:
+        """Something came in between: the next action is no repetition."""
+        self.last, self.repeats = None, 0
+
     def act(self, action: Action, success: bool) -> None:
         """Remember what was done, or tried."""
         self.repeats = self.repeats + 1 if action == self.last else 1
@@ -227,7 +231,7 @@ def _state(situation: Situation) -> NDArray[np.float32]:
     vector[: len(scalars)] = scalars
     np.clip(vector[: len(scalars)], -1.0, 1.0, out=vector[: len(scalars)])
     vector[len(SCALARS) - len(GOAL_VERBS) : len(SCALARS)] = goal(situation.instruction)[0]
-    if last is not None:
+    if last is not None and last.verb in _LAST:  # the paper's protocol has other verbs and types
         vector[_LAST[last.verb]] = 1.0
     table = vector[len(SCALARS) :].reshape(len(FEATURES), len(TYPES))
     table[_ROW["visible"]] = situation.percept.visible_types
@@ -240,7 +244,7 @@ def _state(situation: Situation) -> NDArray[np.float32]:
     table[_ROW["found"]] = memory.found
     np.minimum(memory.did, _OFTEN, out=table[_FIRST_DID:])
     table[_FIRST_DID:] /= _OFTEN
-    if last is not None and last.object_type:
+    if last is not None and last.object_type in KIND_OF:
         table[_ROW["last"], KIND_OF[last.object_type]] = 1.0
     if objects.held >= 0:
         table[_ROW["held"], objects.kinds[objects.held]] = 1.0

@@ -200,6 +200,21 @@ def with_poses(
     ]
 
 
+def with_every_pose(
+    tasks: Iterable[Task], poses: Mapping[str, Mapping[str, AgentPose]] | None = None
+) -> list[Task]:
+    """The same tasks, each with all poses that a pose file and the tasks state, whatever for.
+
+    So the paper's program reads its pose file: the pose of an object is its pose in every task. Of
+    several poses of one object the last one counts, as it does there.
+    """
+    tasks = list(tasks)
+    every: dict[str, AgentPose] = {}
+    for stated in (*(task.poses for task in tasks), *(poses or {}).values()):
+        every |= stated
+    return [replace(task, poses=every) for task in tasks]
+
+
 def _with_identities(
     tasks: Sequence[Task], places: Sequence[int] = ()
 ) -> list[tuple[Task, object]]:

@@ -11,8 +11,8 @@ from agents import make_agent
 from agents.scripted.searcher import words
 from agents.scripted.searcher.words import Goal, understand
 from benchmarks.metrics import score_episode
-from benchmarks.scorers import CORRECTED
 from benchmarks.play import episode_seed, play_episode
+from benchmarks.scorers import CORRECTED
 from er_gym.envs.actions import STANDS_FOR
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.reward import search_targets

@@ -15,10 +15,10 @@ from agents import Decision, make_agent
 from benchmarks import runner
 from benchmarks.episode import EpisodeRecord
 from benchmarks.metrics import score_episode
-from benchmarks.scorers import CORRECTED
 from benchmarks.play import episode_seed, play_episode
 from benchmarks.pool import Lost
 from benchmarks.runner import Outcome, Shard, run, select
+from benchmarks.scorers import CORRECTED
 from benchmarks.store import RunStore
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks.paper_format import read_tasks

@@ -1,0 +1,143 @@
+"""How actions are judged legal and carried out in one episode.
+
+:class:`Conduct` is what the environment asks for; :class:`DefaultConduct` is the default protocol's
+(:mod:`er_gym.envs.protocol`). It holds what lasts for an episode: where the agent went.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.envs import instances as which
+from er_gym.envs import legality, skills
+from er_gym.envs.actions import Action
+from er_gym.envs.legality import Known, Surroundings
+from er_gym.envs.percept import Percept
+from er_gym.envs.skills import Outcome, Reachable
+from er_gym.tasks import verbs
+from er_gym.tasks.task import AgentPose, KeyAction, Task
+
+Done = tuple[str, Outcome]
+"""The id of the object that an action was done to, ``""`` for none, and what came of it."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """An episode as it begins.
+
+    Attributes:
+        task: what is asked.
+        controller: its scene is arranged; the agent is not placed yet.
+        floor: where the agent can stand.
+        start: where it will be placed.
+        grid_size: metres.
+        instances: which object a type name stands for, see :mod:`er_gym.envs.instances`.
+    """
+
+    task: Task
+    controller: Any
+    floor: Reachable
+    start: AgentPose
+    grid_size: float
+    instances: str
+
+
+class Conduct(Protocol):
+    """How actions are judged and carried out in one episode.
+
+    Attributes:
+        at: id of the object last navigated to, ``""`` before that.
+    """
+
+    at: str
+
+    def around(self, percept: Percept) -> Surroundings:
+        """What can be gone to and interacted with, given what is perceived."""
+
+    def objection(self, action: Action, around: Surroundings, known: Known) -> str:
+        """Why an action is illegal now, in words for the agent; "" when it is legal."""
+
+    def legal(self, around: Surroundings, known: Known) -> NDArray[np.int8]:
+        """(len(ACTIONS),) int8: 1 for each action that is legal now."""
+
+    def do(
+        self, action: Action, percept: Percept, around: Surroundings, left: Sequence[KeyAction]
+    ) -> Done:
+        """Carry out a legal action; ``left``: the key actions that are still to be done."""
+
+
+class DefaultConduct:
+    """The default protocol's.
+
+    Args:
+        setting: of the episode.
+    """
+
+    def __init__(self, setting: Setting) -> None:
+        self.at = ""
+        self._setting = setting
+        self._visited: dict[str, list[str]] = {}
+
+    def around(self, percept: Percept) -> Surroundings:
+        """See :func:`~er_gym.envs.legality.surroundings`."""
+        return legality.surroundings(percept, self.at)
+
+    def objection(self, action: Action, around: Surroundings, known: Known) -> str:
+        """See :func:`~er_gym.envs.legality.objection`."""
+        return legality.objection(action, around, known)
+
+    def legal(self, around: Surroundings, known: Known) -> NDArray[np.int8]:
+        """See :func:`~er_gym.envs.legality.legal_actions`."""
+        return legality.legal_actions(around, known)
+
+    def do(
+        self, action: Action, percept: Percept, around: Surroundings, left: Sequence[KeyAction]
+    ) -> Done:
+        """Carry out a legal action by the skills of :mod:`er_gym.envs.skills`."""
+        setting, objects = self._setting, percept.objects
+        if action.verb == verbs.OBSERVE:
+            return "", skills.observe(setting.controller)
+        if action.verb == verbs.MOVE_FORWARD:
+            return "", skills.move_forward(setting.controller, setting.grid_size)
+        if action.verb == verbs.END:
+            return "", Outcome(None, True)
+        if action.verb == verbs.NAVIGATE:
+            return self._navigate(action.object_type, percept, left)
+        able = legality.suited(action, around)
+        if setting.instances == which.TARGET:
+            chosen = which.by_task(setting.task, left, action.verb, able, objects)
+        else:
+            chosen = which.nearest(able, objects, percept.pose)
+        done = skills.interact(setting.controller, action.verb, objects, chosen)
+        return objects.ids[chosen], done
+
+    def _navigate(self, object_type: str, percept: Percept, left: Sequence[KeyAction]) -> Done:
+        setting, objects = self._setting, percept.objects
+        able = objects.of_type(object_type)
+        if not able:
+            return "", Outcome(None, False, f"there is no {object_type} any more")
+        if setting.instances == which.TARGET:
+            goal = which.by_task(setting.task, left, verbs.NAVIGATE, able, objects)
+            aim = which.redirected(setting.task, goal, objects)
+        else:
+            visited = self._visited.setdefault(object_type, [])
+            if len(visited) >= len(able):
+                visited.clear()
+            aim = goal = which.nearest(able, objects, percept.pose, visited)
+            visited.append(objects.ids[goal])
+        goal_id = objects.ids[goal]
+        pose = setting.task.poses.get(goal_id)
+        if pose is not None:
+            outcome = skills.place(setting.controller, pose)
+        else:
+            container = which.container_in_the_way(aim, objects)
+            aim = aim if container is None else container
+            outcome = skills.navigate(setting.controller, percept, aim, setting.floor)
+        if outcome.success:
+            self.at = goal_id
+        return goal_id, outcome

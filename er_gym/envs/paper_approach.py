@@ -1,0 +1,306 @@
+"""Where the paper's agent stands to reach an object, and how it then looks at it.
+
+It picks one of AI2-THOR's interactable poses within 1.5 m: for a small object the nearest; for
+others one in front of the object, judged by which way the object faces, or, where there is none,
+behind it. It then crouches or stands, tilts its head and turns towards the object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import radians, sqrt, tan
+from typing import Any
+
+import numpy as np
+
+from er_gym.envs.percept import perceive
+from er_gym.envs.skills import Outcome
+from er_gym.tasks.task import AgentPose
+
+_FARTHEST, _NEAR = 1.5, 1.0
+"""How far from an object the agent may stand, and may if the object is large; metres."""
+_SMALL = (0.1, 1.0)
+"""Of a small object: the largest volume (m³) and face (m²); the agent stands as near as it can."""
+_LITTLE, _MIDDLING = (0.2, 0.5), (1.0, 1.0)
+"""The same where the agent stands in front: as near as it can, or halfway; else far off."""
+_TOLERANCES = (0.1, 0.2, 0.3, 0.4, 0.5)
+_GAP = 0.1
+_HEADINGS = (0, 45, 90, 135, 180, 225, 270, 315, 360)
+_UP, _DOWN = 30, -60
+"""How far the head tilts, degrees upwards."""
+_BELOW = 0.44
+"""The agent crouches for an object whose top is lower than its own centre by more, metres."""
+_HORIZON = 60.0
+
+Pose = Mapping[str, Any]
+"""An entry of GetInteractablePoses's ``actionReturn``."""
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An object as the paper's agent knows it, now or as it was when the episode began.
+
+    Attributes:
+        object_id, object_type: AI2-THOR's.
+        x, z, rotation: where its origin is, metres, and which way it faces, degrees.
+        centre: x, y and z of its axis-aligned box, metres; ``top``: y of the box's top.
+        receptacle, openable, is_toggled: as AI2-THOR has them.
+        contents: ids of what lies in it.
+    """
+
+    object_id: str
+    object_type: str
+    x: float
+    z: float
+    rotation: float
+    centre: tuple[float, float, float]
+    top: float
+    receptacle: bool
+    openable: bool
+    is_toggled: bool
+    contents: tuple[str, ...]
+
+
+def thing_of(entry: Mapping[str, Any]) -> Thing:
+    """Read an entry of the metadata's ``objects``."""
+    box = entry["axisAlignedBoundingBox"]
+    return Thing(
+        object_id=entry["objectId"],
+        object_type=entry["objectType"],
+        x=entry["position"]["x"],
+        z=entry["position"]["z"],
+        rotation=entry["rotation"]["y"],
+        centre=tuple(box["center"][axis] for axis in "xyz"),
+        top=box["cornerPoints"][0][1],
+        receptacle=bool(entry["receptacle"]),
+        openable=bool(entry["openable"]),
+        is_toggled=bool(entry["isToggled"]),
+        contents=tuple(entry["receptacleObjectIds"] or ()),
+    )
+
+
+def current(controller: Any, object_id: str) -> Thing | None:
+    """An object as it is now, None if there is none of that id."""
+    entry = _entry(controller, object_id)
+    return None if entry is None else thing_of(entry)
+
+
+def _entry(controller: Any, object_id: str) -> Mapping[str, Any] | None:
+    objects = controller.last_event.metadata["objects"]
+    return next((entry for entry in objects if entry["objectId"] == object_id), None)
+
+
+def unseen(controller: Any, action: str, **arguments: Any) -> bool:
+    """Make a call whose picture nobody wants; whether AI2-THOR reports no error."""
+    event = controller.step(action=action, renderImage=False, **arguments)
+    return not event.metadata["errorMessage"]
+
+
+def stand_at(controller: Any, pose: AgentPose) -> bool:
+    """Teleport; the agent stands or crouches as it did, whatever the pose says."""
+    return unseen(
+        controller,
+        "Teleport",
+        position={"x": pose.x, "y": pose.y, "z": pose.z},
+        rotation={"x": 0.0, "y": pose.rotation, "z": 0.0},
+        horizon=pose.horizon,
+    )
+
+
+def approach(controller: Any, thing: Thing, stated: AgentPose | None) -> Outcome:
+    """Go to an object and look at it.
+
+    Args:
+        stated: the pose that a pose file states for the object; the agent stays in it as it is.
+    """
+    refused: list[Pose] = []
+    pose = stated or _choose(controller, thing, refused)
+    if pose is None:
+        return Outcome(None, False, f"no way was found to {thing.object_type}")
+    while not stand_at(controller, pose):
+        refused.append({"x": pose.x, "y": pose.y, "z": pose.z})
+        pose = _choose(controller, thing, refused)
+        if pose is None:
+            return Outcome(None, False, f"no way was found to {thing.object_type}")
+    if stated is None:
+        _adjust_height(controller, thing)
+        _look_at(controller, thing)
+    if not controller.headless:
+        controller.step(action="Pass")  # for the one picture that is wanted
+    return Outcome(perceive(controller.last_event), True)
+
+
+# -- where to stand --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Sides:
+    """Where to look for a place in front of an object that faces some way.
+
+    Attributes:
+        axis: places are taken whose offset along it is small; ``""`` for all.
+        sides: the signs of the place's offsets along x and z, 0 for any, with the rotation to face
+            the object from there; in order of preference.
+        skips: whether the second side counts only where the first has no place at all. Else it
+            counts also where the first has none that is near enough.
+    """
+
+    axis: str
+    sides: tuple[tuple[int, int, float], ...]
+    skips: bool = False
+
+
+_FACING = {
+    45: _Sides("", ((1, 1, 225.0), (-1, -1, 45.0))),
+    90: _Sides("z", ((1, 0, 270.0), (-1, 0, 90.0)), skips=True),
+    135: _Sides("", ((1, -1, 315.0), (-1, 1, 135.0), (1, 1, 225.0), (-1, -1, 45.0))),
+    180: _Sides("x", ((0, -1, 0.0),)),
+    225: _Sides("", ((-1, -1, 45.0), (1, 1, 225.0))),
+    270: _Sides("z", ((-1, 0, 90.0), (1, 0, 270.0))),
+    315: _Sides("", ((-1, 1, 135.0), (1, -1, 315.0))),
+}
+"""By the direction that the object faces; 0 has its own rule, :func:`_for_facing_north`."""
+
+
+def _choose(controller: Any, thing: Thing, refused: Sequence[Pose]) -> AgentPose | None:
+    """The pose from which to reach an object; None where there is none within reach.
+
+    Args:
+        refused: positions that turned out to be impossible.
+    """
+    event = controller.step(
+        action="GetInteractablePoses", objectId=thing.object_id, renderImage=False
+    )
+    poses = [
+        pose
+        for pose in event.metadata["actionReturn"] or ()
+        if _away(pose, thing) <= _FARTHEST
+        and not any(all(pose[axis] == place[axis] for axis in "xyz") for place in refused)
+    ]
+    if not poses:
+        return None
+    entry = _entry(controller, thing.object_id)
+    assert entry is not None
+    size = [entry["axisAlignedBoundingBox"]["size"][axis] for axis in "xyz"]
+    volume = round(size[0] * size[1] * size[2], 4)
+    face = round(max(size[0] * size[1], size[0] * size[2], size[1] * size[2]), 4)
+    found, rotation = None, 0.0
+    if not (volume <= _SMALL[0] and face <= _SMALL[1]):
+        facing = _heading(thing.rotation)
+        choose = _for_facing_north if facing == 0 else _by_sides
+        found, rotation = choose(thing, poses, _FACING.get(facing), (volume, face))
+    if found is None:
+        found = min(poses, key=lambda pose: _away(pose, thing))
+        rotation = found["rotation"]
+    return AgentPose(found["x"], found["y"], found["z"], rotation, _HORIZON)
+
+
+def _heading(degrees: float) -> int:
+    """The nearest of eight directions; the first of two that are as near."""
+    return min(_HEADINGS, key=lambda heading: abs(heading - round(degrees))) % 360
+
+
+def _away(pose: Pose, thing: Thing) -> float:
+    return sqrt((pose["x"] - thing.x) ** 2 + (pose["z"] - thing.z) ** 2)
+
+
+_Found = tuple[Pose | None, float]
+_Size = tuple[float, float]
+
+
+def _by_sides(thing: Thing, poses: Sequence[Pose], ways: _Sides | None, size: _Size) -> _Found:
+    assert ways is not None
+    for x, z, rotation in ways.sides:
+        there = _on_side(thing, _in_line(thing, poses, ways.axis), x, z)
+        found = _straight_ahead(thing, there, size)
+        if found is not None or (ways.skips and there):
+            return found, rotation
+    return None, 0.0
+
+
+def _for_facing_north(thing: Thing, poses: Sequence[Pose], _: object, size: _Size) -> _Found:
+    """Of the best places on both sides, the nearer. The agent looks north wherever there is a
+    place behind the object, even if it then stands in front of it."""
+    line = _in_line(thing, poses, "z")
+    front, back = _on_side(thing, line, 0, 1), _on_side(thing, line, 0, -1)
+    best = [_straight_ahead(thing, there, size) for there in (back, front)]
+    there_is = [pose for pose in best if pose is not None]
+    # Where both are as near, the place behind is taken: min returns the first.
+    found = min(there_is, key=lambda pose: _away(pose, thing)) if there_is else None
+    return found, 0.0 if back else 180.0
+
+
+def _in_line(thing: Thing, poses: Sequence[Pose], axis: str) -> Sequence[Pose]:
+    """The poses whose offset along an axis is least, to within a tolerance that grows."""
+    if not axis:
+        return poses
+    origin = {"x": thing.x, "z": thing.z}[axis]
+    for tolerance in _TOLERANCES:
+        found = [pose for pose in poses if abs(pose[axis] - origin) <= tolerance]
+        if found:
+            return found
+    return []
+
+
+def _on_side(thing: Thing, poses: Sequence[Pose], x: int, z: int) -> list[Pose]:
+    return [
+        pose
+        for pose in poses
+        if (not x or (pose["x"] - thing.x) * x > 0) and (not z or (pose["z"] - thing.z) * z > 0)
+    ]
+
+
+def _straight_ahead(thing: Thing, poses: Sequence[Pose], size: _Size) -> Pose | None:
+    """Of the poses close to the line in which an object faces, one as far off as its size asks.
+
+    The paper's equation of the line has x and z the wrong way round; so has this.
+    """
+    slope = -tan(radians(thing.rotation))
+    offset = -thing.x - slope * thing.z
+    least, close = float("inf"), []
+    for pose in poses:
+        aside = abs(pose["z"] + slope * pose["x"] + offset) / sqrt(1 + slope**2)
+        if aside <= least + _GAP:
+            least = min(least, aside)
+            close.append(pose)
+    if not close:
+        return None
+    if size[0] <= _LITTLE[0] and size[1] <= _LITTLE[1]:
+        return min(close, key=lambda pose: _away(pose, thing))
+    near = [pose for pose in close if _away(pose, thing) <= _NEAR]
+    if not near:
+        return None
+    if size[0] <= _MIDDLING[0] and size[1] <= _MIDDLING[1]:
+        return sorted(near, key=lambda pose: _away(pose, thing))[len(near) // 2]
+    return max(near, key=lambda pose: _away(pose, thing))
+
+
+# -- how to look -----------------------------------------------------------------------------------
+
+
+def _adjust_height(controller: Any, thing: Thing) -> None:
+    """Crouch for what is low, and stand up again if it is then out of sight."""
+    low = controller.last_event.metadata["agent"]["position"]["y"] > thing.top + _BELOW
+    unseen(controller, "Crouch" if low else "Stand")
+    entry = _entry(controller, thing.object_id)
+    if entry is None or not entry["visible"]:
+        unseen(controller, "Stand")
+
+
+def _look_at(controller: Any, thing: Thing) -> None:
+    """Tilt the head to the object's middle, and turn to the nearest of eight directions to it."""
+    metadata = controller.last_event.metadata
+    camera = metadata["cameraPosition"]
+    offset = np.array([thing.centre[k] - camera[axis] for k, axis in enumerate("xyz")])
+    length = np.linalg.norm(offset)
+    direction = offset / length if length else offset
+    yaw = float(np.degrees(np.arctan2(direction[0], direction[2])))
+    pitch = int(np.degrees(np.arcsin(direction[1])))
+    wanted = min(_UP, pitch) if pitch > 0 else max(_DOWN, pitch)
+    up = wanted + round(metadata["agent"]["cameraHorizon"])
+    if up:
+        unseen(controller, "LookUp" if up > 0 else "LookDown", degrees=abs(up))
+    heading = _heading(360 + yaw if int(yaw) < 0 else yaw)
+    turn = controller.last_event.metadata["agent"]["rotation"]["y"] - heading
+    unseen(controller, "RotateLeft", degrees=turn)

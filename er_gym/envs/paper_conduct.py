@@ -1,0 +1,182 @@
+"""The paper's protocol: what its evaluation program understands, allows and does.
+
+The rules are those of Embodied-Reasoner's runner and agent (arXiv 2503.21696, ``evaluate/``). Where
+they look odd they are kept: numbers that stand beside the paper's table must be made alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.envs.actions import INDICES, NO_ACTION, NOWHERE, Action, AnyAction, text_of
+from er_gym.envs.conduct import Done, Setting
+from er_gym.envs.legality import Known, Surroundings, navigable_within
+from er_gym.envs.paper_approach import Thing, approach, current, thing_of
+from er_gym.envs.paper_skills import interact, move_forward, observe, start_again
+from er_gym.envs.percept import Percept, marked
+from er_gym.envs.skills import Outcome
+from er_gym.tasks import verbs
+from er_gym.tasks.task import KeyAction
+from er_gym.thor.objects import KIND_OF, TYPES, ObjectTable
+
+NO_OBJECT = "No Suitable Object"
+"""The type of what a reply names that is not in the scene."""
+_PUT_IN = "put in"
+_SPOKEN = {
+    **{verb: verb for verb in (verbs.INIT, verbs.NAVIGATE, verbs.PICKUP)},
+    "put": verbs.PUT,
+    **{verb: verb for verb in (verbs.TOGGLE, verbs.OPEN, verbs.CLOSE, *verbs.BARE_VERBS)},
+}
+"""What a reply may begin with, in the order in which it is looked for, and the verb meant."""
+_NAMELESS = (*verbs.BARE_VERBS, "error")
+_INTERACTIONS = tuple(verb for verb in verbs.INTERACTIONS if verb != verbs.SLICE)
+_SECOND_WHEN_HOLDING = frozenset({"84", "85"})
+"""Identities of the paper's tasks in which going to a type means the second of the targets when
+something is held: both places are of one type."""
+
+
+def understand_as_paper(action: AnyAction, objects: ObjectTable) -> tuple[Action | None, str]:
+    """The action that the paper's runner reads in a text, None if none; and the text.
+
+    A text is read as it is written: its case and leading spaces matter to the verb. The object is
+    its last word, whatever the verb; a word that names no type in the scene, in any case, stands
+    for :data:`NO_OBJECT`. (The paper asks a model which type is closest in meaning. Here this is
+    for the agent.)
+
+    Raises:
+        gymnasium.error.InvalidAction: it is neither text nor an action nor its index.
+    """
+    text = text_of(action)
+    if text.startswith(NO_ACTION):
+        return None, text
+    if _PUT_IN in text:
+        verb = verbs.PUT
+    else:
+        start = next((word for word in _SPOKEN if text.startswith(word)), None)
+        if start is None:
+            return None, text
+        verb = _SPOKEN[start]
+    if verb in (verbs.INIT, *verbs.BARE_VERBS) or text.startswith(_NAMELESS):
+        return Action(verb), text
+    word = text.split(" ")[-1].strip()
+    there = {TYPES[kind] for kind in set(objects.kinds.tolist())}
+    alike = (name for name in sorted(there) if name.lower() == word.lower())
+    return Action(verb, word if word in there else next(alike, NO_OBJECT)), text
+
+
+class PaperConduct:
+    """The paper's way to judge and carry out actions.
+
+    - A type may be gone to once it has been plain to see, or where the task lists it.
+    - A type may be interacted with in any way while one of its objects is plain to see, or visible
+      and of a type that lay in the receptacle last gone to. Whether the object's state and the hand
+      allow it, AI2-THOR says. What is in the hand counts too.
+    - A type stands for the task's first target object of that type, or for the first in the scene,
+      as that was when the episode began: where it has been moved to since, or whether it has been
+      switched on, is not heeded.
+
+    Args:
+        setting: of the episode; its ``instances`` means nothing here.
+    """
+
+    def __init__(self, setting: Setting) -> None:
+        self.at = ""
+        self._setting, task = setting, setting.task
+        self._inside = marked(np.array([], np.intp))  # types that lay in the last receptacle
+        self._second = str(task.extra.get("identity")) in _SECOND_WHEN_HOLDING
+        self._targets: dict[str, list[str]] = {}
+        for object_id in task.target_objects:
+            self._targets.setdefault(object_id.split("|")[0], []).append(object_id)
+        self._first: dict[str, Thing] = {}
+        for entry in setting.controller.last_event.metadata["objects"]:
+            if entry["objectType"] not in self._first:
+                self._first[entry["objectType"]] = thing_of(entry)
+
+    def around(self, percept: Percept) -> Surroundings:
+        """What is plain to see, what is in the hand included; and what lay in the receptacle."""
+        table, visible = percept.objects, percept.visible
+        away = np.hypot(table.centre[:, 0] - percept.pose.x, table.centre[:, 2] - percept.pose.z)
+        plain = visible & (away < _within(table))
+        inside = visible & self._inside[table.kinds]
+        return Surroundings(table, plain.nonzero()[0], (plain | inside).nonzero()[0])
+
+    def objection(self, action: Action, around: Surroundings, known: Known) -> str:
+        """A type must be known to go there, and at hand to do anything else to it."""
+        name = action.object_type
+        if action.verb in (verbs.INIT, *verbs.BARE_VERBS):
+            return ""
+        if action.verb == verbs.NAVIGATE:
+            return "" if name in known else f"You cannot navigate to {name or 'nothing'}."
+        if name in around.in_reach:
+            return ""
+        return f"You cannot {action.verb} {name or 'nothing'}: it is not available for interaction."
+
+    def legal(self, around: Surroundings, known: Known) -> NDArray[np.int8]:
+        """(len(ACTIONS),) int8: every interaction with what is at hand is legal, but ``slice``."""
+        legal = known.legal.copy()
+        for verb in _INTERACTIONS:
+            indices = INDICES[verb][around.interactable_types]
+            legal[indices[indices >= 0]] = 1
+        return legal
+
+    def do(
+        self, action: Action, percept: Percept, around: Surroundings, left: Sequence[KeyAction]
+    ) -> Done:
+        """Carry out a legal action."""
+        setting, controller = self._setting, self._setting.controller
+        if action.verb == verbs.OBSERVE:
+            return "", observe(controller)
+        if action.verb == verbs.MOVE_FORWARD:
+            return "", move_forward(controller, setting.task.related_objects)
+        if action.verb == verbs.END:
+            return "", Outcome(None, True)
+        if action.verb == verbs.INIT:
+            return "", start_again(controller, setting.start)
+        thing = self._choose(action, percept.objects)
+        if thing is None:
+            return "", Outcome(None, False, f"there is no such {action.object_type}")
+        if action.verb != verbs.NAVIGATE:
+            return thing.object_id, interact(controller, action.verb, thing)
+        aim = self._on_it(thing)
+        outcome = approach(controller, aim, setting.task.poses.get(aim.object_id))
+        if outcome.success:
+            self.at = thing.object_id
+            if aim.receptacle:
+                types = (object_id.split("|")[0] for object_id in aim.contents)
+                self._inside = marked(np.array([KIND_OF[t] for t in types if t in KIND_OF], int))
+        return thing.object_id, outcome
+
+    def _choose(self, action: Action, objects: ObjectTable) -> Thing | None:
+        """The object that a type stands for; None if a task names one that the scene lacks."""
+        targets = self._targets.get(action.object_type)
+        if targets is None:
+            return self._first.get(action.object_type)
+        second = self._second and action.verb == verbs.NAVIGATE and objects.held >= 0
+        if second and len(targets) < 2:
+            return None
+        return current(self._setting.controller, targets[1 if second else 0])
+
+    def _on_it(self, thing: Thing) -> Thing:
+        """Where going to an object leads: to the first of the task's related objects that lies in
+        it, if it is a receptacle that does not open."""
+        if thing.receptacle and not thing.openable:
+            for object_id in self._setting.task.related_objects:
+                if object_id in thing.contents:
+                    return current(self._setting.controller, object_id) or thing
+        return thing
+
+
+_FLOOR = marked(np.array([KIND_OF[name] for name in NOWHERE]))
+
+
+def _within(table: ObjectTable) -> NDArray[np.float64]:
+    """(N,) how near each object is plain to see, metres; 0 for the floor."""
+    found = table.derived.get("paper_within")
+    if not isinstance(found, np.ndarray):
+        found = navigable_within(table.volume, table.face)
+        found[_FLOOR[table.kinds]] = 0.0
+        table.derived["paper_within"] = found
+    return found

@@ -1,0 +1,145 @@
+"""The paper's skills, turned into calls of the AI2-THOR controller.
+
+An action has succeeded when AI2-THOR reports no error after the last of its calls; after a walk or
+a look round that last call is a turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import hypot
+from typing import Any
+
+from er_gym.envs.paper_approach import Thing, stand_at, unseen
+from er_gym.envs.percept import Percept, perceive
+from er_gym.envs.skills import FORWARD_STEP, Outcome
+from er_gym.tasks import verbs
+from er_gym.tasks.task import AgentPose
+
+_VIEWS = ("left", "behind", "right")
+_LEFT, _RIGHT = "Left", "Right"
+
+
+def seen(controller: Any) -> Outcome:
+    """What is perceived after the calls of a skill, and what the last one's error was."""
+    problem = controller.last_event.metadata["errorMessage"]
+    if not controller.headless:
+        controller.step(action="Pass")  # for the one picture that is wanted
+    return Outcome(perceive(controller.last_event), not problem, problem)
+
+
+def start_again(controller: Any, start: AgentPose) -> Outcome:
+    """Go back to where the episode began."""
+    stand_at(controller, start)
+    return seen(controller)
+
+
+def observe(controller: Any) -> Outcome:
+    """Look left, behind and right, and turn back to where one looked before."""
+
+    def turned() -> Percept:
+        return perceive(controller.step(action="RotateLeft", degrees=90))
+
+    views = {view: turned() for view in _VIEWS}
+    last = turned()
+    problem = controller.last_event.metadata["errorMessage"]
+    return Outcome(last, not problem, problem, views)
+
+
+def _call(verb_to_action: str, **fixed: Any) -> Callable[[Any, Thing], Any]:
+    return lambda controller, thing: controller.step(
+        action=verb_to_action, objectId=thing.object_id, forceAction=False, **fixed
+    )
+
+
+_TOGGLE = {False: _call("ToggleObjectOn"), True: _call("ToggleObjectOff")}
+_INTERACTIONS: dict[str, Callable[[Any, Thing], Any]] = {
+    verbs.PICKUP: _call("PickupObject", manualInteract=False),
+    verbs.PUT: _call("PutObject", placeStationary=True),
+    verbs.OPEN: _call("OpenObject", openness=1),
+    verbs.CLOSE: _call("CloseObject"),
+    verbs.TOGGLE: lambda controller, thing: _TOGGLE[thing.is_toggled](controller, thing),
+}
+
+
+def interact(controller: Any, verb: str, thing: Thing) -> Outcome:
+    """Pick up, put into, open, close or toggle an object, as far as AI2-THOR allows."""
+    event = _INTERACTIONS[verb](controller, thing)
+    problem = event.metadata["errorMessage"]
+    return Outcome(perceive(event), not problem, problem)
+
+
+# -- move forward ----------------------------------------------------------------------------------
+
+
+def move_forward(controller: Any, related: Sequence[str]) -> Outcome:
+    """Walk half a metre ahead; where that is blocked, to a side, and only then back.
+
+    A side step is a turn, a step ahead and a turn back. The paper takes it for done when the turn
+    back was, so that the step itself may be blocked, too.
+
+    Args:
+        related: ids of the task's related objects; of two free sides the agent takes the one that
+            brings it nearest to one of them that it sees.
+    """
+    if not _walk(controller, "MoveAhead"):
+        _go_round(controller, related)
+    return seen(controller)
+
+
+def _go_round(controller: Any, related: Sequence[str]) -> None:
+    if not related:
+        if not (_side_step(controller, _RIGHT) or _side_step(controller, _LEFT)):
+            _back_off(controller)
+        return
+    right, at_right = _tried(controller, _RIGHT, _LEFT)
+    left, at_left = _tried(controller, _LEFT, _RIGHT)
+    goals = [
+        (entry["position"]["x"], entry["position"]["z"])
+        for entry in controller.last_event.metadata["objects"]
+        if entry["objectId"] in related and entry["visible"]
+    ]
+    if right and left and goals:
+        nearer = _nearest(at_right, goals) < _nearest(at_left, goals)
+        _side_step(controller, _RIGHT if nearer else _LEFT)
+    elif right or left:
+        _side_step(controller, _RIGHT if right else _LEFT)
+    else:
+        _back_off(controller)
+
+
+def _tried(controller: Any, side: str, other: str) -> tuple[bool, tuple[float, float]]:
+    """Step to a side and back to the other: whether that went, and where (x, z) the step led.
+
+    The step back leads elsewhere if the step aside was blocked, as in the paper's program.
+    """
+    went = _side_step(controller, side)
+    position = controller.last_event.metadata["agent"]["position"]
+    if went:
+        _side_step(controller, other)
+    return went, (position["x"], position["z"])
+
+
+def _nearest(place: tuple[float, float], goals: Sequence[tuple[float, float]]) -> float:
+    return min(hypot(place[0] - x, place[1] - z) for x, z in goals)
+
+
+def _side_step(controller: Any, side: str) -> bool:
+    unseen(controller, f"Rotate{side}", degrees=90)
+    _walk(controller, "MoveAhead")
+    return unseen(controller, f"Rotate{_LEFT if side == _RIGHT else _RIGHT}", degrees=90)
+
+
+def _back_off(controller: Any) -> None:
+    """Walk back; where that is blocked too, turn right and walk, or left and walk."""
+    if _walk(controller, "MoveBack"):
+        return
+    turned = unseen(controller, "RotateRight", degrees=90)
+    if not _walk(controller, "MoveAhead"):
+        if turned:
+            unseen(controller, "RotateLeft", degrees=180)
+        _walk(controller, "MoveAhead")
+
+
+def _walk(controller: Any, action: str) -> bool:
+    return unseen(controller, action, moveMagnitude=FORWARD_STEP)

@@ -1,0 +1,68 @@
+"""Protocols: by which rules an episode is played. Each is a row of :data:`PROTOCOLS`.
+
+``default`` is this suite's own. ``paper`` is that of the evaluation program of Embodied-Reasoner
+(arXiv 2503.21696), rule by rule, so that numbers stand beside the paper's table; docs/agents.md
+lists what differs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from er_gym.envs.actions import Action, AnyAction, understand
+from er_gym.envs.conduct import Conduct, DefaultConduct, Setting
+from er_gym.envs.paper_conduct import PaperConduct, understand_as_paper
+from er_gym.tasks.verbs import END
+from er_gym.thor import ObjectTable
+
+
+@dataclass(frozen=True)
+class EpisodeProtocol:
+    """The rules of an episode.
+
+    Attributes:
+        name: as ``--protocol`` and ``EmbodiedEnv(protocol=…)`` take it.
+        understand: the action that is meant, None if none is; and its text.
+        conduct: how actions are judged and carried out in an episode.
+        chooses_instances: whether it decides itself which object a type name stands for.
+        unknown_breaks_runs: whether a reply that names no action comes between two same actions.
+        repeated: what the fourth same action in a row is recorded as; None for itself.
+        end_is_step: whether ``end`` counts towards the step limit.
+        appends_end: whether an episode that is cut off, by the step limit or by three replies that
+            name no action, is ended by a successful ``end``.
+    """
+
+    name: str
+    understand: Callable[[AnyAction, ObjectTable], tuple[Action | None, str]]
+    conduct: Callable[[Setting], Conduct]
+    chooses_instances: bool = False
+    unknown_breaks_runs: bool = False
+    repeated: Action | None = None
+    end_is_step: bool = True
+    appends_end: bool = False
+
+
+DEFAULT = EpisodeProtocol("default", lambda action, _: understand(action), DefaultConduct)
+PAPER = EpisodeProtocol(
+    "paper",
+    understand_as_paper,
+    PaperConduct,
+    chooses_instances=True,
+    unknown_breaks_runs=True,
+    repeated=Action(END),
+    end_is_step=False,
+    appends_end=True,
+)
+PROTOCOLS = {protocol.name: protocol for protocol in (DEFAULT, PAPER)}
+
+
+def protocol_named(name: str) -> EpisodeProtocol:
+    """Look a protocol up.
+
+    Raises:
+        ValueError: there is none of that name; the message lists those there are.
+    """
+    if name not in PROTOCOLS:
+        raise ValueError(f"unknown protocol {name!r}; choose one of: {', '.join(PROTOCOLS)}")
+    return PROTOCOLS[name]
