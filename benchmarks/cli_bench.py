@@ -23,6 +23,7 @@ from benchmarks.cli_errors import (
 from benchmarks.cli_options import (
     agent_config_option,
     overrides_option,
+    protocol_option,
     scorer_option,
     split,
     stdout,
@@ -105,6 +106,7 @@ def _spoken_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--backend", help="The engine: embedded or unity.  [default: the suite's]")
 @click.option("--instances", help="What a type name stands for.  [default: the suite's]")
+@protocol_option
 @scorer_option
 @_spoken_options
 def bench(
@@ -120,6 +122,7 @@ def bench(
     seed: int,
     backend: str | None,
     instances: str | None,
+    protocol: str,
     scorer: str,
     spoken: Spoken,
 ) -> int:
@@ -148,9 +151,9 @@ def bench(
     terminal = Console(stderr=True)
     with bad_input(BackendError):
         part = Shard.parse(shard) if shard else None
-        asked = _load_suite(suite, tasks_file, poses)
+        asked = _load_suite(suite, tasks_file, poses, protocol)
         voice = _voice(agent, spoken)
-        env = _env_kwargs(asked, agent, seed, voice, backend=backend, instances=instances)
+        env = _env_kwargs(asked, agent, seed, voice, protocol, backend=backend, instances=instances)
         fitted = resolve_tasks(asked.tasks, env["backend"])
         aside = (*asked.set_aside, *fitted.set_aside)
         if aside and not fitted.tasks:
@@ -231,9 +234,13 @@ def _player(
         )
 
 
-def _load_suite(name: str | None, tasks_file: Path | None, poses: Path | None) -> Suite:
+def _load_suite(
+    name: str | None, tasks_file: Path | None, poses: Path | None, protocol: str
+) -> Suite:
+    """The suite; under the paper's protocol a stated pose is the object's in every task."""
+    from er_gym.envs.protocol import PAPER
     from er_gym.tasks.jsonl_format import digest
-    from er_gym.tasks.paper_format import read_poses, with_poses
+    from er_gym.tasks.paper_format import read_poses, with_every_pose, with_poses
     from er_gym.tasks.suites import load_suite, suite_from_file, suite_names
 
     if (name is None) == (tasks_file is None):
@@ -241,26 +248,35 @@ def _load_suite(name: str | None, tasks_file: Path | None, poses: Path | None) -
     if name is not None:
         if poses is not None:
             raise BadInput("--poses goes with --tasks-file; a suite has its own")
-        return load_suite(name)
-    assert tasks_file is not None
-    suite = suite_from_file(tasks_file)
-    if poses is None:
-        return suite
-    tasks = tuple(with_poses(suite.tasks, read_poses(poses), suite.places))
-    return replace(suite, tasks=tasks, digest=digest(tasks))
+        suite = load_suite(name)
+    else:
+        assert tasks_file is not None
+        suite = suite_from_file(tasks_file)
+    stated = {} if poses is None else read_poses(poses)
+    if stated:
+        tasks = tuple(with_poses(suite.tasks, stated, suite.places))
+        suite = replace(suite, tasks=tasks, digest=digest(tasks))
+    if protocol == PAPER.name:
+        suite = replace(suite, tasks=tuple(with_every_pose(suite.tasks, stated)))
+    return suite
 
 
 def _env_kwargs(
-    suite: Suite, agent: str, seed: int, voice: Voice | None, **given: str | None
+    suite: Suite, agent: str, seed: int, voice: Voice | None, protocol: str, **given: str | None
 ) -> dict[str, Any]:
     """The environment's arguments: the suite's, overruled by the options that were given, and the
     observations that the agent needs. Agent and environment are made once, to hear of what is wrong
     with them before any worker is started."""
     from agents import make_agent
     from er_gym.envs.embodied_env import EmbodiedEnv
+    from er_gym.envs.protocol import DEFAULT, protocol_named
     from er_gym.thor import BACKENDS
 
     env = {"backend": "embedded", **suite.env}
+    if protocol != DEFAULT.name:  # runs of before, which say nothing of it, can be continued
+        env["protocol"] = protocol
+    if protocol_named(protocol).chooses_instances:
+        env.pop("instances", None)
     env |= {name: value for name, value in given.items() if value is not None}
     if env["backend"] not in BACKENDS:
         raise ValueError(

@@ -22,6 +22,18 @@ scorer_option = click.option(
     help="Which scorer the table shows; both: each where they differ.",
 )
 
+PROTOCOL_CHOICES = ("default", "paper")
+"""As in ``er_gym.envs.protocol``, likewise."""
+
+protocol_option = click.option(
+    "--protocol",
+    type=click.Choice(PROTOCOL_CHOICES),
+    default=PROTOCOL_CHOICES[0],
+    show_default=True,
+    help="The rules of an episode; paper: those of the paper's own evaluation program, for figures "
+    "that stand beside its table.",
+)
+
 workers_option = click.option(
     "--workers",
     type=click.IntRange(min=1),

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from benchmarks.episode import EpisodeRecord
 from benchmarks.scorers import JUDGED_BY_NAME, Scorer, Tally
 from er_gym.tasks.types import task_type
-from er_gym.tasks.verbs import END, NAVIGATE
+from er_gym.tasks.verbs import END
 
 _Z = 1.959963984540054  # the 97.5 % point of the normal distribution
 
@@ -53,9 +53,9 @@ def ordered_completeness(episode: EpisodeRecord, counted: Tally) -> float:
     return _longest_common(counted.scored, counted.expected) / len(counted.expected)
 
 
-def repeat_rate(episode: EpisodeRecord) -> float:
+def repeat_rate(counted: Tally) -> float:
     """The share of navigations, failed ones too, that name a type navigated to before."""
-    targets = [step.object_type for step in episode.steps if step.verb == NAVIGATE]
+    targets = counted.gone_to
     return (len(targets) - len(set(targets))) / len(targets) if targets else 0.0
 
 
@@ -94,6 +94,8 @@ class Score:
 
     Attributes:
         task_id, task_type, group: what was played.
+        success: also where the paper's program gives more than 1, as it does in a task whose only
+            other key action was done and that does not ask for ``end``.
         missing: the scoring key actions that were not done, as ``"verb Type"``.
     """
 
@@ -136,7 +138,7 @@ def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
         search_efficiency=search_efficiency(episode, counted),
         completeness=completeness(counted),
         ordered_completeness=ordered_completeness(episode, counted),
-        repeat_rate=repeat_rate(episode),
+        repeat_rate=repeat_rate(counted),
         steps_saved=steps_saved(episode),
         key_action_precision=key_action_precision(episode, counted),
         missing=tuple(missing.elements()),

@@ -158,6 +158,7 @@ def as_json(runs: Sequence[RunReport]) -> str:
 def _run(run: RunReport) -> dict[str, Any]:
     return {
         "path": str(run.path),
+        "protocol": run.manifest.protocol,
         "manifest": run.manifest.model_dump(),
         "episodes": len(run.episodes),
         "crashed": run.crashed,
@@ -190,9 +191,10 @@ def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = Fal
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     columns = [f"{metric}{end}" for metric in METRICS for end in ("", "_low", "_high")]
-    writer.writerow(["run", "agent", "suite", "scorer", "level", "name", "n", *columns])
+    writer.writerow(["run", "agent", "suite", "protocol", "scorer", "level", "name", "n", *columns])
     for run in runs:
-        head = [str(run.path), run.manifest.agent, run.manifest.suite]
+        manifest = run.manifest
+        head = [str(run.path), manifest.agent, manifest.suite, manifest.protocol]
         for name, scores in run.shown(scorer).items():
             for level, part, summary in slices(scores):
                 if level == "type" and not with_types:

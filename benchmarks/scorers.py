@@ -34,6 +34,7 @@ class Tally:
             task's name decides about it.
         points: how many scored, that ``end`` included.
         routes: key actions done besides, which score nothing: navigations that the task lists.
+        gone_to: the types that navigations named, failed ones too.
         steps: how many steps the episode took, ``init`` and ``end`` included.
         goal_holds: whether the final state is as the task asks, where the scorer heeds that.
     """
@@ -42,6 +43,7 @@ class Tally:
     scored: tuple[str, ...]
     points: int
     routes: int
+    gone_to: tuple[str, ...]
     steps: int
     goal_holds: bool = True
 
@@ -88,7 +90,10 @@ def _paper(episode: EpisodeRecord) -> Tally:
     scored: list[str] = []
     points = routes = 0
     last = ""
+    gone_to: list[str] = []
     for step in episode.steps:
+        if step.verb == NAVIGATE:
+            gone_to.append(step.object_type)
         if not step.success:
             continue
         verb, label = step.verb, _label(step.verb, step.object_type)
@@ -104,7 +109,7 @@ def _paper(episode: EpisodeRecord) -> Tally:
                 points += 1
             elif last in keys:
                 points += 1
-                break
+                break  # the program looks no further, at what follows there neither
         elif step.object_type:
             label = _label(_PUT if verb.startswith(_PUT) else verb, step.object_type)
             if left[label] > 0:
@@ -112,7 +117,7 @@ def _paper(episode: EpisodeRecord) -> Tally:
                 scored.append(label)
                 points += 1
         last = label
-    return Tally(tuple(expected), tuple(scored), points, routes, len(episode.steps))
+    return Tally(tuple(expected), tuple(scored), points, routes, tuple(gone_to), len(episode.steps))
 
 
 # -- corrected -------------------------------------------------------------------------------------
@@ -184,6 +189,7 @@ def _corrected(episode: EpisodeRecord) -> Tally:
         tuple(scored),
         points,
         routes,
+        tuple(step.object_type for step in episode.steps if step.verb == NAVIGATE),
         episode.num_steps,
         goal_holds=not episode.goal_unmet,
     )

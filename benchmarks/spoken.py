@@ -89,7 +89,7 @@ class Voice:
         """Play the tasks that the store has no finished episode of; see :func:`run_together`."""
 
         def keep(episode: EpisodeRecord, agent: Agent) -> None:
-            last = episode.steps[-1] if episode.steps else None
+            last = next((step for step in reversed(episode.steps) if not step.appended), None)
             kept = agent.conversation(
                 picture_folder(episode.task_id),
                 feedback=last.feedback if last else "",

@@ -28,6 +28,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from agents.vlm.record import ConversationRecord
 from benchmarks.episode import EpisodeRecord
+from er_gym.envs.protocol import DEFAULT
 from er_gym.tasks.errors import SetAside, Taken
 
 MANIFEST = "run.json"
@@ -73,6 +74,11 @@ class Manifest(BaseModel):
     set_aside: tuple[SetAside, ...] = ()
     taken: tuple[Taken, ...] = ()
 
+    @property
+    def protocol(self) -> str:
+        """By which rules episodes are played, see :mod:`er_gym.envs.protocol`."""
+        return str(self.env.get("protocol", DEFAULT.name))
+
 
 class RunStore:
     """A run directory, opened with :meth:`create` to play or :meth:`open` to read.
@@ -95,7 +101,14 @@ class RunStore:
             OSError: the directory cannot be made or written to.
         """
         if (path / MANIFEST).exists():
-            theirs = cls.open(path).manifest.model_dump(mode="json")
+            other = cls.open(path).manifest
+            if other.protocol != manifest.protocol:
+                raise RunDirectoryError(
+                    f"{path} holds a run under the {other.protocol} protocol, not the "
+                    f"{manifest.protocol} one; choose another --out, or continue that run with "
+                    f"--protocol {other.protocol}"
+                )
+            theirs = other.model_dump(mode="json")
             for name, here in manifest.model_dump(mode="json").items():
                 there = theirs[name]
                 if there != here:

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from benchmarks.metrics import METRICS, Estimate, Score, Summary
 from benchmarks.report import BOTH, RunReport, by_group, by_type, slices
+from er_gym.envs.protocol import DEFAULT
 from er_gym.tasks.types import BY_NAME, GROUPS
 
 _NONE = "-"
@@ -74,10 +75,11 @@ def tables(
 def _overview(runs: Sequence[RunReport], scorer: str) -> Table:
     """The columns of the paper's result table, in its order.
 
-    Suite and scorer are columns only where they differ, else part of the title.
+    Suite, protocol and scorer are columns only where they differ, else part of the title, in which
+    the default protocol goes without saying.
     """
     head = (
-        *("Agent", "Suite", "Scorer", "n", "Success", "95 %"),
+        *("Agent", "Suite", "Protocol", "Scorer", "n", "Success", "95 %"),
         *("Search efficiency", "Task completeness"),
         *GROUPS,
     )
@@ -86,8 +88,12 @@ def _overview(runs: Sequence[RunReport], scorer: str) -> Table:
         for run in runs
         for name, scores in run.shown(scorer).items()
     ]
-    constant = [column for column in (1, 2) if len({row[column] for row in rows}) == 1]
-    about = [f"{head[column].lower()} {rows[0][column]}" for column in constant]
+    constant = [column for column in (1, 2, 3) if len({row[column] for row in rows}) == 1]
+    about = [
+        f"{head[column].lower()} {rows[0][column]}"
+        for column in constant
+        if (column, rows[0][column]) != (2, DEFAULT.name)
+    ]
 
     def rest(row: Sequence[str]) -> tuple[str, ...]:
         return tuple(cell for column, cell in enumerate(row) if column not in constant)
@@ -96,7 +102,7 @@ def _overview(runs: Sequence[RunReport], scorer: str) -> Table:
         title=", ".join(["Results", *about, "in %"]),
         head=rest(head),
         rows=tuple(rest(row) for row in rows),
-        text_columns=3 - len(constant),
+        text_columns=4 - len(constant),
         notes=tuple(note for run in runs for note in _notes(run)),
         may_turn=True,
     )
@@ -105,7 +111,7 @@ def _overview(runs: Sequence[RunReport], scorer: str) -> Table:
 def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple[str, ...]:
     size = run.manifest.suite_size
     n = str(size) if len(scores) == size else f"{len(scores)}/{size}"
-    head = (run.manifest.agent, run.manifest.suite, scorer, n)
+    head = (run.manifest.agent, run.manifest.suite, run.manifest.protocol, scorer, n)
     if not scores:
         return (*head, *[_NONE] * (4 + len(GROUPS)))
     groups = by_group(scores)

@@ -85,7 +85,7 @@ class VLMAgent:
             RoundRecord(
                 message=len(self._messages) - 1,
                 thoughts=thoughts,
-                action=str(action or ""),
+                action="" if problem else str(action),
                 name=parsed.name,
                 matched=matched,
                 rules=list(parsed.rules),
@@ -99,7 +99,7 @@ class VLMAgent:
             )
         )
         thought = "\n".join(f"{each.kind}: {each.text}" for each in parsed.thoughts)
-        return Decision(action or NO_ACTION + said[:_LONGEST_QUOTE], thought)
+        return Decision(action or _as_written(parsed, said), thought)
 
     # -- what is said to the model ---------------------------------------------------------------
 
@@ -117,9 +117,10 @@ class VLMAgent:
         )
         if not self._rounds:
             return Message("user", parts_of(self._prompts.first(now), pictures))
-        last = self._rounds[-1] = self._rounds[-1].model_copy(
-            update={"feedback": info["feedback"], "success": bool(info["action_success"])}
-        )
+        answer = {"feedback": info["feedback"], "success": bool(info["action_success"])}
+        if answer["success"]:  # the paper's protocol finds something even in an unusable reply
+            answer |= {"action": str(info["action"]), "problem": ""}
+        last = self._rounds[-1] = self._rounds[-1].model_copy(update=answer)
         if last.problem:
             told = self._prompts.feedback(problem=last.problem, decide=self._settings.decide)
             return Message("user", (told,))
@@ -156,7 +157,8 @@ class VLMAgent:
     def _understand(
         self, parsed: Parsed, info: Mapping[str, Any]
     ) -> tuple[Action | None, str, str]:
-        """The action, or None and what is wrong; and how a name became a type."""
+        """The action, None where the object is unknown; what is wrong with it, "" if nothing; and
+        how a name became a type."""
         if parsed.problem or parsed.verb in verbs.BARE_VERBS:
             return (None if parsed.problem else Action(parsed.verb)), parsed.problem, ""
         at_hand = (*info["interactable"], *info["navigable"])
@@ -166,7 +168,7 @@ class VLMAgent:
         if not applies(parsed.verb, match.object_type):
             article = "an" if match.object_type[0] in "AEIOU" else "a"
             problem = f"One cannot {parsed.verb} {article} {match.object_type}."
-            return None, problem, match.how
+            return Action(parsed.verb, match.object_type), problem, match.how
         return Action(parsed.verb, match.object_type), "", match.how
 
     # -- the record ------------------------------------------------------------------------------
@@ -204,6 +206,15 @@ class VLMAgent:
             error=error,
         )
         return record, files
+
+
+def _as_written(parsed: Parsed, said: str) -> str:
+    """What is handed to the environment in place of an action: the verb and the name that no type
+    has, else the reply. To the default protocol both name no action; the paper's counts the former
+    as a step."""
+    if parsed.verb:
+        return " ".join(f"{parsed.verb} {parsed.name}".split())[:_LONGEST_QUOTE]
+    return NO_ACTION + said[:_LONGEST_QUOTE]
 
 
 def _kept(message: Message, folder: str, files: dict[str, bytes]) -> MessageRecord:

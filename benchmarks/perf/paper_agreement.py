@@ -70,7 +70,8 @@ def scripted(task: Task, types_there: Sequence[str], draw: random.Random) -> lis
     replies: list[str] = []
     for key in task.key_actions:
         while draw.random() < noise:
-            replies += [_noise(types_there, draw)] * draw.choice((1, 1, 1, 2, 4))
+            # Four in a row end an episode.
+            replies += [_noise(types_there, draw)] * draw.choice((*[1] * 20, 2, 3, 4))
         verb = draw.choice(("put", "put in")) if key.verb == PUT else key.verb
         if draw.random() < 0.9:
             replies.append(f"{verb} {key.actual_type}".strip())

@@ -204,7 +204,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         controller = self._started_controller(self.task.scene)
         bounds = begin(controller, self.task.scene, self.task.start).metadata["sceneBounds"]
         floor = skills.reachable(controller, (self._backend, self.task.scene, self._grid_size))
-        pose = skills.start_pose(bounds, floor)
+        pose = self._protocol.start(bounds, floor)
         self._memory = Memory(pose, goal_row(self.task.instruction))
         self._progress = Progress.start(self.task)
         self._known = Known(self.task.navigable_objects)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from er_gym.envs.percept import perceive
-from er_gym.envs.skills import Outcome
+from er_gym.envs.skills import Outcome, Reachable
 from er_gym.tasks.task import AgentPose
 
 _FARTHEST, _NEAR = 1.5, 1.0
@@ -32,6 +32,10 @@ _UP, _DOWN = 30, -60
 _BELOW = 0.44
 """The agent crouches for an object whose top is lower than its own centre by more, metres."""
 _HORIZON = 60.0
+
+_CORNERS = ((2, 225.0), (3, 315.0), (6, 135.0), (7, 45.0))
+"""The lower corners among AI2-THOR's eight, in the order in which they are tried, and which way the
+agent looks from each."""
 
 Pose = Mapping[str, Any]
 """An entry of GetInteractablePoses's ``actionReturn``."""
@@ -106,6 +110,25 @@ def stand_at(controller: Any, pose: AgentPose) -> bool:
         rotation={"x": 0.0, "y": pose.rotation, "z": 0.0},
         horizon=pose.horizon,
     )
+
+
+def start_in_corner(bounds: Mapping[str, Any], floor: Reachable) -> AgentPose:
+    """Where episodes begin: the reachable position nearest to a corner of the scene's bounds.
+
+    It is that of :func:`er_gym.envs.skills.start_pose`, but where two corners are as near.
+
+    Args:
+        bounds: ``sceneBounds`` of an event's metadata.
+    """
+    least, pose = float("inf"), None
+    for corner, rotation in _CORNERS:
+        x, _, z = bounds["cornerPoints"][corner]
+        away = np.sqrt((floor.positions[:, 0] - x) ** 2 + (floor.positions[:, 2] - z) ** 2)
+        nearest = int(away.argmin())
+        if away[nearest] < least:
+            least, pose = away[nearest], AgentPose(*floor.positions[nearest].tolist(), rotation)
+    assert pose is not None
+    return pose
 
 
 def approach(controller: Any, thing: Thing, stated: AgentPose | None) -> Outcome:

@@ -7,12 +7,16 @@ lists what differs.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from er_gym.envs.actions import Action, AnyAction, understand
 from er_gym.envs.conduct import Conduct, DefaultConduct, Setting
+from er_gym.envs.paper_approach import start_in_corner
 from er_gym.envs.paper_conduct import PaperConduct, understand_as_paper
+from er_gym.envs.skills import Reachable, start_pose
+from er_gym.tasks.task import AgentPose
 from er_gym.tasks.verbs import END
 from er_gym.thor import ObjectTable
 
@@ -25,6 +29,7 @@ class EpisodeProtocol:
         name: as ``--protocol`` and ``EmbodiedEnv(protocol=…)`` take it.
         understand: the action that is meant, None if none is; and its text.
         conduct: how actions are judged and carried out in an episode.
+        start: where an episode begins, given the scene's bounds and where the agent can stand.
         chooses_instances: whether it decides itself which object a type name stands for.
         unknown_breaks_runs: whether a reply that names no action comes between two same actions.
         repeated: what the fourth same action in a row is recorded as; None for itself.
@@ -36,6 +41,7 @@ class EpisodeProtocol:
     name: str
     understand: Callable[[AnyAction, ObjectTable], tuple[Action | None, str]]
     conduct: Callable[[Setting], Conduct]
+    start: Callable[[Mapping[str, Any], Reachable], AgentPose]
     chooses_instances: bool = False
     unknown_breaks_runs: bool = False
     repeated: Action | None = None
@@ -43,11 +49,14 @@ class EpisodeProtocol:
     appends_end: bool = False
 
 
-DEFAULT = EpisodeProtocol("default", lambda action, _: understand(action), DefaultConduct)
+DEFAULT = EpisodeProtocol(
+    "default", lambda action, _: understand(action), DefaultConduct, start_pose
+)
 PAPER = EpisodeProtocol(
     "paper",
     understand_as_paper,
     PaperConduct,
+    start_in_corner,
     chooses_instances=True,
     unknown_breaks_runs=True,
     repeated=Action(END),

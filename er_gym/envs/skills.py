@@ -48,6 +48,11 @@ class Reachable:
         xyz = np.fromiter(flat, np.float64, 3 * len(positions)).reshape(-1, 3)
         self._xyz = xyz[np.lexsort((xyz[:, 2], xyz[:, 0]))]
 
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """(N, 3) x, y and z of each position, in the order of x, then z."""
+        return self._xyz
+
     def nearest_to(self, x: float, z: float) -> Iterator[list[Position]]:
         """The positions in batches, those nearest to a point first."""
         distance = np.hypot(self._xyz[:, 0] - x, self._xyz[:, 2] - z).round(6)

@@ -74,6 +74,7 @@ def their_figures(result: dict[str, Any]) -> dict[str, float]:
 
     done = [entry for entry in trajectory if entry["success"]]
     wanted, earned, answers = list(keys), [], 0
+    looked_at = trajectory  # all of it, unless a search is answered by where the agent came from
     for place, entry in enumerate(done):
         if entry["action"] in free:
             continue
@@ -88,6 +89,9 @@ def their_figures(result: dict[str, Any]) -> dict[str, float]:
             came_by = before is not None and _remembered(before, name_of) in keys
             answers += within or came_by
             if came_by and not within:
+                looked_at = trajectory[
+                    : 1 + next(i for i, e in enumerate(trajectory) if e is entry)
+                ]
                 break
         elif entry["object"] is not None:
             name = name_of(entry, "put" if entry["action"][:3] == "put" else None)
@@ -100,7 +104,7 @@ def their_figures(result: dict[str, Any]) -> dict[str, float]:
         for key in keys
         if "observe" not in key and "move forward" not in key and "navigate to" not in key
     ]
-    gone_to = [entry["object"] for entry in trajectory if entry["action"] == "navigate to"]
+    gone_to = [entry["object"] for entry in looked_at if entry["action"] == "navigate to"]
     share = count / len(counted) if counted else 0.0
     return {
         "success": share >= 1,
