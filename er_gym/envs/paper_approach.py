@@ -126,7 +126,8 @@ def start_in_corner(bounds: Mapping[str, Any], floor: Reachable) -> AgentPose:
         away = np.sqrt((floor.positions[:, 0] - x) ** 2 + (floor.positions[:, 2] - z) ** 2)
         nearest = int(away.argmin())
         if away[nearest] < least:
-            least, pose = away[nearest], AgentPose(*floor.positions[nearest].tolist(), rotation)
+            x, y, z = floor.positions[nearest].tolist()
+            least, pose = away[nearest], AgentPose(x, y, z, rotation)
     assert pose is not None
     return pose
 

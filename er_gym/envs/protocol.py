@@ -50,13 +50,16 @@ class EpisodeProtocol:
 
 
 DEFAULT = EpisodeProtocol(
-    "default", lambda action, _: understand(action), DefaultConduct, start_pose
+    name="default",
+    understand=lambda action, _: understand(action),
+    conduct=DefaultConduct,
+    start=start_pose,
 )
 PAPER = EpisodeProtocol(
-    "paper",
-    understand_as_paper,
-    PaperConduct,
-    start_in_corner,
+    name="paper",
+    understand=understand_as_paper,
+    conduct=PaperConduct,
+    start=start_in_corner,
     chooses_instances=True,
     unknown_breaks_runs=True,
     repeated=Action(END),

@@ -19,6 +19,8 @@ from benchmarks.runner import Outcome
 from benchmarks.store import RunStore
 from er_gym.tasks.types import TASK_TYPES
 
+COUNTER = "CounterTop|-00.08|+01.15|00.00"
+NOTHING = Outcome(0, 0, ())
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "benchmarks.cli"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
@@ -111,6 +113,11 @@ BAD_OPTIONS = {
     "limit": (["--limit", "0"], ["--limit", "er-gym bench --help"]),
     "workers": (["--workers", "none"], ["--workers", "er-gym bench --help"]),
     "scorer": (["--scorer", "kind"], ["'kind'", "corrected"]),
+    "protocol": (["--protocol", "papers"], ["'papers'", "default", "paper"]),
+    "the paper's instances": (
+        ["--protocol", "paper", "--instances", "explore"],
+        ["paper protocol", "leave out instances='explore'"],
+    ),
     "poses": (["--poses", __file__], [Path(__file__).name, "not JSON"]),
     "option": (["--fast"], ["--fast", "er-gym bench --help"]),
 }
@@ -256,6 +263,43 @@ def test_bench_continues_and_report_reports(tasks_file, tmp_path, er_gym):
     code, shown, err = er_gym("report", out, "--misses", "--scorer", "paper")
     assert (code, err) == (0, "")
     assert "scorer paper" in shown
+
+
+def test_a_run_is_played_and_continued_under_one_protocol(
+    er_gym, tasks_file, tmp_path, monkeypatch
+):
+    out = tmp_path / "run"
+    poses = tmp_path / "poses.json"
+    pose = {
+        "agent_teleport_position": {"x": 0.5, "y": 0.9, "z": 0.5},
+        "agent_cameraHorizon": 30,
+        "agent_isstanding": True,
+        "agent_rotation": {"x": 0, "y": 270, "z": 0},
+    }
+    stated = {"scene": "FloorPlan1", "tasktype": "single_pickup", "taskname": "", COUNTER: pose}
+    poses.write_text(json.dumps({"6": stated}))
+    command = ("bench", "--tasks-file", tasks_file, "--poses", poses, "--agent", "oracle")
+    where = ("--out", out, "--limit", "1")
+    code, shown, err = er_gym(*command, *where, "--protocol", "paper")
+    assert code == 0, err
+    assert "protocol paper" in shown
+    assert RunStore.open(out).manifest.env["protocol"] == "paper"
+    (episode,) = RunStore.open(out).episodes()
+    assert episode.success
+
+    code, shown, err = er_gym(*command, *where)
+    assert (code, shown) == (2, "")
+    for words in ("under the paper protocol, not the default one", "--protocol paper"):
+        assert words in one_line(err)
+
+    played = []
+    monkeypatch.setattr(runner, "run", lambda store, tasks, **_: played.extend(tasks) or NOTHING)
+    for protocol, states in (("paper", True), ("default", False)):
+        code, _, err = er_gym(
+            *command, "--out", tmp_path / protocol, "--limit", "1", "--protocol", protocol
+        )
+        assert code == 0, err
+        assert (COUNTER in played[-1].poses) is states  # task 0 has the pose of task 6
 
 
 def start(command: list[str]) -> subprocess.Popen[str]:

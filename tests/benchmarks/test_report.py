@@ -11,6 +11,7 @@ from benchmarks import cli_options, report
 from benchmarks.report import load_run
 from benchmarks.store import RunStore
 from benchmarks.tables import as_markdown, print_tables, tables
+from er_gym.envs.protocol import PROTOCOLS
 
 KEYS = ("navigate to CounterTop", "pickup Egg", "navigate to Bowl", "put in Bowl", "end")
 UNTYPED = ("pickup Egg", "put in = Plate|-01.47|+01.31|+00.24", "end")
@@ -105,6 +106,24 @@ def test_what_differs_between_runs_has_a_column(run, tmp_path, manifest, episode
         ("oracle", "hand-made", "corrected", "2"),
         ("oracle", "other", "both", "1/2"),
     ]
+
+
+def test_another_protocol_than_the_default_is_named(run, tmp_path, manifest, episode):
+    env = {**manifest.env, "protocol": "paper"}
+    other = RunStore.create(tmp_path / "y", manifest.model_copy(update={"env": env}))
+    other.write(episode(KEYS, KEYS))
+    papers = load_run(other.path)
+    assert "protocol paper" in tables([papers])[0].title
+    both = tables([run, papers])[0]
+    assert both.head[:3] == ("Agent", "Protocol", "Scorer")
+    assert [row[1] for row in both.rows] == ["default", "default", "paper"]
+    rows = csv.DictReader(io.StringIO(report.as_csv([run, papers])))
+    assert {row["run"]: row["protocol"] for row in rows} == {
+        str(run.path): "default",
+        str(papers.path): "paper",
+    }
+    data = json.loads(report.as_json([run, papers]))["runs"]
+    assert [each["protocol"] for each in data] == ["default", "paper"]
 
 
 def test_by_type(run):
@@ -215,5 +234,6 @@ def test_a_narrow_terminal_turns_the_results(run):
     assert max(map(len, narrow)) <= 80
 
 
-def test_the_command_offers_the_scorers_there_are():
+def test_the_command_offers_the_scorers_and_protocols_there_are():
     assert cli_options.SCORER_CHOICES == report.SCORER_CHOICES
+    assert tuple(PROTOCOLS) == cli_options.PROTOCOL_CHOICES
