@@ -12,11 +12,10 @@ from typing import Any
 
 from er_gym.envs.paper_approach import Thing, stand_at, unseen
 from er_gym.envs.percept import Percept, perceive
-from er_gym.envs.skills import FORWARD_STEP, Outcome
+from er_gym.envs.skills import FORWARD_STEP, VIEWS, Outcome
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
 
-_VIEWS = ("left", "behind", "right")
 _LEFT, _RIGHT = "Left", "Right"
 
 
@@ -35,14 +34,17 @@ def start_again(controller: Any, start: AgentPose) -> Outcome:
 
 
 def observe(controller: Any) -> Outcome:
-    """Look left, behind and right, and turn back to where one looked before."""
+    """Look left, behind and right, and turn back to where one looked before.
+
+    The views are handed over in the order in which agents are told of them.
+    """
 
     def turned() -> Percept:
         return perceive(controller.step(action="RotateLeft", degrees=90))
 
-    views = {view: turned() for view in _VIEWS}
-    last = turned()
+    left, behind, right, last = turned(), turned(), turned(), turned()
     problem = controller.last_event.metadata["errorMessage"]
+    views = dict(zip(VIEWS, (right, behind, left), strict=True))
     return Outcome(last, not problem, problem, views)
 
 

@@ -32,7 +32,8 @@ _POSITIONS_AT_ONCE = 12
 _ROTATIONS = (0, 90, 180, 270)
 _HORIZONS = (-30, 0, 30, 60)
 _DIRECTIONS = np.array([(r, h) for r in _ROTATIONS for h in _HORIZONS])
-_VIEWS = ("right", "behind", "left")
+VIEWS = ("right", "behind", "left")
+"""What an "observe" shows, in this order."""
 _xyz = itemgetter(*"xyz")
 
 Position = Sequence[float]
@@ -241,7 +242,7 @@ def observe(controller: Any) -> Outcome:
     def turned() -> Percept:
         return perceive(controller.step(action="RotateRight", degrees=90))
 
-    views = {view: turned() for view in _VIEWS}
+    views = {view: turned() for view in VIEWS}
     return Outcome(turned(), True, views=views)
 
 

@@ -16,9 +16,11 @@ from benchmarks.episode import EpisodeRecord
 from benchmarks.metrics import score_episode
 from benchmarks.play import play_episode
 from benchmarks.scorers import CORRECTED, PAPER
+from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS, INDEX, NO_ACTION, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.paper_conduct import NO_OBJECT, understand_as_paper
+from er_gym.envs.paper_skills import observe
 from er_gym.envs.protocol import PROTOCOLS
 from er_gym.tasks.paper_format import with_every_pose
 from er_gym.tasks.task import AgentPose, Task
@@ -382,8 +384,14 @@ def test_a_step_to_the_side_goes_towards_what_the_task_is_about(
     assert {(0.5, 0.0), (-0.5, 0.0)} <= sides  # both sides are taken
 
 
-def test_a_look_round_goes_left(play: Play) -> None:
-    assert list(play(TAKE_APPLE, "observe")[-1].get("views", ())) == ["left", "behind", "right"]
+def test_a_look_round_shows_what_it_says(env: EmbodiedEnv, play: Play) -> None:
+    info = play(TAKE_APPLE, "observe")[-1]
+    assert list(info["views"]) == list(skills.VIEWS)
+    ahead = env.agent_pose.rotation
+    views = observe(env._controller).views
+    turns = {name: (view.pose.rotation - ahead) % 360 for name, view in views.items()}
+    assert turns == {"right": 90, "behind": 180, "left": 270}
+    assert env._controller.last_event.metadata["agent"]["rotation"]["y"] == ahead
 
 
 # -- the option ------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +53,8 @@ def decided(*actions: str) -> list[str]:
 def env() -> Iterator[Callable[..., EmbodiedEnv]]:
     made: list[EmbodiedEnv] = []
 
-    def make(obs_mode: str = "text") -> EmbodiedEnv:
-        made.append(EmbodiedEnv((), obs_mode=obs_mode, width=96, height=64))
+    def make(obs_mode: str = "text", **options: Any) -> EmbodiedEnv:
+        made.append(EmbodiedEnv((), obs_mode=obs_mode, width=96, height=64, **options))
         return made[-1]
 
     yield make
@@ -185,6 +186,35 @@ def test_what_cannot_be_done_with_a_type_is_said(env: Callable[..., EmbodiedEnv]
     script = Script(*decided("open Apple", "end"))
     play(env(), script, settings())
     assert "One cannot open an Apple." in texts(script.sent[1][-1])
+
+
+def test_unusable_replies_reach_the_paper_protocol_as_its_runner_sees_them(
+    env: Callable[..., EmbodiedEnv],
+) -> None:
+    script = Script(*decided("open Apple", "navigate to Unobtainium"), "No.", "No.", "I put in it.")
+    agent, episode = play(env(protocol="paper"), script, settings())
+    verbs = [f"{step.verb} {step.object_type}".rstrip() for step in episode.steps]
+    assert verbs == [
+        *("init", "open Apple", "navigate to No Suitable Object"),
+        *("error", "error", "error", "end"),
+    ]
+    assert "One cannot open an Apple." in texts(script.sent[1][-1])
+    record, _ = agent.conversation("pictures/x")
+    assert [each.action for each in record.rounds] == [""] * 5
+
+
+def test_an_object_that_only_the_paper_protocol_knows_is_no_problem(
+    env: Callable[..., EmbodiedEnv],
+) -> None:
+    """Its runner takes the last word that names a type."""
+    script = Script(*decided("navigate to qwertz Fridge", "end"))
+    fuzzy = settings(matching={"fuzzy": 100})
+    task = replace(PICKUP, navigable_objects=("Fridge",), scene="FloorPlan1", target_objects=())
+    agent, episode = play(env(protocol="paper"), script, fuzzy, task)
+    assert episode.steps[1].success
+    record, _ = agent.conversation("pictures/x")
+    first = record.rounds[0]
+    assert (first.matched, first.action, first.problem) == ("none", "navigate to Fridge", "")
 
 
 def test_a_tool_call_decides(env: Callable[..., EmbodiedEnv]) -> None:
