@@ -97,7 +97,9 @@ def understand(action: AnyAction) -> tuple[Action | None, str]:
         gymnasium.error.InvalidAction: it is neither text nor an action nor its index.
     """
     text = text_of(action)
-    return parse(text), text
+    if isinstance(action, str | Action):
+        return parse(text), text
+    return ACTIONS[int(action)], text
 
 
 def text_of(action: AnyAction) -> str:

@@ -411,6 +411,7 @@ def test_every_protocol_can_be_made_by_gymnasium() -> None:
     for name in PROTOCOLS:
         env = gymnasium.make("ER-SinglePickup-v0", protocol=name, obs_mode="state")
         env.reset(seed=1)
-        for _ in range(5):
-            env.step(env.action_space.sample())
+        for action in ("observe", INDEX[Action("open", "Fridge")], "move forward", "end"):
+            *_, ended, _, info = env.step(action)
+        assert (ended, info["end_reason"]) == (True, "end")
         env.close()
