@@ -101,7 +101,12 @@ class PaperConduct:
         away = np.hypot(table.centre[:, 0] - percept.pose.x, table.centre[:, 2] - percept.pose.z)
         plain = visible & (away < _within(table))
         inside = visible & self._inside[table.kinds]
-        return Surroundings(table, plain.nonzero()[0], (plain | inside).nonzero()[0])
+        return Surroundings(
+            objects=table,
+            navigable=plain.nonzero()[0],
+            interactable=(plain | inside).nonzero()[0],
+            covered=np.array([], np.intp),  # AI2-THOR refuses what a pan hides
+        )
 
     def objection(self, action: Action, around: Surroundings, known: Known) -> str:
         """A type must be known to go there, and at hand to do anything else to it."""
