@@ -23,7 +23,7 @@ from er_gym.sim.scene import PROPERTIES, STATES, Scene
 from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.shapes import Shape, shape_of
 from er_gym.sim.space.shapes.samples import points_on, points_on_top, surface_fractions
-from er_gym.sim.space.walk import WalkableFloor, walkable_floor
+from er_gym.sim.start import start_pose
 
 AGENT_HEIGHT = 0.900999128818512
 """Height of the agent's centre above the top of the scene's Floor, metres, as AI2-THOR has it."""
@@ -145,15 +145,12 @@ class World:
 
     @staticmethod
     def load(scene: Scene, settings: Settings) -> World:
-        """The scene as recorded, with the agent at the walkable position nearest its middle."""
-        floor = scene.reachable
-        middle = floor[np.argmin(np.linalg.norm(floor - floor.mean(axis=0), axis=1))]
+        """The scene as recorded, with the agent where AI2-THOR starts it."""
         half = scene.aabb_size / 2
-        ground = (scene.aabb_center + half)[scene.types.index("Floor"), 1]
         world = World(
             scene=scene,
             settings=settings,
-            agent=Agent(np.array([middle[0], ground + AGENT_HEIGHT, middle[1]])),
+            agent=Agent(np.zeros(3)),
             object_ids=list(scene.object_ids),
             names=list(scene.names),
             types=list(scene.types),
@@ -177,6 +174,9 @@ class World:
         world.index = {object_id: i for i, object_id in enumerate(world.object_ids)}
         world._nesting = recorded.nesting(scene)
         world._by_type = recorded.rows_by_type(scene)
+        start = start_pose(scene.name)
+        position = np.array([start.x, world.standing_height, start.z])
+        world.agent = Agent(position, start.rotation)
         return world
 
     def snapshot(self) -> World:
@@ -227,9 +227,15 @@ class World:
         return i
 
     @property
-    def floor(self) -> WalkableFloor:
-        """Where the agent can stand."""
-        return walkable_floor(self.scene.name)
+    def ground(self) -> float:
+        """Height of the floor, metres."""
+        floor = self.scene.types.index("Floor")
+        return float(self.scene.aabb_center[floor, 1] + self.scene.aabb_size[floor, 1] / 2)
+
+    @property
+    def standing_height(self) -> float:
+        """Height of the agent's centre where it stands on the floor, metres."""
+        return self.ground + AGENT_HEIGHT + start_pose(self.scene.name).lift
 
     @property
     def nesting(self) -> Nesting:

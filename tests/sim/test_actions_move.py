@@ -80,6 +80,15 @@ def test_one_long_step_does_not_jump_over_the_island(kitchen):
     kitchen.refused("MoveAhead", moveMagnitude=1.75)
 
 
+def test_a_step_stops_short_of_what_is_between_two_free_points(enter):
+    """The body is tested along the way: both ends of this one are free, a corner is between."""
+    room = enter("FloorPlan1", snapToGrid=False)
+    room.do("TeleportFull", x=-0.9, z=1.1, rotation=135)
+    room.do("TeleportFull", x=-0.5, z=1.3)
+    room.do("TeleportFull", x=-0.9, z=0.9, rotation=45)
+    room.refused("MoveAhead", moveMagnitude=0.55)
+
+
 def test_negative_magnitude_is_a_wrong_argument(kitchen):
     with pytest.raises(ValueError, match="moveMagnitude"):
         kitchen.step("MoveAhead", moveMagnitude=-0.25)
@@ -117,6 +126,9 @@ def test_a_recorded_pose_is_taken_as_it_is_written(kitchen):
         ({"x": 50.0, "z": 0.0}, "wall"),
         ({"x": 1e30, "z": 0.0}, "wall"),
         ({"x": -1.0, "y": 2.0, "z": 1.5}, "height"),
+        ({"x": -1.0, "y": HEIGHT + 0.06, "z": 1.5}, "height"),
+        ({"x": -1.0, "y": HEIGHT - 0.06, "z": 1.5}, "height"),
+        ({"x": -0.3, "z": 1.15}, ISLAND),  # its edge is at 1.01, the body reaches 0.2 m
     ],
 )
 def test_teleport_off_the_floor_is_refused(kitchen, where, why):
@@ -126,6 +138,29 @@ def test_teleport_off_the_floor_is_refused(kitchen, where, why):
 def test_force_teleports_into_furniture(kitchen):
     kitchen.do("TeleportFull", x=0.0, z=0.0, forceAction=True)
     assert position(kitchen) == (0.0, 0.0)
+
+
+def test_a_forced_teleport_keeps_its_height(kitchen):
+    kitchen.do("TeleportFull", **{**CLEAR, "y": 1.5}, forceAction=True)
+    assert kitchen.agent["position"] == pytest.approx({**CLEAR, "y": 1.5})
+    assert "height" in kitchen.refused("Teleport", x=0.75)  # 1.5 m is where it would stay
+    kitchen.do("Teleport", **CLEAR)
+    assert kitchen.agent["position"] == pytest.approx(CLEAR, abs=1e-6)
+
+
+@pytest.mark.parametrize("z", [1.5, 1.47, 1.53])
+@pytest.mark.parametrize("x", [0.5, 0.58, 0.61])
+def test_teleport_goes_where_the_body_has_room_on_or_off_the_grid(kitchen, x, z):
+    kitchen.do("Teleport", x=x, y=HEIGHT + 0.03, z=z)
+    assert kitchen.agent["position"] == pytest.approx({"x": x, "y": HEIGHT, "z": z}, abs=1e-6)
+
+
+def test_who_stands_in_furniture_can_step_out_of_it(enter):
+    room = enter("FloorPlan1", snapToGrid=False)
+    room.do("TeleportFull", x=-0.5, z=0.0, rotation=270, forceAction=True)
+    room.refused("MoveAhead", moveMagnitude=0.2)  # into the island's edge
+    room.do("TeleportFull", x=-0.8, z=0.0, rotation=270, forceAction=True)
+    room.do("MoveAhead", moveMagnitude=0.2)
 
 
 def test_a_horizon_beyond_the_vertical_is_a_wrong_argument(kitchen):

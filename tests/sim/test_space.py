@@ -49,30 +49,75 @@ def distance_to_walkable(points, recorded):
 
 
 @pytest.mark.parametrize("scene", SCENE_NAMES)
-def test_at_the_recorded_step_one_can_stand_where_the_record_says(enter, scene):
-    found = reachable(enter(scene), 0.25)
-    assert sorted(found.tolist()) == sorted(load_scene(scene).reachable.tolist())
+def test_one_can_stand_where_the_record_says(enter, scene):
+    found = {tuple(place) for place in reachable(enter(scene), 0.25).tolist()}
+    recorded = {tuple(place) for place in load_scene(scene).reachable.tolist()}
+    assert recorded < found
+    assert len(found) < 2 * len(recorded)
 
 
 @pytest.mark.parametrize("scene", SCENE_NAMES)
-def test_a_finer_grid_fills_in_between(enter, scene):
-    """At 0.1 m no point is more than 7.5 cm off, and what was joined stays joined.
+def test_a_finer_grid_goes_on_a_little_beyond_the_record(enter, scene):
+    """What was joined stays joined, and much of what is 0.1 m from the record can be stood on.
 
-    The record itself is in several pieces in ten scenes (the floor behind a closed door, say);
-    there the fine grid is in as many.
+    The record itself is in several pieces in ten scenes; there the fine grid is in no more.
     """
     recorded = load_scene(scene).reachable
-    found = reachable(enter(scene), 0.1)
-    assert len(found) > 4 * len(recorded)
+    found = reachable(enter(scene, gridSize=0.1), 0.1)
+    assert len(found) > 5 * len(recorded)
     assert np.allclose(found, np.round(found / 0.1) * 0.1)
-    # The tolerance is along each axis; over a corner it is its diagonal.
-    assert distance_to_walkable(found, recorded).max() <= 0.075 * sqrt(2)
-    assert pieces(found, 0.1) == pieces(recorded, 0.25)
+    assert 0.1 < distance_to_walkable(found, recorded).max() <= 0.4 + 1e-9
+    assert pieces(found, 0.1) <= pieces(recorded, 0.25)
+
+
+@pytest.mark.parametrize("scene", SCENE_NAMES[::7])
+def test_the_body_touches_nothing_beyond_the_recorded_floor(enter, scene):
+    """Measured here against the boxes of what cannot be carried, at the height of the waist.
+
+    Beyond the record, which may enter boxes that are too large, the agent's middle is 0.18 m from
+    every box that is level with it.
+    """
+    room = enter(scene)
+    found = reachable(room, 0.05)
+    beyond = found[distance_to_walkable(found, load_scene(scene).reachable) > 0.03]
+    waist = room.agent["position"]["y"]
+    checked = 0
+    for thing in room.event.metadata["objects"]:
+        box = thing["axisAlignedBoundingBox"]
+        low, high = (
+            np.array([box["center"][axis] + sign * box["size"][axis] / 2 for axis in "xyz"])
+            for sign in (-1, 1)
+        )
+        if thing["objectType"] not in ("Fridge", "Cabinet", "Dresser", "Safe", "Shelf"):
+            continue
+        if low[1] > waist or high[1] < waist or round(thing["rotation"]["y"]) % 90:
+            continue
+        gaps = beyond - np.clip(beyond, low[[0, 2]], high[[0, 2]])
+        assert np.linalg.norm(gaps, axis=1).min(initial=np.inf) > 0.18, thing["objectId"]
+        checked += 1
+    assert checked or scene not in ("FloorPlan1", "FloorPlan8")
 
 
 def test_positions_are_on_the_floor(kitchen):
     heights = {position["y"] for position in kitchen.do("GetReachablePositions")}
     assert heights == {kitchen.agent["position"]["y"]}
+
+
+def test_the_grid_is_that_on_which_the_agent_stands(kitchen):
+    kitchen.do("Teleport", x=0.53, z=1.46)
+    found = reachable(kitchen, 0.25)
+    assert [0.53, 1.46] in found.round(6).tolist()
+    assert np.allclose((found - [0.53, 1.46]) / 0.25, np.round((found - [0.53, 1.46]) / 0.25))
+    assert len(found) > 100
+    kitchen.do("Teleport", x=0.5, z=1.5)
+    assert [0.5, 1.5] in reachable(kitchen, 0.25).tolist()
+
+
+def test_who_was_forced_into_furniture_is_told_where_to_stand(kitchen):
+    kitchen.do("TeleportFull", x=0.0, z=0.0, forceAction=True)
+    found = reachable(kitchen, 0.25).tolist()
+    assert [0.0, 0.0] not in found
+    assert [0.5, 1.5] in found
 
 
 # -- rays ------------------------------------------------------------------------------------------

@@ -8,12 +8,13 @@ import numpy as np
 
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.space.standing import floor_of
 from er_gym.sim.world import Agent, World
 
 _FARTHEST = 1000.0
 """No scene is larger than this, metres."""
-_HEIGHT_TOLERANCE = 0.3
-"""A position whose height is farther off than this is not on the floor, metres."""
+_HEIGHT_TOLERANCE = 0.05
+"""A position whose height is farther off than this is not on the floor, metres; AI2-THOR's."""
 
 
 def _step(world: World, magnitude: float | None, heading: float) -> None:
@@ -28,12 +29,31 @@ def _step(world: World, magnitude: float | None, heading: float) -> None:
     if world.settings.snap_to_grid:
         grid = world.settings.grid_size
         end[[0, 2]] = np.round(end[[0, 2]] / grid) * grid
-    if not world.floor.path_is_clear(start[[0, 2]], end[[0, 2]]):
+    if not floor_of(world.scene.name).path_is_clear(start[[0, 2]], end[[0, 2]]):
         dx, _, dz = end - start
         raise ActionFailed(
             f"{_obstacle(world, end)} is blocking the agent from moving by ({dx:.4f}, {dz:.4f})."
         )
     world.place_agent(replace(world.agent, position=end))
+
+
+def snap_to_grid(world: World) -> None:
+    """Bring the agent to a corner of the grid square that it is in, as AI2-THOR's Initialize does.
+
+    The corner of lowest x and z that it can walk to is taken. Where it can walk to none, it ends up
+    at the nearest, so that what follows is on the grid.
+    """
+    grid = world.settings.grid_size
+    here = world.agent.position
+    low = np.floor(here[[0, 2]] / grid + 1e-6)
+    corners = [((low + by) * grid).round(6) for by in ((0, 0), (0, 1), (1, 0), (1, 1))]
+    if any(np.abs(corner - here[[0, 2]]).max() < 1e-5 for corner in corners):
+        return
+    floor = floor_of(world.scene.name)
+    nearest = min(corners, key=lambda corner: float(np.linalg.norm(corner - here[[0, 2]])))
+    way_to = (corner for corner in corners if floor.path_is_clear(here[[0, 2]], corner))
+    x, z = next(way_to, nearest)
+    world.place_agent(replace(world.agent, position=np.array([x, here[1], z])))
 
 
 def _obstacle(world: World, end: np.ndarray) -> str:
@@ -106,11 +126,13 @@ def teleport(
             f"({there[0]:g}, {there[1]:g}, {there[2]:g}) is farther than {_FARTHEST:g} m away, "
             "beyond every wall."
         )
-    if abs(there[1] - here[1]) > _HEIGHT_TOLERANCE and not forceAction:
+    standing_at = world.standing_height
+    if abs(there[1] - standing_at) > _HEIGHT_TOLERANCE and not forceAction:
         raise ActionFailed(
-            f"Cannot teleport to height {there[1]:.3f}: the agent's centre is at {here[1]:.3f}."
+            f"Cannot teleport to height {there[1]:.3f}: on the floor the agent's centre is at "
+            f"{standing_at:.3f}. Consider using forceAction=true to teleport there anyway."
         )
-    if not forceAction and not world.floor.contains(there[[0, 2]]):
+    if not forceAction and not floor_of(world.scene.name).contains(there[[0, 2]]):
         raise ActionFailed(
             f"Cannot teleport to ({there[0]:.3f}, {there[2]:.3f}): {_obstacle(world, there)} is "
             "there. GetReachablePositions lists where the agent can stand."
@@ -119,7 +141,8 @@ def teleport(
         raise ActionFailed(
             f"horizon must be within -90 and 90 degrees, not {horizon:g}.", INVALID_ARGUMENT
         )
-    there[1] = here[1]
+    if not forceAction:
+        there[1] = standing_at
     world.place_agent(
         Agent(
             position=there,

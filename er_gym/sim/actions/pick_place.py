@@ -11,7 +11,7 @@ from er_gym.sim.compatibility import accepts
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.placement import free_spots
 from er_gym.sim.space.resting import landing
-from er_gym.sim.world import AGENT_HEIGHT, World
+from er_gym.sim.world import World
 
 _NEWTONS_PER_METRE = 100.0
 _FARTHEST_THROW = 2.0
@@ -126,7 +126,7 @@ def fall(world: World, i: int, centre: np.ndarray) -> None:
     if found is None:
         agent = world.agent.position
         centre = agent + (centre - agent) * 0.5
-        found = agent[1] - AGENT_HEIGHT, list(world.of_type("Floor"))[:1]
+        found = world.ground, list(world.of_type("Floor"))[:1]
     height, receptacles = found
     foot = np.array([centre[0], height, centre[2]])
     put_down(world, i, world.rotation[i, 1], foot, receptacles)

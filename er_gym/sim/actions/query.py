@@ -12,7 +12,7 @@ from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
 from er_gym.sim.render.view import object_at
 from er_gym.sim.scene import SCENE_NAMES
 from er_gym.sim.space.poses import HORIZONS, interactable_poses
-from er_gym.sim.space.standing import standing_places
+from er_gym.sim.space.standing import floor_of, standing_places
 from er_gym.sim.world import World
 
 
@@ -44,7 +44,13 @@ def _grid(world: World, step: float | None) -> np.ndarray:
         raise ActionFailed(
             f"A grid needs a step of 0.01 m or more, not {size:g}.", INVALID_ARGUMENT
         )
-    return standing_places(world.scene.name, float(size))
+    here = world.agent.position[[0, 2]]
+    offset = (here % size).round(5) % size  # of the grid that the agent stands on
+    places = standing_places(world.scene.name, float(size), (float(offset[0]), float(offset[1])))
+    listed = (np.abs(places - here).max(axis=1, initial=0.0) < 1e-4).any()
+    if listed or not floor_of(world.scene.name).contains(here):
+        return places
+    return np.concatenate([here[None], places])  # free floor that no way over the grid leads to
 
 
 @action("GetObjectInFrame")
@@ -96,7 +102,7 @@ def get_interactable_poses(
         if positions is None
         else np.array([(p.x, p.z) for p in positions if _is_near(p)]).reshape(-1, 2)
     )
-    places = places[world.floor.contains(places)] if len(places) else places
+    places = places[floor_of(world.scene.name).contains(places)]
     if rotations is None:
         step = world.settings.rotate_step
         rotations = [k * step for k in range(int(360 // step))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from er_gym.sim.actions.checks import FIELDS_OF_VIEW, within
+from er_gym.sim.actions.move import snap_to_grid
 from er_gym.sim.actions.registry import action, quoted
 from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
 from er_gym.sim.space.visibility import NEAR_PLANE
@@ -74,6 +75,8 @@ def initialize(
         "render_classes": _either(renderSemanticSegmentation, renderClassImage),
     }
     world.configure(**{name: value for name, value in chosen.items() if value is not None})
+    if world.settings.snap_to_grid:
+        snap_to_grid(world)
     return {"cameraNearPlane": NEAR_PLANE, "cameraFarPlane": _FAR_PLANE}
 
 

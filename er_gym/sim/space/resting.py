@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.space.placement import surface_height
-from er_gym.sim.world import AGENT_HEIGHT, World
+from er_gym.sim.space.standing import floor_of
+from er_gym.sim.world import World
 
 _FLOOR = [0, 2]
 
@@ -17,9 +18,8 @@ def landing(world: World, i: int, point: NDArray[np.float64]) -> tuple[float, li
     Returns:
         The height of its underside and the receptacles that it then is in, None inside a wall.
     """
-    if world.floor.contains(point[_FLOOR]):
-        floor = float(world.agent.position[1]) - AGENT_HEIGHT
-        return floor, list(world.of_type("Floor"))[:1]
+    if floor_of(world.scene.name).contains(point[_FLOOR]):
+        return world.ground, list(world.of_type("Floor"))[:1]
     falling = {i, *world.inside(i)}
     under = [
         (surface_height(world, r), r)

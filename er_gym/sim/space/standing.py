@@ -1,56 +1,198 @@
-"""Where the agent can stand on any grid: the walkable floor, less what furniture covers."""
+"""Where the agent can stand: where its capsule touches nothing, near what the record shows it on.
+
+AI2-THOR walks a capsule about and lists where it gets to. Here the capsule is tested against the
+parts of things (:mod:`er_gym.sim.space.footprints`). Walls are not objects, so how far free floor
+goes on is not known; it is taken to end a little beyond the recorded positions, whose grid of
+0.25 m leaves out what lies between its points and the furniture. Recorded positions are floor
+whatever overlaps them. docs/fidelity.md has the comparison with AI2-THOR.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.scene import load_scene
-from er_gym.sim.space.walk import RECORDED_STEP, walkable_grid
-from er_gym.sim.world import AGENT_HEIGHT, Settings, World
+from er_gym.sim.scene import Scene, load_scene
+from er_gym.sim.space.footprints import RADIUS, Footprints
+from er_gym.sim.space.walk import RECORDED_STEP, Cells, recorded_cells
+from er_gym.sim.world import Settings, World
 
-_LOWEST, _HIGHEST = 0.1, 1.5
-"""What begins higher over the floor than the second, or ends lower than the first, is in nobody's
-way; metres."""
+_SIDE = 0.025
+"""Of the cells that the floor is cut into, metres."""
+_BEYOND = 0.4
+"""How far beyond the recorded floor free floor goes on, metres."""
+_WALL = 0.28
+"""How far from the edge of the scene's Floor the agent stays: the Floor goes on under walls;
+metres."""
 _TOUCH = 0.01
+"""How deep in a part the agent's middle can be and count as beside it, metres."""
+
+Bitmap = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Where the agent can stand and walk, as bitmaps of cells of 2.5 cm.
+
+    Attributes:
+        origin: (2,) x and z of the middle of cell [0, 0], metres.
+        free: (X, Z) bool, where it can stand. The outermost cells are not free.
+        passable: (X, Z) bool, the same and the ways between neighbouring recorded positions.
+        certain: (X, Z) bool, the free floor that the record shows.
+    """
+
+    origin: NDArray[np.float64]
+    free: Bitmap
+    passable: Bitmap
+    certain: Bitmap
+
+    def contains(self, points: NDArray[np.float64]) -> Bitmap:
+        """Which of (..., 2) x, z points the agent can stand on, to within 1.3 cm."""
+        return self._look_up(self.free, points)
+
+    def path_is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
+        """Whether the agent can go straight from one (2,) x, z point to another, and stand there.
+
+        The start itself is not asked about: whoever was forced into furniture can step out of it.
+        """
+        count = max(2, int(np.ceil(np.linalg.norm(end - start) / _SIDE)) + 1)
+        way = start + np.linspace(0.0, 1.0, count)[1:, None] * (end - start)
+        on_the_way = self._look_up(self.passable, way[:-1]).all()
+        return bool(on_the_way and self.contains(end))
+
+    def grid(self, step: float, offset: tuple[float, float]) -> NDArray[np.float64]:
+        """(G, 2) x, z places on a grid, sorted: what one gets to from the recorded floor.
+
+        Args:
+            step: of the grid, metres. offset: x and z of any of its points.
+        """
+        high = self.origin + np.array(self.free.shape) * _SIDE
+        axes = [
+            np.arange(np.ceil((low - by) / step), np.floor((top - by) / step) + 1) * step + by
+            for low, top, by in zip(self.origin, high, offset, strict=True)
+        ]
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        on = self.contains(points)
+        if step < RECORDED_STEP:  # between points farther apart, floor may be that no point is on
+            on = connected(on & self._look_up(self.certain, points), on)
+        return np.asarray(points[on].round(6))
+
+    def _look_up(self, bitmap: Bitmap, points: NDArray[np.float64]) -> Bitmap:
+        wide, deep = bitmap.shape
+        if points.ndim == 1:  # one place, as at every step: ten times as fast
+            (x, z), (west, south) = points.tolist(), self.origin.tolist()
+            column = min(max(round((x - west) / _SIDE), 0), wide - 1)
+            row = min(max(round((z - south) / _SIDE), 0), deep - 1)
+            return np.asarray(bitmap[column, row])
+        cells = np.clip(np.round((points - self.origin) / _SIDE), 0.0, (wide - 1, deep - 1))
+        columns, rows = np.moveaxis(cells.astype(int), -1, 0)
+        return np.asarray(bitmap[columns, rows])
+
+
+def connected(seeds: Bitmap, on: Bitmap) -> Bitmap:
+    """(X, Z) cells of ``on`` that one gets to from ``seeds``, which are on, by sides of cells."""
+    found, before = seeds.copy(), 0
+    while (count := int(np.count_nonzero(found))) > before:
+        before = count
+        found[1:] |= found[:-1] & on[1:]
+        found[:-1] |= found[1:] & on[:-1]
+        found[:, 1:] |= found[:, :-1] & on[:, 1:]
+        found[:, :-1] |= found[:, 1:] & on[:, :-1]
+    return found
+
+
+@lru_cache(maxsize=128)
+def floor_of(scene_name: str) -> Floor:
+    """The floor of a recorded scene, as it is before anything is moved or opened."""
+    scene = load_scene(scene_name)
+    recorded = recorded_cells(scene_name, _SIDE)
+    near = recorded.grown(_BEYOND)
+    origin, free = near.origin - _SIDE, np.pad(near.on, 1)
+    at = np.round((scene.reachable - origin) / _SIDE).astype(int)
+    nodes = np.zeros_like(free)
+    nodes[tuple(at.T)] = True
+    certain = np.zeros_like(free)
+    _lay(recorded, certain, origin)
+    passed = np.zeros_like(free)  # what the body sweeps on the recorded floor
+    _lay(recorded.grown(RADIUS), passed, origin)
+    touched, covered = _stamped(Footprints.of(World.load(scene, Settings())), origin, nodes, passed)
+    free &= ~touched & _inside_walls(scene, origin, free.shape)
+    lines = _between_neighbours(certain, at[0])
+    certain &= ~covered
+    certain |= nodes
+    free = connected(certain, free | certain)
+    return Floor(origin, free, free | lines, certain)
 
 
 @lru_cache(maxsize=512)
-def standing_places(scene_name: str, step: float) -> NDArray[np.float64]:
-    """(G, 2) x, z places of a scene where the agent can stand, on a grid of ``step`` metres.
+def standing_places(
+    scene_name: str, step: float, offset: tuple[float, float] = (0.0, 0.0)
+) -> NDArray[np.float64]:
+    """(G, 2) x, z places of a scene where the agent can stand, on a grid; sorted, read-only.
 
-    At the step of the record these are the recorded positions. On finer grids, which are filled in
-    between them, places inside a part of the furniture are left out; a part that a recorded
-    position lies in is taken to be wrong there. Read-only.
+    Args:
+        step: of the grid, metres. offset: x and z of any of its points.
     """
-    places = walkable_grid(scene_name, step)
-    if step >= RECORDED_STEP:
-        return places
-    recorded = load_scene(scene_name).reachable
-    covered = np.zeros(len(places), dtype=bool)
-    for part in _parts_in_the_way(scene_name):
-        if not _inside(recorded, part).any():
-            covered |= _inside(places, part)
-    free = places[~covered]
-    free.setflags(write=False)
-    return free
+    places = floor_of(scene_name).grid(step, offset)
+    places.setflags(write=False)
+    return places
 
 
-def _parts_in_the_way(scene_name: str) -> NDArray[np.float64]:
-    """(Q, 2, 2) corners x, z of the parts of furniture that a body meets."""
-    world = World.load(load_scene(scene_name), Settings())
-    ground = world.agent.position[1] - AGENT_HEIGHT
-    furniture = [
-        world.shape(i).boxes
-        for i, kind in enumerate(world.types)
-        if kind != "Floor" and not world.has(i, "pickupable")
-    ]
-    parts = np.concatenate(furniture)
-    met = (parts[:, 1, 1] > ground + _LOWEST) & (parts[:, 0, 1] < ground + _HIGHEST)
-    return np.asarray(parts[met][:, :, [0, 2]])
+def _stamped(
+    prints: Footprints, origin: NDArray[np.float64], nodes: Bitmap, passed: Bitmap
+) -> tuple[Bitmap, Bitmap]:
+    """Where the capsule touches a part, and where its middle is in one.
+
+    The box of a part that a recorded position is in is wrong there: a round table's, a bent desk's.
+    Only so much of it is solid as the body does not pass through on the recorded floor.
+    """
+    touched, covered, bent = (np.zeros_like(nodes) for _ in range(3))
+    low, high = ((corner - origin) / _SIDE for corner in prints.spans())
+    first = np.clip(np.ceil(low), 0, nodes.shape).astype(int)
+    last = np.clip(np.floor(high) + 1, 0, nodes.shape).astype(int)
+    for q in np.flatnonzero((first < last).all(axis=1)).tolist():
+        (x0, z0), (x1, z1) = first[q], last[q]
+        x, z = (
+            np.arange(a, b) * _SIDE + o for a, b, o in zip((x0, z0), (x1, z1), origin, strict=True)
+        )
+        points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1)
+        gaps = prints.gaps(q, points)
+        inside = gaps < -_TOUCH
+        if (inside & nodes[x0:x1, z0:z1]).any():
+            bent[x0:x1, z0:z1] |= inside & ~passed[x0:x1, z0:z1]
+        else:
+            covered[x0:x1, z0:z1] |= inside
+            touched[x0:x1, z0:z1] |= gaps < prints.reach[q]
+    _lay(Cells(origin, _SIDE, bent).grown(RADIUS - _TOUCH), touched, origin)
+    return touched, covered
 
 
-def _inside(points: NDArray[np.float64], part: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return np.asarray(((points > part[0] + _TOUCH) & (points < part[1] - _TOUCH)).all(axis=1))
+def _lay(cells: Cells, over: Bitmap, origin: NDArray[np.float64]) -> None:
+    """Set the cells that are on in a bitmap whose cell [0, 0] has its middle at (2,) origin."""
+    at = np.argwhere(cells.on) + np.round((cells.origin - origin) / _SIDE).astype(int)
+    at = at[((at >= 0) & (at < over.shape)).all(axis=1)]
+    over[tuple(at.T)] = True
+
+
+def _inside_walls(scene: Scene, origin: NDArray[np.float64], shape: tuple[int, ...]) -> Bitmap:
+    floor = scene.types.index("Floor")
+    half = scene.aabb_size[floor] / 2
+    low, high = (scene.aabb_center[floor] - half)[[0, 2]], (scene.aabb_center[floor] + half)[[0, 2]]
+    x, z = (o + np.arange(n) * _SIDE for o, n in zip(origin, shape, strict=True))
+    inside: Bitmap = np.logical_and.outer(
+        (x >= low[0] + _WALL) & (x <= high[0] - _WALL),
+        (z >= low[1] + _WALL) & (z <= high[1] - _WALL),
+    )
+    return inside
+
+
+def _between_neighbours(certain: Bitmap, node: NDArray[np.int64]) -> Bitmap:
+    """The recorded floor on the lines of the recorded grid, one point of which is (2,) ``node``."""
+    per_step = round(RECORDED_STEP / _SIDE)
+    i, k = (
+        np.arange(n) % per_step == at % per_step for n, at in zip(certain.shape, node, strict=True)
+    )
+    return np.asarray(certain & np.logical_or.outer(i, k))

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.scene import load_scene
-from er_gym.sim.space.walk import CELL, walkable_floor
+from er_gym.sim.space.walk import recorded_cells
 
+_CELL = 0.05
 _AGENT_RADIUS = 0.2
 _NEIGHBOURS = frozenset({"Fridge", "DiningTable", "SideTable", "Dresser", "Sofa", "ArmChair"})
 _NARROW = 0.15
@@ -33,12 +34,12 @@ def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
         if kind in _NEIGHBOURS:
             reach = scene.aabb_size[k][[0, 2]] / 2
             edges = scene.aabb_center[k][[0, 2]] + np.array([-reach, reach])
-            (x0, z0), (x1, z1) = np.clip(np.ceil((edges - first) / CELL), 0, None).astype(int)
+            (x0, z0), (x1, z1) = np.clip(np.ceil((edges - first) / _CELL), 0, None).astype(int)
             left[x0:x1, z0:z1] = False
     found = []
     while True:
         x0, x1, z0, z1 = _largest_rectangle(left)
-        edges = first + CELL * (np.array([(x0, z0), (x1, z1)]) - 0.5)
+        edges = first + _CELL * (np.array([(x0, z0), (x1, z1)]) - 0.5)
         corners = np.clip(edges, low, high)
         if (corners[1] - corners[0] < np.minimum(_NARROW, high - low)).any():
             break
@@ -53,16 +54,17 @@ def _not_swept(
     scene_name: str, low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """The centre (2,) of the first cell over an area, metres, and which of its cells are free."""
-    origin, swept = walkable_floor(scene_name).swept(_AGENT_RADIUS)
-    from_cell = np.round((low - origin) / CELL).astype(int)
-    to_cell = np.round((high - origin) / CELL).astype(int) + 1
+    swept = recorded_cells(scene_name, _CELL).grown(_AGENT_RADIUS)
+    origin = swept.origin
+    from_cell = np.round((low - origin) / _CELL).astype(int)
+    to_cell = np.round((high - origin) / _CELL).astype(int) + 1
     free = np.ones(to_cell - from_cell, dtype=bool)
-    inner_low, inner_high = np.maximum(from_cell, 0), np.minimum(to_cell, swept.shape)
+    inner_low, inner_high = np.maximum(from_cell, 0), np.minimum(to_cell, swept.on.shape)
     if (inner_low < inner_high).all():
         (x0, z0), (x1, z1) = inner_low, inner_high
         dx, dz = inner_low - from_cell
-        free[dx : dx + x1 - x0, dz : dz + z1 - z0] = ~swept[x0:x1, z0:z1]
-    return origin + from_cell * CELL, free
+        free[dx : dx + x1 - x0, dz : dz + z1 - z0] = ~swept.on[x0:x1, z0:z1]
+    return origin + from_cell * _CELL, free
 
 
 def _largest_rectangle(cells: NDArray[np.bool_]) -> tuple[int, int, int, int]:

@@ -1,0 +1,92 @@
+"""Where the agent is after a scene is loaded, and what Initialize makes of that."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from er_gym.sim.data.build_start_poses import build, start_pose_of
+from er_gym.sim.scene import SCENE_NAMES, load_scene
+from er_gym.sim.space.standing import floor_of
+from er_gym.sim.start import START_POSES, start_pose
+
+OF_OTHER_ROOMS = {"FloorPlan410", "FloorPlan411"}
+"""Their poses were published with the numbers of the rooms after them; see docs/fidelity.md."""
+OWN_STARTS = [scene for scene in SCENE_NAMES if scene not in OF_OTHER_ROOMS]
+
+
+@pytest.fixture(scope="module")
+def published(shared_data: Path):
+    return json.loads((shared_data / "unity_start_poses.json").read_text())["poses"]
+
+
+def test_every_published_start_is_ours(enter, published):
+    assert len(published) == 119
+    for scene, pose in published.items():
+        agent = enter(scene, gridSize=0.25).agent
+        here = [agent["position"][axis] for axis in "xyz"]
+        assert here == pytest.approx([pose[axis] for axis in "xyz"], abs=1e-4), scene
+        assert agent["rotation"] == pytest.approx({"x": 0, "y": pose["rotation"], "z": 0}), scene
+        assert agent["cameraHorizon"] == pytest.approx(pose["horizon"]), scene
+        assert agent["isStanding"] is True
+
+
+def test_the_packaged_table_is_what_the_script_makes_of_them(published):
+    made = {name: list(row) for name, row in build(published).items()}
+    assert made == json.loads(START_POSES.read_text())
+
+
+def test_a_start_that_looks_down_is_no_row_of_the_table():
+    pose = {"x": 0.0, "y": 0.9, "z": 0.0, "rotation": 0.0, "horizon": 30.0}
+    with pytest.raises(ValueError, match="horizon"):
+        start_pose_of("FloorPlan1", pose)
+
+
+def test_one_can_stand_where_episodes_start():
+    for scene in OWN_STARTS:
+        start = start_pose(scene)
+        assert floor_of(scene).contains(np.array([start.x, start.z])), scene
+
+
+def test_the_start_without_a_published_pose_is_a_recorded_position():
+    start = start_pose("FloorPlan30")
+    assert [start.x, start.z] in load_scene("FloorPlan30").reachable.tolist()
+
+
+def test_from_the_start_one_can_move(enter):
+    for scene in OWN_STARTS[::10]:
+        room = enter(scene)
+        moves = ("MoveAhead", "MoveRight", "MoveBack", "MoveLeft")
+        assert any(room.step(move).metadata["lastActionSuccess"] for move in moves), scene
+
+
+@pytest.mark.parametrize("grid", [0.1, 0.15, 0.2, 0.25, 0.5])
+def test_initialize_snaps_the_pose_to_its_grid(enter, grid):
+    for scene in OWN_STARTS[::9]:
+        room = enter(scene, gridSize=grid)
+        here = np.array([room.agent["position"][axis] for axis in "xz"])
+        assert np.allclose(here / grid, np.round(here / grid), atol=1e-4), scene
+        start = start_pose(scene)
+        assert np.abs(here - [start.x, start.z]).max() < grid
+        assert here.tolist() in [
+            [place["x"], place["z"]] for place in room.do("GetReachablePositions")
+        ], scene
+
+
+def test_without_a_grid_the_pose_stays(enter):
+    room = enter("FloorPlan3", gridSize=0.1, snapToGrid=False)
+    assert [room.agent["position"][axis] for axis in "xz"] == [0.0, -1.75]
+
+
+def test_initialize_takes_the_lower_corner_that_can_be_walked_to(enter):
+    """AI2-THOR tries the corners of the grid square in the order of x, then z."""
+    room = enter("FloorPlan1")
+    room.do("Teleport", x=0.56, z=1.56)
+    room.do("Initialize", gridSize=0.25)
+    assert [room.agent["position"][axis] for axis in "xz"] == [0.5, 1.5]
+    room.do("Teleport", x=-0.91, z=0.24)  # the island begins at -0.62
+    room.do("Initialize", gridSize=0.5)
+    assert [room.agent["position"][axis] for axis in "xz"] == [-1.0, 0.0]
