@@ -18,9 +18,6 @@ RADIUS = 0.2
 """Of the agent's capsule, metres."""
 _TOP = 1.75
 """Height of the top of the capsule over the floor, metres."""
-_SLACK = 0.012
-"""How much nearer than its radius the capsule comes to recorded boxes, which are generous;
-metres."""
 _COUNTER_DEPTH = 0.7
 """Depth of the arms of a counter that bends, metres."""
 _PANES = frozenset({"Window", "ShowerGlass"})
@@ -47,8 +44,8 @@ class Footprints:
     reach: NDArray[np.float64]
 
     @staticmethod
-    def of(world: World) -> Footprints:
-        """All parts that the capsule meets where it stands on the floor."""
+    def of(world: World, slack: float = 0.0) -> Footprints:
+        """All parts that the capsule, made ``slack`` metres thinner, meets on the floor."""
         parts = [
             (shape, part)
             for i, kind in enumerate(world.types)
@@ -63,7 +60,7 @@ class Footprints:
         x, z = ((boxes[:, 0] + boxes[:, 1]) / 2)[:, [0, 2]].T
         middle = centres[:, [0, 2]] + np.stack([x * cos + z * sin, z * cos - x * sin], axis=1)
         low, high = (boxes[:, :, 1] + centres[:, None, 1] - world.ground).T
-        reach = _reach(low, high)
+        reach = _reach(low, high) - slack
         met = reach > 0.0
         half = (boxes[:, 1] - boxes[:, 0])[:, [0, 2]] / 2
         return Footprints(middle[met], np.stack([cos, sin], axis=1)[met], half[met], reach[met])
@@ -91,8 +88,8 @@ def _reach(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.fl
     below = np.clip(RADIUS - high, 0.0, RADIUS)
     above = np.clip(low - (_TOP - RADIUS), 0.0, RADIUS)
     inside = (high > 0.0) & (low < _TOP)
-    away = np.sqrt(RADIUS**2 - np.maximum(below, above) ** 2) - _SLACK
-    return np.where(inside, np.maximum(away, 0.0), 0.0)
+    away = np.sqrt(RADIUS**2 - np.maximum(below, above) ** 2)
+    return np.where(inside, away, 0.0)
 
 
 def _solid(kind: str, shape: Shape) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +23,24 @@ from er_gym.sim.world import Settings, World
 
 _SIDE = 0.025
 """Of the cells that the floor is cut into, metres."""
-_BEYOND = 0.4
-"""How far beyond the recorded floor free floor goes on, metres."""
-_WALL = 0.28
-"""How far from the edge of the scene's Floor the agent stays: the Floor goes on under walls;
-metres."""
 _TOUCH = 0.01
 """How deep in a part the agent's middle can be and count as beside it, metres."""
 
 Bitmap = NDArray[np.bool_]
+
+
+class Rules(NamedTuple):
+    """What the comparison with AI2-THOR's positions settled, metres (see docs/fidelity.md).
+
+    Attributes:
+        beyond: how far beyond the recorded floor free floor goes on.
+        wall: how far from the edge of the scene's Floor the agent stays: that goes on under walls.
+        slack: how much nearer to a box than its radius the body comes; recorded boxes are generous.
+    """
+
+    beyond: float = 0.45
+    wall: float = 0.28
+    slack: float = 0.012
 
 
 @dataclass(frozen=True)
@@ -52,6 +62,10 @@ class Floor:
     def contains(self, points: NDArray[np.float64]) -> Bitmap:
         """Which of (..., 2) x, z points the agent can stand on, to within 1.3 cm."""
         return self._look_up(self.free, points)
+
+    def is_certain(self, points: NDArray[np.float64]) -> Bitmap:
+        """Which of (..., 2) x, z points are on floor that the record shows."""
+        return self._look_up(self.certain, points)
 
     def path_is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
         """Whether the agent can go straight from one (2,) x, z point to another, and stand there.
@@ -77,7 +91,7 @@ class Floor:
         points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         on = self.contains(points)
         if step < RECORDED_STEP:  # between points farther apart, floor may be that no point is on
-            on = connected(on & self._look_up(self.certain, points), on)
+            on = connected(on & self.is_certain(points), on)
         return np.asarray(points[on].round(6))
 
     def _look_up(self, bitmap: Bitmap, points: NDArray[np.float64]) -> Bitmap:
@@ -107,9 +121,14 @@ def connected(seeds: Bitmap, on: Bitmap) -> Bitmap:
 @lru_cache(maxsize=128)
 def floor_of(scene_name: str) -> Floor:
     """The floor of a recorded scene, as it is before anything is moved or opened."""
+    return floor_by(scene_name, Rules())
+
+
+def floor_by(scene_name: str, rules: Rules) -> Floor:
+    """As :func:`floor_of`, with other rules; not cached."""
     scene = load_scene(scene_name)
     recorded = recorded_cells(scene_name, _SIDE)
-    near = recorded.grown(_BEYOND)
+    near = recorded.grown(rules.beyond)
     origin, free = near.origin - _SIDE, np.pad(near.on, 1)
     at = np.round((scene.reachable - origin) / _SIDE).astype(int)
     nodes = np.zeros_like(free)
@@ -118,8 +137,10 @@ def floor_of(scene_name: str) -> Floor:
     _lay(recorded, certain, origin)
     passed = np.zeros_like(free)  # what the body sweeps on the recorded floor
     _lay(recorded.grown(RADIUS), passed, origin)
-    touched, covered = _stamped(Footprints.of(World.load(scene, Settings())), origin, nodes, passed)
-    free &= ~touched & _inside_walls(scene, origin, free.shape)
+    touched, covered = _stamped(
+        Footprints.of(World.load(scene, Settings()), rules.slack), origin, nodes, passed
+    )
+    free &= ~touched & _inside_walls(scene, rules.wall, origin, free.shape)
     lines = _between_neighbours(certain, at[0])
     certain &= ~covered
     certain |= nodes
@@ -177,14 +198,16 @@ def _lay(cells: Cells, over: Bitmap, origin: NDArray[np.float64]) -> None:
     over[tuple(at.T)] = True
 
 
-def _inside_walls(scene: Scene, origin: NDArray[np.float64], shape: tuple[int, ...]) -> Bitmap:
+def _inside_walls(
+    scene: Scene, wall: float, origin: NDArray[np.float64], shape: tuple[int, ...]
+) -> Bitmap:
     floor = scene.types.index("Floor")
     half = scene.aabb_size[floor] / 2
     low, high = (scene.aabb_center[floor] - half)[[0, 2]], (scene.aabb_center[floor] + half)[[0, 2]]
     x, z = (o + np.arange(n) * _SIDE for o, n in zip(origin, shape, strict=True))
     inside: Bitmap = np.logical_and.outer(
-        (x >= low[0] + _WALL) & (x <= high[0] - _WALL),
-        (z >= low[1] + _WALL) & (z <= high[1] - _WALL),
+        (x >= low[0] + wall) & (x <= high[0] - wall),
+        (z >= low[1] + wall) & (z <= high[1] - wall),
     )
     return inside
 
