@@ -19,10 +19,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.perf.comparisons import reachable as standing
 from benchmarks.perf.comparisons.containment import containment
 from benchmarks.perf.comparisons.placement import random_placements
 from benchmarks.perf.comparisons.poses import openable_poses
-from benchmarks.perf.comparisons import reachable as standing
 from benchmarks.perf.comparisons.reachable import (
     BEFORE,
     LARGER,

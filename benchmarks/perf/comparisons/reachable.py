@@ -95,8 +95,8 @@ def _in_furniture(scene: Scene, points: np.ndarray) -> int:
     prints = Footprints.of(World.load(scene, Settings()))
     found = np.zeros(len(points), dtype=bool)
     for q in range(len(prints.reach)):
-        if not (prints.gaps(q, scene.reachable) < -_TOUCH).any():
-            found |= prints.gaps(q, points) < -_TOUCH
+        if not (prints.gaps(q, *scene.reachable.T) < -_TOUCH).any():
+            found |= prints.gaps(q, *points.T) < -_TOUCH
     return int(found.sum())
 
 

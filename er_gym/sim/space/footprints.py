@@ -65,14 +65,18 @@ class Footprints:
         half = (boxes[:, 1] - boxes[:, 0])[:, [0, 2]] / 2
         return Footprints(middle[met], np.stack([cos, sin], axis=1)[met], half[met], reach[met])
 
-    def gaps(self, q: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(...,) metres from (..., 2) x, z points to part q; inside it, negative to its edge."""
-        away = points - self.middle[q]
-        cos, sin = self.turn[q]
-        x = np.abs(away[..., 0] * cos - away[..., 1] * sin) - self.half[q, 0]
-        z = np.abs(away[..., 0] * sin + away[..., 1] * cos) - self.half[q, 1]
-        outside = np.hypot(np.maximum(x, 0.0), np.maximum(z, 0.0))
-        return np.asarray(outside + np.minimum(np.maximum(x, z), 0.0))
+    def gaps(self, q: int, x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Metres from points to part q; inside it, negative to its edge.
+
+        Args:
+            x, z: of the points, metres; of shapes that broadcast.
+        """
+        (dx, dz), (cos, sin) = self.middle[q], self.turn[q]
+        x, z = x - dx, z - dz
+        across = np.abs(x * cos - z * sin) - self.half[q, 0]
+        along = np.abs(x * sin + z * cos) - self.half[q, 1]
+        outside = np.hypot(np.maximum(across, 0.0), np.maximum(along, 0.0))
+        return np.asarray(outside + np.minimum(np.maximum(across, along), 0.0))
 
     def spans(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lower and upper corners (Q, 2) of the area in which each part is in the way, metres."""

@@ -128,22 +128,18 @@ def floor_by(scene_name: str, rules: Rules) -> Floor:
     """As :func:`floor_of`, with other rules; not cached."""
     scene = load_scene(scene_name)
     recorded = recorded_cells(scene_name, _SIDE)
-    near = recorded.grown(rules.beyond)
-    origin, free = near.origin - _SIDE, np.pad(near.on, 1)
-    at = np.round((scene.reachable - origin) / _SIDE).astype(int)
-    nodes = np.zeros_like(free)
-    nodes[tuple(at.T)] = True
-    certain = np.zeros_like(free)
+    grown = recorded.grown(rules.beyond)
+    origin, near = grown.origin - _SIDE, np.pad(grown.on, 1)
+    certain, passed, nodes = (np.zeros_like(near) for _ in range(3))
     _lay(recorded, certain, origin)
-    passed = np.zeros_like(free)  # what the body sweeps on the recorded floor
-    _lay(recorded.grown(RADIUS), passed, origin)
-    touched, covered = _stamped(
-        Footprints.of(World.load(scene, Settings()), rules.slack), origin, nodes, passed
-    )
-    free &= ~touched & _inside_walls(scene, rules.wall, origin, free.shape)
+    _lay(recorded.grown(RADIUS), passed, origin)  # what the body sweeps there
+    at = np.round((scene.reachable - origin) / _SIDE).astype(int)
+    nodes[tuple(at.T)] = True
+    prints = Footprints.of(World.load(scene, Settings()), rules.slack)
+    touched, covered = _stamped(prints, origin, near, nodes, passed)
     lines = _between_neighbours(certain, at[0])
-    certain &= ~covered
-    certain |= nodes
+    certain = certain & ~covered | nodes
+    free = near & ~touched & _inside_walls(scene, rules.wall, origin, near.shape)
     free = connected(certain, free | certain)
     return Floor(origin, free, free | lines, certain)
 
@@ -163,24 +159,23 @@ def standing_places(
 
 
 def _stamped(
-    prints: Footprints, origin: NDArray[np.float64], nodes: Bitmap, passed: Bitmap
+    prints: Footprints, origin: NDArray[np.float64], near: Bitmap, nodes: Bitmap, passed: Bitmap
 ) -> tuple[Bitmap, Bitmap]:
-    """Where the capsule touches a part, and where its middle is in one.
+    """Where, about the floor that is near, the body touches a part and its middle is in one.
 
     The box of a part that a recorded position is in is wrong there: a round table's, a bent desk's.
     Only so much of it is solid as the body does not pass through on the recorded floor.
     """
     touched, covered, bent = (np.zeros_like(nodes) for _ in range(3))
+    x, z = (west + np.arange(n) * _SIDE for west, n in zip(origin, nodes.shape, strict=True))
     low, high = ((corner - origin) / _SIDE for corner in prints.spans())
     first = np.clip(np.ceil(low), 0, nodes.shape).astype(int)
     last = np.clip(np.floor(high) + 1, 0, nodes.shape).astype(int)
     for q in np.flatnonzero((first < last).all(axis=1)).tolist():
         (x0, z0), (x1, z1) = first[q], last[q]
-        x, z = (
-            np.arange(a, b) * _SIDE + o for a, b, o in zip((x0, z0), (x1, z1), origin, strict=True)
-        )
-        points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1)
-        gaps = prints.gaps(q, points)
+        if not near[x0:x1, z0:z1].any():
+            continue
+        gaps = prints.gaps(q, x[x0:x1, None], z[z0:z1])
         inside = gaps < -_TOUCH
         if (inside & nodes[x0:x1, z0:z1]).any():
             bent[x0:x1, z0:z1] |= inside & ~passed[x0:x1, z0:z1]
@@ -193,9 +188,10 @@ def _stamped(
 
 def _lay(cells: Cells, over: Bitmap, origin: NDArray[np.float64]) -> None:
     """Set the cells that are on in a bitmap whose cell [0, 0] has its middle at (2,) origin."""
-    at = np.argwhere(cells.on) + np.round((cells.origin - origin) / _SIDE).astype(int)
-    at = at[((at >= 0) & (at < over.shape)).all(axis=1)]
-    over[tuple(at.T)] = True
+    first = np.round((cells.origin - origin) / _SIDE).astype(int)
+    (x0, z0), (x1, z1) = np.maximum(first, 0), np.minimum(first + cells.on.shape, over.shape)
+    (i0, k0), (i1, k1) = (x0, z0) - first, (x1, z1) - first
+    over[x0:x1, z0:z1] |= cells.on[i0:i1, k0:k1]
 
 
 def _inside_walls(
