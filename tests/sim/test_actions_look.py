@@ -18,14 +18,16 @@ import pytest
     ],
 )
 def test_turning(kitchen, action, arguments, heading):
+    kitchen.do("TeleportFull", rotation=0)
     kitchen.do(action, **arguments)
     assert kitchen.agent["rotation"]["y"] == pytest.approx(heading)
 
 
 def test_turning_goes_by_rotate_step_degrees(enter):
     room = enter("FloorPlan1", rotateStepDegrees=30)
+    assert room.agent["rotation"]["y"] == 270
     room.do("RotateRight")
-    assert room.agent["rotation"]["y"] == 30
+    assert room.agent["rotation"]["y"] == 300
 
 
 @pytest.mark.parametrize(

@@ -96,6 +96,7 @@ def test_putting_on_a_surface(kitchen):
 
 
 def test_what_is_put_down_overlaps_nothing_there(kitchen):
+    kitchen.do("TeleportFull", x=0.5, z=1.5, rotation=180)
     kitchen.take(PAN)
     kitchen.do("PutObject", ISLAND, forceAction=True)
     low, high = box(kitchen[PAN])

@@ -220,7 +220,7 @@ def test_headless_sends_no_picture():
     with launch(headless=True) as played:
         event = played.step("RotateRight")
         assert event.frame is None
-        assert event.metadata["agent"]["rotation"]["y"] == 90
+        assert event.metadata["agent"]["rotation"]["y"] == 0  # it starts at 270
 
 
 def test_where_nothing_has_changed_a_patch_is_sent(played):
@@ -470,7 +470,7 @@ def test_twenty_side_by_side():
     time.sleep(0.6)  # more than the time between looks at whether the parent lives
     for turn, controller in enumerate(fleet):
         event = controller.step("RotateRight", degrees=turn)
-        assert event.metadata["agent"]["rotation"]["y"] == turn
+        assert event.metadata["agent"]["rotation"]["y"] == (270 + turn) % 360
     pids = [controller.unity_pid for controller in fleet]
     assert len(set(pids)) == 20
     for controller in fleet:

@@ -39,9 +39,9 @@ class Cells:
         wide, deep = self.on.shape
         found = np.zeros((wide + 2 * reach, deep + 2 * reach), dtype=bool)
         # A row of the disc at a time: the cells within `half` of one that is on, along z.
-        counts = np.zeros((wide, deep + 2 * reach + 1), dtype=np.int32)
+        counts = np.zeros((wide, deep + 2 * reach + 1), dtype=np.int16)
         counts[:, reach + 1 : reach + 1 + deep] = self.on
-        counts = np.cumsum(counts, axis=1)
+        counts = np.cumsum(counts, axis=1, dtype=np.int16)
         counts = np.pad(counts, ((0, 0), (reach, reach)), mode="edge")
         for dx in range(-reach, reach + 1):
             half = int(np.sqrt((radius / self.side + 1e-9) ** 2 - dx * dx))
