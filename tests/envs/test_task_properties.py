@@ -231,7 +231,7 @@ def test_another_of_the_type_earns_nothing_in_the_benchmark(nearest: EmbodiedEnv
 
 
 ANY_WILL_DO = (
-    ("FloorPlan204", "single_pickup", "Statue"),
+    ("FloorPlan208", "single_pickup", "Statue"),
     ("FloorPlan230", "single_toggle", "Candle"),
     ("FloorPlan403", "single_pickup", "ToiletPaper"),
 )

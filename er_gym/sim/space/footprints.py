@@ -98,8 +98,7 @@ def _reach(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.fl
 
 def _solid(kind: str, shape: Shape) -> NDArray[np.float64]:
     """(K, 2, 3) corners of what is solid of a thing, about its middle, before its turn."""
-    narrow = float(np.ptp(shape.upright[..., [0, 2]], axis=(0, 1)).min(initial=np.inf))
-    if kind in _PANES and narrow > _PANE:
+    if kind in _PANES and np.ptp(shape.upright[..., [0, 2]], axis=(0, 1)).min() > _PANE:
         return shape.upright[:0]
     if kind == "CounterTop" and len(shape.upright) > 1:
         return _arms(shape.upright)

@@ -130,13 +130,16 @@ def floor_by(scene_name: str, rules: Rules) -> Floor:
     recorded = recorded_cells(scene_name, _SIDE)
     grown = recorded.grown(rules.beyond)
     origin, near = grown.origin - _SIDE, np.pad(grown.on, 1)
-    certain, passed, nodes = (np.zeros_like(near) for _ in range(3))
+    certain, nodes = np.zeros_like(near), np.zeros_like(near)
     _lay(recorded, certain, origin)
-    _lay(recorded.grown(RADIUS), passed, origin)  # what the body sweeps there
     at = np.round((scene.reachable - origin) / _SIDE).astype(int)
     nodes[tuple(at.T)] = True
     prints = Footprints.of(World.load(scene, Settings()), rules.slack)
-    touched, covered = _stamped(prints, origin, near, nodes, passed)
+    touched, covered, bent = _stamped(prints, origin, near, nodes)
+    if bent.any():
+        passed = np.zeros_like(near)  # what the body sweeps on the recorded floor
+        _lay(recorded.grown(RADIUS), passed, origin)
+        _lay(Cells(origin, _SIDE, bent & ~passed).grown(RADIUS - _TOUCH), touched, origin)
     lines = _between_neighbours(certain, at[0])
     certain = certain & ~covered | nodes
     free = near & ~touched & _inside_walls(scene, rules.wall, origin, near.shape)
@@ -159,12 +162,13 @@ def standing_places(
 
 
 def _stamped(
-    prints: Footprints, origin: NDArray[np.float64], near: Bitmap, nodes: Bitmap, passed: Bitmap
-) -> tuple[Bitmap, Bitmap]:
-    """Where, about the floor that is near, the body touches a part and its middle is in one.
+    prints: Footprints, origin: NDArray[np.float64], near: Bitmap, nodes: Bitmap
+) -> tuple[Bitmap, Bitmap, Bitmap]:
+    """Where, about the floor that is near, the body touches a part, and its middle is in one.
 
     The box of a part that a recorded position is in is wrong there: a round table's, a bent desk's.
-    Only so much of it is solid as the body does not pass through on the recorded floor.
+    The third bitmap has such boxes; only so much of them is solid as the body does not pass through
+    on the recorded floor.
     """
     touched, covered, bent = (np.zeros_like(nodes) for _ in range(3))
     x, z = (west + np.arange(n) * _SIDE for west, n in zip(origin, nodes.shape, strict=True))
@@ -178,12 +182,11 @@ def _stamped(
         gaps = prints.gaps(q, x[x0:x1, None], z[z0:z1])
         inside = gaps < -_TOUCH
         if (inside & nodes[x0:x1, z0:z1]).any():
-            bent[x0:x1, z0:z1] |= inside & ~passed[x0:x1, z0:z1]
+            bent[x0:x1, z0:z1] |= inside
         else:
             covered[x0:x1, z0:z1] |= inside
             touched[x0:x1, z0:z1] |= gaps < prints.reach[q]
-    _lay(Cells(origin, _SIDE, bent).grown(RADIUS - _TOUCH), touched, origin)
-    return touched, covered
+    return touched, covered, bent
 
 
 def _lay(cells: Cells, over: Bitmap, origin: NDArray[np.float64]) -> None:
