@@ -8,8 +8,7 @@ from hashlib import blake2b
 import numpy as np
 
 from er_gym.sim.render.mesh import Colour
-
-Box = tuple[tuple[float, float, float], tuple[float, float, float]]
+from er_gym.sim.space.shapes.built_in import Box
 
 
 @dataclass(frozen=True)

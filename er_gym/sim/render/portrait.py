@@ -7,11 +7,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.render.built_in import built_in
-from er_gym.sim.render.look import Box, Look
+from er_gym.sim.render.look import Look
 from er_gym.sim.render.palette import palette, room_kind
 from er_gym.sim.scene import Scene
 from er_gym.sim.space.rotation import unity_rotation
+from er_gym.sim.space.shapes.built_in import Box, built_in
 from er_gym.sim.space.surfaces import recorded_surfaces
 from er_gym.sim.world import World
 

@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import Any
 
 from er_gym.sim.render.camera import Camera
+from er_gym.sim.render.carcasses import carcasses
 from er_gym.sim.render.fixtures import fixtures
 from er_gym.sim.render.look import Look
 from er_gym.sim.render.mesh import Patch
@@ -47,6 +48,7 @@ class Stage:
         shell = room_shell(scene_name)
         self._root.attachNewNode(_drawn(shell.rest, 0, "room"))
         self._root.attachNewNode(_drawn(fixtures(scene_name), 0, "fixtures"))
+        self._root.attachNewNode(_drawn(carcasses(scene_name), 0, "carcasses"))
         self._floor, self._floor_number = shell.floor, -1
         self._state = object()
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from er_gym.sim.render.look import Look, mixed, shaded
 from er_gym.sim.render.mesh import Axis, Colour, Mesh
 from er_gym.sim.render.shapes.hangings import across, cracks, frame, turned
-from er_gym.sim.render.shapes.joinery import built_in
 from er_gym.sim.render.shapes.table import shape
 
 _CERAMIC, _STEEL, _CHROME = (0.96, 0.96, 0.95), (0.78, 0.80, 0.83), (0.88, 0.90, 0.94)
@@ -60,7 +59,7 @@ def _ceramic(look: Look) -> bool:
 
 def _place(look: Look, most: tuple[float, float]) -> tuple[Area, float] | None:
     """Where in it the basin is, at most so wide and deep, and its top; None where not known."""
-    for kind, (low, high) in built_in(look):
+    for kind, (low, high) in look.built_in:
         if kind == f"{look.kind}Basin":
             w, d = min(high[0] - low[0], most[0]), min(high[2] - low[2], most[1])
             return ((low[0] + high[0]) / 2, (low[2] + high[2]) / 2, w, d), high[1]

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from er_gym.sim.render.look import Box, Look, shaded
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from er_gym.sim.render.look import Palette, shaded
 from er_gym.sim.render.mesh import Colour, Mesh, Triple
+from er_gym.sim.space.shapes.built_in import Box
 
 WALL = 0.02
 """Thickness of boards, metres."""
 HANDLE = 0.025
 """How far handles stick out, metres."""
+_PLINTH = (0.16, 0.14, 0.13)
 CLEAR = 0.008
 """How far a board lies under the shelf's own that is drawn at the same height, metres."""
+
+Rectangle = tuple[float, float, float, float]
+"""Two lower ends and two upper ones, metres."""
 
 
 def grain(colour: Colour) -> str:
@@ -96,6 +104,63 @@ def bar(at: Triple, long: float, colour: Colour, *, upright: bool) -> Mesh:
     return mesh
 
 
-def built_in(look: Look) -> tuple[tuple[str, Box], ...]:
-    """Type and box, in the mesh's frame, of what is let into a thing or built in under it."""
-    return look.built_in
+def carcass_colour(palette: Palette) -> Colour:
+    """The colour of what counters rest on."""
+    return shaded(palette.cabinet, 0.85)
+
+
+def panels(
+    mesh: Mesh,
+    footprint: Sequence[Rectangle],
+    ends: tuple[float, float],
+    fitted: Sequence[Box],
+    colour: Colour,
+) -> None:
+    """Upright panels round what a counter rests on, but where a cabinet or a drawer is built in.
+
+    Args:
+        footprint: what it covers on the floor. ends: its height, from and to, metres.
+        fitted: low and high corners of what is built in.
+    """
+    floor, top = ends
+    for k, part in enumerate(footprint):
+        # What another part touches is no edge.
+        others = [
+            ((a[0], floor, a[1]), (a[2], top, a[3])) for j, a in enumerate(footprint) if j != k
+        ]
+        for axis, sign, facing in ((0, -1, "x"), (0, 1, "X"), (2, -1, "z"), (2, 1, "Z")):
+            edge = part[axis // 2 + (2 if sign > 0 else 0)]
+            along = 2 - axis
+            near = [
+                (low[along], high[along], low[1], high[1])
+                for boxes, reach in ((others, 0.05), (fitted, 0.12))
+                for low, high in boxes
+                if low[axis] - reach < edge < high[axis] + reach
+            ]
+            inner = (part[along // 2], part[along // 2 + 2])
+            for a, b, y0, y1 in _gaps((*inner, floor, top), near):
+                low = y1 - floor < 0.16
+                at, size = [0.0, (y0 + y1) / 2, 0.0], [0.01, y1 - y0, 0.01]
+                at[axis], at[along] = edge - sign * (0.06 if low else 0.005), (a + b) / 2
+                size[along] = b - a
+                mesh.box(
+                    (at[0], at[1], at[2]),
+                    (size[0], size[1], size[2]),
+                    _PLINTH if low else colour,
+                    "plain" if low else grain(colour),
+                    faces=facing,
+                )
+
+
+def _gaps(wall: Rectangle, taken: Sequence[Rectangle]) -> Iterator[Rectangle]:
+    """What is left of an upright rectangle: along from and to, height from and to, metres."""
+    first, last, floor, top = wall
+    ends = {first, last}
+    ends.update(min(max(end, first), last) for rectangle in taken for end in rectangle[:2])
+    for a, b in pairwise(sorted(ends)):
+        middle, y = (a + b) / 2, floor
+        spans = [(y0, y1) for x0, x1, y0, y1 in taken if x0 <= middle <= x1]
+        for y0, y1 in [*sorted(spans), (top, top)]:
+            if y0 - y > 0.04 and b - a > 0.005:
+                yield a, b, y, min(y0, top)
+            y = max(y, y1)

@@ -2,37 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
-
-from er_gym.sim.render.look import Box, Look, mixed, shaded
+from er_gym.sim.render.look import Look, mixed, shaded
 from er_gym.sim.render.mesh import Colour, Mesh, Triple
 from er_gym.sim.render.shapes.joinery import (
     CLEAR,
     HANDLE,
     WALL,
     bar,
-    built_in,
+    carcass_colour,
     case,
     front,
     grain,
     legs,
+    panels,
 )
 from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.space.shapes.carcass import LET_IN, LIP, SLAB, TALL, without
 
 _CARD, _TAPE = (0.72, 0.54, 0.34), (0.86, 0.76, 0.52)
 _STEEL, _GUNMETAL, _DIAL = (0.30, 0.33, 0.35), (0.20, 0.24, 0.25), (0.85, 0.85, 0.82)
 _BRASS, _CRACK = (0.78, 0.62, 0.30), (0.12, 0.11, 0.11)
 _WICKERS = ((0.70, 0.54, 0.34), (0.50, 0.36, 0.22), (0.85, 0.80, 0.70))
 _LINEN, _LAUNDRY = (0.90, 0.88, 0.82), (0.45, 0.58, 0.72)
-_PLINTH = (0.16, 0.14, 0.13)
-_LET_IN = frozenset({"Sink", "Bathtub"})
-"""What goes through a counter's top."""
-_SLAB = 0.035
-"""Thickness of a counter's top, metres."""
 _BACK = 0.03
-"""How far a counter's base stands back from its edges, metres."""
-Rectangle = tuple[float, float, float, float]
+"""How far the sides of a counter stand back from its edges, metres."""
 
 
 def _fitted(look: Look) -> Colour:
@@ -111,93 +104,31 @@ def _tray(mesh: Mesh, size: Triple, back: float, colour: Colour) -> None:
 
 @shape("CounterTop")
 def counter_top(look: Look) -> Mesh:
-    """A slab of stone, with holes for sinks, over a base between what is built in under it."""
+    """A slab of stone with holes for sinks; one that reaches to the floor has sides as well.
+
+    What other slabs rest on is no object: :mod:`er_gym.sim.render.carcasses` draws it.
+    """
     h = look.size[1]
     stone, mesh = look.palette.counter, Mesh()
     top = min(max(h if look.surface is None else look.surface, 0.0), h) + 0.002
-    fitted = built_in(look)
     # The rim of a sink lies on the slab.
     holes = [
-        (low[0] + 0.02, low[2] + 0.02, high[0] - 0.02, high[2] - 0.02)
-        for kind, (low, high) in fitted
-        if kind in _LET_IN and low[1] < top - 0.05 < high[1]
+        (low[0] + LIP, low[2] + LIP, high[0] - LIP, high[2] - LIP)
+        for kind, (low, high) in look.built_in
+        if kind in LET_IN and low[1] < top - 0.05 < high[1]
     ]
     for low, high in look.parts:
-        for x0, z0, x1, z1 in _without((low[0], low[2], high[0], high[2]), holes):
-            at, size = ((x0 + x1) / 2, top - _SLAB / 2, (z0 + z1) / 2), (x1 - x0, _SLAB, z1 - z0)
+        for x0, z0, x1, z1 in without((low[0], low[2], high[0], high[2]), holes):
+            at, size = ((x0 + x1) / 2, top - SLAB / 2, (z0 + z1) / 2), (x1 - x0, SLAB, z1 - z0)
             mesh.box(at, size, stone, "stone")
-    if h > 0.3 or fitted:
-        _base(mesh, look, top - _SLAB, [box for kind, box in fitted if kind not in _LET_IN])
-    elif min(look.size[0], look.size[2]) > 0.3:
-        _foot(mesh, look, top - _SLAB)
+    if h > TALL:
+        fitted = [box for kind, box in look.built_in if kind not in LET_IN]
+        footprint = [
+            (low[0] + _BACK, low[2] + _BACK, high[0] - _BACK, high[2] - _BACK)
+            for low, high in look.parts
+        ]
+        panels(mesh, footprint, (-look.height, top - SLAB), fitted, carcass_colour(look.palette))
     return mesh
-
-
-def _foot(mesh: Mesh, look: Look, top: float) -> None:
-    """A block under a counter that nothing is known to be built in under: far from its edges."""
-    colour, tall = shaded(look.palette.cabinet, 0.85), top + look.height
-    for low, high in look.parts:
-        w, d = high[0] - low[0], high[2] - low[2]
-        at = ((low[0] + high[0]) / 2, top - tall / 2, (low[2] + high[2]) / 2)
-        back = min(0.3, 0.2 * min(w, d))
-        size = (w - 2 * back, tall, d - 2 * back)
-        mesh.box(at, size, colour, grain(colour), faces="xXzZ")
-
-
-def _without(rectangle: Rectangle, holes: Sequence[Rectangle]) -> list[Rectangle]:
-    """A rectangle cut up so that it leaves holes open: x and z from, x and z to, metres."""
-    x0, z0, x1, z1 = rectangle
-    for k, (a, b, c, e) in enumerate(holes):
-        a, b, c, e = max(a, x0), max(b, z0), min(c, x1), min(e, z1)
-        if a < c and b < e:
-            pieces = ((x0, z0, x1, b), (x0, e, x1, z1), (x0, b, a, e), (c, b, x1, e))
-            real = [p for p in pieces if p[2] - p[0] > 1e-6 and p[3] - p[1] > 1e-6]
-            return [q for p in real for q in _without(p, holes[k + 1 :])]
-    return [rectangle]
-
-
-def _base(mesh: Mesh, look: Look, top: float, fitted: Sequence[Box]) -> None:
-    """Upright panels under the edges of a counter, where neither counter nor cabinet goes on."""
-    colour, floor = shaded(look.palette.cabinet, 0.85), -look.height
-    for part in look.parts:
-        # What another part of the counter touches is no edge.
-        others = [((a[0], floor, a[2]), (b[0], top, b[2])) for a, b in look.parts if (a, b) != part]
-        for axis, sign, facing in ((0, -1, "x"), (0, 1, "X"), (2, -1, "z"), (2, 1, "Z")):
-            edge = part[sign > 0][axis] - sign * _BACK
-            along = 2 - axis
-            near = [
-                (low[along], high[along], low[1], high[1])
-                for boxes, reach in ((others, 0.05), (fitted, 0.12))
-                for low, high in boxes
-                if low[axis] - reach < edge < high[axis] + reach
-            ]
-            inner = (part[0][along] + _BACK, part[1][along] - _BACK)
-            for a, b, y0, y1 in _gaps((*inner, floor, top), near):
-                low = y1 - floor < 0.16
-                at, size = [0.0, (y0 + y1) / 2, 0.0], [0.01, y1 - y0, 0.01]
-                at[axis], at[along] = edge - sign * (0.06 if low else 0.0), (a + b) / 2
-                size[along] = b - a
-                mesh.box(
-                    (at[0], at[1], at[2]),
-                    (size[0], size[1], size[2]),
-                    _PLINTH if low else colour,
-                    "plain" if low else grain(colour),
-                    faces=facing,
-                )
-
-
-def _gaps(wall: Rectangle, taken: Sequence[Rectangle]) -> Iterator[Rectangle]:
-    """What is left of an upright rectangle: along from and to, height from and to, metres."""
-    first, last, floor, top = wall
-    ends = {first, last}
-    ends.update(min(max(end, first), last) for rectangle in taken for end in rectangle[:2])
-    for a, b in pairwise(sorted(ends)):
-        middle, y = (a + b) / 2, floor
-        spans = [(y0, y1) for x0, x1, y0, y1 in taken if x0 <= middle <= x1]
-        for y0, y1 in [*sorted(spans), (top, top)]:
-            if y0 - y > 0.04 and b - a > 0.005:
-                yield a, b, y, min(y0, top)
-            y = max(y, y1)
 
 
 @shape("Shelf")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from er_gym.sim.render.look import Look, mixed, shaded
 from er_gym.sim.render.mesh import Colour, Mesh
-from er_gym.sim.render.shapes.joinery import CLEAR, WALL, apron, built_in, case, legs
+from er_gym.sim.render.shapes.joinery import CLEAR, WALL, apron, case, legs
 from er_gym.sim.render.shapes.table import shape
 
 _WHITE, _DARK = (0.88, 0.87, 0.84), (0.22, 0.16, 0.12)
@@ -109,7 +109,7 @@ def desk(look: Look) -> Mesh:
 def _pedestals(mesh: Mesh, look: Look, under: float, colour: Colour) -> bool:
     """Cases about the drawers and cabinets built in under a table; whether they reach low down."""
     w, _, d = look.size
-    fitted = [box for kind, box in built_in(look) if kind != "Sink" and box[0][1] < under - 0.05]
+    fitted = [box for kind, box in look.built_in if kind != "Sink" and box[0][1] < under - 0.05]
     stacks: list[list[float]] = []
     for low, high in sorted(fitted):
         if not stacks or low[0] > stacks[-1][1] - 0.02:

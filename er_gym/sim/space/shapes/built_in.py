@@ -6,10 +6,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from er_gym.sim.render.look import Box
 from er_gym.sim.scene import load_scene
 from er_gym.sim.space.shapes.facing import facings
 
+Box = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Low and high corner, metres."""
 _FITTED = frozenset({"Cabinet", "Drawer", "Sink", "Bathtub"})
 _HOSTS = frozenset({"CounterTop", "Desk", "SideTable", "DiningTable", "CoffeeTable"})
 _MARGIN = 0.05
@@ -18,7 +19,11 @@ _MARGIN = 0.05
 
 @lru_cache(maxsize=4096)
 def built_in(scene_name: str, i: int) -> tuple[tuple[str, Box], ...]:
-    """Type and box of what is built into recorded object i, in the frame of its mesh."""
+    """Type and box of what is built into recorded object i, in its own frame.
+
+    The frame is upright and turned to its heading (a counter's is not turned); its origin is the
+    middle of the underside.
+    """
     scene = load_scene(scene_name)
     if i >= len(scene) or scene.types[i] not in _HOSTS:
         return ()

@@ -1,0 +1,191 @@
+"""Counters: the slab that the record calls CounterTop, and what it rests on, which is no object.
+
+The record's box of nearly every counter is a slab 2 cm thick. Cabinets and drawers under it are
+objects; the carcass between and behind them is not. Only a few counters reach down to the floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.scene import PROPERTIES, Scene, load_scene
+from er_gym.sim.space.shapes.built_in import built_in
+from er_gym.sim.space.shapes.counters import rectangles
+from er_gym.sim.space.surfaces import recorded_surfaces
+
+SLAB = 0.035
+"""Thickness of a counter's slab, metres."""
+LET_IN = frozenset({"Sink", "Bathtub"})
+"""What goes through a slab."""
+LIP = 0.02
+"""How far what is let in reaches over the edge of its hole, metres."""
+_BACK = 0.03
+"""How far a carcass stands back from the slab's edges, metres."""
+_FAR_BACK = 0.3
+"""How far at most where nothing is built in under the counter, metres."""
+_TOUCH = 0.05
+"""Parts of a counter that are no farther apart than this go on without an edge, metres."""
+TALL = 0.3
+"""A counter whose box is higher than this is its own carcass, metres."""
+_NARROW = 0.3
+"""A counter that is narrower than this, with nothing built in under it, is a shelf, metres."""
+_NICHE = 0.02
+"""The room around what stands under a counter, metres."""
+_LEAST = 0.08
+"""Narrower pieces of a carcass are left out, metres."""
+_ON_THE_FLOOR = 0.1
+_OPEN_UNDER = frozenset({"Shelf", "ShelvingUnit"})
+"""Fixed things under a counter that are open at their front."""
+
+Rectangle = tuple[float, float, float, float]
+"""From x and z, to x and z, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Carcass:
+    """What a counter is made of, in the world's frame, metres.
+
+    Attributes:
+        slab: (S, 2, 3) boxes, with what is let in left open.
+        footprint: the rectangles on the floor that the carcass stands on.
+        fitted: (K, 2, 3) boxes of the cabinets and drawers that are built in.
+        holes: (H, 2, 3) boxes of what is let in.
+        floor, under: heights between which the carcass is.
+        own: whether the carcass is part of the counter's own box.
+    """
+
+    slab: NDArray[np.float64]
+    footprint: tuple[Rectangle, ...]
+    fitted: NDArray[np.float64]
+    holes: NDArray[np.float64]
+    floor: float
+    under: float
+    own: bool
+
+    @property
+    def solid(self) -> NDArray[np.float64]:
+        """(B, 2, 3) boxes of the carcass, hollow where something is let in."""
+        found: list[NDArray[np.float64]] = []
+        pits = [(low[0], low[2], high[0], high[2]) for low, high in self.holes]
+        for rectangle in self.footprint:
+            found += [_box(piece, self.floor, self.under) for piece in without(rectangle, pits)]
+            for pit, (low, _) in zip(pits, self.holes, strict=True):
+                piece = _common(rectangle, pit)
+                if piece is not None and low[1] > self.floor:
+                    found.append(_box(piece, self.floor, float(low[1])))
+        return _stacked(found)
+
+
+@lru_cache(maxsize=512)
+def carcass(scene_name: str, i: int) -> Carcass:
+    """The carcass of recorded counter i."""
+    scene = load_scene(scene_name)
+    half = scene.aabb_size[i] / 2
+    low, high = scene.aabb_center[i] - half, scene.aabb_center[i] + half
+    top = slab_top(scene_name, i)
+    parts = [_flat(corners) for corners in rectangles(scene_name, i)]
+    origin = np.array([scene.aabb_center[i, 0], low[1], scene.aabb_center[i, 2]])
+    fitted = [(kind, np.array(box) + origin) for kind, box in built_in(scene_name, i)]
+    let_in = [b for kind, b in fitted if kind in LET_IN and b[0, 1] < top - 0.05 < b[1, 1]]
+    holes = _stacked(let_in)
+    holes[:, 0, [0, 2]] += LIP
+    holes[:, 1, [0, 2]] -= LIP
+    pits = [_flat(box[:, [0, 2]]) for box in holes]
+    under, tall = top - SLAB, bool(high[1] - low[1] > TALL)
+    floor_row = scene.types.index("Floor")
+    floor = float(scene.aabb_center[floor_row, 1] + scene.aabb_size[floor_row, 1] / 2)
+    pieces = [p for part in parts for p in without(part, pits)]
+    niches = [] if tall else list(_niches(scene, floor, under))
+    rests = bool(fitted) or tall or min(scene.aabb_size[i, [0, 2]]) > _NARROW
+    return Carcass(
+        slab=_stacked([_box(piece, under, top) for piece in pieces]),
+        footprint=tuple(
+            piece
+            for k, part in enumerate(parts if rests else ())
+            for piece in without(_set_back(part, parts[:k] + parts[k + 1 :], tall or fitted), niches)
+            if min(piece[2] - piece[0], piece[3] - piece[1]) > _LEAST
+        ),
+        fitted=_stacked([box for kind, box in fitted if kind not in LET_IN]),
+        holes=holes,
+        floor=floor,
+        under=under,
+        own=tall,
+    )
+
+
+def slab_top(scene_name: str, i: int) -> float:
+    """How high the upper side of recorded counter i is: where the record shows things to stand."""
+    scene = load_scene(scene_name)
+    height = float(scene.aabb_size[i, 1])
+    surface = recorded_surfaces(scene_name).get(i, height)
+    return float(scene.aabb_center[i, 1]) - height / 2 + min(max(surface, 0.0), height) + 0.002
+
+
+def _set_back(part: Rectangle, others: Sequence[Rectangle], fitted: object) -> Rectangle:
+    """What a part rests on: a little narrower, or much where nothing is known to be built in.
+
+    On a side on which another part goes on it is not.
+    """
+    x0, z0, x1, z1 = part
+    back = _BACK if fitted else min(_FAR_BACK, 0.2 * min(x1 - x0, z1 - z0))
+    sides = (
+        (x0 - _TOUCH, z0, x0, z1), (x0, z0 - _TOUCH, x1, z0),
+        (x1, z0, x1 + _TOUCH, z1), (x0, z1, x1, z1 + _TOUCH),
+    )  # fmt: skip
+    a, b, c, e = (
+        0.0 if any(_common(side, other) is not None for other in others) else back for side in sides
+    )
+    return x0 + a, z0 + b, x1 - c, z1 - e
+
+
+def _niches(scene: Scene, floor: float, under: float) -> list[Rectangle]:
+    """Where something stands that is not built in: on the floor, or a shelf."""
+    found = []
+    moves = scene.properties[:, [PROPERTIES.index(name) for name in ("moveable", "pickupable")]]
+    for j in range(len(scene)):
+        low = scene.aabb_center[j] - scene.aabb_size[j] / 2
+        high = low + scene.aabb_size[j]
+        stands = moves[j].any() and low[1] < floor + _ON_THE_FLOOR
+        if (stands or scene.types[j] in _OPEN_UNDER) and low[1] < under:
+            found.append(
+                (low[0] - _NICHE, low[2] - _NICHE, high[0] + _NICHE, high[2] + _NICHE)
+            )
+    return found
+
+
+def without(rectangle: Rectangle, holes: Sequence[Rectangle]) -> list[Rectangle]:
+    """A rectangle cut up so that it leaves holes open."""
+    x0, z0, x1, z1 = rectangle
+    for k, hole in enumerate(holes):
+        common = _common(rectangle, hole)
+        if common is not None:
+            a, b, c, e = common
+            pieces = ((x0, z0, x1, b), (x0, e, x1, z1), (x0, b, a, e), (c, b, x1, e))
+            real = [p for p in pieces if p[2] - p[0] > 1e-6 and p[3] - p[1] > 1e-6]
+            return [q for p in real for q in without(p, holes[k + 1 :])]
+    return [rectangle]
+
+
+def _common(one: Rectangle, other: Rectangle) -> Rectangle | None:
+    a, b = max(one[0], other[0]), max(one[1], other[1])
+    c, e = min(one[2], other[2]), min(one[3], other[3])
+    return (a, b, c, e) if a < c and b < e else None
+
+
+def _flat(corners: NDArray[np.float64]) -> Rectangle:
+    (x0, z0), (x1, z1) = corners.tolist()
+    return x0, z0, x1, z1
+
+
+def _box(rectangle: Rectangle, low: float, high: float) -> NDArray[np.float64]:
+    x0, z0, x1, z1 = rectangle
+    return np.array([(x0, low, z0), (x1, high, z1)])
+
+
+def _stacked(boxes: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    return np.array(boxes, dtype=np.float64).reshape(-1, 2, 3)
