@@ -22,7 +22,7 @@ from er_gym.sim.nesting import Nesting
 from er_gym.sim.scene import PROPERTIES, STATES, Scene
 from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.shapes import Shape, shape_of
-from er_gym.sim.space.shapes.samples import points_on, points_on_top, surface_fractions
+from er_gym.sim.space.shapes.seen import points_to_see
 from er_gym.sim.start import start_pose
 
 AGENT_HEIGHT = 0.900999128818512
@@ -322,23 +322,11 @@ class World:
         return np.concatenate([bottom, bottom + up])
 
     def sample_points(self, i: int) -> NDArray[np.float64]:
-        """(P, 3) points over the surface of object i's box: the oriented one, where recorded."""
+        """(P, 3) points of object i that the agent may see; :func:`points_to_see`."""
         kept = recorded.samples(self.scene) if self._as_recorded(i) else self._samples
         points = kept.get(i)
         if points is None:
-            if np.isnan(self.obb[i, 0, 0]):
-                box = np.array([[self.low[i], self.high[i]]])
-                if self.types[i] == "Floor":
-                    points = points_on_top(box[0])
-                else:  # a counter that bends is looked for where it is
-                    points = points_on(
-                        self.shape(i).boxes if self.types[i] == "CounterTop" else box
-                    )
-            else:
-                corner, edges = self.obb[i, 0], self.obb[i, 1:]
-                size = np.linalg.norm(edges, axis=1)
-                points = corner + surface_fractions(size) @ edges
-                points = points @ unity_rotation(self.rotation[i]).T + self.position[i]
+            points = points_to_see(self, i)
             kept[i] = points
         return points
 

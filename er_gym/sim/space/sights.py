@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from er_gym.sim.scene import load_scene
 from er_gym.sim.space.rays import Targets, blocked_by, crossings
 from er_gym.sim.space.reach import Outlines
+from er_gym.sim.space.shapes.seen import SLABS, SOLID
 from er_gym.sim.world import Settings, World
 
 _RUN = 26
@@ -256,8 +257,14 @@ def _boxes(world: World, rows: Iterable[int]) -> tuple[Floats, Floats, NDArray[n
 
 
 def _own(world: World, whose: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """(N, M) which boxes belong to each object, or to something that it lies in or on."""
-    return np.asarray((np.arange(len(world))[:, None] == whose) | world.nesting.within[:, whose])
+    """(N, M) which boxes hide nothing of which object: its own, and those of what it lies in.
+
+    Of what is seen from outside only, the own ones do; and a slab hides what lies on it.
+    """
+    solid = np.isin(world.types, SOLID)
+    mine = (np.arange(len(world))[:, None] == whose) & ~solid[:, None]
+    slabs = np.isin(world.types, SLABS)
+    return np.asarray(mine | (world.nesting.within[:, whose] & ~slabs[whose]))
 
 
 def _rectangle(outlines: Outlines) -> _Rectangle:

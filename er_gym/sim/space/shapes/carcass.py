@@ -6,7 +6,7 @@ objects; the carcass between and behind them is not. Only a few counters reach d
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.scene import PROPERTIES, Scene, load_scene
-from er_gym.sim.space.shapes.built_in import built_in
+from er_gym.sim.space.shapes.built_in import Front, Rectangle, built_in, fronts
 from er_gym.sim.space.shapes.counters import rectangles
 from er_gym.sim.space.surfaces import recorded_surfaces
 
@@ -28,6 +28,10 @@ _BACK = 0.03
 """How far a carcass stands back from the slab's edges, metres."""
 _FAR_BACK = 0.3
 """How far at most where nothing is built in under the counter, metres."""
+_BEHIND = 0.01
+"""How far behind the fronts of what is built in it ends, metres."""
+_DEEP = 0.35
+"""Fronts that are farther in than this do not make a carcass end there on the whole side, metres."""
 _TOUCH = 0.05
 """Parts of a counter that are no farther apart than this go on without an edge, metres."""
 TALL = 0.3
@@ -41,9 +45,6 @@ _LEAST = 0.08
 _ON_THE_FLOOR = 0.1
 _OPEN_UNDER = frozenset({"Shelf", "ShelvingUnit"})
 """Fixed things under a counter that are open at their front."""
-
-Rectangle = tuple[float, float, float, float]
-"""From x and z, to x and z, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,17 +100,19 @@ def carcass(scene_name: str, i: int) -> Carcass:
     under, tall = top - SLAB, bool(high[1] - low[1] > TALL)
     floor_row = scene.types.index("Floor")
     floor = float(scene.aabb_center[floor_row, 1] + scene.aabb_size[floor_row, 1] / 2)
-    pieces = [p for part in parts for p in without(part, pits)]
-    niches = [] if tall else list(_niches(scene, floor, under))
-    rests = bool(fitted) or tall or min(scene.aabb_size[i, [0, 2]]) > _NARROW
+    footprint: list[Rectangle] = []
+    if fitted or tall or min(scene.aabb_size[i, [0, 2]]) > _NARROW:
+        row = list(fronts(scene_name, i))
+        niches = [] if tall else list(_niches(scene, floor, under))
+        for k, part in enumerate(parts):
+            others = parts[:k] + parts[k + 1 :]
+            rest = _set_back(part, others, row, bool(fitted) or tall)
+            open_to = [_open(rest, niche) for niche in niches]
+            open_to += [_before(front, rest) for front in row]
+            footprint += without(rest, [hole for hole in open_to if hole is not None])
     return Carcass(
-        slab=_stacked([_box(piece, under, top) for piece in pieces]),
-        footprint=tuple(
-            piece
-            for k, part in enumerate(parts if rests else ())
-            for piece in without(_set_back(part, parts[:k] + parts[k + 1 :], tall or fitted), niches)
-            if min(piece[2] - piece[0], piece[3] - piece[1]) > _LEAST
-        ),
+        slab=_stacked([_box(p, under, top) for part in parts for p in without(part, pits)]),
+        footprint=tuple(p for p in footprint if min(p[2] - p[0], p[3] - p[1]) > _LEAST),
         fitted=_stacked([box for kind, box in fitted if kind not in LET_IN]),
         holes=holes,
         floor=floor,
@@ -126,21 +129,52 @@ def slab_top(scene_name: str, i: int) -> float:
     return float(scene.aabb_center[i, 1]) - height / 2 + min(max(surface, 0.0), height) + 0.002
 
 
-def _set_back(part: Rectangle, others: Sequence[Rectangle], fitted: object) -> Rectangle:
+def _set_back(
+    part: Rectangle, others: Sequence[Rectangle], row: Sequence[Front], fitted: bool
+) -> Rectangle:
     """What a part rests on: a little narrower, or much where nothing is known to be built in.
 
-    On a side on which another part goes on it is not.
+    On a side where another part goes on it is not; where there are fronts, it ends at them.
     """
     x0, z0, x1, z1 = part
     back = _BACK if fitted else min(_FAR_BACK, 0.2 * min(x1 - x0, z1 - z0))
-    sides = (
+    beside = (
         (x0 - _TOUCH, z0, x0, z1), (x0, z0 - _TOUCH, x1, z0),
         (x1, z0, x1 + _TOUCH, z1), (x0, z1, x1, z1 + _TOUCH),
     )  # fmt: skip
-    a, b, c, e = (
-        0.0 if any(_common(side, other) is not None for other in others) else back for side in sides
-    )
-    return x0 + a, z0 + b, x1 - c, z1 - e
+    found = []
+    for k, side in enumerate(beside):
+        axis, sign = k % 2, 1 if k > 1 else -1
+        if any(_common(side, other) is not None for other in others):
+            found.append(part[k])
+            continue
+        edge = sign * part[k] - back
+        before = [sign * f.at - _BEHIND for f in row if (f.axis, f.sign) == (axis, sign) and _before(f, part)]
+        near = [at for at in before if at > edge - _DEEP]
+        found.append(sign * min(edge, max(near, default=edge)))
+    return found[0], found[1], found[2], found[3]
+
+
+def _before(front: Front, part: Rectangle) -> Rectangle | None:
+    """What of a part is before a front, if it is the front of something in the part."""
+    ends, near, far = list(part), front.axis, front.axis + 2
+    at = front.at - front.sign * _BEHIND
+    if not part[near] < at < part[far]:
+        return None
+    ends[near if front.sign > 0 else far] = at
+    ends[1 - front.axis], ends[3 - front.axis] = front.low, front.high
+    return _common(part, (ends[0], ends[1], ends[2], ends[3]))
+
+
+def _open(part: Rectangle, niche: Rectangle) -> Rectangle | None:
+    """What of a part a niche takes up: as far as the side that it is nearest to."""
+    common = _common(part, niche)
+    if common is None:
+        return None
+    gaps = [abs(part[k] - common[k]) for k in range(4)]
+    nearest = min(range(4), key=gaps.__getitem__)
+    a, b, c, e = (part[k] if k == nearest else common[k] for k in range(4))
+    return a, b, c, e
 
 
 def _niches(scene: Scene, floor: float, under: float) -> list[Rectangle]:

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.scene import load_scene
+from er_gym.sim.space.shapes.built_in import Front, Rectangle, fronts
 from er_gym.sim.space.walk import recorded_cells
 
 _CELL = 0.05
 _AGENT_RADIUS = 0.2
 _NEIGHBOURS = frozenset({"Fridge", "DiningTable", "SideTable", "Dresser", "Sofa", "ArmChair"})
+_OVERHANG = 0.04
+"""How far a counter juts out over the fronts under it, metres."""
+_OPENS = 0.35
+"""So far before a front there is no counter, metres."""
+_IN_LINE, _GAP = 0.06, 0.8
+"""How much cabinets of one row may be apart, ahead and to the side, metres."""
 _NARROW = 0.15
 """Strips of counter that are narrower than this are left out, metres."""
 
@@ -22,8 +30,8 @@ def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
     """(R, 2, 2) corners x, z of the rectangles that the box of recorded object i comes down to.
 
     What the agent's body sweeps as it walks is free floor, whatever the box says, and where other
-    large furniture stands there is no counter either. The largest rectangle of the rest is taken,
-    then the largest of what that leaves, and so on. A box that is swept altogether is left whole:
+    large furniture stands there is no counter either, nor right before a cabinet or a drawer. The
+    largest rectangle of the rest is taken, then the largest of what that leaves, and so on. A box that is swept altogether is left whole:
     one can walk under it.
     """
     scene = load_scene(scene_name)
@@ -36,6 +44,9 @@ def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
             edges = scene.aabb_center[k][[0, 2]] + np.array([-reach, reach])
             (x0, z0), (x1, z1) = np.clip(np.ceil((edges - first) / _CELL), 0, None).astype(int)
             left[x0:x1, z0:z1] = False
+    for x0, z0, x1, z1 in _before_fronts(scene_name, i, low, high):
+        a, b = np.clip(np.ceil((np.array([[x0, z0], [x1, z1]]) - first) / _CELL), 0, None).astype(int)
+        left[a[0] : b[0], a[1] : b[1]] = False
     found = []
     while True:
         x0, x1, z0, z1 = _largest_rectangle(left)
@@ -48,6 +59,34 @@ def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
     boxes = np.array(found or [np.array([low, high])])
     boxes.setflags(write=False)
     return boxes
+
+
+def _before_fronts(
+    scene_name: str, i: int, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> Iterator[Rectangle]:
+    """Where doors and drawers under counter i open: not where its box ends anyway."""
+    rows: dict[tuple[int, int], list[Front]] = {}
+    for front in fronts(scene_name, i):
+        rows.setdefault((front.axis, front.sign), []).append(front)
+    for (axis, sign), row in rows.items():
+        # One row of cabinets has gaps, for an oven or a dishwasher.
+        spans: list[list[float]] = []
+        for front in sorted(row, key=lambda f: (round(f.at, 1), f.low)):
+            last = spans[-1] if spans else [np.inf, 0.0, 0.0]
+            if abs(front.at - last[0]) < _IN_LINE and front.low - last[2] < _GAP:
+                last[2] = max(last[2], front.high)
+                last[0] = sign * max(sign * front.at, sign * last[0])
+            else:
+                spans.append([front.at, front.low, front.high])
+        for at, first, last_end in spans:
+            near, far = at + sign * _OVERHANG, at + sign * _OPENS
+            end = high[axis] if sign > 0 else low[axis]
+            if sign * (end - far) > 0.0:
+                across = sorted((near, far))
+                ends = [0.0] * 4
+                ends[axis], ends[axis + 2] = across
+                ends[1 - axis], ends[3 - axis] = first, last_end
+                yield ends[0], ends[1], ends[2], ends[3]
 
 
 def _not_swept(

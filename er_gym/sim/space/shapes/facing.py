@@ -16,13 +16,17 @@ from er_gym.sim.scene import load_scene
 
 _BY_THE_ROOM = frozenset({"Drawer", "Cabinet"})
 _HOSTS = frozenset({"Dresser", "SideTable", "Desk", "TVStand", "CoffeeTable"})
+_TWO_SIDED = frozenset({"CoffeeTable"})
+"""What stands in the open and has drawers on both sides."""
 _MARGIN = 0.1
 """How far a drawer may stick out of the furniture that it is part of, metres."""
+_AT_THE_BACK = 0.2
+"""A drawer that is nearer to the back of its furniture by so much opens there, metres."""
 _DOUBT = 0.3
 """Sides whose distances to the floor differ by less could each be the front, metres."""
 _ASIDE = 3.0
 """What a metre to the side counts, against a metre ahead."""
-_SIDES = ((1, 1), (0, 1), (1, -1), (0, -1))
+SIDES = ((1, 1), (0, 1), (1, -1), (0, -1))
 """World axis (0 x, 1 z) and sign of each side, by quarter turns of its heading from +z."""
 
 
@@ -49,12 +53,29 @@ def _towards_the_room(scene_name: str, i: int, quarters: int) -> int:
         here = scene.aabb_center[i]
         inside = (low[j] - _MARGIN <= here).all() and (here <= high[j] + _MARGIN).all()
         if kind in _HOSTS and inside:
-            return round(float(scene.rotation[j, 1]) / 90.0) % 4
-    gaps = np.array([_gap(scene.reachable, low[i], high[i], *side) for side in _SIDES])
+            front = round(float(scene.rotation[j, 1]) / 90.0) % 4
+            if kind in _TWO_SIDED and _at_back(low[i], high[i], low[j], high[j], front):
+                return (front + 2) % 4
+            return front
+    gaps = np.array([_gap(scene.reachable, low[i], high[i], *side) for side in SIDES])
     likely = np.flatnonzero(gaps < gaps.min() + _DOUBT).tolist()
     pose = scene.openable_poses.get(i)
     hints = [quarters] if pose is None else [round(pose.rotation / 90.0 + 2) % 4, quarters]
     return next((hint for hint in hints if hint in likely), int(gaps.argmin()))
+
+
+def _at_back(
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    host_low: NDArray[np.float64],
+    host_high: NDArray[np.float64],
+    quarters: int,
+) -> bool:
+    """Whether a drawer is nearer to the back of its furniture than to its front."""
+    axis, sign = SIDES[quarters]
+    upper, lower = (host_high - high)[2 * axis], (low - host_low)[2 * axis]
+    ahead, behind = (upper, lower) if sign > 0 else (lower, upper)
+    return bool(behind < ahead - _AT_THE_BACK)
 
 
 def _gap(

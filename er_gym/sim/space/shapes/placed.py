@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.space.rotation import unity_rotation
+from er_gym.sim.space.shapes.carcass import carcass
 from er_gym.sim.space.shapes.counters import rectangles
 from er_gym.sim.space.shapes.facing import facings
 from er_gym.sim.space.shapes.families import parts
@@ -43,7 +44,7 @@ def shape_of(world: World, i: int) -> Shape:
     """The shape of object i as it stands now; :meth:`World.shape` keeps it."""
     if world.types[i] == "CounterTop" and i < len(world.scene):
         return _counter(world, i)
-    middle, size, yaw = _upright_box(world, i)
+    middle, size, yaw = upright_box(world, i)
     standing = recorded_surfaces(world.scene.name).get(i)
     made_of, hiding = parts(
         world.types[i],
@@ -56,7 +57,7 @@ def shape_of(world: World, i: int) -> Shape:
     return Shape(middle, yaw, upright, boxes[: len(upright)], trimmed(boxes[len(upright) :]))
 
 
-def _upright_box(world: World, i: int) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def upright_box(world: World, i: int) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Middle (3,), size (3,) and heading of object i's box before it is turned to that heading."""
     if np.isnan(world.obb[i, 0, 0]):
         fronts = facings(world.scene.name)
@@ -72,10 +73,11 @@ def _upright_box(world: World, i: int) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def _counter(world: World, i: int) -> Shape:
-    """A counter, less what the agent walks through; it hides nothing, for it is thin."""
+    """A counter, less what the agent walks through; its slab and its carcass hide things."""
     middle = (world.low[i] + world.high[i]) / 2
     tops = rectangles(world.scene.name, i)
     boxes = np.empty((len(tops), 2, 3))
     boxes[:, :, [0, 2]] = tops
     boxes[:, 0, 1], boxes[:, 1, 1] = world.low[i, 1], world.high[i, 1]
-    return Shape(middle, 0.0, boxes - middle, boxes, boxes[:0])
+    under = carcass(world.scene.name, i)
+    return Shape(middle, 0.0, boxes - middle, boxes, np.concatenate([under.slab, under.solid]))

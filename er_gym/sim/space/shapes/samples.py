@@ -42,7 +42,20 @@ def points_on(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def points_on_top(box: NDArray[np.float64]) -> NDArray[np.float64]:
     """(P, 3) points on the upper face of a (2, 3) box: of a floor one sees nothing else; metres."""
-    points: NDArray[np.float64] = points_on(box[None])
-    points = points[points[:, 1] == points[:, 1].max()]
-    points[:, 1] = box[1, 1]
+    return points_on_face(box, 1, 1)
+
+
+def points_on_face(
+    box: NDArray[np.float64], axis: int, sign: int, out: float = 0.0
+) -> NDArray[np.float64]:
+    """(P, 3) points on one face of a (2, 3) box, or ``out`` metres before it."""
+    low, high = box
+    size = high - low
+    along = [k for k in range(3) if k != axis]
+    counts = np.clip(np.ceil(size[along] / _SPACING) + 1, 3, _MOST).astype(int)
+    first, second = (np.linspace(_INSET, 1.0 - _INSET, count) for count in counts.tolist())
+    shares = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = np.empty((len(shares), 3))
+    points[:, along] = low[along] + shares * size[along]
+    points[:, axis] = high[axis] + out if sign > 0 else low[axis] - out
     return points
