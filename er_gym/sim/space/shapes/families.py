@@ -107,6 +107,23 @@ def shelf(w: float, h: float, d: float, s: float) -> Parts:
     return [((0, 0, 0), (w, min(_BOARD, h), d))]
 
 
+def desk(w: float, h: float, d: float, s: float) -> Parts:
+    """What of a desk hides things: its top, two upright sides and a board behind the knees."""
+    slab = min(0.04, 0.15 * s)
+    under, side = s - slab, _BOARD + 0.02
+    return [
+        ((0, under, 0), (w, s, d)),
+        ((0, 0, 0.02), (side, under, d - 0.02)),
+        ((w - side, 0, 0.02), (w, under, d - 0.02)),
+        ((side, 0.5 * under, 0.05), (w - side, under, 0.09)),
+    ]
+
+
+def open_case(w: float, h: float, d: float, s: float) -> Parts:
+    """A case that is open at its front, but for its bottom."""
+    return boards(w, s if s > 0.6 * h else h, d, s)[1:]
+
+
 def plant(w: float, h: float, d: float, s: float) -> Parts:
     """A pot, and leaves above it."""
     return [
@@ -153,7 +170,9 @@ _SMALL = Family(hides=_core(0.7, 0.95))
 """Things one can carry are rounded: the corners of their boxes are air."""
 
 _BY_TYPES = {
-    "DiningTable CoffeeTable Desk SideTable Stool Footstool": Family(
+    "Desk": Family(table, desk),
+    "TVStand": Family(hides=open_case),
+    "DiningTable CoffeeTable SideTable Stool Footstool": Family(
         table, lambda w, h, d, s: table(w, h, d, s)[:1]
     ),
     "Chair": Family(chair, lambda w, h, d, s: chair(w, h, d, s)[:2], stand=0.5),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,9 @@ from er_gym.sim.space.surfaces import recorded_surfaces
 
 if TYPE_CHECKING:
     from er_gym.sim.world import World
+
+_HOB, _UNDER = 0.03, 0.004
+"""How much wider than its burners a stove is at least, and from a burner down to it, metres."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,12 @@ def shape_of(world: World, i: int) -> Shape:
     """The shape of object i as it stands now; :meth:`World.shape` keeps it."""
     if world.types[i] == "CounterTop" and i < len(world.scene):
         return _counter(world, i)
+    if world.types[i] == "StoveBurner" and i == next(world.of_type("StoveBurner")):
+        return _with_stove(world, i)
+    return _of_family(world, i)
+
+
+def _of_family(world: World, i: int) -> Shape:
     middle, size, yaw = upright_box(world, i)
     standing = recorded_surfaces(world.scene.name).get(i)
     made_of, hiding = parts(
@@ -70,6 +79,18 @@ def upright_box(world: World, i: int) -> tuple[NDArray[np.float64], NDArray[np.f
     corner, *edges = world.obb[i] @ tilt.T
     middle = world.position[i] + turn @ (corner + sum(edges) / 2)
     return middle, np.abs(edges).sum(axis=0), yaw
+
+
+def _with_stove(world: World, i: int) -> Shape:
+    """A burner; the first of a kitchen hides things with the stove under them, which is no object.
+
+    What hides: from the floor to just below the burners, over which it is a little wider.
+    """
+    burner, rows = _of_family(world, i), list(world.of_type("StoveBurner"))
+    low, high = world.low[rows].min(axis=0), world.high[rows].max(axis=0)
+    stove = np.array([low, high]) + np.array([[-_HOB, 0.0, -_HOB], [_HOB, 0.0, _HOB]])
+    stove[:, 1] = world.high[next(world.of_type("Floor")), 1], low[1] - _UNDER
+    return replace(burner, hiding=stove[None])
 
 
 def _counter(world: World, i: int) -> Shape:

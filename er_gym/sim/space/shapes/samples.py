@@ -7,22 +7,23 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-_SPACING = 0.5
+_SPACING = 0.3
 """Big boxes get a point about every so many metres, small ones three along each side."""
 _MOST = 11
-_INSET = 0.08
-"""How far inside the box's faces the outer points lie, as a fraction of its size."""
+INSET, ROUND = 0.03, 0.12
+"""How far inside a box's edges the outer points lie, as a fraction of its size: of furniture, and
+of what is round, whose corners are air."""
 
 
-def surface_fractions(size: NDArray[np.float64]) -> NDArray[np.float64]:
+def surface_fractions(size: NDArray[np.float64], inset: float = INSET) -> NDArray[np.float64]:
     """(P, 3) points on the surface of a box of (3,) metres, as fractions of its size."""
     counts = np.clip(np.ceil(size / _SPACING) + 1, 3, _MOST).astype(int)
-    return _surface_grid(*counts.tolist())
+    return _surface_grid(inset, *counts.tolist())
 
 
 @lru_cache(maxsize=1024)
-def _surface_grid(*counts: int) -> NDArray[np.float64]:
-    axes = [np.linspace(_INSET, 1.0 - _INSET, count) for count in counts]
+def _surface_grid(inset: float, *counts: int) -> NDArray[np.float64]:
+    axes = [np.linspace(inset, 1.0 - inset, count) for count in counts]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     on_surface = np.zeros(counts, dtype=bool)
     for axis in range(3):
@@ -31,29 +32,24 @@ def _surface_grid(*counts: int) -> NDArray[np.float64]:
     return grid[on_surface]
 
 
-def points_on(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(P, 3) points on the surfaces of (K, 2, 3) boxes, in the boxes' frame, metres."""
-    sizes = boxes[:, 1] - boxes[:, 0]
-    found = [
-        low + surface_fractions(size) * size for (low, _), size in zip(boxes, sizes, strict=True)
-    ]
-    return np.concatenate(found)
-
-
 def points_on_top(box: NDArray[np.float64]) -> NDArray[np.float64]:
     """(P, 3) points on the upper face of a (2, 3) box: of a floor one sees nothing else; metres."""
     return points_on_face(box, 1, 1)
 
 
 def points_on_face(
-    box: NDArray[np.float64], axis: int, sign: int, out: float = 0.0
+    box: NDArray[np.float64],
+    axis: int,
+    sign: int,
+    out: float = 0.0,
+    spacing: float = _SPACING,
 ) -> NDArray[np.float64]:
     """(P, 3) points on one face of a (2, 3) box, or ``out`` metres before it."""
     low, high = box
     size = high - low
     along = [k for k in range(3) if k != axis]
-    counts = np.clip(np.ceil(size[along] / _SPACING) + 1, 3, _MOST).astype(int)
-    first, second = (np.linspace(_INSET, 1.0 - _INSET, count) for count in counts.tolist())
+    counts = np.clip(np.ceil(size[along] / spacing) + 1, 3, _MOST).astype(int)
+    first, second = (np.linspace(INSET, 1.0 - INSET, count) for count in counts.tolist())
     shares = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1).reshape(-1, 2)
     points = np.empty((len(shares), 3))
     points[:, along] = low[along] + shares * size[along]

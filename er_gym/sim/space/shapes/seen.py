@@ -14,7 +14,8 @@ from er_gym.sim.space.shapes.built_in import hosts
 from er_gym.sim.space.shapes.carcass import carcass
 from er_gym.sim.space.shapes.placed import upright_box
 from er_gym.sim.space.shapes.samples import (
-    points_on,
+    INSET,
+    ROUND,
     points_on_face,
     points_on_top,
     surface_fractions,
@@ -23,40 +24,69 @@ from er_gym.sim.space.shapes.samples import (
 if TYPE_CHECKING:
     from er_gym.sim.world import World
 
-SOLID = ("Drawer", "Cabinet", "CounterTop")
+SOLID = ("Drawer", "Cabinet", "CounterTop", "StoveBurner")
 """Types that are seen from outside only: their own boxes hide the points on their far sides."""
 SLABS = ("CounterTop",)
 """Types that hide what lies on them from who looks from below."""
+_ROUND = frozenset(
+    {"Faucet", "FloorLamp", "DeskLamp", "GarbageCan", "HousePlant", "StoveBurner", "StoveKnob", "Toilet"}
+)
+"""What is round though it cannot be carried."""
 _OUT = 0.01
 """How far before their faces the points of solid things lie, metres."""
+_BOARD = 0.015
+"""How far below its upper side one looks for the edges of a shelf, metres."""
+_CLOSE = 0.2
+"""How far apart the points of a front are, metres: one stands close to it."""
 Floats = NDArray[np.float64]
 
 
 def points_to_see(world: World, i: int) -> Floats:
     """(P, 3) points of object i, world frame, metres: as many wherever it is and however it is.
 
-    Most things are looked for all over their boxes, the oriented ones where recorded. Of what is
-    built in one sees the front.
+    Most things are looked for all over their boxes, the oriented ones where recorded; of what is
+    built in one sees the front, of a shelf the board.
     """
     kind = world.types[i]
     if kind == "Floor":
         return points_on_top(np.array([world.low[i], world.high[i]]))
     if kind == "CounterTop" and i < len(world.scene):
         return np.concatenate([_outside(box) for box in carcass(world.scene.name, i).slab])
-    if kind in ("Drawer", "Cabinet"):
+    if kind in _FROM_OUTSIDE:
         middle, size, yaw = upright_box(world, i)
-        box = np.array([-size / 2, size / 2])
-        points = points_on_face(box, 2, 1, _OUT)
-        if kind == "Cabinet" and i not in hosts(world.scene.name):
-            sides = [points_on_face(box, axis, sign, _OUT) for axis in (0, 1) for sign in (-1, 1)]
-            points = np.concatenate([points, *sides])
+        built_in = i in hosts(world.scene.name)
+        points = _FROM_OUTSIDE[kind](np.array([-size / 2, size / 2]), built_in)
         return points @ unity_rotation((0.0, yaw, 0.0)).T + middle
+    inset = ROUND if kind in _ROUND or world.has(i, "pickupable") else INSET
     if np.isnan(world.obb[i, 0, 0]):
-        box = np.array([[world.low[i], world.high[i]]])
-        return points_on(box)
+        size = world.high[i] - world.low[i]
+        return world.low[i] + surface_fractions(size, inset) * size
     corner, edges = world.obb[i, 0], world.obb[i, 1:]
-    points = corner + surface_fractions(np.linalg.norm(edges, axis=1)) @ edges
+    points = corner + surface_fractions(np.linalg.norm(edges, axis=1), inset) @ edges
     return points @ unity_rotation(world.rotation[i]).T + world.position[i]
+
+
+def _front(box: Floats, built_in: bool) -> Floats:
+    return points_on_face(box, 2, 1, _OUT, _CLOSE)
+
+
+def _cabinet(box: Floats, built_in: bool) -> Floats:
+    """The front, and all but the back of one that is not built in."""
+    if built_in:
+        return _front(box, built_in)
+    sides = [points_on_face(box, axis, sign, _OUT) for axis in (0, 1) for sign in (-1, 1)]
+    return np.concatenate([_front(box, built_in), *sides])
+
+
+def _shelf(box: Floats, built_in: bool) -> Floats:
+    """The upper side of the board that the room above it is named after, and its edges."""
+    top = box.copy()
+    top[1, 1] = top[0, 1]
+    edges = [points_on_face(top, axis, sign, 0.0)[1::3] for axis in (0, 2) for sign in (-1, 1)]
+    return np.concatenate([points_on_face(top, 1, 1, 0.005), *(e - [0, _BOARD, 0] for e in edges)])
+
+
+_FROM_OUTSIDE = {"Drawer": _front, "Cabinet": _cabinet, "Shelf": _shelf}
 
 
 def _outside(box: Floats) -> Floats:
