@@ -113,13 +113,16 @@ def _pedestals(mesh: Mesh, look: Look, under: float, colour: Colour) -> bool:
     stacks: list[list[float]] = []
     for low, high in sorted(fitted):
         if not stacks or low[0] > stacks[-1][1] - 0.02:
-            stacks.append([low[0], high[0], low[1], high[1], high[2]])
+            stacks.append([low[0], high[0], low[1], high[1], low[2], high[2]])
         else:
-            x0, x1, y0, y1, z = stacks[-1]
-            stacks[-1] = [x0, max(x1, high[0]), min(y0, low[1]), max(y1, high[1]), max(z, high[2])]
-    for x0, x1, y0, y1, z in stacks:
-        near = (max(x0 - 0.012, -w / 2 + 0.01), max(y0 - 0.012, 0.0), -d / 2 + 0.02)
-        far = (min(x1 + 0.012, w / 2 - 0.01), min(y1 + 0.03, under), min(z, d / 2) - 0.055)
+            x0, x1, y0, y1, z0, z1 = stacks[-1]
+            stacks[-1] = [x0, max(x1, high[0]), min(y0, low[1]), max(y1, high[1]),
+                          min(z0, low[2]), max(z1, high[2])]  # fmt: skip
+    for x0, x1, y0, y1, z0, z1 in stacks:
+        # A table that stands in the open has drawers at its back as well.
+        back = z0 + 0.055 if look.kind == "CoffeeTable" and z0 < -d / 2 + 0.05 else -d / 2 + 0.02
+        near = (max(x0 - 0.012, -w / 2 + 0.01), max(y0 - 0.012, 0.0), back)
+        far = (min(x1 + 0.012, w / 2 - 0.01), min(y1 + 0.03, under), min(z1, d / 2) - 0.055)
         case(mesh, near, far, colour, shaded(colour, 0.4))
     return any(stack[2] < 0.4 * under for stack in stacks)
 

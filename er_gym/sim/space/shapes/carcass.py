@@ -20,6 +20,8 @@ from er_gym.sim.space.surfaces import recorded_surfaces
 
 SLAB = 0.035
 """Thickness of a counter's slab, metres."""
+SUNK = 0.001
+"""How far under what stands on it a slab ends, metres: what lies flat is thin."""
 LET_IN = frozenset({"Sink", "Bathtub"})
 """What goes through a slab."""
 LIP = 0.02
@@ -126,7 +128,7 @@ def slab_top(scene_name: str, i: int) -> float:
     scene = load_scene(scene_name)
     height = float(scene.aabb_size[i, 1])
     surface = recorded_surfaces(scene_name).get(i, height)
-    return float(scene.aabb_center[i, 1]) - height / 2 + min(max(surface, 0.0), height) + 0.002
+    return float(scene.aabb_center[i, 1]) - height / 2 + min(max(surface, 0.0), height) - SUNK
 
 
 def _set_back(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 _SPACING = 0.3
 """Big boxes get a point about every so many metres, small ones three along each side."""
 _MOST = 11
-INSET, ROUND = 0.03, 0.12
+INSET, ROUND = 0.03, 0.2
 """How far inside a box's edges the outer points lie, as a fraction of its size: of furniture, and
 of what is round, whose corners are air."""
 
