@@ -24,6 +24,9 @@ _BOARD = 0.03
 _LEG = 0.05
 """Side of a leg, metres."""
 
+_PEDESTAL = 0.45
+"""A sink that is higher than this stands on a foot, metres."""
+
 
 def whole(w: float, h: float, d: float, s: float) -> Parts:
     """The box itself."""
@@ -89,6 +92,16 @@ def basin(w: float, h: float, d: float, s: float) -> Parts:
         ((0, 0, wall), (wall, h, d - wall)),
         ((w - wall, 0, wall), (w, h, d - wall)),
     ]
+
+
+def bowl(w: float, h: float, d: float, s: float) -> Parts:
+    """What of a sink hides things: the bowl of one on a foot; the rim of one let in is flat."""
+    low, wall = h - 0.28, 0.1 * min(w, d)
+    if h < _PEDESTAL:
+        return []
+    around = basin(w, h - low - 0.02, d, s)[1:]
+    lifted = [((a, b + low, c), (e, f + low, g)) for (a, b, c), (e, f, g) in around]
+    return [((wall, low, wall), (w - wall, low + 0.03, d - wall)), *lifted]
 
 
 def boards(w: float, h: float, d: float, s: float) -> Parts:
@@ -181,7 +194,7 @@ _BY_TYPES = {
     "DogBed": Family(hides=_core(1.0, 0.5), stand=0.5),
     "Toilet": Family(toilet, stand=1.0),
     "Bathtub": Family(basin, stand=None),
-    "Sink": Family(basin, nothing, stand=None),
+    "Sink": Family(basin, bowl, stand=None),
     "Box GarbageCan LaundryHamper": Family(basin, _core(0.9, 0.9), stand=None),
     "ShelvingUnit": Family(boards, nothing),
     "Shelf": Family(shelf, nothing, stand=None),

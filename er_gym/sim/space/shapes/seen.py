@@ -26,12 +26,22 @@ if TYPE_CHECKING:
 
 SOLID = ("Drawer", "Cabinet", "CounterTop", "StoveBurner")
 """Types that are seen from outside only: their own boxes hide the points on their far sides."""
-SLABS = ("CounterTop",)
-"""Types that hide what lies on them from who looks from below."""
+SLABS = (
+    "CounterTop", "Desk", "CoffeeTable", "SideTable", "DiningTable", "Dresser", "TVStand", "Sofa",
+    "ArmChair", "Bed", "Sink",
+)  # fmt: skip
+"""Types that hide what lies on them from who looks from below or behind.
+
+What lies in other things, a bowl or a bin, is in the midst of their boxes.
+"""
 _ROUND = frozenset(
     {"Faucet", "FloorLamp", "DeskLamp", "GarbageCan", "HousePlant", "StoveBurner", "StoveKnob", "Toilet"}
 )
 """What is round though it cannot be carried."""
+_SQUARE = frozenset(
+    {"Book", "Box", "CellPhone", "Cloth", "Laptop", "Newspaper", "Pillow", "TissueBox", "Towel"}
+)
+"""What fills its box though it can be carried."""
 _OUT = 0.01
 """How far before their faces the points of solid things lie, metres."""
 _BOARD = 0.015
@@ -57,7 +67,9 @@ def points_to_see(world: World, i: int) -> Floats:
         built_in = i in hosts(world.scene.name)
         points = _FROM_OUTSIDE[kind](np.array([-size / 2, size / 2]), built_in)
         return points @ unity_rotation((0.0, yaw, 0.0)).T + middle
-    inset = ROUND if kind in _ROUND or world.has(i, "pickupable") else INSET
+    inset = INSET
+    if kind in _ROUND or (kind not in _SQUARE and world.has(i, "pickupable")):
+        inset = ROUND
     if np.isnan(world.obb[i, 0, 0]):
         size = world.high[i] - world.low[i]
         return world.low[i] + surface_fractions(size, inset) * size
