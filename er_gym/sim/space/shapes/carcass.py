@@ -6,7 +6,7 @@ objects; the carcass between and behind them is not. Only a few counters reach d
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -33,7 +33,7 @@ _FAR_BACK = 0.3
 _BEHIND = 0.01
 """How far behind the fronts of what is built in it ends, metres."""
 _DEEP = 0.35
-"""Fronts that are farther in than this do not make a carcass end there on the whole side, metres."""
+"""Fronts farther in than this do not make a carcass end at them on its whole side, metres."""
 _TOUCH = 0.05
 """Parts of a counter that are no farther apart than this go on without an edge, metres."""
 TALL = 0.3
@@ -151,7 +151,11 @@ def _set_back(
             found.append(part[k])
             continue
         edge = sign * part[k] - back
-        before = [sign * f.at - _BEHIND for f in row if (f.axis, f.sign) == (axis, sign) and _before(f, part)]
+        before = [
+            sign * f.at - _BEHIND
+            for f in row
+            if (f.axis, f.sign) == (axis, sign) and _before(f, part)
+        ]
         near = [at for at in before if at > edge - _DEEP]
         found.append(sign * min(edge, max(near, default=edge)))
     return found[0], found[1], found[2], found[3]
@@ -188,9 +192,7 @@ def _niches(scene: Scene, floor: float, under: float) -> list[Rectangle]:
         high = low + scene.aabb_size[j]
         stands = moves[j].any() and low[1] < floor + _ON_THE_FLOOR
         if (stands or scene.types[j] in _OPEN_UNDER) and low[1] < under:
-            found.append(
-                (low[0] - _NICHE, low[2] - _NICHE, high[0] + _NICHE, high[2] + _NICHE)
-            )
+            found.append((low[0] - _NICHE, low[2] - _NICHE, high[0] + _NICHE, high[2] + _NICHE))
     return found
 
 

@@ -29,10 +29,10 @@ _NARROW = 0.15
 def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
     """(R, 2, 2) corners x, z of the rectangles that the box of recorded object i comes down to.
 
-    What the agent's body sweeps as it walks is free floor, whatever the box says, and where other
+    What the agent's body sweeps as it walks is free floor, whatever the box says. Where other
     large furniture stands there is no counter either, nor right before a cabinet or a drawer. The
-    largest rectangle of the rest is taken, then the largest of what that leaves, and so on. A box that is swept altogether is left whole:
-    one can walk under it.
+    largest rectangle of the rest is taken, then the largest of what that leaves, and so on. A box
+    that is swept altogether is left whole: one can walk under it.
     """
     scene = load_scene(scene_name)
     low = (scene.aabb_center[i] - scene.aabb_size[i] / 2)[[0, 2]]
@@ -45,7 +45,9 @@ def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
             (x0, z0), (x1, z1) = np.clip(np.ceil((edges - first) / _CELL), 0, None).astype(int)
             left[x0:x1, z0:z1] = False
     for x0, z0, x1, z1 in _before_fronts(scene_name, i, low, high):
-        a, b = np.clip(np.ceil((np.array([[x0, z0], [x1, z1]]) - first) / _CELL), 0, None).astype(int)
+        a, b = np.clip(np.ceil((np.array([[x0, z0], [x1, z1]]) - first) / _CELL), 0, None).astype(
+            int
+        )
         left[a[0] : b[0], a[1] : b[1]] = False
     found = []
     while True:

@@ -24,6 +24,8 @@ _BOARD = 0.03
 _LEG = 0.05
 """Side of a leg, metres."""
 
+_DOOR = 0.03
+"""Thickness of a front, as a share of the depth of what is behind it."""
 _PEDESTAL = 0.45
 """A sink that is higher than this stands on a foot, metres."""
 
@@ -132,6 +134,11 @@ def desk(w: float, h: float, d: float, s: float) -> Parts:
     ]
 
 
+def closed(w: float, h: float, d: float, s: float) -> Parts:
+    """All but a little at the front and the back: doors and drawers stand before it."""
+    return [((0, 0, _DOOR * d), (w, h, (1 - _DOOR) * d))]
+
+
 def open_case(w: float, h: float, d: float, s: float) -> Parts:
     """A case that is open at its front, but for its bottom."""
     return boards(w, s if s > 0.6 * h else h, d, s)[1:]
@@ -167,6 +174,7 @@ class Family:
         parts: what they consist of.
         hides: what of them hides what is behind it, if not all parts: leaves, glass and lattices
             hide nothing.
+        snug: whether the boxes that hide things are as wide as they are recorded.
         stand: where things stand, as a share of the height, where the record shows none standing;
             None for near the floor of the box.
     """
@@ -174,6 +182,7 @@ class Family:
     parts: Builder = whole
     hides: Builder | None = None
     stand: float | None = 1.0
+    snug: bool = False
 
 
 _CASE = Family(stand=None)
@@ -198,7 +207,9 @@ _BY_TYPES = {
     "Box GarbageCan LaundryHamper": Family(basin, _core(0.9, 0.9), stand=None),
     "ShelvingUnit": Family(boards, nothing),
     "Shelf": Family(shelf, nothing, stand=None),
-    "Cabinet Drawer Fridge Microwave Safe Cart Toaster CoffeeMachine": _CASE,
+    "Cabinet Drawer": Family(hides=closed, stand=None, snug=True),
+    "Dresser": Family(hides=closed, snug=True),
+    "Fridge Microwave Safe Cart Toaster CoffeeMachine": _CASE,
     "Pot Pan Bowl Plate Cup Mug": _VESSEL,
     "HousePlant": Family(plant, lambda w, h, d, s: plant(w, h, d, s)[:1]),
     "FloorLamp DeskLamp": Family(lamp, nothing),

@@ -12,7 +12,7 @@ from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.shapes.carcass import carcass
 from er_gym.sim.space.shapes.counters import rectangles
 from er_gym.sim.space.shapes.facing import facings
-from er_gym.sim.space.shapes.families import parts
+from er_gym.sim.space.shapes.families import family, parts
 from er_gym.sim.space.shapes.frame import trimmed, turned
 from er_gym.sim.space.surfaces import recorded_surfaces
 
@@ -63,7 +63,10 @@ def _of_family(world: World, i: int) -> Shape:
     )
     upright = made_of - size / 2
     boxes = turned(np.concatenate([upright, hiding - size / 2]), yaw) + middle
-    return Shape(middle, yaw, upright, boxes[: len(upright)], trimmed(boxes[len(upright) :]))
+    hides = boxes[len(upright) :]
+    if not family(world.types[i], world.has(i, "pickupable")).snug:
+        hides = trimmed(hides)
+    return Shape(middle, yaw, upright, boxes[: len(upright)], hides)
 
 
 def upright_box(world: World, i: int) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.scene import load_scene
 from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.shapes.built_in import hosts
 from er_gym.sim.space.shapes.carcass import carcass
@@ -35,7 +33,16 @@ SLABS = (
 What lies in other things, a bowl or a bin, is in the midst of their boxes.
 """
 _ROUND = frozenset(
-    {"Faucet", "FloorLamp", "DeskLamp", "GarbageCan", "HousePlant", "StoveBurner", "StoveKnob", "Toilet"}
+    {
+        "Faucet",
+        "FloorLamp",
+        "DeskLamp",
+        "GarbageCan",
+        "HousePlant",
+        "StoveBurner",
+        "StoveKnob",
+        "Toilet",
+    }
 )
 """What is round though it cannot be carried."""
 _SQUARE = frozenset(
@@ -66,13 +73,13 @@ def points_to_see(world: World, i: int) -> Floats:
         middle, size, yaw = upright_box(world, i)
         built_in = i in hosts(world.scene.name)
         points = _FROM_OUTSIDE[kind](np.array([-size / 2, size / 2]), built_in)
-        return points @ unity_rotation((0.0, yaw, 0.0)).T + middle
+        return np.asarray(points @ unity_rotation((0.0, yaw, 0.0)).T + middle)
     inset = INSET
     if kind in _ROUND or (kind not in _SQUARE and world.has(i, "pickupable")):
         inset = ROUND
     if np.isnan(world.obb[i, 0, 0]):
         size = world.high[i] - world.low[i]
-        return world.low[i] + surface_fractions(size, inset) * size
+        return np.asarray(world.low[i] + surface_fractions(size, inset) * size)
     corner, edges = world.obb[i, 0], world.obb[i, 1:]
     points = corner + surface_fractions(np.linalg.norm(edges, axis=1), inset) @ edges
     return points @ unity_rotation(world.rotation[i]).T + world.position[i]
