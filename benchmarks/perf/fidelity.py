@@ -61,7 +61,7 @@ def recorded_rows() -> Iterator[Row]:
     yield Row(
         "at 0.1 m: inside furniture or outside the floor",
         f"{floor.in_furniture + floor.outside} of {floor.fine}", "0",
-        floor.in_furniture + floor.outside == 0,
+        bool(floor.in_furniture + floor.outside == 0),
     )  # fmt: skip
     yield Row(
         "at 0.1 m: scenes connected as recorded, or better",
@@ -114,7 +114,9 @@ def captured_rows(captures_file: Path) -> Iterator[Row]:
     found = rooms(captures)
     for name, gaps in (("agent's height", found.agent), ("camera's height", found.camera)):
         farthest = float(abs(gaps).max())
-        yield Row(f"{name}: farthest off", f"{100 * farthest:.2f} cm", "1 cm", farthest <= 0.01)
+        yield Row(
+            f"{name}: farthest off", f"{100 * farthest:.2f} cm", "1 cm", bool(farthest <= 0.01)
+        )
     right = len(captures) - len(found.missed)
     yield Row(
         "room bounds: scenes within 0.25 m",
@@ -128,7 +130,11 @@ def captured_rows(captures_file: Path) -> Iterator[Row]:
 def _share(name: str, part: int, whole: int, bound: float | None = None) -> Row:
     share = part / whole
     figure = f"{share:.3f} ({part} of {whole})"
-    return Row(name, figure) if bound is None else Row(name, figure, f"≥ {bound}", share >= bound)
+    return (
+        Row(name, figure)
+        if bound is None
+        else Row(name, figure, f"≥ {bound}", bool(share >= bound))
+    )
 
 
 @click.command()

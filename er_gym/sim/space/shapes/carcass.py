@@ -44,6 +44,8 @@ _NICHE = 0.02
 """The room around what stands under a counter, metres."""
 _LEAST = 0.08
 """Narrower pieces of a carcass are left out, metres."""
+_MOST_OF_IT = 0.75
+"""A slab of which more than this share rests on its carcass juts out little."""
 _ON_THE_FLOOR = 0.1
 _OPEN_UNDER = frozenset({"Shelf", "ShelvingUnit"})
 """Fixed things under a counter that are open at their front."""
@@ -71,16 +73,25 @@ class Carcass:
     own: bool
 
     @property
-    def solid(self) -> NDArray[np.float64]:
-        """(B, 2, 3) boxes of the carcass, hollow where something is let in."""
+    def hiding(self) -> NDArray[np.float64]:
+        """(B, 2, 3) boxes that hide what is behind them: few, for each costs time.
+
+        The carcass, up to the top and hollow where something is let in; and the slab as well where
+        it juts out far.
+        """
         found: list[NDArray[np.float64]] = []
+        top = self.under + SLAB
         pits = [(low[0], low[2], high[0], high[2]) for low, high in self.holes]
         for rectangle in self.footprint:
-            found += [_box(piece, self.floor, self.under) for piece in without(rectangle, pits)]
+            found += [_box(piece, self.floor, top) for piece in without(rectangle, pits)]
             for pit, (low, _) in zip(pits, self.holes, strict=True):
                 piece = _common(rectangle, pit)
                 if piece is not None and low[1] > self.floor:
                     found.append(_box(piece, self.floor, float(low[1])))
+        covered = sum((x1 - x0) * (z1 - z0) for x0, z0, x1, z1 in self.footprint)
+        whole = np.prod((self.slab[:, 1] - self.slab[:, 0])[:, [0, 2]], axis=1).sum()
+        if covered < _MOST_OF_IT * whole:
+            found += list(self.slab)
         return _stacked(found)
 
 

@@ -103,5 +103,4 @@ def _counter(world: World, i: int) -> Shape:
     boxes = np.empty((len(tops), 2, 3))
     boxes[:, :, [0, 2]] = tops
     boxes[:, 0, 1], boxes[:, 1, 1] = world.low[i, 1], world.high[i, 1]
-    under = carcass(world.scene.name, i)
-    return Shape(middle, 0.0, boxes - middle, boxes, np.concatenate([under.slab, under.solid]))
+    return Shape(middle, 0.0, boxes - middle, boxes, carcass(world.scene.name, i).hiding)

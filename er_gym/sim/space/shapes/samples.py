@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-_SPACING = 0.3
+_SPACING = 0.5
 """Big boxes get a point about every so many metres, small ones three along each side."""
 _MOST = 11
 INSET, ROUND = 0.03, 0.2

@@ -68,7 +68,7 @@ def points_to_see(world: World, i: int) -> Floats:
     if kind == "Floor":
         return points_on_top(np.array([world.low[i], world.high[i]]))
     if kind == "CounterTop" and i < len(world.scene):
-        return np.concatenate([_outside(box) for box in carcass(world.scene.name, i).slab])
+        return np.concatenate([_slab(box) for box in carcass(world.scene.name, i).slab])
     if kind in _FROM_OUTSIDE:
         middle, size, yaw = upright_box(world, i)
         built_in = i in hosts(world.scene.name)
@@ -93,22 +93,29 @@ def _cabinet(box: Floats, built_in: bool) -> Floats:
     """The front, and all but the back of one that is not built in."""
     if built_in:
         return _front(box, built_in)
-    sides = [points_on_face(box, axis, sign, _OUT) for axis in (0, 1) for sign in (-1, 1)]
+    # Every other one: the front is what shows, and each point costs time.
+    sides = [points_on_face(box, axis, sign, _OUT)[::2] for axis in (0, 1) for sign in (-1, 1)]
     return np.concatenate([_front(box, built_in), *sides])
 
 
 def _shelf(box: Floats, built_in: bool) -> Floats:
     """The upper side of the board that the room above it is named after, and its edges."""
-    top = box.copy()
-    top[1, 1] = top[0, 1]
-    edges = [points_on_face(top, axis, sign, 0.0)[1::3] for axis in (0, 2) for sign in (-1, 1)]
-    return np.concatenate([points_on_face(top, 1, 1, 0.005), *(e - [0, _BOARD, 0] for e in edges)])
+    board = box.copy()
+    board[:, 1] = box[0, 1] - 2 * _BOARD, box[0, 1]
+    return _slab(board, 0.005, 0.0)
 
 
 _FROM_OUTSIDE = {"Drawer": _front, "Cabinet": _cabinet, "Shelf": _shelf}
 
 
-def _outside(box: Floats) -> Floats:
-    """Points before all faces of a slab but the lower one."""
-    faces = ((1, 1), (0, -1), (0, 1), (2, -1), (2, 1))
-    return np.concatenate([points_on_face(box, axis, sign, _OUT) for axis, sign in faces])
+def _slab(box: Floats, above: float = _OUT, out: float = _OUT) -> Floats:
+    """Points on the upper side of something flat, and one row along each of its edges."""
+    top = points_on_face(box, 1, 1, above)
+    rows = []
+    for axis in (0, 2):
+        for edge, beyond in ((box[0, axis], -out), (box[1, axis], out)):
+            nearest = np.abs(top[:, axis] - edge)
+            row = top[nearest < nearest.min() + 1e-9].copy()
+            row[:, axis], row[:, 1] = edge + beyond, box[:, 1].mean()
+            rows.append(row)
+    return np.concatenate([top, *rows])
