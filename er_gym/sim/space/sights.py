@@ -259,12 +259,17 @@ def _boxes(world: World, rows: Iterable[int]) -> tuple[Floats, Floats, NDArray[n
 def _own(world: World, whose: NDArray[np.intp]) -> NDArray[np.bool_]:
     """(N, M) which boxes hide nothing of which object: its own, and those of what it lies in.
 
-    Of what is seen from outside only, the own ones do; and a slab hides what lies on it.
+    Of what is seen from outside only, the own ones do; and a slab hides what lies on it. The
+    carcass of a counter is hollow where an open cabinet or drawer in it is.
     """
     solid = np.isin(world.types, SOLID)
     mine = (np.arange(len(world))[:, None] == whose) & ~solid[:, None]
     slabs = np.isin(world.types, SLABS)
-    return np.asarray(mine | (world.nesting.within[:, whose] & ~slabs[whose]))
+    found = mine | (world.nesting.within[:, whose] & ~slabs[whose])
+    in_counter = world.nesting.within[:, list(world.of_type("Cabinet", "Drawer"))].any(axis=1)
+    carcasses = np.isin(world.types, "CounterTop")[whose]
+    found[np.ix_(in_counter, carcasses)] = True
+    return np.asarray(found)
 
 
 def _rectangle(outlines: Outlines) -> _Rectangle:
