@@ -72,7 +72,7 @@ def points_to_see(world: World, i: int) -> Floats:
     if kind in _FROM_OUTSIDE:
         middle, size, yaw = upright_box(world, i)
         built_in = i in hosts(world.scene.name)
-        points = _FROM_OUTSIDE[kind](np.array([-size / 2, size / 2]), built_in)
+        points: Floats = _FROM_OUTSIDE[kind](np.array([-size / 2, size / 2]), built_in)
         return np.asarray(points @ unity_rotation((0.0, yaw, 0.0)).T + middle)
     inset = INSET
     if kind in _ROUND or (kind not in _SQUARE and world.has(i, "pickupable")):
@@ -82,7 +82,7 @@ def points_to_see(world: World, i: int) -> Floats:
         return np.asarray(world.low[i] + surface_fractions(size, inset) * size)
     corner, edges = world.obb[i, 0], world.obb[i, 1:]
     points = corner + surface_fractions(np.linalg.norm(edges, axis=1), inset) @ edges
-    return points @ unity_rotation(world.rotation[i]).T + world.position[i]
+    return np.asarray(points @ unity_rotation(world.rotation[i]).T + world.position[i])
 
 
 def _front(box: Floats, built_in: bool) -> Floats:
