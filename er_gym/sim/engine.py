@@ -8,7 +8,7 @@ from typing import Any
 from weakref import ReferenceType, ref
 
 from er_gym.sim.actions import perform
-from er_gym.sim.errors import INVALID_ARGUMENT, MISSING_ARGUMENTS, ActionFailed
+from er_gym.sim.errors import ActionFailed, WrongCall
 from er_gym.sim.lazy import LazyMetadata
 from er_gym.sim.metadata import metadata
 from er_gym.sim.render.view import View, draw, with_flags
@@ -47,13 +47,13 @@ class Engine:
         last = None if self._last is None else self._last()
         if last is not None and name != "Reset":  # after which there is another world
             last.settle()  # somebody keeps it: it must not speak of what comes now
-        reply, error, code = None, "", ""
+        reply, error, code = None, "", None
         try:
             if name == "Reset":
                 self._reset(request)
             else:
                 reply = perform(self.world, request)
-        except ActionFailed as failure:
+        except (ActionFailed, WrongCall) as failure:
             error, code = str(failure), failure.code
         settings = self.world.settings
         self.world.settings = with_flags(settings, request)
@@ -64,12 +64,12 @@ class Engine:
         return report, frames
 
     def _reset(self, request: Mapping[str, Any]) -> None:
-        name = request.get("sceneName")
+        name = request.get("sceneName") or self.world.scene.name  # none: the same again
         if not isinstance(name, str):
-            raise ActionFailed("Reset needs sceneName, such as FloorPlan1.", MISSING_ARGUMENTS)
+            raise ActionFailed(f"sceneName is a text such as FloorPlan1, not {name!r:.200}.")
         try:
             scene = load_scene(name)
         except UnknownSceneError as error:
-            raise ActionFailed(str(error), INVALID_ARGUMENT) from None
+            raise ActionFailed(str(error)) from None
         size = self.world.settings
         self.world = World.load(scene, replace(Settings(), width=size.width, height=size.height))

@@ -221,9 +221,7 @@ class World:
         """
         i = self.index.get(object_id)
         if i is None or not self.exists[i]:
-            raise ActionFailed(
-                f"No object with ID {object_id!r:.200} is in {self.scene.name}.", "ObjectNotFound"
-            )
+            raise ActionFailed(f"No object with ID {object_id!r:.200} is in {self.scene.name}.")
         return i
 
     @property

@@ -6,14 +6,14 @@ from collections import OrderedDict
 from itertools import islice
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
 from er_gym.sim import consequences
 from er_gym.sim.actions.checks import FARTHEST, within
 from er_gym.sim.actions.pick_place import fall, put_down
 from er_gym.sim.actions.registry import Vector, action, quoted
 from er_gym.sim.compatibility import accepts
-from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.containment import receptacles_of
 from er_gym.sim.space.placement import free_spots
 from er_gym.sim.world import World
@@ -29,8 +29,6 @@ _SAME = 1e-3
 class ObjectPose(BaseModel):
     """Where ``SetObjectPoses`` wants an object: its ``name`` in the metadata, metres, degrees."""
 
-    model_config = ConfigDict(extra="forbid")
-
     objectName: str
     position: Vector
     rotation: Vector
@@ -43,9 +41,9 @@ class ObjectTypeCount(BaseModel):
     count: int
 
 
-@action("SetObjectPoses")
+@action("SetObjectPoses", server_action=True)
 def set_object_poses(
-    world: World, *, objectPoses: list[ObjectPose], placeStationary: bool = True
+    world: World, *, objectPoses: list[ObjectPose] | None = None, placeStationary: bool = True
 ) -> None:
     """Put what can be carried or pushed exactly where it is wanted, and take the rest away.
 
@@ -53,6 +51,8 @@ def set_object_poses(
     named again is copied, nobody asks whether there is room, and what has moved gets the id of its
     new place. ``placeStationary`` False lets things fall from there.
     """
+    if objectPoses is None:
+        raise ActionFailed("objectPoses was not initialized correctly: it lists no pose.")
     # Rooms are mostly arranged right after they are loaded, and the same way again and again.
     wanted = (world.scene.name, placeStationary, *map(_key, objectPoses))
     fresh = world.untouched
@@ -73,8 +73,7 @@ def set_object_poses(
         if pose.objectName not in loose:
             raise ActionFailed(
                 f"No pickupable or moveable object is named {quoted(pose.objectName)} in this "
-                "scene; names are those of the metadata's objects, not their ids.",
-                "ObjectNotFound",
+                "scene; names are those of the metadata's objects, not their ids."
             )
     if not objectPoses:
         return
@@ -158,8 +157,7 @@ def initial_random_spawn(
     ):
         if wanted:
             raise ActionFailed(
-                f"The embedded engine's InitialRandomSpawn has no {name}; backend='unity' has.",
-                INVALID_ARGUMENT,
+                f"The embedded engine's InitialRandomSpawn has no {name}; backend='unity' has."
             )
     random = np.random.default_rng(randomSeed % 2**64)
     excluded_types = frozenset(excludedReceptacles or ())

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import BaseModel, ConfigDict
 
-from er_gym.sim.actions.checks import FARTHEST, FIELDS_OF_VIEW, within
+from er_gym.sim.actions.checks import FARTHEST, field_of_view, within
 from er_gym.sim.actions.registry import Vector, action
-from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.errors import ActionFailed
 from er_gym.sim.world import ThirdPartyCamera, World
-
-_AntiAliasing = Literal["none", "fxaa", "smaa", "taa"]
 
 
 class PartialVector(BaseModel):
@@ -27,7 +23,7 @@ class PartialVector(BaseModel):
 @action("ChangeFOV")
 def change_fov(world: World, *, fieldOfView: float) -> None:
     """Give the agent's camera another vertical field of view, in degrees."""
-    within("fieldOfView", fieldOfView, *FIELDS_OF_VIEW)
+    field_of_view("fov", fieldOfView)
     world.configure(field_of_view=fieldOfView)
 
 
@@ -38,18 +34,21 @@ def add_third_party_camera(
     position: Vector,
     rotation: Vector,
     fieldOfView: float = 90.0,
-    orthographic: bool = False,
     skyboxColor: str | None = None,
-    antiAliasing: _AntiAliasing = "none",
+    orthographic: bool = False,
+    orthographicSize: float | None = None,
+    nearClippingPlane: float | None = None,
+    farClippingPlane: float | None = None,
+    antiAliasing: str = "none",
 ) -> None:
     """Set up another camera, at a point in metres and a rotation in degrees.
 
-    ``skyboxColor`` and ``antiAliasing`` are accepted and change nothing: the room is drawn around
-    every camera, so that no sky is seen, and edges are drawn as they are.
+    ``skyboxColor``, ``antiAliasing`` and the clipping planes are accepted and change nothing: the
+    room is drawn around every camera, so that no sky is seen, and edges are drawn as they are.
     """
-    _no_orthographic(orthographic)
+    _no_orthographic(orthographic, orthographicSize)
     _no_farther(position, rotation)
-    within("fieldOfView", fieldOfView, *FIELDS_OF_VIEW)
+    field_of_view("fieldOfView", fieldOfView)
     camera = ThirdPartyCamera(
         (position.x, position.y, position.z), (rotation.x, rotation.y, rotation.z), fieldOfView
     )
@@ -64,19 +63,21 @@ def update_third_party_camera(
     position: PartialVector | None = None,
     rotation: PartialVector | None = None,
     fieldOfView: float | None = None,
-    orthographic: bool = False,
     skyboxColor: str | None = None,
+    orthographic: bool | None = None,
+    orthographicSize: float | None = None,
+    nearClippingPlane: float | None = None,
+    farClippingPlane: float | None = None,
 ) -> None:
     """Move, turn or zoom a third-party camera; what is not given stays as it is."""
-    _no_orthographic(orthographic)
+    _no_orthographic(orthographic, orthographicSize)
     _no_farther(position, rotation)
-    within("fieldOfView", fieldOfView, *FIELDS_OF_VIEW)
+    if fieldOfView is not None:
+        field_of_view("fieldOfView", fieldOfView)
     count = len(world.cameras)
     if not 0 <= thirdPartyCameraId < count:
         there = f"of 0 to {count - 1}" if count else "yet: AddThirdPartyCamera makes one"
-        raise ActionFailed(
-            f"There is no third-party camera {thirdPartyCameraId} {there}.", INVALID_ARGUMENT
-        )
+        raise ActionFailed(f"There is no third-party camera {thirdPartyCameraId} {there}.")
     old = world.cameras[thirdPartyCameraId]
     cameras = list(world.cameras)
     cameras[thirdPartyCameraId] = ThirdPartyCamera(
@@ -100,12 +101,15 @@ def _updated(
     )
 
 
-def _no_orthographic(orthographic: bool) -> None:
+def _no_orthographic(orthographic: bool | None, size: float | None) -> None:
     if orthographic:
         raise ActionFailed(
             "The embedded engine draws in perspective only, not orthographic=True; "
-            "backend='unity' has both.",
-            INVALID_ARGUMENT,
+            "backend='unity' has both."
+        )
+    if size is not None:
+        raise ActionFailed(
+            f"orthographicSize ({size:g}) can only be set when orthographic=True."
         )
 
 

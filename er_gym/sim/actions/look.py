@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from er_gym.sim.actions.registry import action
+from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.world import World
 
 LOOK_STEP = 30.0
 """Default tilt of LookUp and LookDown, degrees."""
+BEYOND_THE_LIMIT = "LookDownCantExceedMin"
+"""AI2-THOR's ``errorCode`` of a tilt too far, up or down."""
 LOOK_LIMITS = (-30.0, 60.0)
 """The camera tilts from 30 degrees up to 60 degrees down."""
 _TOLERANCE = 1e-3
@@ -19,39 +21,78 @@ def _turn(world: World, degrees: float) -> None:
     world.place_agent(replace(world.agent, rotation=(world.agent.rotation + degrees) % 360.0))
 
 
-def _tilt(world: World, degrees: float) -> None:
-    horizon = world.agent.horizon + degrees
+def _tilt(world: World, action: str, degrees: float, downwards: float) -> None:
+    if degrees < 0.0:
+        raise ActionFailed(
+            f"{action} action requires positive degree value. Invalid value used: {degrees:g}"
+        )
+    horizon = world.agent.horizon + downwards * (degrees or LOOK_STEP)
     low, high = LOOK_LIMITS
     if not low - _TOLERANCE <= horizon <= high + _TOLERANCE:
         raise ActionFailed(
-            f"The camera tilts from {low:g} (up) to {high:g} degrees (down); "
-            f"this would tilt it to {horizon:g}."
+            f"can't look beyond {-low:g} degrees above and {high:g} degrees below the forward "
+            f"horizon; this would tilt the camera to {horizon:g}.",
+            BEYOND_THE_LIMIT,
         )
     world.place_agent(replace(world.agent, horizon=horizon))
 
 
 @action("RotateRight")
-def rotate_right(world: World, *, degrees: float | None = None) -> None:
-    """Turn clockwise by some degrees (default: rotateStepDegrees)."""
+def rotate_right(
+    world: World,
+    *,
+    degrees: float | None = None,
+    manualInteract: bool = False,
+    forceAction: bool = False,
+    speed: float = 1.0,
+    waitForFixedUpdate: bool = False,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+    fixedDeltaTime: float = 0.02,
+) -> None:
+    """Turn clockwise by some degrees (default: rotateStepDegrees).
+
+    All else is accepted and has no effect: what is held runs into nothing here.
+    """
     _turn(world, world.settings.rotate_step if degrees is None else degrees)
 
 
 @action("RotateLeft")
-def rotate_left(world: World, *, degrees: float | None = None) -> None:
-    """Turn anticlockwise."""
+def rotate_left(
+    world: World,
+    *,
+    degrees: float | None = None,
+    manualInteract: bool = False,
+    forceAction: bool = False,
+    speed: float = 1.0,
+    waitForFixedUpdate: bool = False,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+    fixedDeltaTime: float = 0.02,
+) -> None:
+    """Turn anticlockwise, as ``RotateRight`` does clockwise."""
     _turn(world, -(world.settings.rotate_step if degrees is None else degrees))
 
 
-@action("LookUp")
-def look_up(world: World, *, degrees: float = LOOK_STEP) -> None:
-    """Tilt the camera up."""
-    _tilt(world, -degrees)
+@action("LookUp", server_action=True)
+def look_up(world: World, *, degrees: float = 0.0) -> None:
+    """Tilt the camera up by some degrees (0: by :data:`LOOK_STEP`)."""
+    _tilt(world, "LookUp", degrees, -1.0)
 
 
-@action("LookDown")
-def look_down(world: World, *, degrees: float = LOOK_STEP) -> None:
-    """Tilt the camera down."""
-    _tilt(world, degrees)
+@action("LookDown", server_action=True)
+def look_down(world: World, *, degrees: float = 0.0) -> None:
+    """Tilt the camera down, as ``LookUp`` does up."""
+    _tilt(world, "LookDown", degrees, 1.0)
+
+
+@action("RotateLook", server_action=True)
+def rotate_look(world: World, *, rotation: Vector | None = None, horizon: float = 0.0) -> None:
+    """Turn to a heading and tilt the camera to an angle; what is not given is 0."""
+    if abs(horizon) > 90.0:
+        raise ActionFailed(f"horizon must be within -90 and 90 degrees, not {horizon:g}.")
+    yaw = 0.0 if rotation is None else rotation.y % 360.0
+    world.place_agent(replace(world.agent, rotation=yaw, horizon=horizon))
 
 
 @action("Stand")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from er_gym.sim.actions.registry import Vector, action
-from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.standing import floor_of
 from er_gym.sim.world import Agent, World
 
@@ -19,8 +20,8 @@ _HEIGHT_TOLERANCE = 0.05
 
 def _step(world: World, magnitude: float | None, heading: float) -> None:
     size = world.settings.grid_size if magnitude is None else magnitude
-    if size < 0:
-        raise ActionFailed(f"moveMagnitude must be 0 or more, not {size:g}.", INVALID_ARGUMENT)
+    if size <= 0:
+        raise ActionFailed(f"moveMagnitude must be > 0, not {size:g}.")
     if size > _FARTHEST:
         raise ActionFailed(f"A wall is blocking the agent from moving by {size:g} m.")
     angle = np.radians(world.agent.rotation + heading)
@@ -76,28 +77,55 @@ def _obstacle(world: World, end: np.ndarray) -> str:
     return world.object_ids[rows[nearest]] if distance[nearest] < 0.25 else "A wall"
 
 
-@action("MoveAhead")
-def move_ahead(world: World, *, moveMagnitude: float | None = None) -> None:
-    """Step forward by moveMagnitude metres (default: gridSize)."""
-    _step(world, moveMagnitude, 0.0)
+_HEADINGS = {"MoveAhead": 0.0, "MoveRight": 90.0, "MoveBack": 180.0, "MoveLeft": 270.0}
+"""Where the agent goes by an action, clockwise from where it looks, degrees."""
 
 
-@action("MoveBack")
-def move_back(world: World, *, moveMagnitude: float | None = None) -> None:
-    """Step backward."""
-    _step(world, moveMagnitude, 180.0)
+def _mover(heading: float) -> Callable[..., None]:
+    def move(
+        world: World,
+        *,
+        moveMagnitude: float | None = None,
+        objectId: str = "",
+        maxAgentsDistance: float = -1.0,
+        forceAction: bool = False,
+        manualInteract: bool = False,
+        allowAgentsToIntersect: bool = False,
+        speed: float = 1.0,
+        fixedDeltaTime: float | None = None,
+        returnToStart: bool = True,
+        disableRendering: bool = True,
+    ) -> None:
+        """Step by moveMagnitude metres (default: gridSize) without turning.
+
+        With ``objectId``, no farther than ``maxAgentsDistance`` metres from that object. All else
+        is accepted and has no effect: what is held runs into nothing here.
+        """
+        start = world.agent
+        _step(world, moveMagnitude, heading)
+        if objectId and maxAgentsDistance > 0.0:
+            try:
+                _stay_near(world, objectId, maxAgentsDistance)
+            except ActionFailed:
+                world.place_agent(start)
+                raise
+
+    return move
 
 
-@action("MoveLeft")
-def move_left(world: World, *, moveMagnitude: float | None = None) -> None:
-    """Step to the left without turning."""
-    _step(world, moveMagnitude, 270.0)
+for _name, _heading in _HEADINGS.items():
+    action(_name)(_mover(_heading))
 
 
-@action("MoveRight")
-def move_right(world: World, *, moveMagnitude: float | None = None) -> None:
-    """Step to the right without turning."""
-    _step(world, moveMagnitude, 90.0)
+def _stay_near(world: World, object_id: str, most: float) -> None:
+    """Refuse to be farther than so many metres, along the floor, from an object's box."""
+    i = world.find(object_id)
+    here = world.agent.position
+    gap = np.clip(here, world.low[i], world.high[i]) - here
+    if np.hypot(gap[0], gap[2]) > most:
+        raise ActionFailed(
+            f"Agent movement would bring it beyond the max distance of {object_id}."
+        )
 
 
 @action("Teleport", "TeleportFull")
@@ -138,9 +166,7 @@ def teleport(
             "there. GetReachablePositions lists where the agent can stand."
         )
     if horizon is not None and not forceAction and not -90.0 <= horizon <= 90.0:
-        raise ActionFailed(
-            f"horizon must be within -90 and 90 degrees, not {horizon:g}.", INVALID_ARGUMENT
-        )
+        raise ActionFailed(f"horizon must be within -90 and 90 degrees, not {horizon:g}.")
     if not forceAction:
         there[1] = standing_at
     world.place_agent(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from er_gym.sim import consequences
+from er_gym.sim.actions.aim import object_action
 from er_gym.sim.actions.checks import require, target
-from er_gym.sim.actions.registry import action
-from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.errors import ActionFailed
 from er_gym.sim.world import World
 
 _ONLY_SHUT = frozenset({"Microwave"})
@@ -25,15 +25,25 @@ def _slide(world: World, i: int, openness: float) -> None:
     world.move_by(i, ahead * depth * (openness - world.openness[i]))
 
 
-@action("OpenObject")
+@object_action("OpenObject")
 def open_object(
-    world: World, *, objectId: str, openness: float = 1.0, forceAction: bool = False
+    world: World,
+    *,
+    objectId: str,
+    openness: float = 1.0,
+    forceAction: bool = False,
+    moveMagnitude: float | None = None,
 ) -> None:
-    """Open an object, to a share of its full opening in (0, 1]."""
+    """Open an object, to a share of its full opening in (0, 1].
+
+    ``moveMagnitude`` is the old name of ``openness``, of which 0 meant the full opening.
+    """
+    if moveMagnitude is not None:
+        openness = moveMagnitude or 1.0
     i = target(world, objectId, forceAction)
     require(world, i, "openable", "an openable object")
     if not 0.0 <= openness <= 1.0:
-        raise ActionFailed(f"openness must be within 0 and 1, not {openness:g}.", INVALID_ARGUMENT)
+        raise ActionFailed(f"openness must be in [0:1], not {openness:g}.")
     if world.state(i, "isOpen") and world.openness[i] == openness:
         raise ActionFailed(f"{objectId} is open already.")
     if world.types[i] in _ONLY_SHUT and world.state(i, "isToggled"):
@@ -43,7 +53,7 @@ def open_object(
     world.set_state(i, "isOpen", openness > 0.0)
 
 
-@action("CloseObject")
+@object_action("CloseObject")
 def close_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
     """Close an object."""
     i = target(world, objectId, forceAction)
@@ -60,9 +70,7 @@ def _toggle(world: World, object_id: str, force: bool, on: bool) -> None:
     if world.types[i] == "StoveBurner":
         knobs = [k for k in world.of_type("StoveKnob") if i in (world.controlled[k] or ())]
         which = " or ".join(world.object_ids[k] for k in knobs) or "a StoveKnob"
-        raise ActionFailed(
-            f"{object_id} is not toggled itself: turn {which}, which controls it.", "NotToggleable"
-        )
+        raise ActionFailed(f"{object_id} is not toggled itself: turn {which}, which controls it.")
     require(world, i, "toggleable", "a toggleable object")
     if world.state(i, "isToggled") is on:
         raise ActionFailed(f"{object_id} is {'on' if on else 'off'} already.")
@@ -72,13 +80,13 @@ def _toggle(world: World, object_id: str, force: bool, on: bool) -> None:
     consequences.apply(world)
 
 
-@action("ToggleObjectOn")
+@object_action("ToggleObjectOn")
 def toggle_on(world: World, *, objectId: str, forceAction: bool = False) -> None:
     """Switch an object on."""
     _toggle(world, objectId, forceAction, on=True)
 
 
-@action("ToggleObjectOff")
+@object_action("ToggleObjectOff")
 def toggle_off(world: World, *, objectId: str, forceAction: bool = False) -> None:
     """Switch an object off."""
     _toggle(world, objectId, forceAction, on=False)

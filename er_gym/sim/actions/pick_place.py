@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from er_gym.sim import consequences
+from er_gym.sim.actions.aim import object_action
 from er_gym.sim.actions.checks import require, target, within
 from er_gym.sim.actions.registry import action
 from er_gym.sim.compatibility import accepts
@@ -24,7 +25,7 @@ def _held(world: World) -> int:
     return world.held
 
 
-@action("PickupObject")
+@object_action("PickupObject")
 def pickup_object(
     world: World, *, objectId: str, forceAction: bool = False, manualInteract: bool = False
 ) -> None:
@@ -53,14 +54,20 @@ def put_down(world: World, i: int, yaw: float, foot: np.ndarray, parents: list[i
     consequences.apply(world)
 
 
-@action("PutObject")
+@object_action("PutObject")
 def put_object(
-    world: World, *, objectId: str, forceAction: bool = False, placeStationary: bool = True
+    world: World,
+    *,
+    objectId: str,
+    forceAction: bool = False,
+    placeStationary: bool = True,
+    randomSeed: int = 0,
+    putNearXY: bool = False,
 ) -> None:
     """Put what is held in or on a receptacle, where it is seen and nearest to the agent.
 
     ``forceAction`` waives the receptacle's restrictions on types, as in AI2-THOR, besides
-    visibility.
+    visibility. ``placeStationary``, ``randomSeed`` and ``putNearXY`` change nothing.
     """
     i = _held(world)
     receptacle = target(world, objectId, forceAction)

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any
 
 import numpy as np
 
+from er_gym.sim.actions.aim import pointed_at
 from er_gym.sim.actions.checks import FARTHEST, target
 from er_gym.sim.actions.registry import Vector, action
-from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
-from er_gym.sim.render.view import object_at
+from er_gym.sim.errors import ActionFailed
 from er_gym.sim.scene import SCENE_NAMES
 from er_gym.sim.space.poses import HORIZONS, interactable_poses
 from er_gym.sim.space.standing import floor_of, standing_places
 from er_gym.sim.world import World
+
+_SMALLEST_STEP = 0.01
+"""Of a grid of positions, metres; finer ones would fill the memory."""
 
 
 @action("Pass", "Done", "PausePhysicsAutoSim", "UnpausePhysicsAutoSim")
@@ -40,10 +44,8 @@ def get_scenes_in_build(world: World) -> list[str]:
 
 def _grid(world: World, step: float | None) -> np.ndarray:
     size = world.settings.grid_size if step is None else step
-    if size < 0.01:
-        raise ActionFailed(
-            f"A grid needs a step of 0.01 m or more, not {size:g}.", INVALID_ARGUMENT
-        )
+    if size < _SMALLEST_STEP:
+        raise ActionFailed(f"A grid needs a step of {_SMALLEST_STEP:g} m or more, not {size:g}.")
     here = world.agent.position[[0, 2]]
     offset = (here % size).round(5) % size  # of the grid that the agent stands on
     places = standing_places(world.scene.name, float(size), (float(offset[0]), float(offset[1])))
@@ -53,16 +55,32 @@ def _grid(world: World, step: float | None) -> np.ndarray:
     return np.concatenate([here[None], places])  # free floor that no way over the grid leads to
 
 
+def _grid_ahead(world: World, step: float | None) -> np.ndarray:
+    """(P, 2) places that the agent gets to by steps along its heading and across."""
+    size = world.settings.grid_size if step is None else step
+    if size < _SMALLEST_STEP:
+        raise ActionFailed(f"A grid needs a step of {_SMALLEST_STEP:g} m or more, not {size:g}.")
+    yaw = np.radians(world.agent.rotation)
+    forward = size * np.array([np.sin(yaw), np.cos(yaw)])
+    right = size * np.array([np.cos(yaw), -np.sin(yaw)])
+    start = world.agent.position[[0, 2]]
+    found = {(0, 0): start}
+    todo = deque(found)
+    while todo:
+        i, k = todo.popleft()
+        here = found[i, k]
+        for node in ((i + 1, k), (i, k + 1), (i - 1, k), (i, k - 1)):
+            there = start + node[0] * right + node[1] * forward
+            if node not in found and floor_of(world.scene.name).path_is_clear(here, there):
+                found[node] = there
+                todo.append(node)
+    return np.array(list(found.values()))
+
+
 @action("GetObjectInFrame")
 def get_object_in_frame(world: World, *, x: float, y: float, checkVisible: bool = False) -> str:
     """The id of the object at a point of the agent's picture, 0 to 1 from its upper left corner."""
-    if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
-        raise ActionFailed(
-            f"x and y must be within 0 and 1, not {x:g} and {y:g}.", INVALID_ARGUMENT
-        )
-    object_id = object_at(world, x, y)
-    if object_id is None:
-        raise ActionFailed(f"There is no object at ({x:g}, {y:g}), only the room.")
+    object_id = pointed_at(world, x, y)
     if checkVisible:
         target(world, object_id, force=False)
     return object_id
@@ -70,11 +88,27 @@ def get_object_in_frame(world: World, *, x: float, y: float, checkVisible: bool 
 
 @action("GetReachablePositions")
 def get_reachable_positions(
-    world: World, *, gridSize: float | None = None
+    world: World,
+    *,
+    maxStepCount: int | None = None,
+    directionsRelativeAgent: bool = False,
+    gridSize: float | None = None,
 ) -> list[dict[str, float]]:
-    """Every position of the grid where the agent can stand, metres."""
+    """Every position of the grid where the agent can stand, metres.
+
+    Args:
+        maxStepCount: fail if the grid has more positions than this over the square of its step.
+        directionsRelativeAgent: lay the grid out from the agent, along its heading.
+    """
+    if directionsRelativeAgent:
+        places = _grid_ahead(world, gridSize)
+    else:
+        places = _grid(world, gridSize)
+    step = world.settings.grid_size if gridSize is None else gridSize
+    if maxStepCount is not None and len(places) > maxStepCount // step**2:
+        raise ActionFailed("Too many steps taken in GetReachablePositions.")
     y = float(world.agent.position[1])
-    return [{"x": x, "y": y, "z": z} for x, z in _grid(world, gridSize).tolist()]
+    return [{"x": x, "y": y, "z": z} for x, z in places.tolist()]
 
 
 def _is_near(point: Vector) -> bool:
@@ -91,11 +125,17 @@ def get_interactable_poses(
     rotations: list[float] | None = None,
     horizons: list[float] | None = None,
     standings: list[bool] | None = None,
+    maxDistance: float | None = None,
     maxPoses: int | None = None,
 ) -> list[dict[str, Any]]:
-    """Every pose from which an object can be interacted with; each filter narrows the search."""
-    if maxPoses is not None and maxPoses < 1:
-        raise ActionFailed(f"maxPoses must be 1 or more, not {maxPoses}.", INVALID_ARGUMENT)
+    """Every pose from which an object can be interacted with; each filter narrows the search.
+
+    ``maxDistance``, in metres, takes the place of the visibility distance.
+    """
+    if maxPoses is not None and maxPoses <= 0:
+        raise ActionFailed(f"maxPoses must be > 0, not {maxPoses}.")
+    if maxDistance is not None and maxDistance <= 0.0:
+        raise ActionFailed(f"maxDistance must be > 0 meters, not {maxDistance:g}.")
     i = world.find(objectId)
     places = (
         _grid(world, None)
@@ -105,7 +145,7 @@ def get_interactable_poses(
     places = places[floor_of(world.scene.name).contains(places)]
     if rotations is None:
         step = world.settings.rotate_step
-        rotations = [k * step for k in range(int(360 // step))]
+        rotations = [k * step for k in range(max(1, int(360 // step)))]
     poses = interactable_poses(
         world,
         i,
@@ -114,6 +154,7 @@ def get_interactable_poses(
         HORIZONS if horizons is None else horizons,
         (True, False) if standings is None else standings,
         maxPoses,
+        maxDistance,
     )
     return [
         {"x": x, "y": y, "z": z, "rotation": yaw, "standing": standing > 0.0, "horizon": tilt}

@@ -1,8 +1,16 @@
-"""The table of actions: AI2-THOR's name, the function that does it, its checked parameters.
+"""The table of actions: AI2-THOR's name, the functions that do it, and what they take.
 
 A handler is a plain function ``handler(world, *, objectId: str, …)`` whose annotations are the
-action's parameters; pydantic checks and converts them. It returns the event's ``actionReturn`` or
-raises :class:`~er_gym.sim.errors.ActionFailed`.
+action's parameters. It returns the event's ``actionReturn`` or raises
+:class:`~er_gym.sim.errors.ActionFailed`. As in AI2-THOR, an action is of one of two sorts:
+
+- It has *named parameters*: an argument that is none of them, a required one that is missing and
+  one that cannot be converted are wrong calls, at which the official client raises ValueError. It
+  may have several ways to be called, such as by ``objectId`` and by ``x, y``; that one is taken
+  which knows most of the arguments, and of those the one that requires least.
+- It takes a *server action*, a record of everything that any action may be told: what the action
+  does not read is ignored, whatever it is, the case of names does not matter, and null stands for
+  nothing given.
 """
 
 from __future__ import annotations
@@ -14,19 +22,39 @@ from difflib import get_close_matches
 from functools import cached_property
 from typing import Any, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, ValidationError, create_model
+from pydantic import BaseModel, ConfigDict
 
-from er_gym.sim.errors import INVALID_ACTION, INVALID_ARGUMENT, MISSING_ARGUMENTS, ActionFailed
+from er_gym.sim.actions.conversion import Kind, Unconvertible, kind_of
+from er_gym.sim.errors import (
+    INVALID_ACTION,
+    INVALID_ARGUMENT,
+    MISSING_ARGUMENTS,
+    ActionFailed,
+    WrongCall,
+)
 from er_gym.sim.world import World
 
-GLOBAL_PARAMETERS = frozenset(
+EXEMPT = frozenset(
     {
-        "action", "sequenceId", "agentId", "renderImage", "renderDepthImage",
-        "renderInstanceSegmentation", "renderSemanticSegmentation", "renderNormalsImage",
-        "renderClassImage", "renderObjectImage", "visibilityDistance", "fastActionEmit",
+        *("action", "sequenceId", "agentId", "renderImage", "renderObjectImage"),
+        *("renderClassImage", "renderNormalsImage", "renderInstanceSegmentation"),
+        # The official client adds these by itself.
+        *("renderSemanticSegmentation", "visibilityDistance"),
     }
-)  # fmt: skip
-"""Parameters that any action may carry."""
+)
+"""Arguments that any action may carry."""
+REFUSED = {
+    "CreateHouse": "it has the recorded iTHOR rooms and no procedural houses; backend='unity' has"
+}
+"""Actions of AI2-THOR that are known, not there, and worth a reason."""
+REQUIRED: Any = inspect.Parameter.empty
+"""The default of a parameter that has none."""
+_LONGEST_QUOTE = 200
+"""Characters of what was given that an error message repeats."""
+_MOST_NAMES = 8
+"""Names of arguments that an error message repeats."""
+
+Run = Callable[..., Any]
 
 
 class Vector(BaseModel):
@@ -40,71 +68,161 @@ class Vector(BaseModel):
 
 
 @dataclass(frozen=True)
-class Handler:
-    """An action as registered."""
+class Parameter:
+    """What an action takes under a name.
+
+    Attributes:
+        annotation: the type that the handler declares.
+        default: :data:`REQUIRED` where there is none.
+    """
 
     name: str
-    run: Callable[..., Any]
-    parameters: type[BaseModel]
+    annotation: Any
+    kind: Kind
+    default: Any = REQUIRED
+
+    @property
+    def required(self) -> bool:
+        return self.default is REQUIRED
+
+    def __str__(self) -> str:
+        default = "" if self.required else f" = {self.default}"
+        return f"{self.kind.name} {self.name}{default}"
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to call an action: a handler and what it takes.
+
+    Attributes:
+        run: the handler.
+        parameters: by name, in the handler's order.
+        server_action: whether it takes a server action, not named parameters.
+    """
+
+    action: str
+    run: Run
+    parameters: Mapping[str, Parameter]
+    server_action: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.action}({', '.join(map(str, self.parameters.values()))})"
+
+    @property
+    def cost(self) -> tuple[int, int]:
+        """How many parameters it requires, and how many it has."""
+        return sum(p.required for p in self.parameters.values()), len(self.parameters)
+
+    def knows(self, request: Mapping[str, Any]) -> int:
+        """How many of the arguments it has parameters for."""
+        return sum(name in self.parameters for name in request)
+
+    def arguments(self, request: Mapping[str, Any], ways: tuple[Way, ...]) -> dict[str, Any]:
+        """The handler's arguments out of a request.
+
+        Args:
+            ways: all the ways to call this action, for the error message.
+
+        Raises:
+            WrongCall, ActionFailed: something is missing, or is not to be converted or not known.
+        """
+        if self.server_action:
+            return self._read(request)
+        parameters = self.parameters
+        unknown = [name for name in request if name not in parameters and name not in EXEMPT]
+        if unknown:
+            raise _unknown_arguments(self, unknown, request, ways)
+        found = {
+            name: self._converted(parameter, request[name])
+            for name, parameter in parameters.items()
+            if name in request
+        }
+        missing = [p.name for p in parameters.values() if p.required and p.name not in request]
+        if missing:
+            raise WrongCall(
+                f"action: {self.action} is missing the following arguments: {','.join(missing)}",
+                MISSING_ARGUMENTS,
+            )
+        return found
+
+    def _read(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for name, value in request.items():
+            parameter = self._by_lower_case.get(name.lower())
+            if parameter is None or value is None:
+                continue
+            if name == parameter.name or parameter.name not in request:
+                found[parameter.name] = self._converted(parameter, value)
+        return found
 
     @cached_property
-    def fields(self) -> frozenset[str]:
-        """The names of its parameters."""
-        return frozenset(self.parameters.model_fields)
+    def _by_lower_case(self) -> dict[str, Parameter]:
+        return {name.lower(): parameter for name, parameter in self.parameters.items()}
 
-
-ACTIONS: dict[str, Handler] = {}
-REFUSED = {
-    "CreateHouse": "it has the recorded iTHOR rooms and no procedural houses; backend='unity' has"
-}
-"""Actions of AI2-THOR that are known, not there, and worth a reason."""
-_LONGEST_QUOTE = 200
-"""Characters of what was given that an error message repeats."""
-
-
-def action(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Register a handler under one or several AI2-THOR action names."""
-
-    def register(run: Callable[..., Any]) -> Callable[..., Any]:
-        hints = get_type_hints(run)
-        fields: dict[str, Any] = {
-            parameter.name: (
-                hints[parameter.name],
-                ... if parameter.default is inspect.Parameter.empty else parameter.default,
+    def _converted(self, parameter: Parameter, value: Any) -> Any:
+        try:
+            return parameter.kind.convert(value)
+        except Unconvertible as error:
+            why = f" ({error})" if str(error) else ""
+            message = (
+                f"action: {self.action} has an invalid argument: {parameter.name} "
+                f"(=={_shown(value)}). Cannot convert to: {parameter.kind.name}{why:.{_LONGEST_QUOTE}}"
             )
-            for parameter in inspect.signature(run).parameters.values()
-            if parameter.kind is inspect.Parameter.KEYWORD_ONLY
-        }
+            if self.server_action or not parameter.kind.single:
+                raise ActionFailed(message) from None
+            raise WrongCall(message, INVALID_ARGUMENT) from None
+
+
+ACTIONS: dict[str, tuple[Way, ...]] = {}
+"""Every action there is, and the ways to call it, those that require least first."""
+
+
+def action(*names: str, server_action: bool = False) -> Callable[[Run], Run]:
+    """Register a handler under one or several AI2-THOR action names.
+
+    Registering another one under the same name adds a way to call the action.
+
+    Args:
+        server_action: whether AI2-THOR's method takes its record of a server action.
+    """
+
+    def register(run: Run) -> Run:
         for name in names:
-            model = create_model(
-                name, __config__=ConfigDict(extra="forbid", allow_inf_nan=False), **fields
-            )
-            ACTIONS[name] = Handler(name, run, model)
+            add_way(Way(name, run, parameters_of(run), server_action))
         return run
 
     return register
+
+
+def parameters_of(run: Run) -> dict[str, Parameter]:
+    """What a handler takes: its keyword-only parameters."""
+    hints = get_type_hints(run)
+    return {
+        each.name: Parameter(each.name, hints[each.name], kind_of(hints[each.name]), each.default)
+        for each in inspect.signature(run).parameters.values()
+        if each.kind is inspect.Parameter.KEYWORD_ONLY
+    }
+
+
+def add_way(way: Way) -> None:
+    """Enter a way to call an action into the table."""
+    ways = sorted((*ACTIONS.get(way.action, ()), way), key=lambda each: each.cost)
+    ACTIONS[way.action] = tuple(ways)
 
 
 def perform(world: World, request: Mapping[str, Any]) -> Any:
     """Do an action; returns its ``actionReturn``.
 
     Raises:
-        ActionFailed: it is unknown, wrongly called, or cannot be done in this state of the world.
+        WrongCall: there is no such action, or it is wrongly called.
+        ActionFailed: it cannot be done in this state of the world.
     """
     name = request.get("action")
-    handler = ACTIONS.get(name) if isinstance(name, str) else None
-    if handler is None:
-        raise ActionFailed(_unknown(name), INVALID_ACTION)
-    given = {
-        key: value
-        for key, value in request.items()
-        if value is not None and (key in handler.fields or key not in GLOBAL_PARAMETERS)
-    }
-    try:
-        checked = handler.parameters(**given)
-    except ValidationError as error:
-        raise _wrongly_called(handler, error) from None
-    return handler.run(world, **vars(checked))
+    ways = ACTIONS.get(name) if isinstance(name, str) else None
+    if ways is None:
+        raise WrongCall(_unknown(name), INVALID_ACTION)
+    way = ways[0] if len(ways) == 1 else max(ways, key=lambda each: each.knows(request))
+    return way.run(world, **way.arguments(request, ways))
 
 
 def quoted(value: object) -> str:
@@ -113,30 +231,34 @@ def quoted(value: object) -> str:
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
 
 
+def _shown(value: object) -> str:
+    """The same without quotation marks, where that is readable; as AI2-THOR does."""
+    plain = isinstance(value, str) and value.isprintable() and len(value) <= _LONGEST_QUOTE
+    return str(value) if plain else quoted(value)
+
+
 def _unknown(name: object) -> str:
     if isinstance(name, str) and name in REFUSED:
-        return f"The embedded engine has no action {name!r}: {REFUSED[name]}."
+        return f"Invalid action: {name}. The embedded engine has no such action: {REFUSED[name]}."
     close = get_close_matches(str(name), ACTIONS, n=3)
     hint = f" Did you mean {' or '.join(close)}?" if close else ""
-    return f"The embedded engine has no action {quoted(name)}.{hint}"
+    return f"Invalid action: {_shown(name)}. The embedded engine has no action of that name.{hint}"
 
 
-def _wrongly_called(handler: Handler, error: ValidationError) -> ActionFailed:
-    problems = error.errors(include_url=False)
-    allowed = ", ".join(handler.parameters.model_fields) or "none"
-    missing = [str(p["loc"][0]) for p in problems if p["type"] == "missing"]
-    if missing:
-        return ActionFailed(
-            f"{handler.name} needs {', '.join(missing)}; its arguments are: {allowed}.",
-            MISSING_ARGUMENTS,
-        )
-    first = problems[0]
-    where = ".".join(str(part) for part in first["loc"])
-    if len(where) > _LONGEST_QUOTE or not where.isprintable():
-        where = quoted(where)
-    said = "is not an argument" if first["type"] == "extra_forbidden" else first["msg"]
-    return ActionFailed(
-        f"{handler.name} was called with {where}={quoted(first['input'])}: {said}; "
-        f"its arguments are: {allowed}.",
+def _unknown_arguments(
+    way: Way, unknown: list[str], request: Mapping[str, Any], ways: tuple[Way, ...]
+) -> WrongCall:
+    given = [name for name in request if name not in EXEMPT]
+    several = "s" if len(unknown) > 1 else ""
+    expected = ", ".join(map(str, way.parameters.values())) or "none"
+    return WrongCall(
+        f'Action: "{way.action}" called with invalid argument{several}: {_names(unknown)}. '
+        f"Expected arguments: {expected}. Your arguments: {_names(given)}. "
+        f'Valid ways to call "{way.action}" action: {" or ".join(map(str, ways))}.',
         INVALID_ARGUMENT,
     )
+
+
+def _names(names: list[str]) -> str:
+    shown = [repr(name) if len(name) <= 40 else f"{name[:40]!r}…" for name in names[:_MOST_NAMES]]
+    return ", ".join([*shown, "…"] if len(names) > _MOST_NAMES else shown)

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from er_gym.sim.actions.checks import FIELDS_OF_VIEW, within
+from er_gym.sim.actions.checks import field_of_view, within
 from er_gym.sim.actions.move import snap_to_grid
 from er_gym.sim.actions.registry import action, quoted
-from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.visibility import NEAR_PLANE
 from er_gym.sim.world import World
 
 _FAR_PLANE = 20.0
+_SMALLEST_GRID, _LARGEST_GRID = 0.01, 5.0
+"""AI2-THOR takes any gridSize above 0 and up to the second; finer ones would fill the memory."""
+_SMALLEST_TURN = 1.0
+_FARTHEST_SIGHT = 1000.0
+"""From here on one sees across any room, metres; a larger visibilityDistance means the same."""
 
 
 def _either(flag: bool | None, old_name: bool | None) -> bool | None:
@@ -19,56 +24,57 @@ def _either(flag: bool | None, old_name: bool | None) -> bool | None:
     return old_name if flag is None else flag
 
 
-@action("Initialize")
+@action("Initialize", server_action=True)
 def initialize(
     world: World,
     *,
-    gridSize: float | None = None,
+    gridSize: float = 0.0,
     snapToGrid: bool | None = None,
-    continuous: bool | None = None,
-    visibilityDistance: float | None = None,
-    fieldOfView: float | None = None,
+    visibilityDistance: float = 0.0,
+    fieldOfView: float = 0.0,
     rotateStepDegrees: float | None = None,
+    timeScale: float = 1.0,
     renderDepthImage: bool | None = None,
     renderInstanceSegmentation: bool | None = None,
     renderSemanticSegmentation: bool | None = None,
     renderClassImage: bool | None = None,
     renderObjectImage: bool | None = None,
-    renderNormalsImage: bool | None = None,
     agentMode: str = "default",
     agentCount: int = 1,
-    massThreshold: float | None = None,
-    visibilityScheme: str | None = None,
-    makeAgentsVisible: bool = True,
-    fastActionEmit: bool = True,
 ) -> dict[str, Any]:
     """Set what the engine goes by; distances in metres, angles in degrees.
 
-    ``agentMode`` other than "default" and more than one agent are refused: the embedded engine has
-    neither arm, drone nor crowd. ``massThreshold`` is accepted and has no effect, for nothing here
-    is pushed.
+    What AI2-THOR refuses is refused in its words; 0 stands for its default, and a
+    ``visibilityDistance`` that is not positive is passed over. The embedded engine has neither arm,
+    drone nor crowd, and says so. Everything else that AI2-THOR's ``Initialize`` is told is accepted
+    and has no effect (docs/fidelity.md lists it), and what it does not know it ignores as well.
     """
-    if agentMode.lower() != "default":
+    if agentMode.lower() not in ("default", ""):
         raise ActionFailed(
             f"The embedded engine has agentMode 'default' only, not {quoted(agentMode)}; "
-            "use backend='unity' for others.",
-            INVALID_ARGUMENT,
+            "use backend='unity' for others."
         )
-    if agentCount != 1:
+    if agentCount > 1:
+        raise ActionFailed(f"The embedded engine has one agent, not {agentCount}.")
+    if fieldOfView:
+        field_of_view("fov", fieldOfView)
+    if timeScale <= 0.0:
+        raise ActionFailed(f"Time scale must be > 0, not {timeScale:g}.")
+    if rotateStepDegrees is not None and rotateStepDegrees < _SMALLEST_TURN:
         raise ActionFailed(
-            f"The embedded engine has one agent, not {agentCount}.", INVALID_ARGUMENT
+            "rotateStepDegrees must be a non-zero, non-negative float, "
+            f"{_SMALLEST_TURN:g} or more, not {rotateStepDegrees:g}."
         )
-    within("gridSize", gridSize, 0.01, 10.0)
-    within("visibilityDistance", visibilityDistance, 0.0, 1000.0)
-    within("fieldOfView", fieldOfView, *FIELDS_OF_VIEW)
-    within("rotateStepDegrees", rotateStepDegrees, 1.0, 360.0)
-    if continuous is not None and snapToGrid is None:
-        snapToGrid = not continuous
+    if gridSize and not 0.0 < gridSize <= _LARGEST_GRID:
+        raise ActionFailed(f"grid size must be in the range (0,5], not {gridSize:g}.")
+    if gridSize:
+        within("gridSize", gridSize, _SMALLEST_GRID, _LARGEST_GRID)
+    sight = min(visibilityDistance, _FARTHEST_SIGHT)
     chosen = {
-        "grid_size": gridSize,
+        "grid_size": gridSize or None,
         "snap_to_grid": snapToGrid,
-        "visibility_distance": visibilityDistance,
-        "field_of_view": fieldOfView,
+        "visibility_distance": sight if sight > 0.0 else None,
+        "field_of_view": fieldOfView or None,
         "rotate_step": rotateStepDegrees,
         "render_depth": renderDepthImage,
         "render_instances": _either(renderInstanceSegmentation, renderObjectImage),
@@ -89,5 +95,5 @@ def change_resolution(world: World, *, x: int, y: int) -> None:
 
 
 @action("ChangeQuality")
-def change_quality(world: World, *, quality: str = "") -> None:
+def change_quality(world: World, *, quality: str) -> None:
     """Accepted for the client's sake: the embedded engine draws in one quality."""

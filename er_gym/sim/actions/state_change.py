@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from er_gym.sim import consequences
+from er_gym.sim.actions.aim import object_action
 from er_gym.sim.actions.checks import require, target
-from er_gym.sim.actions.registry import action, quoted
-from er_gym.sim.errors import INVALID_ARGUMENT, ActionFailed
+from er_gym.sim.actions.registry import quoted
+from er_gym.sim.errors import ActionFailed
 from er_gym.sim.world import World
 
 LIQUIDS = ("coffee", "water", "wine")
@@ -22,7 +23,7 @@ def parts_of(kind: str) -> tuple[str, bool]:
     return part, part in _COOKABLE_PARTS
 
 
-@action("SliceObject")
+@object_action("SliceObject", server_action=True)
 def slice_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
     """Cut an object up: its slices take its place. An egg cracks open."""
     i = target(world, objectId, forceAction)
@@ -63,7 +64,7 @@ def _cut_up(world: World, i: int) -> None:
     consequences.apply(world)
 
 
-@action("BreakObject")
+@object_action("BreakObject", server_action=True)
 def break_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
     """Break an object; an egg cracks open."""
     i = target(world, objectId, forceAction)
@@ -80,7 +81,7 @@ def break_object(world: World, *, objectId: str, forceAction: bool = False) -> N
     world.set_state(i, "isBroken", True)
 
 
-@action("CookObject")
+@object_action("CookObject", server_action=True)
 def cook_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
     """Cook an object as if by magic, without a source of heat."""
     i = target(world, objectId, forceAction)
@@ -90,7 +91,7 @@ def cook_object(world: World, *, objectId: str, forceAction: bool = False) -> No
     consequences.cook(world, i)
 
 
-@action("DirtyObject")
+@object_action("DirtyObject", server_action=True)
 def dirty_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
     """Make an object dirty."""
     i = target(world, objectId, forceAction)
@@ -101,7 +102,7 @@ def dirty_object(world: World, *, objectId: str, forceAction: bool = False) -> N
     consequences.apply(world)
 
 
-@action("CleanObject")
+@object_action("CleanObject", server_action=True)
 def clean_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
     """Clean an object."""
     i = target(world, objectId, forceAction)
@@ -111,24 +112,24 @@ def clean_object(world: World, *, objectId: str, forceAction: bool = False) -> N
     world.set_state(i, "isDirty", False)
 
 
-@action("FillObjectWithLiquid")
+@object_action("FillObjectWithLiquid", server_action=True)
 def fill_object(
     world: World, *, objectId: str, fillLiquid: str = "water", forceAction: bool = False
 ) -> None:
-    """Fill an object with one of :data:`LIQUIDS`."""
-    if fillLiquid not in LIQUIDS:
+    """Fill an object with one of :data:`LIQUIDS`; capital letters will do."""
+    if fillLiquid.lower() not in LIQUIDS:
         raise ActionFailed(
-            f"fillLiquid must be one of {', '.join(LIQUIDS)}, not {quoted(fillLiquid)}.",
-            INVALID_ARGUMENT,
+            f"{quoted(fillLiquid)} is not a valid Liquid Type; fillLiquid is one of "
+            f"{', '.join(LIQUIDS)}."
         )
     i = target(world, objectId, forceAction)
     require(world, i, "canFillWithLiquid", "something that can be filled")
     if world.state(i, "isFilledWithLiquid"):
         raise ActionFailed(f"{objectId} is filled already.")
-    consequences.fill(world, i, fillLiquid)
+    consequences.fill(world, i, fillLiquid.lower())
 
 
-@action("EmptyLiquidFromObject")
+@object_action("EmptyLiquidFromObject", server_action=True)
 def empty_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
     """Pour out what an object is filled with."""
     i = target(world, objectId, forceAction)
@@ -140,7 +141,7 @@ def empty_object(world: World, *, objectId: str, forceAction: bool = False) -> N
     consequences.apply(world)
 
 
-@action("UseUpObject")
+@object_action("UseUpObject", server_action=True)
 def use_up_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
     """Use an object up, such as a roll of paper."""
     i = target(world, objectId, forceAction)

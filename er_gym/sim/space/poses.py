@@ -31,6 +31,7 @@ def interactable_poses(
     horizons: Sequence[float],
     standings: Sequence[bool],
     max_poses: int | None = None,
+    max_distance: float | None = None,
 ) -> Poses:
     """Poses from which object i is visible, hence can be interacted with.
 
@@ -38,8 +39,10 @@ def interactable_poses(
         positions: (P, 2) x and z where the agent may stand, tried in order.
         rotations, horizons: degrees. standings: whether to stand or crouch.
         max_poses: stop after so many.
+        max_distance: metres that the object may be away; the visibility distance if None.
     """
-    filters = (tuple(rotations), tuple(horizons), tuple(standings), max_poses)
+    distance = world.settings.visibility_distance if max_distance is None else max_distance
+    filters = (tuple(rotations), tuple(horizons), tuple(standings), max_poses, distance)
 
     def search() -> Poses:
         found = _search(world, i, positions, *filters)
@@ -48,14 +51,14 @@ def interactable_poses(
 
     in_hand = i in world.in_hand
     one = len(positions) == len(rotations) == len(horizons) == len(standings) == 1
-    if one and not in_hand:
+    if one and not in_hand and max_distance is None:
         # Whoever asks for one pose will take it next, and look about: that is asked for already.
         return _one_pose(world, i, positions[0], rotations[0] % 360.0, horizons[0], standings[0])
     # Where the hand is, is no part of an arrangement; and the poses of a whole room take megabytes.
     if in_hand or len(positions) > _REMEMBERED:
         return search()
     settings = world.settings
-    lens = (settings.field_of_view, settings.width / settings.height, settings.visibility_distance)
+    lens = (settings.field_of_view, settings.width / settings.height)
     question = (i, positions.tobytes(), filters, lens, world.agent.position[1])
     return sights(world).remembered(question, search)
 
@@ -68,12 +71,13 @@ def _search(
     horizons: Sequence[float],
     standings: Sequence[bool],
     max_poses: int | None,
+    distance: float,
 ) -> Poses:
     found = [np.empty((0, 6))]
     if world.hidden[i]:
         return found[0]
     settings = world.settings
-    near = _within_reach(world, i, positions)
+    near = _within_reach(world, i, positions, distance)
     yaws, tilts = np.array(rotations) % 360.0, np.array(horizons)
     upright = np.array(standings, dtype=bool)
     lifts = np.where(upright, CAMERA_STANDING, CAMERA_CROUCHING)
@@ -121,9 +125,10 @@ def _one_pose(
     return np.array([[x, y, z, rotation, horizon, standing]])
 
 
-def _within_reach(world: World, i: int, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Those of (P, 2) positions that object i is within the visibility distance of."""
-    distance = world.settings.visibility_distance
+def _within_reach(
+    world: World, i: int, positions: NDArray[np.float64], distance: float
+) -> NDArray[np.float64]:
+    """Those of (P, 2) positions that object i is within so many metres of."""
     away = np.abs(np.array(sights(world).reach)[:, None] - positions).max(axis=0, initial=0.0)
     if i not in world.in_hand and (np.hypot(away[:, 0], away[:, 1]) <= distance).all():
         return positions  # all that there is, is

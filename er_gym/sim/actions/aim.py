@@ -1,0 +1,72 @@
+"""Actions on an object, which is named by its id or by a point of the agent's picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from er_gym.sim.actions.conversion import kind_of
+from er_gym.sim.actions.registry import Parameter, Run, Way, add_way, parameters_of
+from er_gym.sim.errors import ActionFailed
+from er_gym.sim.render.view import object_at
+from er_gym.sim.world import World
+
+
+def pointed_at(world: World, x: float, y: float) -> str:
+    """The id of the object at a point of the agent's picture.
+
+    Args:
+        x, y: 0 to 1, from the left and from the top.
+
+    Raises:
+        ActionFailed: the point is outside the picture, or shows the room.
+    """
+    if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
+        raise ActionFailed(f"x/y must be in [0:1], from the upper left corner, not ({x:g}, {y:g}).")
+    found = object_at(world, x, y)
+    if found is None:
+        raise ActionFailed(f"No SimObject found at (x: {x:g}, y: {y:g}), only the room.")
+    return found
+
+
+def object_action(*names: str, server_action: bool = False) -> Callable[[Run], Run]:
+    """Register a handler that takes ``objectId``, so that it is also called with ``x, y`` instead.
+
+    With named parameters these are two ways to call the action, and both at once is a wrong call.
+    An action that takes a server action looks at the point, the upper left corner if none is given,
+    when it is not told an ``objectId``.
+    """
+
+    def register(run: Run) -> Run:
+        own = parameters_of(run)
+        others = {name: each for name, each in own.items() if name != "objectId"}
+        point = {axis: Parameter(axis, float, kind_of(float)) for axis in "xy"}
+        anywhere = {axis: replace(each, default=0.0) for axis, each in point.items()}
+        either = {"objectId": replace(own["objectId"], default=None), **anywhere, **others}
+        for name in names:
+            if server_action:
+                add_way(Way(name, _at_either(run), either, server_action=True))
+            else:
+                add_way(Way(name, run, own))
+                add_way(Way(name, _at_point(run), {**point, **others}))
+        return run
+
+    return register
+
+
+def _at_point(run: Run) -> Run:
+    def at_point(world: World, *, x: float, y: float, **others: Any) -> Any:
+        return run(world, objectId=pointed_at(world, x, y), **others)
+
+    return at_point
+
+
+def _at_either(run: Run) -> Run:
+    def at_either(
+        world: World, *, objectId: str | None = None, x: float = 0.0, y: float = 0.0, **others: Any
+    ) -> Any:
+        named = pointed_at(world, x, y) if objectId is None else objectId
+        return run(world, objectId=named, **others)
+
+    return at_either
