@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import ai2thor.controller
 import ai2thor.server
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from er_gym.sim.engine import Engine
 from er_gym.sim.errors import CLIENT_ERRORS
 from er_gym.sim.lazy import LazyMetadata
+from er_gym.sim.object_metadata import own_objects
+from er_gym.sim.own import OwnDict
 from er_gym.sim.protocol import rgba
 from er_gym.sim.render.view import View
 
@@ -29,7 +31,18 @@ _RENAMED = {
 
 
 class EventMetadata(LazyMetadata, ai2thor.server.MetadataWrapper):  # type: ignore[misc]  # untyped
-    """Lazy, and with the client's aliases for old keys."""
+    """Lazy, the receiver's own to change, and with the client's aliases for old keys.
+
+    What reads them as a whole, such as ``dict`` or ``json``, finds plain dictionaries.
+    """
+
+    instead: ClassVar = {"objects": own_objects}
+
+    def read_whole(self) -> None:
+        super().read_whole()
+        objects = dict.__getitem__(self, "objects")
+        if objects and type(objects[0]) is OwnDict:
+            objects[:] = map(dict, objects)
 
 
 class EmbeddedEvent(ai2thor.server.Event):  # type: ignore[misc]  # untyped

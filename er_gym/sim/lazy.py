@@ -6,7 +6,7 @@ Most steps of most programs look at few of them, and the objects are nine tenths
 from __future__ import annotations
 
 from collections.abc import Callable, ItemsView, Iterator, Mapping, ValuesView
-from typing import Any
+from typing import Any, ClassVar
 
 
 class LazyMetadata(dict[str, Any]):
@@ -20,12 +20,15 @@ class LazyMetadata(dict[str, Any]):
         source: what they are made from.
     """
 
+    instead: ClassVar[Mapping[str, Callable[[Any], Any]]] = {}
+    """What makes some of the values in this kind of metadata, in place of ``later``."""
+
     def __init__(
         self, ready: dict[str, Any], later: Mapping[str, Callable[[Any], Any]], source: object
     ) -> None:
         super().__init__(ready)
         self.update(dict.fromkeys(later))
-        self._later = dict(later)
+        self._later = {**later, **self.instead}
         self._source: object | None = source
 
     @property
@@ -39,6 +42,10 @@ class LazyMetadata(dict[str, Any]):
             key, make = self._later.popitem()
             super().__setitem__(key, make(self._source))
         self._source = None
+
+    def read_whole(self) -> None:
+        """What is done before somebody looks at all of it."""
+        self.settle()
 
     def __getitem__(self, key: str) -> Any:
         make = self._later.pop(key, None)
@@ -56,28 +63,28 @@ class LazyMetadata(dict[str, Any]):
 
     def pop(self, key: str, *default: Any) -> Any:
         """As ``dict.pop``."""
-        self.settle()
+        self.read_whole()
         return super().pop(key, *default)
 
     def setdefault(self, key: str, default: Any = None) -> Any:
         """As ``dict.setdefault``."""
-        self.settle()
+        self.read_whole()
         return super().setdefault(key, default)
 
     # dict(x), {**x}, json and msgpack come in by one of these.
 
     def __iter__(self) -> Iterator[str]:
-        self.settle()
+        self.read_whole()
         return super().__iter__()
 
     def items(self) -> ItemsView[str, Any]:  # type: ignore[override]
         """As ``dict.items``."""
-        self.settle()
+        self.read_whole()
         return super().items()
 
     def values(self) -> ValuesView[Any]:  # type: ignore[override]
         """As ``dict.values``."""
-        self.settle()
+        self.read_whole()
         return super().values()
 
     def copy(self) -> dict[str, Any]:
@@ -85,7 +92,7 @@ class LazyMetadata(dict[str, Any]):
         return dict(self)
 
     def __eq__(self, other: object) -> bool:
-        self.settle()
+        self.read_whole()
         return super().__eq__(other)
 
     __hash__ = None
@@ -94,5 +101,5 @@ class LazyMetadata(dict[str, Any]):
         return dict, (dict(self),)
 
     def __repr__(self) -> str:
-        self.settle()
+        self.read_whole()
         return super().__repr__()

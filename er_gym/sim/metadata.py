@@ -33,19 +33,12 @@ def _agent(world: World) -> dict[str, Any]:
 
 
 def _held_pose(world: World) -> dict[str, Any]:
-    if world.held < 0:
-        zero = vector((0.0, 0.0, 0.0))
-        return {
-            "localPosition": vector(HAND_OFFSET),
-            "position": zero,
-            "localRotation": zero,
-            "rotation": zero,
-        }
+    held, nowhere = world.held, (0.0, 0.0, 0.0)
     return {
         "localPosition": vector(HAND_OFFSET),
-        "position": vector(world.position[world.held]),
-        "localRotation": vector((0.0, 0.0, 0.0)),
-        "rotation": vector(world.rotation[world.held]),
+        "position": vector(nowhere if held < 0 else world.position[held]),
+        "localRotation": vector(nowhere),
+        "rotation": vector(nowhere if held < 0 else world.rotation[held]),
     }
 
 
@@ -57,16 +50,23 @@ def instance_color(object_id: str) -> tuple[int, int, int]:
 
 
 def _colors(world: World) -> list[dict[str, Any]] | None:
-    """Which colour means what in the segmentations that are drawn, None while none is."""
-    if not world.settings.render_instances and not world.settings.render_classes:
+    """Which colour means what in the segmentations, None while none is drawn.
+
+    As in AI2-THOR, both objects and types are named whichever is drawn. The official client looks
+    for the masks of a class among the colours of objects whose ids begin with its name; so what
+    bears another's name, such as a SinkBasin (``Sink|…|SinkBasin``), is also named by its type. The
+    name that comes last is what the client takes a colour for.
+    """
+    if not world.settings.draws_colors:
         return None
     there = np.flatnonzero(world.exists).tolist()
-    names: list[str] = []
-    if world.settings.render_instances:
-        names += [world.object_ids[i] for i in there]
-    if world.settings.render_classes:
-        names += sorted({world.types[i] for i in there})
-    return [{"name": name, "color": list(instance_color(name))} for name in names]
+    ids, types = world.object_ids, world.types
+    colors = [
+        (types[i], instance_color(ids[i])) for i in there if ids[i].split("|", 1)[0] != types[i]
+    ]
+    names = [*(ids[i] for i in there), *sorted({types[i] for i in there})]
+    colors += [(name, instance_color(name)) for name in names]
+    return [{"name": name, "color": list(color)} for name, color in colors]
 
 
 def _third_party_cameras(world: World) -> list[dict[str, Any]]:
@@ -103,7 +103,7 @@ def metadata(
     world: World,
     action: str,
     error: str = "",
-    error_code: str = "",
+    error_code: str | None = None,
     action_return: Any = None,
     kind: type[LazyMetadata] = LazyMetadata,
 ) -> LazyMetadata:
@@ -134,5 +134,17 @@ def metadata(
         "visibleRange": None,
         "actionReturn": action_return,
         "depthFormat": "Meters",
+        # What older actions answered in, before there was actionReturn.
+        "actionFloatReturn": 0.0,
+        "actionFloatsReturn": [],
+        "actionIntReturn": 0,
+        "actionStringsReturn": [],
+        "actionVector3sReturn": [],
+        "distances": [],
+        "flatSurfacesOnGrid": [],
+        "isOpenableGrid": [],
+        "normals": [],
+        "objectIdsInBox": [],
+        "segmentedObjectIds": [],
     }
     return kind(report, _LATER, world)

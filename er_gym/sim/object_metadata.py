@@ -1,13 +1,14 @@
 """The objects of the world as AI2-THOR 5 metadata.
 
 All but ``visible``, ``isInteractable`` and ``distance`` says nothing of the agent; it is made for
-many objects at once and kept in ``World.entries`` until the object changes.
+many objects at once and kept in ``World.entries`` until the object changes. What is kept is shared:
+:func:`objects` is for what packs it or reads it, :func:`own_objects` for whoever may write into it.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 from math import isnan
 from typing import Any
@@ -15,12 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.own import OwnDict
 from er_gym.sim.scene import PROPERTIES, STATES
+from er_gym.sim.space.doors import boxes
 from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
 
 Entry = dict[str, Any]
+Parts = tuple[Entry, Entry, Entry]
+"""What is said of an object but for the agent: all, its single values, those that nest others."""
 
 _AABB_CORNERS = np.array(list(product((1.0, 0.0), repeat=3)))
 """Corners of an axis-aligned box in AI2-THOR's order, as fractions of its size."""
@@ -31,6 +36,9 @@ _OBB_CORNERS = np.array(
 """Corners of an oriented box in AI2-THOR's order, in edges from corner 0."""
 _SCENES_KEPT = 128
 _RECEPTACLE = PROPERTIES.index("receptacle")
+_NEVER = {"canBeUsedUp": False, "isUsedUp": False}
+"""AI2-THOR 5 answers False to both for every object: its ``SimObjPhysics`` has them as placeholders.
+``UseUpObject`` works all the same."""
 
 
 def vector(values: Sequence[float] | NDArray[np.float64]) -> dict[str, float]:
@@ -49,7 +57,25 @@ def box(low: NDArray[np.float64], high: NDArray[np.float64]) -> dict[str, Any]:
 
 
 def objects(world: World) -> list[Entry]:
-    """The metadata of every object, in scene order."""
+    """The metadata of every object, in scene order; nested values are not to be changed."""
+    return [
+        {**entry, "visible": seen, "isInteractable": seen, "distance": away}
+        for (entry, _, _), seen, away in _parts(world)
+    ]
+
+
+def own_objects(world: World) -> list[Entry]:
+    """The same, the caller's to change."""
+    found: list[Entry] = []
+    for (_, single, nested), seen, away in _parts(world):
+        entry = OwnDict(single, visible=seen, isInteractable=seen, distance=away)
+        entry.shared = nested
+        found.append(entry)
+    return found
+
+
+def _parts(world: World) -> Iterator[tuple[Parts, bool, float]]:
+    """What is said of every object, whether the agent sees it, and how far from it it is."""
     entries = world.entries
     rows = np.flatnonzero(world.exists).tolist()
     stale = [i for i in rows if i not in entries]
@@ -59,16 +85,13 @@ def objects(world: World) -> list[Entry]:
         entries.update(zip(stale, _entries(world, stale), strict=True))
     seen = visible(world).tolist()
     distance = np.linalg.norm(world.position - world.agent.position, axis=1).tolist()
-    return [
-        {**entries[i], "visible": seen[i], "isInteractable": seen[i], "distance": distance[i]}
-        for i in rows
-    ]
+    return ((entries[i], seen[i], distance[i]) for i in rows)
 
 
-_recorded: OrderedDict[str, dict[int, Entry]] = OrderedDict()
+_recorded: OrderedDict[str, dict[int, Parts]] = OrderedDict()
 
 
-def _as_recorded(world: World) -> dict[int, Entry]:
+def _as_recorded(world: World) -> dict[int, Parts]:
     """The entries of a scene in which nothing has happened yet, kept for the scenes last used."""
     name = world.scene.name
     if name not in _recorded:
@@ -79,9 +102,9 @@ def _as_recorded(world: World) -> dict[int, Entry]:
     return _recorded[name]
 
 
-def _entries(world: World, rows: list[int]) -> list[Entry]:
+def _entries(world: World, rows: list[int]) -> list[Parts]:
     """What does not change with where the agent is, for some objects."""
-    low, high = world.low[rows], world.high[rows]
+    low, high = (corners[rows] for corners in boxes(world))
     turned = world.obb[rows] @ np.swapaxes(unity_rotation(world.rotation[rows]), 1, 2)
     oriented = turned[:, :1] + _OBB_CORNERS @ turned[:, 1:] + world.position[rows, None]
     columns = zip(
@@ -102,35 +125,34 @@ def _entries(world: World, rows: list[int]) -> list[Entry]:
     made = []
     for i, at, turn, centre, size, corners, obb, has, states, openness, mass in columns:
         controlled, materials = world.controlled[i], world.salient_materials[i]
-        made.append(
-            {
-                "name": world.names[i],
-                "position": dict(zip("xyz", at, strict=True)),
-                "rotation": dict(zip("xyz", turn, strict=True)),
-                "visible": False,
-                "isInteractable": False,
-                **dict(zip(PROPERTIES, has, strict=True)),
-                **dict(zip(STATES, states, strict=True)),
-                "openness": openness,
-                "fillLiquid": world.fill_liquid[i],
-                "temperature": world.temperature[i],
-                "mass": mass,
-                "salientMaterials": None if materials is None else list(materials),
-                "receptacleObjectIds": [ids[c] for c in contents[i]] if has[_RECEPTACLE] else None,
-                "parentReceptacles": [ids[p] for p in world.parents[i]] or None,
-                "controlledObjects": None if controlled is None else [ids[c] for c in controlled],
-                "distance": 0.0,
-                "objectType": world.types[i],
-                "objectId": ids[i],
-                "assetId": world.asset_ids[i],
-                "isPickedUp": i == world.held,
-                "isMoving": False,
-                "axisAlignedBoundingBox": {
-                    "center": dict(zip("xyz", centre, strict=True)),
-                    "size": dict(zip("xyz", size, strict=True)),
-                    "cornerPoints": corners,
-                },
-                "objectOrientedBoundingBox": (None if isnan(obb[0][0]) else {"cornerPoints": obb}),
-            }
-        )
+        single = {
+            "name": world.names[i],
+            **dict(zip(PROPERTIES, has, strict=True)),
+            **dict(zip(STATES, states, strict=True)),
+            **_NEVER,
+            "openness": openness,
+            "fillLiquid": world.fill_liquid[i],
+            "temperature": world.temperature[i],
+            "mass": mass,
+            "objectType": world.types[i],
+            "objectId": ids[i],
+            "assetId": world.asset_ids[i],
+            "isPickedUp": i == world.held,
+            "isMoving": False,
+        }
+        nested = {
+            "position": dict(zip("xyz", at, strict=True)),
+            "rotation": dict(zip("xyz", turn, strict=True)),
+            "salientMaterials": None if materials is None else list(materials),
+            "receptacleObjectIds": [ids[c] for c in contents[i]] if has[_RECEPTACLE] else None,
+            "parentReceptacles": [ids[p] for p in world.parents[i]] or None,
+            "controlledObjects": None if controlled is None else [ids[c] for c in controlled],
+            "axisAlignedBoundingBox": {
+                "center": dict(zip("xyz", centre, strict=True)),
+                "size": dict(zip("xyz", size, strict=True)),
+                "cornerPoints": corners,
+            },
+            "objectOrientedBoundingBox": (None if isnan(obb[0][0]) else {"cornerPoints": obb}),
+        }
+        made.append(({**single, **nested}, single, nested))
     return made

@@ -72,6 +72,11 @@ class Settings:
     render_instances: bool = False
     render_classes: bool = False
 
+    @property
+    def draws_colors(self) -> bool:
+        """Whether objects are drawn in colours of their own."""
+        return self.render_instances or self.render_classes
+
 
 @dataclass(frozen=True)
 class ThirdPartyCamera:
@@ -137,7 +142,7 @@ class World:
     _displaced: set[int] = field(default_factory=set)
     _shapes: dict[int, Shape] = field(default_factory=dict)
     _samples: dict[int, NDArray[np.float64]] = field(default_factory=dict)
-    entries: dict[int, dict[str, object]] = field(default_factory=dict)
+    entries: dict[int, tuple[dict[str, Any], ...]] = field(default_factory=dict)
     looks: dict[int, object] = field(default_factory=dict)
     touched: set[int] = field(default_factory=set)
     _nesting: Nesting | None = None

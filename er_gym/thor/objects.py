@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from er_gym.sim.lazy import LazyMetadata
 from er_gym.sim.scene import PROPERTIES, STATES, Scene
+from er_gym.sim.space.doors import boxes
 from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
 from er_gym.thor.object_types import OBJECT_TYPES
@@ -215,12 +216,14 @@ def _of_world(world: World) -> ObjectTable:
     if not isinstance(found, ObjectTable):
         found = world.derived["table"] = _table(world)
     elif world.held >= 0:  # what is carried moves with the agent
-        found = replace(found, centre=(world.low + world.high) / 2)
+        low, high = boxes(world)
+        found = replace(found, centre=(low + high) / 2)
     return found
 
 
 def _table(world: World) -> ObjectTable:
     names = _names(world)
+    low, high = boxes(world)
     has = world.properties[:, list(_HAS.values())].T.copy()
     states = world.states[:, list(_IS.values())].T.copy()
     return ObjectTable(
@@ -229,8 +232,8 @@ def _table(world: World) -> ObjectTable:
         kinds=names.kinds,
         **dict(zip(_HAS, has, strict=True)),
         **dict(zip(_IS, states, strict=True)),
-        centre=(world.low + world.high) / 2,
-        size=world.high - world.low,
+        centre=(low + high) / 2,
+        size=high - low,
         parents=tuple(world.parents),
         contents=world.contents,
         controlled=names.controlled,

@@ -128,16 +128,16 @@ class Way:
         """
         if self.server_action:
             return self._read(request)
-        parameters = self.parameters
-        unknown = [name for name in request if name not in parameters and name not in EXEMPT]
+        known = self.parameters
+        unknown = [name for name in request if name not in known and name not in EXEMPT]
         if unknown:
             raise _unknown_arguments(self, unknown, request, ways)
         found = {
-            name: self._converted(parameter, request[name])
-            for name, parameter in parameters.items()
-            if name in request
+            name: self._converted(known[name], value)
+            for name, value in request.items()
+            if name in known
         }
-        missing = [p.name for p in parameters.values() if p.required and p.name not in request]
+        missing = [name for name in self._required if name not in request]
         if missing:
             raise WrongCall(
                 f"action: {self.action} is missing the following arguments: {','.join(missing)}",
@@ -154,6 +154,10 @@ class Way:
             if name == parameter.name or parameter.name not in request:
                 found[parameter.name] = self._converted(parameter, value)
         return found
+
+    @cached_property
+    def _required(self) -> tuple[str, ...]:
+        return tuple(name for name, parameter in self.parameters.items() if parameter.required)
 
     @cached_property
     def _by_lower_case(self) -> dict[str, Parameter]:

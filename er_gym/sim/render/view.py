@@ -107,7 +107,8 @@ def _draw(world: World, camera: Camera) -> View:
     view = View(
         frames.rgb,
         frames.depth,
-        _colored(frames, world.object_ids) if settings.render_instances else None,
+        # As in AI2-THOR: the client cuts the masks of classes out of this one.
+        _colored(frames, world.object_ids) if settings.draws_colors else None,
         _colored(frames, world.types) if settings.render_classes else None,
     )
     for picture in (view.rgb, view.depth, view.instances, view.classes):
