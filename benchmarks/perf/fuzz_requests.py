@@ -12,20 +12,28 @@ from copy import deepcopy
 from dataclasses import dataclass, field
 from random import Random
 from types import NoneType
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, get_args, get_origin
 
-from pydantic import BaseModel, create_model
-
-from er_gym.sim.actions.registry import ACTIONS, GLOBAL_PARAMETERS, REFUSED
+from er_gym.sim.actions.registry import ACTIONS, EXEMPT, REFUSED, Parameter, parameters_of
 from er_gym.sim.actions.state_change import LIQUIDS
+from er_gym.sim.recorded import USED_UP
 
 Request = dict[str, Any]
 
-PARAMETERS: dict[str, type[BaseModel]] = {
-    **{name: handler.parameters for name, handler in ACTIONS.items()},
-    "Reset": create_model("Reset", sceneName=(str, ...)),  # the one that the engine does itself
+
+def _reset(*, sceneName: str) -> None:
+    """The one action that the engine does itself."""
+
+
+WAYS: dict[str, list[Mapping[str, Parameter]]] = {
+    **{name: [way.parameters for way in ways] for name, ways in ACTIONS.items()},
+    "Reset": [parameters_of(_reset)],
 }
-"""Every action there is, and what it takes."""
+"""Every action there is, and what it takes, by each way to call it."""
+PARAMETERS = {
+    name: {key: p for way in ways for key, p in way.items()} for name, ways in WAYS.items()
+}
+"""Every action there is, and all that it takes by any way."""
 NAMES = [
     *PARAMETERS,
     # Without them most of the others would be refused.
@@ -46,13 +54,26 @@ EXTREMES: tuple[Any, ...] = (
 )  # fmt: skip
 """Values that are out of any range, of another type, or nearly right."""
 _ODD_PARAMETERS = (
-    *("speed", "objectID", "self", "world", "model_config", "", "a\nb", "\ud800", "ü", "x" * 5000),
+    *(
+        "velocity",
+        "objectID",
+        "self",
+        "world",
+        "model_config",
+        "",
+        "a\nb",
+        "\ud800",
+        "ü",
+        "x" * 5000,
+    ),
 )
 _BENT = 0.25
 _APT = 0.4
 """How often the last answer decides which action is next."""
 _OPTIONAL = 0.5
 """How often a parameter is given that need not be."""
+_BY_ID = 0.8
+"""How often an object is named by its id, not by a point of the picture."""
 _PICTURES = 0.03
 """How often pictures are asked for, which take most of the time."""
 _FORGOTTEN = 0.15
@@ -122,6 +143,12 @@ def _object(has: str = "", lacks: str = "") -> Draw:
     return draw
 
 
+def _used_up(room: Room) -> str:
+    """The id of something that can be used up, which AI2-THOR's metadata do not tell."""
+    suited = [e for e in room.objects if e["objectType"] in USED_UP] or room.objects
+    return str(room.random.choice(suited)["objectId"])
+
+
 def _object_type(room: Room) -> str:
     return str(room.random.choice(room.objects)["objectType"])
 
@@ -189,11 +216,13 @@ SUITED = {
     "CleanObject": ("isDirty",),
     "FillObjectWithLiquid": ("canFillWithLiquid", "isFilledWithLiquid"),
     "EmptyLiquidFromObject": ("isFilledWithLiquid",),
-    "UseUpObject": ("canBeUsedUp", "isUsedUp"),
 }
 """What an object must be for an action, and what it must not be yet."""
+AIMED = (*SUITED, "UseUpObject", "GetObjectInFrame")
+"""What is also done to whatever a point of the picture shows."""
 SANE: dict[str, Draw] = {
     **{f"{action}.objectId": _object(*suits) for action, suits in SUITED.items()},
+    "UseUpObject.objectId": _used_up,
     "objectId": _object(),
     "sceneName": lambda room: room.random.choice(room.scenes),
     "forceAction": _among(False, True, True),
@@ -208,8 +237,7 @@ SANE: dict[str, Draw] = {
     "z": _coordinate("z"),
     "ChangeResolution.x": lambda room: room.random.randint(1, 40),
     "ChangeResolution.y": lambda room: room.random.randint(1, 40),
-    "GetObjectInFrame.x": _between(0.0, 1.0),
-    "GetObjectInFrame.y": _between(0.0, 1.0),
+    **{f"{action}.{axis}": _between(0.0, 1.0) for action in AIMED for axis in "xy"},
     "degrees": _among(1.0, 15.0, 30.0, 45.0, 90.0, -90.0, 360.0),
     "moveMagnitude": _among(0.0, 0.1, 0.25, 0.25, 0.5, 1.0),
     "ThrowObject.moveMagnitude": _between(0.0, 300.0),
@@ -219,8 +247,15 @@ SANE: dict[str, Draw] = {
     "fieldOfView": _between(30.0, 120.0),
     "visibilityDistance": _among(1.0, 1.5, 1.5, 3.0, 20.0),
     "rotateStepDegrees": _among(30.0, 45.0, 90.0, 90.0),
-    "agentMode": _among("default"),
     "agentCount": _among(1),
+    "maxDistance": _among(0.5, 1.5, 5.0),
+    "maxAgentsDistance": _among(-1.0, 0.5, 3.0),
+    "maxStepCount": _among(1, 100, 10000),
+    "OpenObject.moveMagnitude": _among(0.0, 0.5, 1.0),
+    "orthographicSize": lambda room: None,
+    "agentMode": _among("default"),
+    "timeScale": _among(1.0, 2.0),
+    "DisableAllObjectsOfType.objectType": _among("Fork", "Apple", "Pillow", "Towel", "Painting"),
     "maxPoses": _among(1, 3, 20),
     "numPlacementAttempts": _among(1, 5),
     "excludedReceptacles": _some(_object_type, 3),
@@ -238,8 +273,6 @@ SANE: dict[str, Draw] = {
 def _of_type(room: Room, kind: Any) -> Any:
     """Any value of a parameter's type."""
     random, inner = room.random, [part for part in get_args(kind) if part is not NoneType]
-    if get_origin(kind) is Literal:
-        return random.choice(inner)
     if get_origin(kind) is list:
         return [_of_type(room, inner[0]) for _ in range(random.randint(0, 3))]
     if inner:  # this or that
@@ -253,8 +286,10 @@ def _sane(room: Room, name: str) -> Request:
     request: Request = {"action": name, "renderImage": False}
     if name in ("Teleport", "TeleportFull") and (room.poses or room.random.random() < 0.5):
         return {**request, **_pose(room)}
-    for parameter, about in PARAMETERS[name].model_fields.items():
-        if about.is_required() or room.random.random() < _OPTIONAL:
+    ways, chance = WAYS[name], room.random.random
+    way = ways[0] if chance() < _BY_ID else room.random.choice(ways)
+    for parameter, about in way.items():
+        if about.required or chance() < (_BY_ID if parameter == "objectId" else _OPTIONAL):
             draw = SANE.get(f"{name}.{parameter}") or SANE.get(parameter)
             request[parameter] = draw(room) if draw else _of_type(room, about.annotation)
     return request
@@ -270,8 +305,8 @@ def _extreme(room: Room) -> Any:
 def _another_value(room: Room, request: Request) -> None:
     """An extreme value for one of the parameters, given or not."""
     name = request.get("action")
-    model = PARAMETERS.get(name) if isinstance(name, str) else None
-    names = list(model.model_fields) if model else sorted(_arguments(request))
+    taken = PARAMETERS.get(name) if isinstance(name, str) else None
+    names = list(taken) if taken else sorted(_arguments(request))
     if names:
         request[room.random.choice(names)] = _extreme(room)
 
@@ -293,7 +328,7 @@ def _one_too_many(room: Room, request: Request) -> None:
 
 
 def _for_any_action(room: Room, request: Request) -> None:
-    request[room.random.choice(sorted(GLOBAL_PARAMETERS - {"action"}))] = _extreme(room)
+    request[room.random.choice(sorted(EXEMPT - {"action"}))] = _extreme(room)
 
 
 def _another_action(room: Room, request: Request) -> None:
@@ -351,7 +386,7 @@ def draw_request(room: Room) -> Request:
     request = _sane(room, random.choice(_next(room) if random.random() < _APT else NAMES))
     if random.random() < _PICTURES:
         request["renderImage"] = True
-        for flag in ("renderDepthImage", "renderInstanceSegmentation"):
+        for flag in ("renderInstanceSegmentation", "renderSemanticSegmentation"):
             request[flag] = random.random() < 0.5
     if random.random() < _BENT:
         for _ in range(random.choice((1, 1, 2))):

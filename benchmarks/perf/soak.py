@@ -198,7 +198,7 @@ REPERTOIRE: dict[str, Parameters] = {
     ),
     "EmptyLiquidFromObject": _object("canFillWithLiquid", **_FORCE),
     "BreakObject": _object("breakable", **_FORCE),
-    "UseUpObject": _object("canBeUsedUp", **_FORCE),
+    "UseUpObject": _object("pickupable", **_FORCE),
 }
 """Actions, and how their parameters are drawn."""
 

@@ -5,7 +5,7 @@ Most steps of most programs look at few of them, and the objects are nine tenths
 
 from __future__ import annotations
 
-from collections.abc import Callable, ItemsView, Iterator, Mapping, ValuesView
+from collections.abc import Callable, ItemsView, Iterator, KeysView, Mapping, ValuesView
 from typing import Any, ClassVar
 
 
@@ -76,6 +76,11 @@ class LazyMetadata(dict[str, Any]):
     def __iter__(self) -> Iterator[str]:
         self.read_whole()
         return super().__iter__()
+
+    def keys(self) -> KeysView[str]:  # type: ignore[override]
+        """As ``dict.keys``."""
+        self.read_whole()
+        return super().keys()
 
     def items(self) -> ItemsView[str, Any]:  # type: ignore[override]
         """As ``dict.items``."""

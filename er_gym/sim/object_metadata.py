@@ -37,7 +37,7 @@ _OBB_CORNERS = np.array(
 _SCENES_KEPT = 128
 _RECEPTACLE = PROPERTIES.index("receptacle")
 _NEVER = {"canBeUsedUp": False, "isUsedUp": False}
-"""AI2-THOR 5 answers False to both for every object: its ``SimObjPhysics`` has them as placeholders.
+"""AI2-THOR 5 says so of every object: in its ``SimObjPhysics`` these two are placeholders.
 ``UseUpObject`` works all the same."""
 
 

@@ -28,6 +28,10 @@ NOT_BY_THE_CLIENT = 2
 """The exit code when somebody else than AI2-THOR's client starts the player."""
 _SECONDS_TO_CONNECT = 300
 """As long as the client waits for a player, a player waits for the client."""
+_QUESTIONS = frozenset({"GetReachablePositions", "GetInteractablePoses", "GetObjectInFrame"})
+"""Actions that Unity answers, with ``fastActionEmit``, by what has changed, which saves the client
+most of its work. After all others it sends everything: of one message the client makes several
+events, so that a program that writes into one event's objects writes into the next event's too."""
 _HEARTBEAT = 0.25
 """Seconds between looks at whether the parent lives."""
 
@@ -60,7 +64,11 @@ class Player:
         self._said, self._shown = dict(metadata), view
         if view is not shown and view is not None:
             self._images = list(images(view))
-        changes = {name: value for name, value in metadata.items() if said.get(name) != value}
+        changes = {
+            name: value
+            for name, value in metadata.items()
+            if name == "actionReturn" or said.get(name) != value
+        }
         self._transport.send(
             Message(
                 sequence_id=request["sequenceId"],
@@ -68,7 +76,9 @@ class Player:
                 changes=changes,
                 images=[] if view is None else self._images,
                 same_images=view is shown,
-                may_patch=self._may_patch,
+                may_patch=(
+                    self._may_patch and action in _QUESTIONS and metadata["lastActionSuccess"]
+                ),
             )
         )
 

@@ -12,14 +12,14 @@ from er_gym.sim.nesting import Nesting
 from er_gym.sim.scene import PROPERTIES, Scene
 from er_gym.sim.space.shapes import Shape
 
-_USED_UP = ("PaperTowelRoll", "SoapBottle", "TissueBox", "ToiletPaper")
+USED_UP = ("PaperTowelRoll", "SoapBottle", "TissueBox", "ToiletPaper")
 """Types that ProcTHOR's asset database says can be used up."""
 
 
 def properties(scene: Scene) -> NDArray[np.bool_]:
     """The recorded properties, and ``canBeUsedUp``, which the record leaves out."""
     found = scene.properties.copy()
-    found[:, PROPERTIES.index("canBeUsedUp")] |= np.isin(scene.types, _USED_UP)
+    found[:, PROPERTIES.index("canBeUsedUp")] |= np.isin(scene.types, USED_UP)
     return found
 
 

@@ -87,6 +87,7 @@ class ThirdPartyCamera:
     field_of_view: float
 
 
+_Entry = tuple[dict[str, Any], dict[str, Any], dict[str, Any]]
 _NOT_OBJECTS = frozenset(
     {"scene", "settings", "agent", "cameras", "derived", "arrangement", "looks", "base"}
 )
@@ -142,7 +143,7 @@ class World:
     _displaced: set[int] = field(default_factory=set)
     _shapes: dict[int, Shape] = field(default_factory=dict)
     _samples: dict[int, NDArray[np.float64]] = field(default_factory=dict)
-    entries: dict[int, tuple[dict[str, Any], ...]] = field(default_factory=dict)
+    entries: dict[int, _Entry] = field(default_factory=dict)
     looks: dict[int, object] = field(default_factory=dict)
     touched: set[int] = field(default_factory=set)
     _nesting: Nesting | None = None

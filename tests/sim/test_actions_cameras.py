@@ -33,20 +33,25 @@ def test_change_fov(drawing):
     assert drawing.reset().metadata["fov"] == 90
 
 
-@pytest.mark.parametrize("degrees", [0, 180, -10, float("nan"), None, "wide"])
-def test_a_field_of_view_out_of_range_is_a_value_error(drawing, degrees):
+@pytest.mark.parametrize("degrees", [float("nan"), float("inf"), None, "wide", {}])
+def test_a_field_of_view_that_is_no_number_is_a_value_error(drawing, degrees):
     with pytest.raises(ValueError, match="fieldOfView"):
         drawing.step("ChangeFOV", fieldOfView=degrees)
     assert drawing.step("Pass").metadata["fov"] == 90
 
 
-@pytest.mark.parametrize("degrees", [0, 180, float("inf")])
+@pytest.mark.parametrize("degrees", [0, 180, 181, -1])
+def test_a_field_of_view_out_of_range_is_refused(drawing, degrees):
+    event = drawing.step("ChangeFOV", fieldOfView=degrees)
+    assert "(0, 180) noninclusive" in event.metadata["errorMessage"]
+    assert event.metadata["fov"] == 90
+
+
+@pytest.mark.parametrize("degrees", [0, 180, 181, -1])
 def test_so_it_is_of_third_party_cameras(drawing, degrees):
-    with pytest.raises(ValueError, match="fieldOfView"):
-        drawing.step("AddThirdPartyCamera", **EYE, fieldOfView=degrees)
+    assert not drawing.step("AddThirdPartyCamera", **EYE, fieldOfView=degrees)
     drawing.step("AddThirdPartyCamera", **EYE)
-    with pytest.raises(ValueError, match="fieldOfView"):
-        drawing.step("UpdateThirdPartyCamera", fieldOfView=degrees)
+    assert not drawing.step("UpdateThirdPartyCamera", fieldOfView=degrees)
     assert drawing.step("Pass").metadata["thirdPartyCameras"][0]["fieldOfView"] == 90
 
 
@@ -123,16 +128,32 @@ def test_roll_turns_the_picture(drawing):
 @pytest.mark.parametrize(
     ("action", "arguments", "named"),
     [
-        ("AddThirdPartyCamera", {"position": EYE["position"]}, "rotation"),
         ("AddThirdPartyCamera", {**EYE, "orthographic": True}, "perspective only"),
-        ("AddThirdPartyCamera", {**EYE, "antiAliasing": "much"}, "antiAliasing"),
+        ("AddThirdPartyCamera", {**EYE, "orthographicSize": 2}, "orthographic=True"),
+        ("AddThirdPartyCamera", {**EYE, "position": 5}, "position"),
         ("UpdateThirdPartyCamera", {}, "AddThirdPartyCamera makes one"),
         ("UpdateThirdPartyCamera", {"thirdPartyCameraId": -1}, "camera -1"),
     ],
 )
-def test_wrong_calls_raise_value_error(drawing, action, arguments, named):
+def test_what_no_camera_can_do_is_refused(drawing, action, arguments, named):
+    event = drawing.step(action, **arguments)
+    assert named in event.metadata["errorMessage"]
+    assert event.metadata["thirdPartyCameras"] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ({"position": EYE["position"]}, "missing the following arguments: rotation"),
+        (
+            {**EYE, "orthographic": True, "orthographicSize": {"x": 0}},
+            "^action: AddThirdPartyCamera has an invalid argument: orthographicSize",
+        ),
+    ],
+)
+def test_wrong_calls_raise_value_error(drawing, arguments, named):
     with pytest.raises(ValueError, match=named):
-        drawing.step(action, **arguments)
+        drawing.step("AddThirdPartyCamera", **arguments)
     assert drawing.step("Pass").metadata["thirdPartyCameras"] == []
 
 
@@ -142,7 +163,7 @@ def test_wrong_calls_raise_value_error(drawing, action, arguments, named):
 ATTRIBUTES = ("depth_frame", "instance_segmentation_frame", "semantic_segmentation_frame")
 
 
-@pytest.mark.parametrize(("flag", "attribute"), list(zip(FLAGS, ATTRIBUTES, strict=True)))
+@pytest.mark.parametrize(("flag", "attribute"), list(zip(FLAGS, ATTRIBUTES, strict=True))[1:])
 def test_a_flag_holds_for_one_step(drawing, flag, attribute):
     assert getattr(drawing.step("Pass"), attribute) is None
     assert getattr(drawing.step("Pass", **{flag: True}), attribute) is not None
@@ -163,7 +184,7 @@ def test_initialize_switches_a_flag_on_and_off_under_either_name(drawing, flag, 
 
 
 def test_semantic_segmentation_has_one_colour_a_type(drawing):
-    event = drawing.step("Pass", **dict.fromkeys(FLAGS, True))
+    event = drawing.step("Pass", **dict.fromkeys(FLAGS[1:], True))
     colours = event.object_id_to_color
     fridge = event.instance_masks[FRIDGE]
     assert fridge.any()
@@ -186,5 +207,5 @@ def test_object_in_frame(drawing):
     assert event.metadata["actionReturn"] == FRIDGE
     assert not drawing.step("GetObjectInFrame", x=0.5, y=0.5, checkVisible=True)  # 2.65 m away
     assert not drawing.step("GetObjectInFrame", x=0.5, y=0.0)  # the ceiling
-    with pytest.raises(ValueError, match="within 0 and 1"):
-        drawing.step("GetObjectInFrame", x=0.5, y=1.5)
+    beyond = drawing.step("GetObjectInFrame", x=0.5, y=1.5)
+    assert "x/y must be in [0:1]" in beyond.metadata["errorMessage"]

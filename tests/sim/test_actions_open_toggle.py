@@ -45,10 +45,15 @@ def test_open_part_of_the_way(kitchen):
     assert kitchen[FRIDGE]["openness"] == 0.8
 
 
-@pytest.mark.parametrize("openness", [-0.1, 1.1])
-def test_openness_is_a_share(kitchen, openness):
-    with pytest.raises(ValueError, match="openness"):
-        kitchen.step("OpenObject", FRIDGE, openness=openness, forceAction=True)
+@pytest.mark.parametrize("share", [{"openness": -0.5}, {"openness": 1.1}, {"moveMagnitude": 1.1}])
+def test_openness_is_a_share(kitchen, share):
+    assert "[0:1]" in kitchen.refused("OpenObject", FRIDGE, **share, forceAction=True)
+
+
+@pytest.mark.parametrize(("magnitude", "openness"), [(0, 1.0), (0.65, 0.65)])
+def test_openness_under_its_old_name(kitchen, magnitude, openness):
+    kitchen.do("OpenObject", FRIDGE, moveMagnitude=magnitude, forceAction=True)
+    assert kitchen[FRIDGE]["openness"] == openness
 
 
 def test_contents_show_only_while_it_is_open(kitchen):

@@ -84,7 +84,8 @@ def test_depth_is_in_metres(view):
 def test_masks_boxes_and_colours_agree(view):
     colours = {entry["name"]: tuple(entry["color"]) for entry in view.metadata["colors"]}
     ids = {entry["objectId"] for entry in view.metadata["objects"]}
-    assert set(colours) == ids
+    types = {entry["objectType"] for entry in view.metadata["objects"]}
+    assert set(colours) == ids | types
     assert len(set(colours.values())) == len(colours)
     shown = ids & set(view.instance_masks)
     assert FRIDGE in shown
@@ -156,9 +157,11 @@ def test_what_chooses_a_unity_build_is_a_type_error(name):
     assert "backend='unity'" in str(caught.value)
 
 
-def test_a_wrong_setting_is_a_value_error():
-    with pytest.raises(ValueError, match="gridsize"):
-        EmbeddedController(scene="FloorPlan1", headless=True, gridsize=0.1)
+def test_a_wrong_setting_ends_a_program_and_an_unknown_one_does_not():
+    with pytest.raises(RuntimeError, match=r"range \(0,5\]"):
+        EmbeddedController(scene="FloorPlan1", headless=True, gridSize=-0.1)
+    controller = EmbeddedController(scene="FloorPlan1", headless=True, gridWidth=-0.1)
+    controller.stop()
 
 
 def played() -> list[str]:

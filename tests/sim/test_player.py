@@ -127,6 +127,9 @@ def some_actions(seed: int, count: int, controller):
         {"action": "Fly"},
         {"action": "PickupObject"},
         {"action": "Pass", "renderDepthImage": True},
+        {"action": "RotateLook", "rotation": 45, "horizon": 10, "speed": "unknown"},
+        {"action": "PickupObject", "x": 0.5, "y": 0.7},
+        {"action": "SliceObject", "x": 0.5, "y": 0.6, "forceAction": True},
         {"action": "Pass", "renderInstanceSegmentation": True},
         {"action": "RotateLeft", "degrees": 45, "renderSemanticSegmentation": True},
         {"action": "MoveAhead", "renderImage": False},
@@ -231,9 +234,10 @@ def test_where_nothing_has_changed_a_patch_is_sent(played):
     assert event.metadata["lastAction"] == "GetReachablePositions"
     assert event.metadata["objects"] is before.metadata["objects"]
     assert event.frame.tobytes() == before.frame.tobytes()
+    assert played.step("Pass").metadata["objects"] is not before.metadata["objects"]
     played.reset(fastActionEmit=False)
     before = played.step("Pass")
-    event = played.step("Pass")
+    event = played.step("GetReachablePositions")
     assert event.metadata["objects"] is not before.metadata["objects"]
     assert event.metadata["objects"] == before.metadata["objects"]
 
@@ -244,7 +248,7 @@ def test_where_nothing_has_changed_a_patch_is_sent(played):
 @pytest.mark.parametrize(
     ("request_", "named"),
     [
-        ({"action": "Fly"}, "no action 'Fly'"),
+        ({"action": "Fly"}, "Invalid action: Fly"),
         ({"action": "PickupObject"}, "objectId"),
         ({"action": "RotateRight", "degrees": "far"}, "degrees"),
         ({"action": "Fly\ud800"}, "no action"),

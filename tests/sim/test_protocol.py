@@ -204,45 +204,59 @@ def test_a_misspelt_action_is_told_the_right_one(kitchen):
 NAN, INFINITE = float("nan"), float("inf")
 
 
-@pytest.mark.parametrize(
-    ("action", "arguments", "named"),
-    [
-        ("PickupObject", {}, "objectId"),
-        ("PutObject", {}, "objectId"),
-        ("GetInteractablePoses", {}, "objectId"),
-        ("PickupObject", {"objectId": None}, "objectId"),
-        ("PickupObject", {"objectId": 7}, "objectId"),
-        ("PickupObject", {"objectId": [APPLE]}, "objectId"),
-        ("PickupObject", {"objectId": APPLE, "force": True}, "force"),
-        ("PickupObject", {"objectId": APPLE, "forceAction": "perhaps"}, "forceAction"),
-        ("RotateRight", {"degrees": "far"}, "degrees"),
-        ("RotateRight", {"degrees": NAN}, "degrees"),
-        ("RotateRight", {"degrees": INFINITE}, "degrees"),
-        ("LookDown", {"degrees": -INFINITE}, "degrees"),
-        ("MoveAhead", {"moveMagnitude": NAN}, "moveMagnitude"),
-        ("MoveAhead", {"moveMagnitude": INFINITE}, "moveMagnitude"),
-        ("TeleportFull", {"x": NAN}, "x"),
-        ("TeleportFull", {"position": {"x": 0, "y": 1, "z": INFINITE}}, "position"),
-        ("TeleportFull", {"position": [0, 1, 0]}, "position"),
-        ("TeleportFull", {"rotation": NAN}, "rotation"),
-        ("TeleportFull", {"horizon": NAN}, "horizon"),
-        ("TeleportFull", {"standing": "upright"}, "standing"),
-        ("OpenObject", {"objectId": FRIDGE, "openness": NAN}, "openness"),
-        ("GetReachablePositions", {"gridSize": 0}, "grid"),
-        ("GetReachablePositions", {"gridSize": NAN}, "gridSize"),
-        ("GetInteractablePoses", {"objectId": FRIDGE, "rotations": [NAN]}, "rotations"),
-        ("GetInteractablePoses", {"objectId": FRIDGE, "horizons": "all"}, "horizons"),
-        ("GetInteractablePoses", {"objectId": FRIDGE, "maxPoses": 0}, "maxPoses"),
-        ("GetInteractablePoses", {"objectId": FRIDGE, "maxPoses": -3}, "maxPoses"),
-        ("Initialize", {"gridSize": 0}, "gridSize"),
-        ("Initialize", {"fieldOfView": 180}, "fieldOfView"),
-        ("Initialize", {"visibilityDistance": -1}, "visibilityDistance"),
-        ("Initialize", {"agentMode": "arm"}, "agentMode"),
-        ("Initialize", {"agentCount": 2}, "agent"),
-        ("ChangeResolution", {"x": 0, "y": 300}, "x"),
-        ("ChangeResolution", {"x": 300}, "y"),
-    ],
-)
+WRONG_CALLS = [
+    ("PickupObject", {}, "objectId"),
+    ("PutObject", {}, "objectId"),
+    ("GetInteractablePoses", {}, "objectId"),
+    ("PickupObject", {"objectId": [APPLE]}, "objectId"),
+    ("PickupObject", {"objectId": APPLE, "force": True}, "force"),
+    ("PickupObject", {"objectId": APPLE, "forceAction": "perhaps"}, "forceAction"),
+    ("PickupObject", {"objectId": APPLE, "forceAction": None}, "forceAction"),
+    ("PickupObject", {"objectId": APPLE, "x": 0.5, "y": 0.5}, "objectId"),
+    ("PickupObject", {"x": 0.5}, "y"),
+    ("RotateRight", {"degrees": "far"}, "degrees"),
+    ("RotateRight", {"degrees": NAN}, "degrees"),
+    ("RotateRight", {"degrees": INFINITE}, "degrees"),
+    ("MoveAhead", {"moveMagnitude": NAN}, "moveMagnitude"),
+    ("MoveAhead", {"moveMagnitude": INFINITE}, "moveMagnitude"),
+    ("Pass", {"renderDepthImage": True}, "renderDepthImage"),
+    ("TeleportFull", {"x": NAN}, "x"),
+    ("TeleportFull", {"horizon": NAN}, "horizon"),
+    ("TeleportFull", {"standing": "upright"}, "standing"),
+    ("OpenObject", {"objectId": FRIDGE, "openness": NAN}, "openness"),
+    ("GetReachablePositions", {"gridSize": NAN}, "gridSize"),
+    ("ChangeResolution", {"x": 300}, "y"),
+]
+REFUSED = [
+    ("PickupObject", {"objectId": None}, "None"),
+    ("PickupObject", {"objectId": 7}, "'7'"),
+    ("LookDown", {"degrees": -INFINITE}, "degrees"),
+    ("LookDown", {"degrees": -1}, "positive degree"),
+    ("TeleportFull", {"position": {"x": 0, "y": 1, "z": INFINITE}}, "position"),
+    ("TeleportFull", {"position": [0, 1, 0]}, "position"),
+    ("TeleportFull", {"rotation": NAN}, "rotation"),
+    ("GetReachablePositions", {"gridSize": 0}, "grid"),
+    ("GetReachablePositions", {"maxStepCount": 1}, "Too many steps"),
+    ("GetInteractablePoses", {"objectId": FRIDGE, "rotations": [NAN]}, "rotations"),
+    ("GetInteractablePoses", {"objectId": FRIDGE, "horizons": "all"}, "horizons"),
+    ("GetInteractablePoses", {"objectId": FRIDGE, "maxPoses": 0}, "maxPoses"),
+    ("GetInteractablePoses", {"objectId": FRIDGE, "maxPoses": -3}, "maxPoses"),
+    ("GetInteractablePoses", {"objectId": FRIDGE, "maxDistance": 0}, "maxDistance"),
+    ("Initialize", {"gridSize": -1}, "grid size"),
+    ("Initialize", {"gridSize": 5.5}, "grid size"),
+    ("Initialize", {"gridSize": "fine"}, "gridSize"),
+    ("Initialize", {"fieldOfView": 180}, "fov"),
+    ("Initialize", {"rotateStepDegrees": 0}, "rotateStepDegrees"),
+    ("Initialize", {"timeScale": 0}, "Time scale"),
+    ("Initialize", {"agentMode": "arm"}, "agentMode"),
+    ("Initialize", {"agentCount": 2}, "agent"),
+    ("ChangeResolution", {"x": 0, "y": 300}, "x"),
+    ("Reset", {"sceneName": "FloorPlan31"}, "FloorPlan31"),
+    ("Reset", {"sceneName": [1]}, "sceneName"),
+]
+
+
+@pytest.mark.parametrize(("action", "arguments", "named"), WRONG_CALLS)
 def test_a_wrong_call_raises_value_error_and_changes_nothing(kitchen, action, arguments, named):
     before = kitchen.event.metadata
     with pytest.raises(ValueError, match=named) as caught:
@@ -253,11 +267,19 @@ def test_a_wrong_call_raises_value_error_and_changes_nothing(kitchen, action, ar
     assert after["agent"] == before["agent"]
 
 
+@pytest.mark.parametrize(("action", "arguments", "named"), REFUSED)
+def test_what_an_action_refuses_is_an_event_and_changes_nothing(kitchen, action, arguments, named):
+    before = kitchen.event.metadata
+    assert named in kitchen.refused(action, **arguments)
+    assert kitchen.event.metadata["errorCode"] is None
+    assert kitchen.agent == before["agent"]
+
+
 def test_the_next_action_after_an_error_is_none_the_worse(kitchen):
     with pytest.raises(ValueError, match="no action"):
         kitchen.step("Fly")
     kitchen.do("RotateRight")
-    assert kitchen.event.metadata["errorCode"] == ""
+    assert kitchen.event.metadata["errorCode"] is None
 
 
 # -- events stay as they were ----------------------------------------------------------------------

@@ -49,7 +49,7 @@ def test_a_refusal_can_be_read(engine, request_):
 
 def test_short_values_are_told_whole(engine):
     metadata, _ = engine.step({"action": "LookUp", "degrees": "steep", "renderImage": False})
-    assert "degrees='steep'" in metadata["errorMessage"]
+    assert "degrees (==steep). Cannot convert to: float" in metadata["errorMessage"]
     metadata, _ = engine.step({"action": "ChangeResolution", "x": 0, "y": 1, "renderImage": False})
     assert metadata["errorMessage"] == "x must be within 1 and 8192, not 0."
 

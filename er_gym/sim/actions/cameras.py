@@ -108,9 +108,7 @@ def _no_orthographic(orthographic: bool | None, size: float | None) -> None:
             "backend='unity' has both."
         )
     if size is not None:
-        raise ActionFailed(
-            f"orthographicSize ({size:g}) can only be set when orthographic=True."
-        )
+        raise ActionFailed(f"orthographicSize ({size:g}) can only be set when orthographic=True.")
 
 
 def _no_farther(*vectors: Vector | PartialVector | None) -> None:

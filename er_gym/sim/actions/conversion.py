@@ -119,7 +119,9 @@ def _structure(annotation: Any, shown: Any) -> Kind:
 
     def convert(value: Any) -> Any:
         try:
-            return adapter.validate_python(value.tolist() if isinstance(value, np.ndarray) else value)
+            return adapter.validate_python(
+                value.tolist() if isinstance(value, np.ndarray) else value
+            )
         except ValidationError as error:
             first = error.errors(include_url=False, include_input=False)[0]
             where = ".".join(map(str, first["loc"]))

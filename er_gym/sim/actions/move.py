@@ -123,9 +123,7 @@ def _stay_near(world: World, object_id: str, most: float) -> None:
     here = world.agent.position
     gap = np.clip(here, world.low[i], world.high[i]) - here
     if np.hypot(gap[0], gap[2]) > most:
-        raise ActionFailed(
-            f"Agent movement would bring it beyond the max distance of {object_id}."
-        )
+        raise ActionFailed(f"Agent movement would bring it beyond the max distance of {object_id}.")
 
 
 @action("Teleport", "TeleportFull")

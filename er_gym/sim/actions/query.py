@@ -100,10 +100,7 @@ def get_reachable_positions(
         maxStepCount: fail if the grid has more positions than this over the square of its step.
         directionsRelativeAgent: lay the grid out from the agent, along its heading.
     """
-    if directionsRelativeAgent:
-        places = _grid_ahead(world, gridSize)
-    else:
-        places = _grid(world, gridSize)
+    places = (_grid_ahead if directionsRelativeAgent else _grid)(world, gridSize)
     step = world.settings.grid_size if gridSize is None else gridSize
     if maxStepCount is not None and len(places) > maxStepCount // step**2:
         raise ActionFailed("Too many steps taken in GetReachablePositions.")

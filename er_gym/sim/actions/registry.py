@@ -167,10 +167,10 @@ class Way:
         try:
             return parameter.kind.convert(value)
         except Unconvertible as error:
-            why = f" ({error})" if str(error) else ""
+            why = f" ({error})"[:_LONGEST_QUOTE] if str(error) else ""
             message = (
                 f"action: {self.action} has an invalid argument: {parameter.name} "
-                f"(=={_shown(value)}). Cannot convert to: {parameter.kind.name}{why:.{_LONGEST_QUOTE}}"
+                f"(=={_shown(value)}). Cannot convert to: {parameter.kind.name}{why}"
             )
             if self.server_action or not parameter.kind.single:
                 raise ActionFailed(message) from None

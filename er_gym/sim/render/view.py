@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from er_gym.sim.render.panda import Frames
 
 _FLAGS = {
-    "renderDepthImage": "render_depth",
     "renderInstanceSegmentation": "render_instances",
     "renderSemanticSegmentation": "render_classes",
 }
