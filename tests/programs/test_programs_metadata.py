@@ -13,13 +13,11 @@ import er_gym
 
 FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 BASIN = "Sink|-01.90|+00.97|-01.50|SinkBasin"
-DEFAULTS = {
-    **dict.fromkeys(("actionFloatsReturn", "actionStringsReturn", "actionVector3sReturn"), []),
-    **dict.fromkeys(("distances", "flatSurfacesOnGrid", "isOpenableGrid", "normals"), []),
-    **dict.fromkeys(("objectIdsInBox", "segmentedObjectIds"), []),
-    "actionFloatReturn": 0.0,
-    "actionIntReturn": 0,
-}
+LISTS = (
+    *("actionFloatsReturn", "actionStringsReturn", "actionVector3sReturn", "distances", "normals"),
+    *("flatSurfacesOnGrid", "isOpenableGrid", "objectIdsInBox", "segmentedObjectIds"),
+)
+DEFAULTS = {**{name: [] for name in LISTS}, "actionFloatReturn": 0.0, "actionIntReturn": 0}
 
 
 def in_process(**arguments):

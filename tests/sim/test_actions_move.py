@@ -174,6 +174,14 @@ def test_a_horizon_beyond_the_vertical_is_refused(kitchen):
     assert "horizon" in kitchen.refused("TeleportFull", horizon=100)
 
 
+def test_a_forced_horizon_is_told_between_half_turns(kitchen):
+    kitchen.do("TeleportFull", horizon=400, forceAction=True)
+    assert kitchen.agent["cameraHorizon"] == pytest.approx(40)
+    kitchen.do("TeleportFull", horizon=1e308, forceAction=True)
+    assert abs(kitchen.agent["cameraHorizon"]) <= 180
+    kitchen.step("PickupObject", x=0.5, y=0.5)  # which draws what is seen
+
+
 def test_what_is_held_goes_along(kitchen):
     kitchen.do("TeleportFull", position=CLEAR, rotation=0)
     kitchen.take(APPLE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import remainder
 
 import numpy as np
 
@@ -171,7 +172,8 @@ def teleport(
         Agent(
             position=there,
             rotation=agent.rotation if rotation is None else rotation.y % 360.0,
-            horizon=agent.horizon if horizon is None else horizon,
+            # As AI2-THOR tells it; a forced one may be any number.
+            horizon=agent.horizon if horizon is None else remainder(horizon, 360.0),
             standing=agent.standing if standing is None else standing,
         )
     )
