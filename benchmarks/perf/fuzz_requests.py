@@ -255,7 +255,6 @@ SANE: dict[str, Draw] = {
     "orthographicSize": lambda room: None,
     "agentMode": _among("default"),
     "timeScale": _among(1.0, 2.0),
-    "DisableAllObjectsOfType.objectType": _among("Fork", "Apple", "Pillow", "Towel", "Painting"),
     "maxPoses": _among(1, 3, 20),
     "numPlacementAttempts": _among(1, 5),
     "excludedReceptacles": _some(_object_type, 3),

@@ -128,22 +128,6 @@ def _set_pose(world: World, i: int, pose: ObjectPose) -> bool:
     return True
 
 
-@action("DisableAllObjectsOfType", server_action=True)
-def disable_all_objects_of_type(
-    world: World, *, objectType: str | None = None, objectId: str | None = None
-) -> None:
-    """Take every object of a type out of the scene; what lies in it stays where it is.
-
-    ``objectId`` names the type when ``objectType`` is empty.
-    """
-    kind = objectId if objectType == "" else objectType
-    if kind == "Floor":
-        raise ActionFailed("The embedded engine has no room without a Floor.")
-    for i in list(world.of_type(kind or "")):
-        world.remove(i)
-    consequences.apply(world)
-
-
 @action("InitialRandomSpawn")
 def initial_random_spawn(
     world: World,

@@ -94,9 +94,9 @@ def _text(value: Any) -> str | None:
 
 
 def _plain(value: Any) -> Any:
-    """A NumPy scalar as Python's own, which is how it would come over the wire."""
-    if isinstance(value, np.generic):
-        return value.item()
+    """What is NumPy's as Python's own, which is how it comes over the wire."""
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
     raise Unconvertible
 
 

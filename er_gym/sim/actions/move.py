@@ -102,13 +102,17 @@ def _mover(heading: float) -> Callable[..., None]:
         With ``objectId``, no farther than ``maxAgentsDistance`` metres from that object. All else
         is accepted and has no effect: what is held runs into nothing here.
         """
-        start = world.agent
+        start, carried = world.agent, world.in_hand
+        were = [array[carried] for array in (world.position, world.low, world.high)]
         _step(world, moveMagnitude, heading)
         if objectId and maxAgentsDistance > 0.0:
             try:
                 _stay_near(world, objectId, maxAgentsDistance)
             except ActionFailed:
                 world.place_agent(start)
+                # There and back is not to the last bit where it was.
+                for array, was in zip((world.position, world.low, world.high), were, strict=True):
+                    array[carried] = was
                 raise
 
     return move

@@ -60,10 +60,12 @@ def _grid_ahead(world: World, step: float | None) -> np.ndarray:
     size = world.settings.grid_size if step is None else step
     if size < _SMALLEST_STEP:
         raise ActionFailed(f"A grid needs a step of {_SMALLEST_STEP:g} m or more, not {size:g}.")
+    start = world.agent.position[[0, 2]]
+    if size > FARTHEST:
+        return start[None]
     yaw = np.radians(world.agent.rotation)
     forward = size * np.array([np.sin(yaw), np.cos(yaw)])
     right = size * np.array([np.cos(yaw), -np.sin(yaw)])
-    start = world.agent.position[[0, 2]]
     found = {(0, 0): start}
     todo = deque(found)
     while todo:
