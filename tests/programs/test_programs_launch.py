@@ -113,7 +113,8 @@ from ai2thor.controller import Controller
 
 def turn(degrees):
     with Controller(scene="FloorPlan1", width=64, height=48, headless=True) as controller:
-        return controller.step("RotateRight", degrees=degrees).metadata["agent"]["rotation"]["y"]
+        agent = controller.step("Teleport", rotation=dict(x=0, y=degrees, z=0)).metadata["agent"]
+        return agent["rotation"]["y"]
 
 with ThreadPoolExecutor(3) as pool:
     print([round(angle) for angle in pool.map(turn, (10, 20, 30))])
