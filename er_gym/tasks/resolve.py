@@ -20,8 +20,6 @@ from er_gym.thor import make_controller
 
 NEAR = 0.25
 """How far off an object may be that is taken for one that is missing, metres."""
-_CLEARLY = 2.0
-"""So many times as far off as the nearest the next one must be, lest it be meant."""
 _ROUNDED = 0.01
 """Ids tell places to a hundredth of a metre."""
 _NUMBER = re.compile(r"[+-]?\d+\.\d+")
@@ -299,7 +297,7 @@ def _nearest(
         if metres > NEAR or named in found or named in unclear or other in gone:
             continue
         others = [far for far, one in near[named] if one not in gone and one != other]
-        if min(others, default=inf) < _CLEARLY * metres:
+        if min(others, default=inf) < metres + _ROUNDED / 2:  # as near, as far as ids tell
             unclear.add(named)
         else:
             found[named] = (other, metres)

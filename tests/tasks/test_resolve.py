@@ -105,14 +105,14 @@ def test_each_object_is_taken_once() -> None:
 
 def test_what_could_be_either_of_two_is_neither() -> None:
     task = make_task("single_pickup", ("open", "Drawer|+00.00|+00.10|+00.00"))
-    drawers = ["Drawer|+00.00|+00.02|+00.00", "Drawer|+00.00|+00.20|+00.00"]
+    drawers = ["Drawer|+00.00|+00.00|+00.00", "Drawer|+00.00|+00.20|+00.00"]
     with pytest.raises(TaskFileError) as caught:
         resolve_task(task, drawers)
     assert str(caught.value) == (
         "task test: FloorPlan1 has no object 'Drawer|+00.00|+00.10|+00.00'; it could be "
-        "Drawer|+00.00|+00.02|+00.00, 0.08 m off or Drawer|+00.00|+00.20|+00.00, 0.10 m off"
+        "Drawer|+00.00|+00.00|+00.00, 0.10 m off or Drawer|+00.00|+00.20|+00.00, 0.10 m off"
     )
-    clearer = make_task("single_pickup", ("open", "Drawer|+00.00|+00.05|+00.00"))
+    clearer = make_task("single_pickup", ("open", "Drawer|+00.00|+00.09|+00.00"))
     assert resolve_task(clearer, drawers)[0].key_actions[0].object_id == drawers[0]
 
 
@@ -210,7 +210,7 @@ def place(object_id: str) -> tuple[float, ...]:
 
 
 @pytest.mark.parametrize(
-    ("metres", "at_least"), [(0.01, 271), (0.03, 262), (0.1, 240), (0.2, 220), (0.4, 0)]
+    ("metres", "at_least"), [(0.01, 272), (0.03, 271), (0.1, 268), (0.2, 260), (0.4, 0)]
 )
 def test_ids_of_another_build_lead_to_the_same_objects(
     shared_data, metres: float, at_least: int
@@ -229,9 +229,9 @@ def test_ids_of_another_build_lead_to_the_same_objects(
         )
         if found.object_id != right.object_id
     }
-    # None but where another Drawer or Cabinet is much nearer to the shifted place than its own.
-    assert all(dist(place(a), place(b)) <= metres / 2 for _, a, b in wrong)
-    assert len(wrong) <= 5
+    # None but where another Drawer or Cabinet is nearer to the shifted place than its own.
+    assert all(dist(place(a), place(b)) < metres for _, a, b in wrong)
+    assert len(wrong) <= 0.04 * len(there)
     if metres > NEAR:
         assert {task.id for task in fitted.tasks} == {task_id for task_id, _, _ in wrong}
 
