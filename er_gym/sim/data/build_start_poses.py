@@ -4,8 +4,9 @@ The input is a JSON file with AI2-THOR 5's pose for scenes by name, at gridSize 
 
     {"poses": {"FloorPlan1": {"x": -1.0, "y": 0.901, "z": 1.0, "rotation": 270.0, "horizon": 0.0}}}
 
-The poses come from the metadata published with Embodied-Reasoner (see NOTICE), which has none for
-FloorPlan30: there the pose is ours. Run after :mod:`er_gym.sim.data.build_scenes`::
+The poses come from the metadata published with Embodied-Reasoner (see NOTICE). It has none for
+FloorPlan30, and for two rooms that of another room: see ``_OUR_OWN``. Run after
+:mod:`er_gym.sim.data.build_scenes`::
 
     python -m er_gym.sim.data.build_start_poses POSES.json
 """
@@ -21,8 +22,14 @@ from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.start import START_POSES, StartPose
 from er_gym.sim.world import AGENT_HEIGHT
 
-_OUR_OWN = {"FloorPlan30": StartPose(2.25, 0.25, 270.0)}
-"""Beside the kitchen island, facing it."""
+_OUR_OWN = {
+    "FloorPlan30": StartPose(2.25, 0.25, 270.0),  # beside the kitchen island, facing it
+    "FloorPlan410": StartPose(-2.25, 3.25, 180.0),  # before the mirror
+    "FloorPlan411": StartPose(-0.75, 2.0, 90.0),  # published for FloorPlan410
+}
+"""What was published for FloorPlan410 and 411 belongs to the rooms after them: all that was seen
+from the first pose is in FloorPlan411, and the second is FloorPlan412's. In the rooms of these
+numbers both are outside the walls."""
 _ROUNDING = 1e-4
 """The poses are given to a tenth of a millimetre."""
 
