@@ -59,7 +59,7 @@ def test_a_policy_comes_to_do_what_the_teacher_did(make_config: Make) -> None:
 
 def test_a_run_begins_warm(make_config: Make, tmp_path: Path) -> None:
     config = make_config(
-        total_steps=256, warm_start={"teacher": "oracle", "episodes": 8, "epochs": 2}
+        total_steps=256, warm_start={"teacher": "oracle", "episodes": 24, "epochs": 6}
     )
     train(config, tmp_path / "run")
     noted = json.loads((tmp_path / "run" / "warm_start.json").read_text())
