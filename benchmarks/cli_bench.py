@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from er_gym.tasks.task import Task
 
     OnEpisode = Callable[[EpisodeRecord], None]
+    Say = Callable[[object], None]
 
 _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 _directory = click.Path(file_okay=False, path_type=Path)
@@ -72,9 +73,9 @@ _SPOKEN_OPTIONS = (
         type=click.IntRange(min=1),
         help="How many conversations at once.  [default: 8]",
     ),
-    click.option("--max-usd", type=click.FloatRange(min=0), help="Stop when so much is spent."),
-    click.option("--max-tokens", type=click.IntRange(min=1), help="Stop at so many tokens."),
-    click.option("--max-minutes", type=click.FloatRange(min=0), help="Stop after so long."),
+    click.option("--max-usd", type=float, help="Stop when so much is spent."),
+    click.option("--max-tokens", type=int, help="Stop at so many tokens."),
+    click.option("--max-minutes", type=float, help="Stop after so long, requests included."),
 )
 """For agents that speak; the budgets are of the run, however often it is continued, and the minutes
 of this command."""
@@ -189,7 +190,8 @@ def bench(
             )
             with progress:
                 outcome = play(
-                    lambda episode: progress.episode(score_episode(episode, judge).success)
+                    lambda episode: progress.episode(score_episode(episode, judge).success),
+                    progress.say,
                 )
             bill = spent()
     except (WorkerSetupError, OSError) as error:  # OSError: the disk is full, the share is gone
@@ -217,19 +219,19 @@ def bench(
 @contextmanager
 def _player(
     store: RunStore, chosen: Sequence[Task], workers: int, voice: Voice | None
-) -> Iterator[tuple[Callable[[OnEpisode], Outcome], Callable[[], str]]]:
+) -> Iterator[tuple[Callable[[OnEpisode, Say], Outcome], Callable[[], str]]]:
     """How the chosen tasks are played, and how to hear what that has cost."""
     from agents.base import CannotGoOn
     from benchmarks.runner import run
 
     if voice is None:
-        yield lambda on_episode: run(store, chosen, workers=workers, on_episode=on_episode), str
+        yield lambda on_episode, _: run(store, chosen, workers=workers, on_episode=on_episode), str
         return
     with bad_input(CannotGoOn):  # no key, no such model
         speaker = voice.speaker(store.path)
     with closing(speaker):
         yield (
-            lambda on_episode: voice.play(speaker, store, chosen, workers, on_episode),
+            lambda on_episode, say: voice.play(speaker, store, chosen, workers, on_episode, say),
             lambda: speaker.spent,
         )
 
@@ -297,7 +299,7 @@ def _voice(agent: str, spoken: Spoken) -> Voice | None:
 
     if speaks(agent):
         return Voice.of(agent, **vars(spoken))
-    given = [name for name, value in vars(spoken).items() if value]
+    given = [name for name, value in vars(spoken).items() if value not in (None, ())]
     if given:
         option = "--set" if given[0] == "overrides" else f"--{given[0].replace('_', '-')}"
         raise BadInput(f"{option} is for agents that speak, such as openai:MODEL, not for {agent}")

@@ -20,7 +20,7 @@ def bar(console: Console) -> Bar:
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[status]}"),
+        TextColumn("{task.fields[status]}", markup=False),
         TimeRemainingColumn(),
         console=console,
         disable=not console.is_terminal,
@@ -84,6 +84,10 @@ class Progress:
                 highlight=False,
                 soft_wrap=True,
             )
+
+    def say(self, what: object) -> None:
+        """Print a line, above the bar where there is one; from any thread."""
+        self._console.print(str(what), style="dim", markup=False, highlight=False, soft_wrap=True)
 
     def _status(self) -> str:
         if not self._done:

@@ -85,8 +85,13 @@ class Voice:
         tasks: Sequence[Task],
         workers: int,
         on_episode: Callable[[EpisodeRecord], None],
+        say: Callable[[object], None],
     ) -> Outcome:
-        """Play the tasks that the store has no finished episode of; see :func:`run_together`."""
+        """Play the tasks that the store has no finished episode of; see :func:`run_together`.
+
+        ``say`` is called with what a user should hear of the server, from any thread.
+        """
+        speaker.watch.show = say
 
         def keep(episode: EpisodeRecord, agent: Agent) -> None:
             last = next((step for step in reversed(episode.steps) if not step.appended), None)

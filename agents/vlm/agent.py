@@ -203,6 +203,7 @@ class VLMAgent:
             prompt_tokens=sum(each.prompt_tokens for each in rounds),
             completion_tokens=sum(each.completion_tokens for each in rounds),
             cost=sum(each.cost for each in rounds),
+            estimated=any(each.estimated for each in rounds),
             error=error,
         )
         return record, files

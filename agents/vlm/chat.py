@@ -60,12 +60,15 @@ class Usage:
     Attributes:
         prompt: of the conversation sent; ``cached``: how many of them the server remembered.
         completion: of the reply; ``reasoning``: how many of them were thought and not said.
+        estimated: whether the server's count was missing or impossible, so that some of these are
+            upper bounds (:mod:`agents.vlm.clients.tokens`).
     """
 
     prompt: int = 0
     completion: int = 0
     cached: int = 0
     reasoning: int = 0
+    estimated: bool = False
 
     def __add__(self, other: Usage) -> Usage:
         return Usage(
@@ -73,6 +76,7 @@ class Usage:
             self.completion + other.completion,
             self.cached + other.cached,
             self.reasoning + other.reasoning,
+            self.estimated or other.estimated,
         )
 
     @property

@@ -6,12 +6,14 @@ is in the settings either, and of a server's address only the part without user 
 
 from __future__ import annotations
 
+import os
 from typing import Any, Literal
 from urllib.parse import urlsplit, urlunsplit
 
 from pydantic import BaseModel, ConfigDict
 
 from agents.vlm.chat import Role, Usage
+from agents.vlm.clients.redaction import Secrets
 from agents.vlm.settings import AgentSettings
 
 
@@ -63,6 +65,7 @@ class RoundRecord(_Record):
         feedback, success: the environment's answer.
         seconds, prompt_tokens, completion_tokens, cached_tokens, reasoning_tokens, cost, finish,
         model: see :class:`agents.vlm.chat.Reply`; cost in US dollars.
+        estimated: whether the tokens are upper bounds, since the server's count cannot be true.
         kept: whether it was kept from an earlier request, which paid for it.
     """
 
@@ -80,6 +83,7 @@ class RoundRecord(_Record):
     completion_tokens: int = 0
     cached_tokens: int = 0
     reasoning_tokens: int = 0
+    estimated: bool = False
     cost: float = 0.0
     finish: str = ""
     model: str = ""
@@ -89,7 +93,11 @@ class RoundRecord(_Record):
     def usage(self) -> Usage:
         """Its tokens."""
         return Usage(
-            self.prompt_tokens, self.completion_tokens, self.cached_tokens, self.reasoning_tokens
+            self.prompt_tokens,
+            self.completion_tokens,
+            self.cached_tokens,
+            self.reasoning_tokens,
+            self.estimated,
         )
 
 
@@ -104,6 +112,7 @@ class ConversationRecord(_Record):
         messages: from the system's to the last reply.
         rounds: one for each reply.
         prompt_tokens, completion_tokens, cost: over all rounds, whenever they were paid for.
+        estimated: whether some of these are upper bounds.
         error: what the episode crashed with, in one line; "" if it did not.
     """
 
@@ -120,23 +129,36 @@ class ConversationRecord(_Record):
     prompt_tokens: int
     completion_tokens: int
     cost: float
+    estimated: bool = False
     error: str = ""
 
 
 def plain_settings(settings: AgentSettings) -> dict[str, Any]:
     """Settings as they may be kept: a server's address without user, password and query."""
-    kept = settings.model_dump(mode="json")
-    url = urlsplit(settings.server.base_url)
-    place = url.netloc.rpartition("@")[2]
-    kept["server"]["base_url"] = urlunsplit((url.scheme, place, url.path, "", ""))
+    kept = without_secrets(settings, settings.model_dump(mode="json"))
+    kept["server"]["base_url"] = plain_url(settings.server.base_url)
     return kept
 
 
-def tokens(usage: Usage) -> dict[str, int]:
+def without_secrets(settings: AgentSettings, value: dict[str, Any]) -> dict[str, Any]:
+    """A JSON value without the key that the settings name."""
+    key = os.environ.get(settings.server.key_from, "").strip()
+    plain: dict[str, Any] = Secrets(key, settings.server.base_url).strike_all(value)
+    return plain
+
+
+def plain_url(address: str) -> str:
+    """An address without user, password, query and fragment."""
+    url = urlsplit(address)
+    return urlunsplit((url.scheme, url.netloc.rpartition("@")[2], url.path, "", ""))
+
+
+def tokens(usage: Usage) -> dict[str, Any]:
     """The token counts of a round, under the names of :class:`RoundRecord`."""
     return {
         "prompt_tokens": usage.prompt,
         "completion_tokens": usage.completion,
         "cached_tokens": usage.cached,
         "reasoning_tokens": usage.reasoning,
+        "estimated": usage.estimated,
     }

@@ -8,15 +8,22 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-Positive = Annotated[int, Field(gt=0)]
-Seconds = Annotated[float, Field(gt=0)]
-Dollars = Annotated[float, Field(ge=0)]
+
+def _no_bool(value: object) -> object:
+    if isinstance(value, bool):
+        raise ValueError("give a number")
+    return value
+
+
+Positive = Annotated[int, BeforeValidator(_no_bool), Field(gt=0)]
+Seconds = Annotated[float, BeforeValidator(_no_bool), Field(gt=0, le=86_400)]
+Dollars = Annotated[float, BeforeValidator(_no_bool), Field(ge=0, le=1_000_000)]
 
 
 class _Settings(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Pictures(_Settings):
@@ -110,16 +117,19 @@ class Prices(_Settings):
 
 
 class Server(_Settings):
-    """Where an OpenAI-compatible server is, and how patient one is with it.
+    """Where an OpenAI-compatible server is, and how long requests wait for it.
 
     Attributes:
-        base_url: such as ``http://127.0.0.1:8000/v1``; OpenAI's own where empty.
+        base_url: such as ``http://127.0.0.1:8000/v1``; OpenAI's own where empty. A query string is
+            sent with each request.
         key_from: the environment variable that holds the key. Without a value none is sent, which
             is right for servers of one's own.
         api_version: of Azure's; its presence says that the server is Azure's.
-        timeout: seconds for one try, from first to last byte.
-        tries: how often a request is sent when what goes wrong may pass: no connection, a time-out,
-            408, 409, 429 and 5xx.
+        timeout: seconds for one try, from the first byte sent to the last received.
+        connect: seconds of these for a connection.
+        tries: how often a request is sent when what goes wrong may pass: no connection, 408, 409,
+            425, 429, 5xx and broken answers. A request that times out is sent twice at most, since
+            the server may charge for each.
         requests_per_minute: at most so many, over all episodes; no limit for None.
         max_tokens_field: what the server calls the limit of a reply.
         extra: further fields of the request's body; null leaves one out that would be sent.
@@ -128,7 +138,8 @@ class Server(_Settings):
     base_url: str = ""
     key_from: str = "OPENAI_API_KEY"
     api_version: str = ""
-    timeout: Seconds = 120.0
+    timeout: Seconds = 60.0
+    connect: Seconds = 10.0
     tries: Positive = 6
     requests_per_minute: Positive | None = None
     max_tokens_field: Literal["max_tokens", "max_completion_tokens"] = "max_tokens"

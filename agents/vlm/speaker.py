@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agents import configs
 from agents.vlm.chat import Client
-from agents.vlm.settings import AgentSettings
+from agents.vlm.record import without_secrets
+from agents.vlm.settings import AgentSettings, Prices
 
 if TYPE_CHECKING:
     from agents.vlm.agent import VLMAgent
-    from agents.vlm.clients.budget import Budget, Metered
+    from agents.vlm.clients.budget import Budget, Ledger
+    from agents.vlm.clients.kept import Identified
+    from agents.vlm.clients.lines import Lines
+    from agents.vlm.clients.watch import Notice, Watch
 
 _WHAT = "agent"
 SPENDING = "spending.jsonl"
+EVENTS = "server-events.jsonl"
 REPLIES = "replies"
 _OF_NO_CONSEQUENCE: Mapping[str, Any] = {
-    "server": {"base_url", "key_from", "timeout", "tries", "requests_per_minute"},
+    "server": {"base_url", "key_from", "timeout", "connect", "tries", "requests_per_minute"},
     "local": {"device_map", "batch", "wait"},
     "prompts": {"dataset"},
     "prices": True,
@@ -27,31 +34,33 @@ _OF_NO_CONSEQUENCE: Mapping[str, Any] = {
 their digest."""
 
 
-def _openai(model: str, settings: AgentSettings) -> Client:
+def _openai(model: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
     from agents.vlm.clients.openai_server import OpenAIClient
 
-    return OpenAIClient(model, settings)
+    return OpenAIClient(model, settings, ledger, watch)
 
 
-def _local(path: str, settings: AgentSettings) -> Client:
+def _local(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+    from agents.vlm.clients.budget import Metered
     from agents.vlm.clients.local import LocalClient
 
-    return LocalClient(path, settings)
+    return Metered(LocalClient(path, settings, watch), ledger, watch)
 
 
-def _recorded(path: str, settings: AgentSettings) -> Client:
+def _recorded(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+    from agents.vlm.clients.budget import Metered
     from agents.vlm.clients.scripted import RecordedClient
 
-    return RecordedClient(Path(path))
+    return Metered(RecordedClient(Path(path)), ledger, watch)
 
 
-CLIENTS: Mapping[str, Callable[[str, AgentSettings], Client]] = {
+CLIENTS: Mapping[str, Callable[[str, AgentSettings, Ledger, Watch], Identified]] = {
     "openai": _openai,
     "hf": _local,
     "recorded": _recorded,
 }
-"""By what the name of an agent begins with, before the colon: how its client is made of the rest
-and the settings."""
+"""By what the name of an agent begins with, before the colon: how its client is made of the rest,
+the settings, and the run's ledger and watch."""
 
 
 def speaks(name: str) -> bool:
@@ -73,16 +82,19 @@ def load_settings(name: str | None, overrides: Sequence[str] = ()) -> AgentSetti
 class Speaker:
     """Makes the agents of a run.
 
+    Attributes:
+        watch: the run's time and news; ``watch.show`` is called with what a user should hear.
+
     Args:
         name: ``openai:MODEL``, ``hf:PATH`` or ``recorded:RUN``.
         settings: of the agent.
-        directory: where replies are kept, so that none is paid for twice, and what has been spent;
-            without it, nothing is kept.
+        directory: where replies are kept, so that none is paid for twice, what has been spent, and
+            what went wrong with the server; without it, nothing is kept.
         budget: what may be spent.
 
     Raises:
-        ValueError: the name, the prompts or the matcher's model are not there, or packages are
-            missing.
+        ValueError: the name, the prompts or the matcher's model are not there, packages are
+            missing, or the directory's ledger is a link.
         CannotGoOn: there is no key, or the model cannot be loaded.
     """
 
@@ -103,16 +115,25 @@ class Speaker:
         self._matcher = Matcher(settings.matching)
         self._matcher.prepare()
         kind, _, rest = name.partition(":")
-        self._metered: Metered | None = None
+        self._events: Lines | None = None
+        self._keeping = threading.Lock()
+        self._directory = directory
         try:
-            self._client = CLIENTS[kind](rest, settings)
+            from agents.vlm.clients.budget import Budget, Ledger
+            from agents.vlm.clients.watch import Watch
+
+            asked = budget or Budget()
+            self.watch = Watch(asked.max_minutes)
+            prices = settings.prices if kind == "openai" else Prices()
+            self._ledger = Ledger(asked, prices)
+            client = CLIENTS[kind](rest, settings, self._ledger, self.watch)
+            self._client: Client = client
             if directory is not None:
-                from agents.vlm.clients import budget as budgets
                 from agents.vlm.clients.kept import Kept
 
-                asked = budget or budgets.Budget()
-                self._metered = budgets.Metered(self._client, asked, directory / SPENDING)
-                self._client = Kept(self._metered, directory / REPLIES)
+                self._ledger.open(directory / SPENDING)
+                self.watch.keep = self._keep
+                self._client = Kept(client, directory / REPLIES)
         except ImportError as error:
             extra = "local" if kind == "hf" else "vlm"
             raise ValueError(
@@ -131,15 +152,29 @@ class Speaker:
     @property
     def spent(self) -> str:
         """What the run has cost so far, for people; "" where nothing is written down."""
-        if self._metered is None:
+        if self._directory is None:
             return ""
-        spent = self._metered.spent
-        words = f"{spent.usage.total:,} tokens in {spent.requests:,} replies"
-        return f"{words}, ${spent.cost:.2f}" if spent.cost else words
+        spent = self._ledger.spent
+        most = "at most " if spent.usage.estimated else ""
+        words = f"{most}{spent.usage.total:,} tokens in {spent.requests:,} replies"
+        return f"{words}, {most}${spent.cost:.2f}" if spent.cost else words
 
     def close(self) -> None:
         """Let go of the client."""
         self._client.close()
+        self._ledger.close()
+        if self._events is not None:
+            self._events.close()
+
+    def _keep(self, notice: Notice) -> None:
+        """Write down what went wrong; the file is made when something does."""
+        from agents.vlm.clients.lines import Lines
+
+        assert self._directory is not None
+        # A full disk is told where something is lost by it.
+        with contextlib.suppress(OSError, ValueError), self._keeping:
+            self._events = self._events or Lines(self._directory / EVENTS)
+            self._events.add(notice.model_dump_json())
 
 
 def ways_to_name() -> str:
@@ -150,4 +185,4 @@ def ways_to_name() -> str:
 def consequential(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:
     """What of the settings decides what an agent says: two runs compare if theirs are equal."""
     kept = settings.model_dump(mode="json", exclude=dict(_OF_NO_CONSEQUENCE))
-    return {**kept, "prompts_digest": prompts_digest}
+    return {**without_secrets(settings, kept), "prompts_digest": prompts_digest}

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import os
+import math
 import threading
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from agents.base import CannotGoOn
 from agents.vlm.chat import Message, Reply, Usage
+from agents.vlm.clients.lines import Lines
+from agents.vlm.clients.watch import AGAIN, Watch
 from agents.vlm.settings import Prices
 
 if TYPE_CHECKING:
     from agents.vlm.clients.kept import Identified
-
-_AGAIN = "run the same command again to continue"
-_CLOSED = -1
 
 
 @dataclass(frozen=True)
@@ -32,94 +30,195 @@ class Budget:
         max_usd: US dollars, by the prices that the settings state.
         max_tokens: of prompts and completions, also those that the server remembered.
         max_minutes: of this process.
+
+    Raises:
+        ValueError: one is not a positive, finite number.
     """
 
     max_usd: float | None = None
     max_tokens: int | None = None
     max_minutes: float | None = None
 
+    def __post_init__(self) -> None:
+        for name, given in vars(self).items():
+            kinds = (int,) if name == "max_tokens" else (int, float)
+            if given is None or (type(given) in kinds and 0 < given < math.inf):
+                continue
+            what = "whole number" if name == "max_tokens" else "finite number"
+            raise ValueError(
+                f"{name} is {given!r}; give a {what} above 0 (on the command line, "
+                f"--{name.replace('_', '-')}), or leave it out for no limit"
+            )
+
 
 @dataclass(frozen=True)
 class Spent:
-    """What has been spent: tokens, US dollars, and how many requests were answered."""
+    """What has been spent: tokens, US dollars, and for how many answers."""
 
     usage: Usage = field(default_factory=Usage)
     cost: float = 0.0
     requests: int = 0
 
 
+_Count = Annotated[int, Field(ge=0)]
+_Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
 class Entry(BaseModel):
-    """A line of a ledger: a reply that was paid for.
+    """A line of a ledger: an answer that was paid for.
 
     Attributes:
         time: when it came, ISO 8601 in UTC.
         model: which answered.
         seed: of the episode.
-        prompt, completion, cached, reasoning: tokens, as :class:`agents.vlm.chat.Usage` has them.
+        prompt, completion, cached, reasoning, estimated: tokens, as
+            :class:`agents.vlm.chat.Usage` has them.
         cost: US dollars.
         seconds: how long it took.
+        rejected: why it was no reply; "" for one that was.
     """
+
+    model_config = ConfigDict(frozen=True)
 
     time: str
     model: str
     seed: int
-    prompt: int
-    completion: int
-    cached: int
-    reasoning: int
-    cost: float
-    seconds: float
+    prompt: _Count
+    completion: _Count
+    cached: _Count
+    reasoning: _Count
+    estimated: bool = False
+    cost: _Amount
+    seconds: _Amount
+    rejected: str = ""
+
+    @staticmethod
+    def of(
+        usage: Usage, *, model: str, seed: int, cost: float, seconds: float, rejected: str = ""
+    ) -> Entry:
+        """An entry of now."""
+        return Entry(
+            time=datetime.now(timezone.utc).isoformat(timespec="milliseconds"),
+            model=model,
+            seed=seed,
+            prompt=usage.prompt,
+            completion=usage.completion,
+            cached=usage.cached,
+            reasoning=usage.reasoning,
+            estimated=usage.estimated,
+            cost=cost,
+            seconds=round(seconds, 3),
+            rejected=rejected,
+        )
 
 
-class Metered:
-    """Writes down what each reply of another client costs, and asks no more when it is too much.
+class Ledger:
+    """What has been spent, and whether more may be.
 
-    The ledger is what counts: whatever stands in it has been spent, by an earlier process too, or
-    by another that writes to the same file now. A limit is looked at before each request, so that
-    at most the requests under way go beyond it. What a server charges for an answer that never
-    came is not known, and not in it.
+    The file is what counts: whatever stands in it has been spent, by an earlier process too, or by
+    another that writes to the same file now. A limit is looked at before each try of a request, so
+    that at most the tries under way go beyond it. What a server charges where it never began to
+    answer is not known, and not in it.
+
+    Without :meth:`open` it remembers what this process spends.
 
     Args:
-        client: is asked.
         budget: what may be spent.
-        ledger: JSON lines, :class:`Entry` each; it and its directory are made.
+        prices: which costs are worked out by.
 
     Raises:
         ValueError: dollars are limited and no prices are known.
-        OSError: the ledger cannot be written.
     """
 
-    def __init__(self, client: Identified, budget: Budget, ledger: Path) -> None:
-        if budget.max_usd is not None:
-            prices = getattr(client, "prices", None) or Prices()
-            if not (prices.prompt or prices.completion):
-                raise ValueError(
-                    "--max-usd needs prices: give prices.prompt and prices.completion, US dollars "
-                    "for a million tokens, or use --max-tokens"
-                )
-        self._client, self._budget = client, budget
-        self._began = time.monotonic()
+    def __init__(self, budget: Budget, prices: Prices) -> None:
+        if budget.max_usd is not None and not (prices.prompt or prices.completion):
+            raise ValueError(
+                "--max-usd needs prices: give prices.prompt and prices.completion, US dollars "
+                "for a million tokens, or use --max-tokens"
+            )
+        self._budget = budget
         self._lock = threading.Lock()
         self._spent = Spent()
-        self._read_to = 0
-        self._path = ledger
-        ledger.parent.mkdir(parents=True, exist_ok=True)
-        self._file = os.open(ledger, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
-        size = os.fstat(self._file).st_size
-        if size and os.pread(self._file, 1, size - 1) != b"\n":
-            os.write(self._file, b"\n")  # ends what a killed process left half-written
+        self._lines: Lines | None = None
 
-    @property
-    def identity(self) -> str:
-        """The other client's."""
-        return self._client.identity
+    def open(self, path: Path) -> None:
+        """Keep it in a file.
+
+        Args:
+            path: JSON lines, :class:`Entry` each; made if it is not there.
+
+        Raises:
+            ValueError: it is a link.
+            OSError: it cannot be written.
+        """
+        self._lines = Lines(path)
 
     @property
     def spent(self) -> Spent:
         """What stands in the ledger; once it is closed, what stood in it then."""
         with self._lock:
-            self._catch_up()
+            for line in self._lines.new() if self._lines is not None else ():
+                try:
+                    self._spent = _with(self._spent, Entry.model_validate_json(line))
+                except ValidationError:
+                    continue  # a half-written line says nothing
             return self._spent
+
+    def check(self) -> None:
+        """Raise CannotGoOn where nothing more may be spent."""
+        budget, spent = self._budget, self.spent
+        if budget.max_usd is not None and spent.cost >= budget.max_usd:
+            raise CannotGoOn(
+                f"the budget is spent: ${spent.cost:.2f} of ${budget.max_usd:.2f}; raise --max-usd "
+                f"and {AGAIN}"
+            )
+        if budget.max_tokens is not None and spent.usage.total >= budget.max_tokens:
+            raise CannotGoOn(
+                f"the budget is spent: {spent.usage.total:,} of {budget.max_tokens:,} tokens; "
+                f"raise --max-tokens and {AGAIN}"
+            )
+
+    def enter(self, entry: Entry) -> None:
+        """Write down what an answer cost.
+
+        Raises:
+            CannotGoOn: it cannot be written.
+        """
+        if self._lines is None:
+            with self._lock:
+                self._spent = _with(self._spent, entry)
+            return
+        try:
+            self._lines.add(entry.model_dump_json())
+        except OSError as error:
+            raise CannotGoOn(
+                f"{self._lines.path} cannot be written ({error.strerror}), so that nobody would "
+                f"know what is spent; see to that and {AGAIN}"
+            ) from error
+
+    def close(self) -> None:
+        """Close the file."""
+        _ = self.spent
+        if self._lines is not None:
+            self._lines.close()
+
+
+class Metered:
+    """Keeps the ledger for a client that does not: one entry a reply.
+
+    Args:
+        client: is asked.
+        ledger: of the run.
+        watch: of the run.
+    """
+
+    def __init__(self, client: Identified, ledger: Ledger, watch: Watch) -> None:
+        self._client, self._ledger, self._watch = client, ledger, watch
+
+    @property
+    def identity(self) -> str:
+        """The other client's."""
+        return self._client.identity
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
         """The next turn, as :class:`agents.vlm.chat.Client` has it.
@@ -127,75 +226,26 @@ class Metered:
         Raises:
             CannotGoOn: the budget is spent, or the ledger cannot be written.
         """
-        self._check()
+        self._watch.request(seed).left()
+        self._ledger.check()
         reply = self._client.reply(messages, seed)
         if not reply.kept:
-            self._write(reply, seed)
+            self._ledger.enter(
+                Entry.of(
+                    reply.usage,
+                    model=reply.model,
+                    seed=seed,
+                    cost=reply.cost,
+                    seconds=reply.seconds,
+                )
+            )
         return reply
 
     def close(self) -> None:
-        """Close the ledger and the other client."""
-        with self._lock:
-            if self._file != _CLOSED:
-                self._catch_up()
-                os.close(self._file)
-                self._file = _CLOSED
+        """Close the other client."""
         self._client.close()
 
-    def _check(self) -> None:
-        budget, spent = self._budget, self.spent
-        if budget.max_usd is not None and spent.cost >= budget.max_usd:
-            raise CannotGoOn(
-                f"the budget is spent: ${spent.cost:.2f} of ${budget.max_usd:.2f}; raise --max-usd "
-                f"and {_AGAIN}"
-            )
-        if budget.max_tokens is not None and spent.usage.total >= budget.max_tokens:
-            raise CannotGoOn(
-                f"the budget is spent: {spent.usage.total:,} of {budget.max_tokens:,} tokens; "
-                f"raise --max-tokens and {_AGAIN}"
-            )
-        minutes = (time.monotonic() - self._began) / 60
-        if budget.max_minutes is not None and minutes >= budget.max_minutes:
-            raise CannotGoOn(f"the {budget.max_minutes:g} minutes are over; {_AGAIN}")
 
-    def _catch_up(self) -> None:
-        """Read what has come to the ledger, whoever wrote it."""
-        if self._file == _CLOSED:
-            return
-        new = max(0, os.fstat(self._file).st_size - self._read_to)
-        for line in os.pread(self._file, new, self._read_to).split(b"\n")[:-1]:
-            self._read_to += len(line) + 1
-            self._spent = _with(self._spent, line)
-
-    def _write(self, reply: Reply, seed: int) -> None:
-        usage = reply.usage
-        entry = Entry(
-            time=datetime.now(timezone.utc).isoformat(timespec="milliseconds"),
-            model=reply.model,
-            seed=seed,
-            prompt=usage.prompt,
-            completion=usage.completion,
-            cached=usage.cached,
-            reasoning=usage.reasoning,
-            cost=reply.cost,
-            seconds=round(reply.seconds, 3),
-        )
-        try:
-            with self._lock:
-                # One write of a whole line to the end of the file: lines of processes do not mix.
-                os.write(self._file, entry.model_dump_json().encode() + b"\n")
-        except OSError as error:
-            raise CannotGoOn(
-                f"{self._path} cannot be written ({error.strerror}), so that nobody would know "
-                f"what is spent; see to that and {_AGAIN}"
-            ) from error
-
-
-def _with(spent: Spent, line: bytes) -> Spent:
-    """What is spent with a line of the ledger; a half-written one says nothing."""
-    try:
-        entry = Entry.model_validate_json(line)
-    except ValidationError:
-        return spent
-    usage = Usage(entry.prompt, entry.completion, entry.cached, entry.reasoning)
+def _with(spent: Spent, entry: Entry) -> Spent:
+    usage = Usage(entry.prompt, entry.completion, entry.cached, entry.reasoning, entry.estimated)
     return Spent(spent.usage + usage, spent.cost + entry.cost, spent.requests + 1)

@@ -26,6 +26,7 @@ from agents.base import CannotGoOn
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients.batching import Batcher
 from agents.vlm.clients.checkpoint import load, one_line
+from agents.vlm.clients.watch import AGAIN, Watch
 from agents.vlm.settings import AgentSettings
 
 _THINK, _THOUGHT = "<think>", "</think>"
@@ -66,6 +67,8 @@ class LocalClient:
         path: a directory that ``save_pretrained`` wrote, which needs no network; or a model's name
             on the Hugging Face hub.
         settings: of the agent.
+        watch: of the run, whose minutes end a reply that is being worked out; by default there is
+            no limit.
 
     Attributes:
         identity: all that decides what it says, as JSON.
@@ -75,12 +78,12 @@ class LocalClient:
             settings.
     """
 
-    def __init__(self, path: str, settings: AgentSettings) -> None:
+    def __init__(self, path: str, settings: AgentSettings, watch: Watch | None = None) -> None:
         if settings.decide == "tools":
             raise ValueError(
                 "decide: tools needs a server; a model in this process takes tags or json"
             )
-        self._name, self._settings = path, settings
+        self._name, self._settings, self._watch = path, settings, watch or Watch()
         loaded = load(path, settings)
         self.identity = loaded.identity
         self._model, self._ends = loaded.model, loaded.ends
@@ -211,6 +214,8 @@ class LocalClient:
             raise _plainer(error, rows) from None
         if self._closing.is_set():
             raise CannotGoOn(_CLOSED)
+        if self._watch.over:
+            raise CannotGoOn(f"the minutes are over; {AGAIN}")
         return [self._reply(row, said) for row, said in zip(rows, spoken, strict=True)]
 
     def _spoken(self, rows: Sequence[_Row]) -> list[list[int]]:
@@ -236,7 +241,8 @@ class LocalClient:
             choices = [_Draw(sampling.temperature, sampling.top_p, [row.seed for row in rows])]
 
         def closing(input_ids: torch.Tensor, scores: Any, **more: Any) -> torch.Tensor:
-            return torch.full((len(rows),), self._closing.is_set(), device=input_ids.device)
+            ends = self._closing.is_set() or self._watch.over
+            return torch.full((len(rows),), ends, device=input_ids.device)
 
         device = self._model.device
         out = self._model.generate(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import math
 import os
-import re
+import random
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,31 +16,37 @@ import httpx2
 import openai
 
 from agents.base import CannotGoOn
-from agents.vlm.chat import Message, ModelError, Reply
+from agents.vlm.chat import Message, Reply
+from agents.vlm.clients.budget import Budget, Entry, Ledger
 from agents.vlm.clients.decision_schema import REQUEST_FIELDS
+from agents.vlm.clients.failures import Failure, failure_of
+from agents.vlm.clients.redaction import DiscreetLogs, Secrets
+from agents.vlm.clients.tokens import Asked
 from agents.vlm.clients.transport import Pace, WholeAnswers
-from agents.vlm.clients.wire import read_completion, reply_of, request_body, server_words
+from agents.vlm.clients.watch import AGAIN, Request, Watch, duration
+from agents.vlm.clients.wire import (
+    billed,
+    cost_of,
+    in_letters,
+    read_bill,
+    read_completion,
+    reply_of,
+    request_body,
+)
 from agents.vlm.settings import AgentSettings, Server
 
 OPENAI_URL = "https://api.openai.com/v1"
 _SEEDS = 2**31
 _LONGEST_WORDS = 400  # characters of a server's, in an error
-
-_REFUSED: Mapping[int, str] = {
-    401: "the server does not accept the key of {key_from}",
-    402: "the server wants to be paid",
-    403: "the server does not let the key of {key_from} do this",
-    404: "the server has no such model, or nothing at all at this address",
-}
-"""What is answered to whatever is asked."""
-_MALFORMED = frozenset({400, 405, 415, 422})
-"""What is answered to a request that is wrong in itself, such as a parameter that is not known; or
-to a single conversation."""
-_ABOUT_ONE_CONVERSATION = re.compile(
-    r"context.{0,20}(length|size|window)|too long|longer than|too many (tokens|images)"
-    r"|content.(filter|policy|management)|moderation",
-    re.IGNORECASE,
+_FIRST_PAUSE, _LONGEST_PAUSE = 0.5, 8.0  # seconds before another try, where the server states none
+_LONGEST_ASKED = 120.0
+"""Seconds that a server may ask to wait; for more, the run has to have minutes left."""
+_SEE_TO_IT = (
+    "nothing has answered yet: see whether the server is up and server.base_url right, or give it "
+    "more time with server.timeout"
 )
+_LATE_TRIES = 2
+"""A server may charge for an answer that came too late, so the same is not asked more often."""
 
 
 class OpenAIClient:
@@ -46,76 +54,105 @@ class OpenAIClient:
 
     What may pass is tried again, ``settings.server.tries`` times in all, each try
     ``settings.server.timeout`` seconds at most from first to last byte: no connection, 408, 409,
-    429, 5xx, and answers that are cut off or empty. Between tries the SDK waits as long as the
-    server asks, or half a second, a second, two …
+    425, 429, 5xx, and answers that are cut off or empty. Between tries it waits as long as the
+    server asks, or half a second, a second, two … Each failed try is told to ``watch``. An answer
+    of status 2xx is entered in the ledger before it is judged.
 
     Args:
         model: its name, as the server knows it; on Azure, the deployment's.
         settings: of the agent.
+        ledger: of the run; by default nothing is written down and nothing limited.
+        watch: of the run; by default without limit.
 
     Attributes:
         prices: what its replies' costs are worked out by.
-        identity: all but the conversation and the episode that a reply depends on, as JSON.
+        identity: all but the conversation and the episode that a reply depends on, as JSON. A
+            server on another port is the same server.
 
     Raises:
         ValueError: the server's address does not fit.
         CannotGoOn: there is no key, and the server is known to want one.
     """
 
-    def __init__(self, model: str, settings: AgentSettings) -> None:
+    def __init__(
+        self,
+        model: str,
+        settings: AgentSettings,
+        ledger: Ledger | None = None,
+        watch: Watch | None = None,
+    ) -> None:
         self._model, self.prices = model, settings.prices
         self._settings = settings
+        self._ledger = ledger or Ledger(Budget(), settings.prices)
+        self._watch = watch or Watch()
         server = settings.server
         url = _address(server)
         # As it may be shown: without user, password and query.
         self._where = f"{url.scheme}://{url.netloc.decode()}{url.path}".rstrip("/")
         self._key = _key(server, url)
+        self._secrets = Secrets(self._key, str(url))
+        self._logs = DiscreetLogs(self._secrets)
         self._fields = _fixed_fields(model, settings)
         self._answered = False
+        place = f"{url.scheme}://{url.host}{url.path}".rstrip("/")
         self.identity = json.dumps(
-            {"server": self._where, "fields": self._fields, "seed": settings.seed}, sort_keys=True
+            {"server": place, "fields": self._fields, "seed": settings.seed}, sort_keys=True
         )
-        pace = Pace(server.requests_per_minute)
+        self._pace = Pace(server.requests_per_minute)
+        self._transport = WholeAnswers(url, server.timeout, server.connect)
+        plain = url.copy_with(query=None, fragment=None)
         options: dict[str, Any] = {
             # The SDK wants one; without a key the header is left out of every request.
             "api_key": self._key or "none",
-            "max_retries": server.tries - 1,
+            "max_retries": 0,  # its waits cannot be told, nor ended
             "timeout": server.timeout,
             "default_headers": {"Accept-Encoding": "identity"},
+            # Where a server sends requests on to may be another's, and would get the pictures.
             "http_client": openai.DefaultHttpxClient(
-                transport=WholeAnswers(str(url), server.timeout, read_completion, pace)
+                transport=self._transport, follow_redirects=False
             ),
         }
         if server.api_version:
             self._sdk: openai.OpenAI = openai.AzureOpenAI(
-                azure_endpoint=str(url),
+                azure_endpoint=str(plain),
                 azure_deployment=model,
                 api_version=server.api_version,
                 **options,
             )
         else:
-            self._sdk = openai.OpenAI(base_url=url, **options)
+            self._sdk = openai.OpenAI(base_url=plain, **options)
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
         """The next turn, as :class:`agents.vlm.chat.Client` has it."""
-        began = time.monotonic()
-        try:
-            response = self._sdk.post(
-                "/chat/completions",
-                cast_to=httpx2.Response,
-                content=self._body(messages, seed),
-                options={} if self._key else {"headers": {"Authorization": openai.Omit()}},
-            )
-        except openai.OpenAIError as error:
-            # Not "from error": a server may have repeated the key in what it says.
-            raise self._failure(error) from None
-        self._answered = True
-        reply = reply_of(response.extensions["read"], self.prices)
-        return replace(reply, seconds=time.monotonic() - began)
+        body = self._body(messages, seed)
+        asked = Asked.of(body, messages, in_letters(messages), self._fields)
+        request = self._watch.request(seed)
+        request.of = self._settings.server.tries
+        late = 0
+        for request.attempt in itertools.count(1):
+            self._check(request)
+            answer = self._try(body, asked, request)
+            if isinstance(answer, Reply):
+                self._answered = True
+                request.answered()
+                return replace(answer, seconds=time.monotonic() - request.began)
+            what = self._line(answer)
+            if answer.ends:
+                raise self._watch.stop(self._with_tries(what, request))
+            late += answer.late
+            if not answer.passes or request.attempt == request.of or late == _LATE_TRIES:
+                what = self._with_tries(what, request)
+                if answer.unreached:
+                    raise self._watch.stop(f"{what}; {_SEE_TO_IT}, and {AGAIN}")
+                raise request.gave_up(what)
+            self._pause(answer, what, request)
+        raise AssertionError("unreachable")
 
     def close(self) -> None:
         """Close all connections. Whoever still waits gets a ModelError."""
+        self._watch.close()
         self._sdk.close()
+        self._logs.close()
 
     def _body(self, messages: Sequence[Message], seed: int) -> bytes:
         fields = self._fields
@@ -123,42 +160,124 @@ class OpenAIClient:
             fields = {**fields, "seed": (self._settings.seed + seed) % _SEEDS}
         return request_body(fields, messages, self._settings.reasoning.in_history)
 
-    # -- errors ----------------------------------------------------------------------------------
+    # -- one try -----------------------------------------------------------------------------------
 
-    def _failure(self, error: openai.OpenAIError) -> ModelError | CannotGoOn:
-        """What to raise for what the SDK gave up on."""
-        if isinstance(error, openai.APIStatusError):
-            return self._after_status(error)
-        cause = error.__cause__ or error
-        message = self._line(str(cause), error)
-        if isinstance(cause, httpx2.ConnectError) and not self._answered:
-            return CannotGoOn(f"{message}; is the server up, and server.base_url right?")
-        return ModelError(message)
+    def _check(self, request: Request) -> None:
+        """Wait for one's turn; CannotGoOn where there is none."""
+        self._pace.wait(request)
+        try:
+            self._ledger.check()
+        except CannotGoOn as error:
+            # The others' answers are under way, and paid for; but nobody tries again.
+            self._watch.stop(str(error), waits_for_answers=True)
+            raise
 
-    def _after_status(self, error: openai.APIStatusError) -> ModelError | CannotGoOn:
-        status, words = error.status_code, server_words(error.response.content)
-        message = self._line(f"{status}, {words}", error)
-        if "insufficient_quota" in (error.code, error.type):
-            return CannotGoOn(message)
-        if status in _REFUSED:
-            meaning = _REFUSED[status].format(key_from=self._settings.server.key_from)
-            return CannotGoOn(f"{message}; {meaning}")
-        about_this = _ABOUT_ONE_CONVERSATION.search(f"{error.code} {words}")
-        if status in _MALFORMED and not self._answered and not about_this:
-            return CannotGoOn(f"{message}; no request like this will do better")
-        return ModelError(message)
+    def _try(self, body: bytes, asked: Asked, request: Request) -> Reply | Failure:
+        """A reply, or why there is none. It is not raised, so that no exception that may hold the
+        key is the context of another."""
+        began = time.monotonic()
+        self._transport.serve(request)
+        answer: httpx2.Response | openai.OpenAIError
+        try:
+            answer = self._sdk.post(
+                "/chat/completions",
+                cast_to=httpx2.Response,
+                content=body,
+                options={} if self._key else {"headers": {"Authorization": openai.Omit()}},
+            )
+        except openai.OpenAIError as error:
+            answer = error
+        except CannotGoOn:
+            if request.answering:
+                self._enter(b"", asked, None, "the run has ended", request, began)
+            raise
+        if isinstance(answer, openai.OpenAIError):
+            failure = failure_of(
+                answer, key_from=self._settings.server.key_from, answered=self._answered
+            )
+            if request.answering:
+                self._enter(b"", asked, None, failure.words, request, began)
+            return failure
+        try:
+            said, rejected = reply_of(read_completion(answer.content)), ""
+        except ValueError as error:
+            said, rejected = None, str(error)
+        reply = self._enter(answer.content, asked, said, rejected, request, began)
+        return reply or Failure(rejected, passes=True)
 
-    def _line(self, words: str, error: openai.OpenAIError) -> str:
-        """One line that says who, what, and how often tried; never the key."""
-        if self._key:
-            words = words.replace(self._key, "***")  # whole, so before anything is cut off
-        words = " ".join(words.split())
-        if len(words) > _LONGEST_WORDS:
-            words = words[:_LONGEST_WORDS] + "…"
-        request = getattr(error, "request", None)
-        tries = 1 + int(request.headers.get("x-stainless-retry-count", 0)) if request else 1
-        often = f" (tried {tries} times)" if tries > 1 else ""
-        return f"{self._model} at {self._where}: {words}{often}"
+    def _enter(
+        self,
+        body: bytes,
+        asked: Asked,
+        said: Reply | None,
+        rejected: str,
+        request: Request,
+        began: float,
+    ) -> Reply | None:
+        """Enter what an answer cost, reply or not; the reply with that, and without secrets."""
+        model, usage = billed(read_bill(body), asked, said)
+        cost, model = cost_of(usage, self.prices), self._secrets.strike(model)
+        self._ledger.enter(
+            Entry.of(
+                usage,
+                model=model,
+                seed=request.seed,
+                cost=cost,
+                seconds=time.monotonic() - began,
+                rejected=self._plain(rejected),
+            )
+        )
+        if said is None:
+            return None
+        strike = self._secrets.strike
+        return replace(
+            said,
+            text=strike(said.text),
+            reasoning=strike(said.reasoning),
+            call=strike(said.call),
+            finish=strike(said.finish),
+            model=model,
+            usage=usage,
+            cost=cost,
+        )
+
+    # -- between tries -----------------------------------------------------------------------------
+
+    def _pause(self, failure: Failure, what: str, request: Request) -> None:
+        """Say what went wrong, and wait; CannotGoOn where that would be too long."""
+        growing = min(_LONGEST_PAUSE, _FIRST_PAUSE * 2.0 ** min(request.attempt - 1, 10))
+        pause = failure.pause or growing * random.uniform(0.75, 1.0)
+        left = request.left()
+        if pause > left:
+            raise self._watch.stop(
+                f"{what}; the server asks to wait {duration(pause)}, and {duration(left)} of "
+                f"--max-minutes are left; {AGAIN}"
+                if failure.pause
+                else f"{what}; the minutes of --max-minutes are over; {AGAIN}"
+            )
+        if pause > _LONGEST_ASKED and math.isinf(left):
+            raise self._watch.stop(
+                f"{what}; the server asks to wait {duration(pause)}: {AGAIN} after that, or give "
+                "--max-minutes of more, and it is waited for"
+            )
+        request.retry(what, pause)
+        request.wait(pause)
+
+    def _line(self, failure: Failure) -> str:
+        """One line that says who and what; never the key."""
+        words = self._plain(failure.words)
+        ends = f"; {self._secrets.strike(failure.ends)}" if failure.ends else ""
+        return f"{self._model} at {self._where}: {words}{ends}"
+
+    def _plain(self, words: str) -> str:
+        """Short, printable, in one line and without secrets."""
+        words = self._secrets.strike(words)  # whole, so before anything is cut off
+        words = " ".join("".join(c if c.isprintable() else " " for c in words).split())
+        return words if len(words) <= _LONGEST_WORDS else words[:_LONGEST_WORDS] + "…"
+
+    @staticmethod
+    def _with_tries(what: str, request: Request) -> str:
+        return f"{what} (tried {request.attempt} times)" if request.attempt > 1 else what
 
 
 def _address(server: Server) -> httpx2.URL:
@@ -173,7 +292,7 @@ def _address(server: Server) -> httpx2.URL:
     except httpx2.InvalidURL:
         url = httpx2.URL("")
     if url.scheme not in ("http", "https") or not url.host:
-        without_user = given.rpartition("@")[2]
+        without_user = given.rpartition("@")[2].partition("?")[0]
         raise ValueError(
             f"server.base_url {without_user!r} is no address; give one such as "
             "http://127.0.0.1:8000/v1"

@@ -1,9 +1,7 @@
-"""What carries the OpenAI SDK's requests: a whole answer in time, or an error that it tries again.
+"""What carries the OpenAI SDK's requests: a whole answer in time, or an error of the connection.
 
-The SDK retries what fails below it: connections, time-outs, 408, 409, 429, 5xx; after the time that
-the server asks for, or after growing pauses. It does not see what is no answer though it looks like
-one: half a JSON text, no choices, bytes that drip so slowly that no single wait takes long. Here
-all that becomes an error of the connection, so that the SDK counts and retries it like any other.
+Each call is one try. The SDK's own time limits are of single waits, so that bytes that drip have no
+end; here the whole try has one. Answers are bounded, after they are decompressed too.
 """
 
 from __future__ import annotations
@@ -11,7 +9,8 @@ from __future__ import annotations
 import ssl
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+import zlib
+from collections.abc import Iterable, Mapping
 from importlib.util import find_spec
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -21,10 +20,12 @@ import httpcore2
 import httpx2
 from openai import OpenAIError
 
+from agents.vlm.clients.watch import Request
+
 LARGEST_ANSWER = 20_000_000
 """Bytes; what is longer is no reply."""
 _AT_ONCE = 262_144  # bytes written between two looks at the clock
-_FOR_GOOD = b"insufficient_quota"
+_LOOK = 0.5  # seconds of waiting between two looks at the run
 
 _KNOWN_TO_THE_SDK: Mapping[type[Exception], type[httpx2.TransportError]] = {
     httpcore2.TimeoutException: httpx2.ReadTimeout,
@@ -33,11 +34,11 @@ _KNOWN_TO_THE_SDK: Mapping[type[Exception], type[httpx2.TransportError]] = {
     httpcore2.ProtocolError: httpx2.RemoteProtocolError,
     httpcore2.ProxyError: httpx2.ProxyError,
 }
-"""The errors of connections, special ones first, and what the SDK retries them as."""
+"""The errors of connections, special ones first, and what the SDK takes them for."""
 
 
 class AnswerTooLong(OpenAIError):
-    """An answer without end. The SDK passes errors of its own on, and does not retry them."""
+    """An answer without end."""
 
 
 class Pace:
@@ -51,51 +52,55 @@ class Pace:
         self._gap = 60 / per_minute if per_minute else 0.0
         self._next = 0.0
         self._lock = threading.Lock()
-        self._closed = threading.Event()
 
-    def wait(self) -> None:
-        """Wait for one's turn; OpenAIError if there will be none."""
+    def wait(self, request: Request) -> None:
+        """Wait for one's turn; raises as :meth:`~agents.vlm.clients.watch.Request.wait`."""
         with self._lock:
             turn = max(time.monotonic(), self._next)
             self._next = turn + self._gap
-        if self._closed.wait(max(0.0, turn - time.monotonic())):
-            raise OpenAIError("the client has been closed")
-
-    def close(self) -> None:
-        """Let nobody wait any longer, and nothing be sent."""
-        self._closed.set()
+        request.wait(max(0.0, turn - time.monotonic()))
 
 
 class WholeAnswers(httpx2.BaseTransport):
     """A transport for one server.
 
-    A good answer has what ``read`` made of it in ``response.extensions["read"]``.
-
     Args:
-        url: of the server; says whether one of the environment's proxies is in between.
+        url: of the server; says whether one of the environment's proxies is in between. Its query
+            is sent with each request.
         timeout: seconds for a try, from the first byte sent to the last received.
-        read: makes something of the body of an answer with status 200; ValueError if it is none.
-        pace: of the tries.
+        connect: seconds of these for a connection.
     """
 
-    def __init__(self, url: str, timeout: float, read: Callable[[bytes], Any], pace: Pace) -> None:
+    def __init__(self, url: httpx2.URL, timeout: float, connect: float) -> None:
         self._clock = _Clock()
-        self._timeout, self._read, self._pace = timeout, read, pace
+        self._timeout, self._query = timeout, url.query
         self._pool = httpcore2.ConnectionPool(
-            ssl_context=httpx2.create_ssl_context() if url.startswith("https:") else None,
-            proxy=_proxy_for(url),
+            ssl_context=httpx2.create_ssl_context() if url.scheme == "https" else None,
+            proxy=_proxy_for(str(url)),
             max_connections=None,
             keepalive_expiry=5.0,
-            network_backend=_TimedBackend(self._clock),
+            network_backend=_TimedBackend(self._clock, connect),
         )
 
+    def serve(self, request: Request) -> None:
+        """What this thread sends next is a try of this request."""
+        self._clock.request = request
+
     def handle_request(self, request: httpx2.Request) -> httpx2.Response:
-        """Send a request and read the answer to its end."""
-        self._pace.wait()
+        """Send a request and read the answer to its end.
+
+        Raises:
+            httpx2.TransportError: there is none, or it is broken.
+            AnswerTooLong: it has no end.
+            CannotGoOn: the run ends meanwhile.
+        """
         self._clock.start(self._timeout)
         try:
-            response = self._whole(request)
-        except httpcore2.TimeoutException:
+            return self._whole(request)
+        except httpcore2.TimeoutException as error:
+            self._clock.request.left(answering=True)  # it may be the run's end that came first
+            if isinstance(error, _NoConnection):
+                raise httpx2.ConnectTimeout(str(error), request=request) from None
             late = f"no whole answer within {self._timeout:g} s"
             raise httpx2.ReadTimeout(late, request=request) from None
         except tuple(_KNOWN_TO_THE_SDK) as error:
@@ -103,44 +108,66 @@ class WholeAnswers(httpx2.BaseTransport):
                 theirs for ours, theirs in _KNOWN_TO_THE_SDK.items() if isinstance(error, ours)
             )
             raise known(str(error) or type(error).__name__, request=request) from None
-        if response.is_success:
-            try:
-                response.extensions["read"] = self._read(response.content)
-            except ValueError as error:
-                raise httpx2.RemoteProtocolError(str(error), request=request) from None
-        elif _FOR_GOOD in response.content:
-            response.headers["x-should-retry"] = "false"
-        return response
 
     def _whole(self, request: httpx2.Request) -> httpx2.Response:
         url = request.url
         assert isinstance(request.stream, httpx2.SyncByteStream)
+        target = url.raw_path
+        if self._query:
+            target += (b"&" if b"?" in target else b"?") + self._query
         answer = self._pool.handle_request(
             httpcore2.Request(
                 request.method,
                 httpcore2.URL(
-                    scheme=url.raw_scheme, host=url.raw_host, port=url.port, target=url.raw_path
+                    scheme=url.raw_scheme, host=url.raw_host, port=url.port, target=target
                 ),
                 headers=request.headers.raw,
                 content=request.stream,
                 extensions=request.extensions,
             )
         )
+        self._clock.request.answering = 200 <= answer.status < 300
         try:
             parts, size = [], 0
             for part in answer.iter_stream():
                 parts.append(part)
                 size += len(part)
                 if size > LARGEST_ANSWER:
-                    raise AnswerTooLong(f"an answer of more than {LARGEST_ANSWER:,} bytes")
+                    raise _too_long()
         finally:
             answer.close()
-        return httpx2.Response(answer.status, headers=answer.headers, content=b"".join(parts))
+        headers = httpx2.Headers(answer.headers)
+        content = _decompressed(b"".join(parts), headers.pop("Content-Encoding", ""), request)
+        return httpx2.Response(answer.status, headers=headers, content=content)
 
     def close(self) -> None:
         """Close all connections."""
-        self._pace.close()
         self._pool.close()
+
+
+def _decompressed(content: bytes, encoding: str, request: httpx2.Request) -> bytes:
+    """An answer that was compressed although none was asked for; never longer than is allowed."""
+    encoding = encoding.strip().lower()
+    if encoding in ("", "identity"):
+        return content
+    if encoding not in ("gzip", "x-gzip", "deflate"):
+        raise httpx2.DecodingError(f"an answer in the unknown encoding {encoding}", request=request)
+    stream = zlib.decompressobj(wbits=32 + zlib.MAX_WBITS)  # of either format
+    try:
+        plain = stream.decompress(content, LARGEST_ANSWER + 1)
+    except zlib.error as error:
+        raise httpx2.DecodingError(
+            f"a broken {encoding} answer: {error}", request=request
+        ) from None
+    if len(plain) > LARGEST_ANSWER:
+        raise _too_long()
+    if not stream.eof:
+        raise httpx2.DecodingError(f"a {encoding} answer that is cut off", request=request)
+    return plain
+
+
+def _too_long() -> AnswerTooLong:
+    return AnswerTooLong(f"an answer of more than {LARGEST_ANSWER:,} bytes")
 
 
 def _proxy_for(url: str) -> httpcore2.Proxy | None:
@@ -165,18 +192,27 @@ def _without_user(netloc: str) -> str:
 
 
 class _Clock(threading.local):
-    """How much time is left; a request is one thread's from beginning to end."""
+    """How much time a try has left; a request is one thread's from beginning to end."""
 
-    _end = 0.0
+    request: Request
+    _end = _began = 0.0
 
     def start(self, seconds: float) -> None:
-        self._end = time.monotonic() + seconds
+        self.request.answering = False
+        self._began = time.monotonic()
+        self._end = self._began + min(seconds, self.request.left())
 
     def left(self) -> float:
         left = self._end - time.monotonic()
         if left <= 0:
             raise httpcore2.TimeoutException
         return left
+
+    def look(self) -> None:
+        """Say that one still waits; raises what ends the run."""
+        self.request.left(answering=True)
+        waited, most = time.monotonic() - self._began, self._end - self._began
+        self.request.still_waiting(f"no answer for {waited:.0f} s of {most:.0f} s", waited)
 
 
 class _TimedStream(httpcore2.NetworkStream):
@@ -186,7 +222,12 @@ class _TimedStream(httpcore2.NetworkStream):
         self._inner, self._clock = inner, clock
 
     def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
-        return self._inner.read(max_bytes, self._clock.left())
+        while True:
+            left = self._clock.left()
+            try:
+                return self._inner.read(max_bytes, min(left, _LOOK))
+            except httpcore2.ReadTimeout:
+                self._clock.look()
 
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
         for start in range(0, len(buffer), _AT_ONCE):
@@ -208,11 +249,15 @@ class _TimedStream(httpcore2.NetworkStream):
         self._inner.close()
 
 
+class _NoConnection(httpcore2.ConnectTimeout):
+    """There is no connection, and there is time left."""
+
+
 class _TimedBackend(httpcore2.NetworkBackend):
     """Makes such connections."""
 
-    def __init__(self, clock: _Clock) -> None:
-        self._inner, self._clock = httpcore2.SyncBackend(), clock
+    def __init__(self, clock: _Clock, connect: float) -> None:
+        self._inner, self._clock, self._connect = httpcore2.SyncBackend(), clock, connect
 
     def connect_tcp(
         self,
@@ -223,5 +268,12 @@ class _TimedBackend(httpcore2.NetworkBackend):
         socket_options: Iterable[httpcore2.SOCKET_OPTION] | None = None,
     ) -> httpcore2.NetworkStream:
         left = self._clock.left()
-        stream = self._inner.connect_tcp(host, port, left, local_address, socket_options)
+        try:
+            stream = self._inner.connect_tcp(
+                host, port, min(left, self._connect), local_address, socket_options
+            )
+        except httpcore2.ConnectTimeout:
+            if left <= self._connect:
+                raise
+            raise _NoConnection(f"no connection within {self._connect:g} s") from None
         return _TimedStream(stream, self._clock)

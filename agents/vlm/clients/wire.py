@@ -8,10 +8,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from weakref import WeakKeyDictionary
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from agents.vlm.chat import Message, Picture, Reply, Usage
+from agents.vlm.clients.lenient import OrNone, Wire
+from agents.vlm.clients.tokens import Asked, Claimed, usage_of
 from agents.vlm.settings import Prices
+
+_LONGEST_WORD = 200  # characters of a model's name, or of why it stopped
+_LONGEST_ERROR = 100_000  # bytes of an error that are read
 
 # A conversation is sent again with every turn: each picture is put into letters once, and
 # forgotten when the conversation is.
@@ -19,6 +24,13 @@ _ENCODED: WeakKeyDictionary[Picture, bytes] = WeakKeyDictionary()
 
 
 # -- what is sent ----------------------------------------------------------------------------------
+
+
+def in_letters(messages: Sequence[Message]) -> int:
+    """How many bytes of a request the pictures of a conversation take."""
+    return sum(
+        len(_picture(part)) for each in messages for part in each.parts if isinstance(part, Picture)
+    )
 
 
 def request_body(
@@ -73,51 +85,38 @@ def _picture(picture: Picture) -> bytes:
 # -- what comes back -------------------------------------------------------------------------------
 
 
-class _Wire(BaseModel):
-    """Servers leave out fields, send null for them, and add their own."""
-
-    model_config = ConfigDict(frozen=True, extra="ignore")
+class _Function(Wire):
+    arguments: OrNone[str] = None
 
 
-class _Function(_Wire):
-    arguments: str | None = None
+class _Call(Wire):
+    function: OrNone[_Function] = None
 
 
-class _Call(_Wire):
-    function: _Function | None = None
-
-
-class _Said(_Wire):
+class _Said(Wire):
     content: str | None = None
-    refusal: str | None = None
-    reasoning_content: str | None = None  # vLLM, SGLang, DeepSeek
-    reasoning: str | None = None  # Ollama, OpenRouter, later vLLM
-    tool_calls: tuple[_Call, ...] | None = None
+    refusal: OrNone[str] = None
+    reasoning_content: OrNone[str] = None  # vLLM, SGLang, DeepSeek
+    reasoning: OrNone[str] = None  # Ollama, OpenRouter, later vLLM
+    tool_calls: OrNone[tuple[_Call, ...]] = None
 
 
-class _Choice(_Wire):
+class _Choice(Wire):
     message: _Said
-    finish_reason: str | None = None
+    finish_reason: OrNone[str] = None
 
 
-class _Details(_Wire):
-    cached_tokens: int | None = None
-    reasoning_tokens: int | None = None
-
-
-class _Usage(_Wire):
-    prompt_tokens: int | None = None
-    completion_tokens: int | None = None
-    prompt_tokens_details: _Details | None = None
-    completion_tokens_details: _Details | None = None
-
-
-class Completion(_Wire):
+class Completion(Wire):
     """What a server answers, as far as we read it."""
 
     choices: tuple[_Choice, ...] = Field(min_length=1)
-    model: str | None = None
-    usage: _Usage | None = None
+
+
+class Bill(Wire):
+    """What an answer says of its costs; it may be no reply otherwise."""
+
+    model: OrNone[str] = None
+    usage: OrNone[Claimed] = None
 
 
 def read_completion(body: bytes) -> Completion:
@@ -134,22 +133,41 @@ def read_completion(body: bytes) -> Completion:
         raise ValueError(f"{where}: {first['msg']}; it says: {server_words(body)}") from None
 
 
-def reply_of(completion: Completion, prices: Prices) -> Reply:
+def read_bill(body: bytes) -> Bill:
+    """What a body says of its costs: nothing, where it is not JSON."""
+    try:
+        return Bill.model_validate_json(body)
+    except ValidationError:
+        return Bill()
+
+
+def reply_of(completion: Completion) -> Reply:
     """The reply that an answer holds. A refusal is one too: its words are the text."""
     choice = completion.choices[0]
     said = choice.message
     thought, text = _without_thoughts(said.content or said.refusal or "")
     calls = [call.function for call in said.tool_calls or () if call.function]
-    usage = _usage_of(completion.usage or _Usage())
     return Reply(
         text=text,
         reasoning="\n".join(filter(None, (said.reasoning_content or said.reasoning, thought))),
         call=(calls[0].arguments or "") if calls else "",
-        usage=usage,
-        cost=cost_of(usage, prices),
-        finish=choice.finish_reason or "",
-        model=completion.model or "",
+        finish=(choice.finish_reason or "")[:_LONGEST_WORD],
     )
+
+
+def billed(bill: Bill, asked: Asked, reply: Reply | None) -> tuple[str, Usage]:
+    """Which model answered, and the tokens that are paid for, never too few.
+
+    Args:
+        bill: what the answer says of it.
+        asked: the request.
+        reply: what was answered; None if that is no reply.
+    """
+    said, cut = None, False
+    if reply is not None:
+        said = sum(len(each.encode()) for each in (reply.text, reply.reasoning, reply.call))
+        cut = reply.finish == "length"
+    return (bill.model or "")[:_LONGEST_WORD], usage_of(bill.usage, asked, said, cut)
 
 
 def _without_thoughts(text: str) -> tuple[str, str]:
@@ -165,15 +183,6 @@ def _without_thoughts(text: str) -> tuple[str, str]:
     return "", text
 
 
-def _usage_of(usage: _Usage) -> Usage:
-    return Usage(
-        prompt=usage.prompt_tokens or 0,
-        completion=usage.completion_tokens or 0,
-        cached=(usage.prompt_tokens_details or _Details()).cached_tokens or 0,
-        reasoning=(usage.completion_tokens_details or _Details()).reasoning_tokens or 0,
-    )
-
-
 def cost_of(usage: Usage, prices: Prices) -> float:
     """US dollars. Tokens thought are among those of the completion, tokens remembered among those
     of the prompt."""
@@ -184,11 +193,11 @@ def cost_of(usage: Usage, prices: Prices) -> float:
 
 
 def server_words(body: bytes) -> str:
-    """What a server says in the body of an error, in one line, however long."""
+    """What a server says in the body of an error, in one line."""
     try:
-        said = json.loads(body)
+        said = json.loads(body if len(body) <= _LONGEST_ERROR else "")
     except (ValueError, RecursionError):
-        said = body.decode("utf-8", "replace")
+        said = body[:_LONGEST_ERROR].decode("utf-8", "replace")
     for name in ("error", "message", "detail"):
         if isinstance(said, dict) and said.get(name):
             said = said[name]

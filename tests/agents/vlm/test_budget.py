@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
+import os
+import resource
 import signal
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -17,7 +20,8 @@ from naughty_server import MODEL, NaughtyServer
 
 from agents.base import CannotGoOn
 from agents.vlm.chat import Message, Reply, Usage
-from agents.vlm.clients.budget import Budget, Entry, Metered, Spent
+from agents.vlm.clients.budget import Budget, Entry, Ledger, Metered, Spent
+from agents.vlm.clients.watch import Watch
 from agents.vlm.settings import AgentSettings, Prices
 
 HELLO = (Message("user", ("hello",)),)
@@ -43,7 +47,32 @@ class Costly:
         pass
 
 
-Make = Callable[..., Metered]
+@dataclass
+class Purse:
+    """A client, and the ledger that it is metered by."""
+
+    client: Metered
+    ledger: Ledger
+
+    def reply(self, messages: Sequence[Message], seed: int) -> Reply:
+        return self.client.reply(messages, seed)
+
+    @property
+    def spent(self) -> Spent:
+        return self.ledger.spent
+
+    def close(self) -> None:
+        self.client.close()
+        self.ledger.close()
+
+
+def purse(client: Costly, budget: Budget, path: Path) -> Purse:
+    ledger = Ledger(budget, client.prices)
+    ledger.open(path)
+    return Purse(Metered(client, ledger, Watch(budget.max_minutes)), ledger)
+
+
+Make = Callable[..., Purse]
 
 
 @pytest.fixture
@@ -56,8 +85,8 @@ def make(ledger: Path) -> Iterator[Make]:
     """Opens the test's ledger around a client."""
     made = []
 
-    def metered(client: Costly, budget: Budget = UNLIMITED) -> Metered:
-        made.append(Metered(client, budget, ledger))
+    def metered(client: Costly, budget: Budget = UNLIMITED) -> Purse:
+        made.append(purse(client, budget, ledger))
         return made[-1]
 
     yield metered
@@ -77,8 +106,10 @@ def test_a_line_for_each_reply(make: Make, ledger: Path) -> None:
         "completion": 2,
         "cached": 3,
         "reasoning": 1,
+        "estimated": False,
         "cost": 0.5,
         "seconds": 0.25,
+        "rejected": "",
     }
 
 
@@ -171,23 +202,55 @@ def test_minutes_are_of_this_process(make: Make) -> None:
     assert client.asked == 1
 
 
-@pytest.mark.parametrize("prices", [Prices(), None])
-def test_dollars_need_prices(make: Make, prices: Prices | None) -> None:
+@pytest.mark.parametrize("limit", ["max_usd", "max_tokens", "max_minutes"])
+@pytest.mark.parametrize("given", [0, -1, math.nan, math.inf, True, "5", 1e400])
+def test_a_budget_is_finite_and_positive(limit: str, given: float) -> None:
+    with pytest.raises(ValueError, match=rf"^{limit} is .*; give a .* number above 0") as caught:
+        Budget(**{limit: given})  # type: ignore[arg-type]
+    assert "\n" not in str(caught.value)
+
+
+def test_a_link_is_not_written_to(make: Make, ledger: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.txt"
+    other.write_text("mine")
+    ledger.parent.mkdir()
+    for link in (os.symlink, os.link):
+        link(other, ledger)
+        with pytest.raises(ValueError, match=r"spending\.jsonl is a link or no regular file"):
+            make(Costly())
+        ledger.unlink()
+    os.mkfifo(ledger)
+    with pytest.raises(ValueError, match="no regular file"):
+        make(Costly())
+    assert other.read_text() == "mine"
+
+
+def test_lines_that_would_give_money_back_say_nothing(make: Make, ledger: Path) -> None:
+    make(Costly()).reply(HELLO, seed=0)
+    good = json.loads(ledger.read_text())
+    with ledger.open("a") as file:
+        for wrong in ({"cost": -100.0}, {"prompt": -5}, {"cost": math.nan}, {"cost": math.inf}):
+            file.write(json.dumps({**good, **wrong}) + "\n")
+    assert make(Costly()).spent == Spent(Usage(10, 2, 3, 1), 0.5, 1)
+
+
+def test_dollars_need_prices(make: Make) -> None:
     client = Costly()
-    client.prices = prices  # type: ignore[assignment]
+    client.prices = Prices()
     with pytest.raises(ValueError, match=r"--max-usd needs prices: .* or use --max-tokens"):
         make(client, Budget(max_usd=1))
     make(client, Budget(max_tokens=1))
 
 
-def test_a_ledger_that_cannot_be_written_stops_the_run() -> None:
-    full = Path("/dev/full")
-    if not full.exists():
-        pytest.skip("needs /dev/full")
-    metered = Metered(Costly(), UNLIMITED, full)
-    with pytest.raises(CannotGoOn, match="/dev/full cannot be written"):
-        metered.reply(HELLO, seed=0)
-    metered.close()
+def test_a_ledger_that_cannot_be_written_stops_the_run(make: Make) -> None:
+    metered = make(Costly())
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))  # as if the disk were full
+    try:
+        with pytest.raises(CannotGoOn, match=r"spending\.jsonl cannot be written"):
+            metered.reply(HELLO, seed=0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 # -- with the others -----------------------------------------------------------------------------
@@ -197,7 +260,7 @@ def test_all_together(
     naughty: NaughtyServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Kept, metered and asked over HTTP, from 8 threads: the ledger is what the server answered,
-    what is kept is not paid again, and the key is nowhere."""
+    two broken answers included; what is kept is not paid again, and the key is nowhere."""
     pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
     pytest.importorskip("diskcache", reason="needs pip install 'er-gym[vlm]'")
     from agents.vlm.clients.kept import Kept
@@ -211,21 +274,25 @@ def test_all_together(
     naughty.then(*["ok", "429", "truncated"] * 2)
 
     def play() -> tuple[list[Reply], Spent]:
-        client = OpenAIClient(MODEL, settings)
-        metered = Metered(client, Budget(max_usd=100.0), tmp_path / "spending.jsonl")
-        kept = Kept(metered, tmp_path / "replies")
+        ledger = Ledger(Budget(max_usd=100.0), settings.prices)
+        ledger.open(tmp_path / "spending.jsonl")
+        kept = Kept(OpenAIClient(MODEL, settings, ledger), tmp_path / "replies")
         with ThreadPoolExecutor(8) as pool:
             replies = list(pool.map(lambda seed: kept.reply(HELLO, seed), range(80)))
         kept.close()
-        return replies, metered.spent
+        ledger.close()
+        return replies, ledger.spent
 
     first, spent = play()
     assert naughty.count == 84
-    assert spent.requests == 80
-    assert spent.cost == pytest.approx(sum(reply.cost for reply in first))
-    assert spent.usage == sum((reply.usage for reply in first), Usage())
+    assert spent.requests == 82
     lines = (tmp_path / "spending.jsonl").read_text().splitlines()
-    assert sorted(Entry.model_validate_json(line).seed for line in lines) == list(range(80))
+    entries = [Entry.model_validate_json(line) for line in lines]
+    good = [each for each in entries if not each.rejected]
+    assert sorted(each.seed for each in good) == list(range(80))
+    assert sum(each.cost for each in good) == pytest.approx(sum(each.cost for each in first))
+    assert sum(each.prompt for each in good) == sum(each.usage.prompt for each in first)
+    assert all(each.estimated and each.cost > 0 for each in entries if each.rejected)
 
     second, still = play()
     assert naughty.count == 84
@@ -242,13 +309,17 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from agents.vlm.chat import Message, Reply, Usage
-from agents.vlm.clients.budget import Budget, Metered
+from agents.vlm.clients.budget import Budget, Ledger, Metered
+from agents.vlm.clients.watch import Watch
+from agents.vlm.settings import Prices
 
 class Saying:
     def reply(self, messages, seed):
         return Reply("end", usage=Usage(10, 2), model="m")
 
-metered = Metered(Saying(), Budget(max_tokens=1_000_000), Path(sys.argv[1]))
+ledger = Ledger(Budget(max_tokens=1_000_000), Prices())
+ledger.open(Path(sys.argv[1]))
+metered = Metered(Saying(), ledger, Watch())
 while True:
     metered.reply((Message("user", ("hello",)),), 0)
     print(flush=True)

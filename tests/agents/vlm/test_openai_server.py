@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import json
 import logging
+import math
 import os
 import socket
 import subprocess
@@ -28,7 +29,9 @@ from agents.base import CannotGoOn
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients import wire
 from agents.vlm.clients.openai_server import OpenAIClient
+from agents.vlm.clients.tokens import Asked, picture_at_most, usage_of
 from agents.vlm.clients.transport import LARGEST_ANSWER, Pace
+from agents.vlm.clients.watch import Watch
 from agents.vlm.settings import AgentSettings
 
 KEY = "sk-test-4f1c9e0b7a2d"
@@ -290,17 +293,70 @@ def test_tokens_and_cost(naughty: NaughtyServer, make: Make) -> None:
     "usage",
     [
         None,
+        "many",
+        [],
+        {},
+        {"prompt_tokens": 5},
         {"prompt_tokens": 5, "completion_tokens": None},
-        {"prompt_tokens": 5, "prompt_tokens_details": None, "completion_tokens_details": {}},
+        {"prompt_tokens": 5, "completion_tokens": -3_360_000},
+        {"prompt_tokens": 5, "completion_tokens": 0},
+        {"prompt_tokens": 5, "completion_tokens": 10**12},
+        {"prompt_tokens": 5, "completion_tokens": 1.5},
+        {"prompt_tokens": 5, "completion_tokens": "1"},
+        {"prompt_tokens": 5, "completion_tokens": True},
+        {"prompt_tokens": 5, "completion_tokens": math.nan},
+        {"prompt_tokens": -5, "completion_tokens": 1},
+        {"prompt_tokens": 0, "completion_tokens": 1},
+        {"prompt_tokens": 10**9, "completion_tokens": 1},
+        {"prompt_tokens": 5, "completion_tokens": 1, "prompt_tokens_details": {"cached_tokens": 6}},
+        {
+            "prompt_tokens": 5,
+            "completion_tokens": 1,
+            "prompt_tokens_details": {"cached_tokens": -6},
+        },
+        {
+            "prompt_tokens": 5,
+            "completion_tokens": 1,
+            "completion_tokens_details": {"reasoning_tokens": 70},
+        },
     ],
 )
-def test_tokens_that_the_server_does_not_tell(
-    naughty: NaughtyServer, make: Make, usage: dict[str, Any] | None
+def test_tokens_that_the_server_does_not_tell_or_cannot_have_counted(
+    naughty: NaughtyServer, make: Make, usage: Any
 ) -> None:
-    naughty.then(Raw({**completion({"content": "end"}), "usage": usage, "model": None}))
-    reply = make(naughty.url).reply(HELLO, seed=0)
-    assert reply.usage == Usage(prompt=5 if usage else 0)
+    naughty.then(Raw({**completion({"content": "end"}), "usage": usage, "model": 7}))
+    client = make(naughty.url, {"prices": {"prompt": 2, "cached_prompt": 1, "completion": 10}})
+    reply = client.reply(HELLO, seed=0)
+    assert reply.usage.estimated
+    assert reply.usage.prompt >= 5
+    assert 0 <= reply.usage.cached <= reply.usage.prompt
+    assert 1 <= reply.usage.completion < 2000
+    assert 0 < reply.cost < 0.05
     assert reply.model == ""
+
+
+def test_tokens_that_are_told_are_believed(naughty: NaughtyServer, make: Make) -> None:
+    usage = {"prompt_tokens": 5, "prompt_tokens_details": None, "completion_tokens_details": {}}
+    naughty.then(
+        Raw({**completion({"content": "end"}), "usage": {**usage, "completion_tokens": 2}})
+    )
+    assert make(naughty.url).reply(HELLO, seed=0).usage == Usage(prompt=5, completion=2)
+
+
+@pytest.mark.parametrize(
+    "text", ["我看见一个冰箱。", "🧊" * 50, "𒀀ᚠ" * 20, "plain words", '\x00\t"\\']
+)
+def test_an_estimate_is_from_above_in_any_script(text: str) -> None:
+    """No tokenizer makes more tokens of a text than it has bytes; so many letters are more."""
+    picture = Picture(b"jpeg", "image/jpeg", 784, 420)
+    messages = (Message("user", (text, picture)),)
+    body = wire.request_body({"model": "m", "max_tokens": 9}, messages, False)
+    asked = Asked.of(body, messages, wire.in_letters(messages), {"max_tokens": 9})
+    assert len(text.encode()) + picture_at_most(784, 420) <= asked.prompt_at_most
+    assert asked.prompt_at_most < 6 * len(text.encode()) + picture_at_most(784, 420) + 700
+    assert picture_at_most(784, 420) > 1105  # GPT-4o's; Qwen takes 420
+    usage = usage_of(None, asked, len(text.encode()))
+    assert usage.completion >= len(text.encode())
 
 
 def test_a_filtered_answer_is_a_reply(naughty: NaughtyServer, make: Make) -> None:
@@ -342,6 +398,8 @@ def test_what_may_pass_is_tried_again(
     naughty: NaughtyServer, make: Make, behaviour: str, words: str
 ) -> None:
     client = make(naughty.url, timeout=0.5 if behaviour in SLOW else 20)
+    client.reply(HELLO, seed=0)
+    naughty.seen.clear()
     naughty.then(behaviour, behaviour)
     began = time.monotonic()
     with pytest.raises(ModelError, match=words) as caught:
@@ -410,7 +468,7 @@ def test_who_listens_slowly_or_not_at_all_is_not_waited_for(make: Make, pause: f
         threading.Thread(target=listen, daemon=True).start()
         client = make(f"http://127.0.0.1:{server.getsockname()[1]}/v1", timeout=0.5, tries=1)
         began = time.monotonic()
-        with pytest.raises(ModelError, match=r"no whole answer within 0.5 s$"):
+        with pytest.raises(CannotGoOn, match=r"no whole answer within 0.5 s; nothing has answered"):
             client.reply((Message("user", (much,)),), seed=0)
         assert time.monotonic() - began < 4  # at 64 KiB each hundredth of a second: 6 s
         done.set()
@@ -472,7 +530,9 @@ def test_no_server(naughty: NaughtyServer, make: Make) -> None:
     never, once = make(naughty.url, tries=1), make(naughty.url, tries=1)
     once.reply(HELLO, seed=0)
     naughty.close()
-    with pytest.raises(CannotGoOn, match=r"refused; is the server up, and server\.base_url"):
+    with pytest.raises(
+        CannotGoOn, match=r"refused; nothing has answered yet: see whether the serv"
+    ):
         never.reply(HELLO, seed=0)
     with pytest.raises(ModelError):
         once.reply(HELLO, seed=0)
@@ -540,19 +600,19 @@ def test_requests_are_spread(naughty: NaughtyServer, make: Make) -> None:
 
 
 def test_who_waits_for_a_turn_is_let_go() -> None:
-    pace = Pace(1)
-    pace.wait()
+    pace, watch = Pace(1), Watch()
+    pace.wait(watch.request(0))
     raised: list[BaseException] = []
 
     def wait() -> None:
         try:
-            pace.wait()
-        except openai.OpenAIError as error:
+            pace.wait(watch.request(0))
+        except ModelError as error:
             raised.append(error)
 
     waiting = threading.Thread(target=wait)
     waiting.start()
-    pace.close()
+    watch.close()
     waiting.join(10)
     assert str(raised[0]) == "the client has been closed"
 
@@ -565,7 +625,10 @@ def test_the_key_is_never_told(
     client = make(naughty.url)
     gossip = f"I got 'Authorization: Bearer {KEY}' " * 50  # so long that it is cut somewhere
     naughty.then(
-        *[Raw({"error": {"message": gossip}}, status) for status in (500, 500, 401, 400)],
+        *[
+            Raw({"error": {"message": gossip}}, status, {"x-request-id": KEY, KEY: "x"})
+            for status in (500, 500, 401, 400)
+        ],
         *[Raw(gossip.encode())] * 2,
     )
     told = [repr(client), str(client.__dict__["_sdk"]), client.identity]
@@ -576,7 +639,8 @@ def test_the_key_is_never_told(
     client.reply(HELLO, seed=0)
     told += [record.getMessage() + repr(record.args) for record in caplog.records]
     assert naughty.count == 7
-    assert any("retries left" in line or "retry left" in line for line in told)  # it does log
+    assert any("try 1 of 2" in line for line in told)  # it does log
+    assert any("receive_response_headers.complete" in line for line in told)
     assert not [line for line in told if KEY[:10] in line]
 
 

@@ -1,0 +1,117 @@
+"""What went wrong with a try, and what follows: another try, the next episode, or the run's end."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import timezone
+from email.utils import parsedate_to_datetime
+
+import httpx2
+import openai
+
+from agents.vlm.clients.wire import server_words
+
+_MAY_PASS = frozenset({408, 409, 425, 429})  # and all from 500 on
+_REFUSED: Mapping[int, str] = {
+    401: "the server does not accept the key of {key_from}",
+    402: "the server wants to be paid",
+    403: "the server does not let the key of {key_from} do this",
+    404: "the server has no such model, or nothing at all at this address",
+}
+"""What is answered to whatever is asked."""
+_MALFORMED = frozenset({400, 405, 415, 422})
+"""What is answered to a request that is wrong in itself, such as a parameter that is not known; or
+to a single conversation."""
+_ABOUT_ONE_CONVERSATION = re.compile(
+    r"context.{0,20}(length|size|window)|too long|longer than|too many (tokens|images)"
+    r"|content.(filter|policy|management)|moderation",
+    re.IGNORECASE,
+)
+_NO_MONEY = "insufficient_quota"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """How a try failed.
+
+    Attributes:
+        words: what happened, as the server or the connection says it.
+        passes: whether another try may do better.
+        ends: what to say where no request will ever do better; otherwise "".
+        late: whether the time was over.
+        unreached: whether there is no sign that a server is there: this try has had no answer, nor
+            has any before.
+        pause: seconds that the server asks to wait; None if it does not.
+    """
+
+    words: str
+    passes: bool = False
+    ends: str = ""
+    late: bool = False
+    unreached: bool = False
+    pause: float | None = None
+
+
+def failure_of(error: openai.OpenAIError, *, key_from: str, answered: bool) -> Failure:
+    """What an error of the SDK means.
+
+    Args:
+        error: of one try.
+        key_from: where the key is from.
+        answered: whether the server has given a reply before.
+    """
+    if isinstance(error, openai.APIStatusError):
+        return _of_status(error, key_from, answered)
+    cause = error.__cause__ or error
+    words = str(cause) or type(cause).__name__
+    if not isinstance(cause, httpx2.RequestError):
+        return Failure(words)
+    late = isinstance(cause, httpx2.ReadTimeout)
+    alone = late or isinstance(cause, (httpx2.ConnectError, httpx2.ConnectTimeout))
+    return Failure(words, passes=True, late=late, unreached=alone and not answered)
+
+
+def _of_status(error: openai.APIStatusError, key_from: str, answered: bool) -> Failure:
+    status, headers = error.status_code, error.response.headers
+    said = server_words(error.response.content)
+    words = f"{status}, {said}"
+    if 300 <= status < 400:
+        place = headers.get("location", "nowhere")
+        ends = (
+            f"the server sends requests on to {place}; give server.base_url of that, if it is yours"
+        )
+        return Failure(words, ends=ends)
+    if _NO_MONEY in (error.code, error.type):
+        return Failure(words, ends="there is no money left for this key")
+    if status in _REFUSED:
+        return Failure(words, ends=_REFUSED[status].format(key_from=key_from))
+    about_this = _ABOUT_ONE_CONVERSATION.search(f"{error.code} {said}")
+    if status in _MALFORMED and not answered and not about_this:
+        return Failure(words, ends="no request like this will do better")
+    passes = status in _MAY_PASS or status >= 500
+    asked_to = headers.get("x-should-retry") != "false"
+    return Failure(words, passes=passes and asked_to, pause=asked_pause(headers))
+
+
+def asked_pause(headers: httpx2.Headers) -> float | None:
+    """The seconds that a server asks to wait, infinity among them; None if it does not ask, or asks
+    for what is no time to come."""
+    text = headers.get("retry-after", "")
+    for name, scale in (("retry-after-ms", 0.001), ("retry-after", 1.0)):
+        try:
+            seconds = float(headers.get(name, "")) * scale
+        except ValueError:
+            continue
+        return seconds if seconds > 0 else None
+    try:
+        then = parsedate_to_datetime(text)
+        if then.tzinfo is None:
+            then = then.replace(tzinfo=timezone.utc)
+        seconds = then.timestamp() - time.time()
+    except (TypeError, ValueError, OverflowError, IndexError):
+        return None
+    return seconds if 0 < seconds <= math.inf else None

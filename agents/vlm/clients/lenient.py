@@ -1,0 +1,25 @@
+"""What pydantic models of servers' answers share: a wrong field does not spoil the others."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, WrapValidator
+
+
+class Wire(BaseModel):
+    """Servers leave out fields, send null for them, and add their own."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+def _or_none(value: object, check: Any) -> Any:
+    try:
+        return check(value)
+    except ValueError:
+        return None
+
+
+T = TypeVar("T")
+OrNone = Annotated[T | None, WrapValidator(_or_none)]
+"""A field that is None where what was sent does not fit."""

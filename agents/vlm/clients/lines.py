@@ -1,0 +1,72 @@
+"""Files of JSON lines that only grow, written to by several threads and processes."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+import threading
+from pathlib import Path
+
+_CLOSED = -1
+
+
+class Lines:
+    """A file of lines; it and its directory are made.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        ValueError: it is a link, or no regular file: what it leads to is not ours to write to.
+        OSError: it cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._lock = threading.Lock()
+        self._read_to = 0
+        path.parent.mkdir(parents=True, exist_ok=True)
+        flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+        try:
+            self._file = os.open(path, flags, 0o644)
+        except OSError as error:
+            if error.errno in (errno.ELOOP, errno.ENXIO):
+                raise _not_ours(path) from None
+            raise
+        state = os.fstat(self._file)
+        if not stat.S_ISREG(state.st_mode) or state.st_nlink != 1:
+            os.close(self._file)
+            raise _not_ours(path)
+        if state.st_size and os.pread(self._file, 1, state.st_size - 1) != b"\n":
+            os.write(self._file, b"\n")  # ends what a killed process left half-written
+
+    def add(self, line: str) -> None:
+        """Write a line; OSError if it cannot be written, or the file is closed."""
+        # One write of a whole line to the end of the file: lines of processes do not mix.
+        with self._lock:
+            os.write(self._file, line.encode() + b"\n")
+
+    def new(self) -> list[bytes]:
+        """The lines that have been added since the last call, whoever added them."""
+        with self._lock:
+            if self._file == _CLOSED:
+                return []
+            size = max(0, os.fstat(self._file).st_size - self._read_to)
+            *lines, _ = os.pread(self._file, size, self._read_to).split(b"\n")
+            self._read_to += sum(len(line) + 1 for line in lines)
+            return lines
+
+    def close(self) -> None:
+        """Close the file."""
+        with self._lock:
+            if self._file != _CLOSED:
+                os.close(self._file)
+                self._file = _CLOSED
+
+
+def _not_ours(path: Path) -> ValueError:
+    return ValueError(
+        f"{path} is a link or no regular file, so it is not written to; remove it, or choose "
+        "another --out"
+    )

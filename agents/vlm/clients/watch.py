@@ -1,0 +1,266 @@
+"""How long a run waits for its server, and what it tells meanwhile.
+
+All requests of a run share a :class:`Watch`: its minutes, what happens to its requests, and its end
+where the server refuses one request after another.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable
+from datetime import datetime, timezone
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from agents.base import CannotGoOn
+from agents.vlm.chat import ModelError
+
+AGAIN = "run the same command again to continue"
+REFUSED = 3
+"""So many different requests refused in a row, with no reply between them, end the run."""
+_QUIET = 15.0
+"""Seconds without news after which a waiting request says so; each further time twice as long."""
+_GRACE = 5.0
+"""Seconds that an answer under way still has once the server is given up."""
+_LONGEST_WAIT = 3600.0  # seconds of one wait; threads cannot wait for an infinite time
+
+_log = logging.getLogger(__name__)
+
+
+class Notice(BaseModel):
+    """Something that a user waits for, or that went wrong; a line of ``server-events.jsonl``.
+
+    Attributes:
+        time: ISO 8601 in UTC.
+        event: ``retry``: a try failed, and another follows after ``wait`` seconds; ``waiting``: no
+            answer yet; ``failed``: a request was given up; ``stopped``: the run was.
+        what: what happened, in one line.
+        seed: of the episode; None for the run.
+        attempt, of: which try of how many.
+        wait: seconds.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    time: str
+    event: Literal["retry", "waiting", "failed", "stopped"]
+    what: str
+    seed: int | None = None
+    attempt: int = 0
+    of: int = 0
+    wait: float = 0.0
+
+    def __str__(self) -> str:
+        """One line for people."""
+        place = f" (try {self.attempt} of {self.of})" if self.attempt else ""
+        then = f"; trying again in {duration(self.wait)}" if self.event == "retry" else ""
+        return f"{self.what}{place}{then}"
+
+
+Listener = Callable[[Notice], None]
+
+
+class Watch:
+    """The time of a run, and its news. One serves all threads.
+
+    Args:
+        max_minutes: of the run, counted from now; None for no limit.
+
+    Attributes:
+        show: is called with each notice that people should see, from the thread that it is about;
+            by default the module's logger warns.
+        keep: is called with every notice.
+    """
+
+    def __init__(self, max_minutes: float | None = None) -> None:
+        self.show: Listener = _warn
+        self.keep: Listener = lambda notice: None
+        self._minutes = max_minutes
+        self._ends = math.inf if max_minutes is None else time.monotonic() + 60 * max_minutes
+        self._changed = threading.Condition()
+        self._numbers = itertools.count()
+        self._refused: set[int] = set()
+        self._stopped: tuple[float, str, bool] | None = None
+        self._closed = False
+        self._last_news = time.monotonic()
+        self._quiet = _QUIET
+
+    def request(self, seed: int) -> Request:
+        """A request that begins now."""
+        return Request(self, next(self._numbers), seed)
+
+    @property
+    def over(self) -> bool:
+        """Whether the minutes are."""
+        return time.monotonic() >= self._ends
+
+    def stop(self, why: str, *, waits_for_answers: bool = False) -> CannotGoOn:
+        """End all requests that have begun.
+
+        Args:
+            why: in one line.
+            waits_for_answers: whether answers that are under way are still waited for, since they
+                are paid for. Otherwise they have five seconds.
+
+        Returns:
+            What to raise.
+        """
+        with self._changed:
+            first = self._stopped is None or self._stopped[1] != why
+            self._stopped = (time.monotonic(), why, waits_for_answers)
+            self._refused.clear()
+            self._changed.notify_all()
+        if first and not waits_for_answers:
+            self.tell("stopped", why)
+        return CannotGoOn(why)
+
+    def close(self) -> None:
+        """Let no request wait any longer; it gets a ModelError."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def tell(
+        self,
+        event: Literal["retry", "waiting", "failed", "stopped"],
+        what: str,
+        seed: int | None = None,
+        attempt: int = 0,
+        of: int = 0,
+        wait: float = 0.0,
+    ) -> None:
+        """Tell those who listen; for the arguments see :class:`Notice`."""
+        now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
+        notice = Notice(
+            time=now, event=event, what=what, seed=seed, attempt=attempt, of=of, wait=wait
+        )
+        self._last_news = time.monotonic()
+        self.keep(notice)
+        if event != "stopped":  # what is raised says so
+            self.show(notice)
+
+    # -- for requests ------------------------------------------------------------------------------
+
+    def _left(self, request: Request, answering: bool) -> float:
+        """Seconds; raises what ends the request."""
+        now = time.monotonic()
+        if self._closed:
+            raise ModelError("the client has been closed")
+        if self._stopped is not None:
+            since, why, waits = self._stopped
+            still = answering and (waits or now < since + _GRACE)
+            if since >= request.began and not still:
+                raise CannotGoOn(why)
+        if now >= self._ends:
+            raise CannotGoOn(f"the {self._minutes:g} minutes are over; {AGAIN}")
+        return self._ends - now
+
+    def _wait(self, request: Request, seconds: float) -> None:
+        until = time.monotonic() + seconds
+        with self._changed:
+            while (left := until - time.monotonic()) > 0:
+                self._changed.wait(min(left, self._left(request, False), _LONGEST_WAIT))
+        self._left(request, False)
+
+    def _is_quiet(self) -> bool:
+        """Whether nothing has been heard for long; only one of those who wait hears that."""
+        with self._changed:
+            now = time.monotonic()
+            if now - self._last_news < self._quiet:
+                return False
+            self._last_news = now
+            self._quiet *= 2
+            return True
+
+    def _answered(self, seconds: float) -> None:
+        with self._changed:
+            self._refused.clear()
+            self._last_news = time.monotonic()
+            # A server that always takes long is no news.
+            self._quiet = max(_QUIET, 2 * seconds)
+
+    def _has_refused(self, request: Request) -> int:
+        """How many different requests it has refused since its last reply."""
+        with self._changed:
+            self._refused.add(request.number)
+            return len(self._refused)
+
+
+class Request:
+    """A request from its first try to its reply; it belongs to one thread.
+
+    Attributes:
+        number: among those of the watch.
+        seed: of the episode.
+        began: monotonic seconds.
+        answering: whether the try that is under way has been accepted: there is a status of 2xx.
+        attempt: which try is under way; ``of``: how many there are at most.
+    """
+
+    def __init__(self, watch: Watch, number: int, seed: int) -> None:
+        self.number, self.seed = number, seed
+        self.began = time.monotonic()
+        self.answering = False
+        self.attempt = self.of = 0
+        self._watch = watch
+
+    def left(self, *, answering: bool = False) -> float:
+        """Seconds until the run's minutes are over.
+
+        Args:
+            answering: whether an answer is waited for.
+
+        Raises:
+            CannotGoOn: they are over, or the run has stopped.
+            ModelError: the client has been closed.
+        """
+        return self._watch._left(self, answering)
+
+    def wait(self, seconds: float) -> None:
+        """Wait, unless the run ends meanwhile; raises as :meth:`left`."""
+        self._watch._wait(self, seconds)
+
+    def still_waiting(self, what: str, seconds: float) -> None:
+        """Say that an answer has not come for so long, if nothing else has been said for long."""
+        if self._watch._is_quiet():
+            self._watch.tell("waiting", what, self.seed, self.attempt, self.of, seconds)
+
+    def retry(self, what: str, wait: float) -> None:
+        """Say that a try failed, and that another follows."""
+        self._watch._has_refused(self)
+        self._watch.tell("retry", what, self.seed, self.attempt, self.of, wait)
+
+    def answered(self) -> None:
+        """There is a reply."""
+        self._watch._answered(time.monotonic() - self.began)
+
+    def gave_up(self, what: str) -> ModelError | CannotGoOn:
+        """What to raise where no further try follows.
+
+        The run stops where the server has refused several different requests in a row; otherwise
+        something may be wrong with this one alone.
+        """
+        refused = self._watch._has_refused(self)
+        if refused >= REFUSED:
+            return self._watch.stop(
+                f"the server has refused {refused} requests in a row, the last with: {what}; see "
+                f"to it, and {AGAIN}"
+            )
+        self._watch.tell("failed", what, self.seed)
+        return ModelError(what)
+
+
+def duration(seconds: float) -> str:
+    """Seconds as people say them: ``0.5 s``, ``90 s``, ``10 min``, ``5 h``."""
+    if seconds < 120:
+        return f"{seconds:.1f} s" if seconds < 10 else f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.0f} h"
+
+
+def _warn(notice: Notice) -> None:
+    _log.warning("%s", notice)
