@@ -50,6 +50,7 @@ from agents.vlm.settings import AgentSettings
 from agents.vlm.speaker import load_settings
 from benchmarks.engines import Engines
 from benchmarks.episode import EpisodeRecord
+from benchmarks.inspect_secrets import discreet
 from benchmarks.metrics import METRICS, score_episode
 from benchmarks.play import episode_seed, play_episode
 from benchmarks.scorers import CORRECTED
@@ -136,7 +137,7 @@ def episode(
     matcher.prepare()
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
-        model, line = get_model(), _Line()
+        model, line = discreet(get_model()), _Line()
         played = tasks[str(state.sample_id)]
         number = episode_seed(seed + state.epoch - 1, played.id)
 
@@ -283,14 +284,14 @@ def _content(part: Part) -> Content:
 def _reply(output: ModelOutput, seconds: float) -> Reply:
     said, used = output.message, output.usage or ModelUsage()
     thoughts = [part.reasoning for part in said.content_list if isinstance(part, ContentReasoning)]
-    cached = used.input_tokens_cache_read or 0
-    prompt = used.input_tokens + (used.input_tokens_cache_write or 0) + cached
+    cached = max(0, used.input_tokens_cache_read or 0)
+    prompt = max(0, used.input_tokens) + max(0, used.input_tokens_cache_write or 0) + cached
     return Reply(
         text=said.text,
         reasoning="\n".join(thoughts),
         call=json.dumps(said.tool_calls[0].arguments) if said.tool_calls else "",
-        usage=Usage(prompt, used.output_tokens, cached, used.reasoning_tokens or 0),
-        cost=used.total_cost or 0.0,
+        usage=Usage(prompt, max(0, used.output_tokens), cached, max(0, used.reasoning_tokens or 0)),
+        cost=max(0.0, used.total_cost or 0.0),
         finish=output.stop_reason,
         model=output.model,
         seconds=seconds,

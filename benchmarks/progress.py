@@ -81,13 +81,16 @@ class Progress:
             self._console.print(
                 f"{self._title}: {self._done}/{self._total} episodes, {self._status()}",
                 markup=False,
+                emoji=False,
                 highlight=False,
                 soft_wrap=True,
             )
 
     def say(self, what: object) -> None:
         """Print a line, above the bar where there is one; from any thread."""
-        self._console.print(str(what), style="dim", markup=False, highlight=False, soft_wrap=True)
+        self._console.print(
+            str(what), style="dim", markup=False, emoji=False, highlight=False, soft_wrap=True
+        )
 
     def _status(self) -> str:
         if not self._done:

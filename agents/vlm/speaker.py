@@ -83,6 +83,7 @@ class Speaker:
     """Makes the agents of a run.
 
     Attributes:
+        client: of the model.
         watch: the run's time and news; ``watch.show`` is called with what a user should hear.
 
     Args:
@@ -127,13 +128,13 @@ class Speaker:
             prices = settings.prices if kind == "openai" else Prices()
             self._ledger = Ledger(asked, prices)
             client = CLIENTS[kind](rest, settings, self._ledger, self.watch)
-            self._client: Client = client
+            self.client: Client = client
             if directory is not None:
                 from agents.vlm.clients.kept import Kept
 
                 self._ledger.open(directory / SPENDING)
                 self.watch.keep = self._keep
-                self._client = Kept(client, directory / REPLIES)
+                self.client = Kept(client, directory / REPLIES)
         except ImportError as error:
             extra = "local" if kind == "hf" else "vlm"
             raise ValueError(
@@ -146,7 +147,7 @@ class Speaker:
         from agents.vlm.agent import VLMAgent
 
         return VLMAgent(
-            self._client, self.settings, self.prompts, self._matcher, seed=seed, name=self.name
+            self.client, self.settings, self.prompts, self._matcher, seed=seed, name=self.name
         )
 
     @property
@@ -161,7 +162,7 @@ class Speaker:
 
     def close(self) -> None:
         """Let go of the client."""
-        self._client.close()
+        self.client.close()
         self._ledger.close()
         if self._events is not None:
             self._events.close()

@@ -80,10 +80,8 @@ def _of_status(error: openai.APIStatusError, key_from: str, answered: bool) -> F
     said = server_words(error.response.content)
     words = f"{status}, {said}"
     if 300 <= status < 400:
-        place = headers.get("location", "nowhere")
-        ends = (
-            f"the server sends requests on to {place}; give server.base_url of that, if it is yours"
-        )
+        place = headers.get("location") or "nowhere"
+        ends = f"requests are not sent on to {place}; if the server is there, give its base_url"
         return Failure(words, ends=ends)
     if _NO_MONEY in (error.code, error.type):
         return Failure(words, ends="there is no money left for this key")

@@ -6,6 +6,7 @@ where the server refuses one request after another.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import logging
 import math
@@ -111,12 +112,10 @@ class Watch:
             What to raise.
         """
         with self._changed:
-            first = self._stopped is None or self._stopped[1] != why
             self._stopped = (time.monotonic(), why, waits_for_answers)
             self._refused.clear()
             self._changed.notify_all()
-        if first and not waits_for_answers:
-            self.tell("stopped", why)
+        self.tell("stopped", why)
         return CannotGoOn(why)
 
     def close(self) -> None:
@@ -185,8 +184,10 @@ class Watch:
             self._quiet = max(_QUIET, 2 * seconds)
 
     def _has_refused(self, request: Request) -> int:
-        """How many different requests it has refused since its last reply."""
+        """How many different requests it has refused since its last reply; CannotGoOn where another
+        of these has stopped the run."""
         with self._changed:
+            self._left(request, False)
             self._refused.add(request.number)
             return len(self._refused)
 
@@ -232,7 +233,8 @@ class Request:
 
     def retry(self, what: str, wait: float) -> None:
         """Say that a try failed, and that another follows."""
-        self._watch._has_refused(self)
+        with contextlib.suppress(CannotGoOn):  # the wait that follows raises it
+            self._watch._has_refused(self)
         self._watch.tell("retry", what, self.seed, self.attempt, self.of, wait)
 
     def answered(self) -> None:
@@ -245,7 +247,11 @@ class Request:
         The run stops where the server has refused several different requests in a row; otherwise
         something may be wrong with this one alone.
         """
-        refused = self._watch._has_refused(self)
+        try:
+            refused = self._watch._has_refused(self)
+        except CannotGoOn as error:
+            self._watch.tell("stopped", what, self.seed)
+            return error
         if refused >= REFUSED:
             return self._watch.stop(
                 f"the server has refused {refused} requests in a row, the last with: {what}; see "
@@ -257,6 +263,8 @@ class Request:
 
 def duration(seconds: float) -> str:
     """Seconds as people say them: ``0.5 s``, ``90 s``, ``10 min``, ``5 h``."""
+    if math.isinf(seconds):
+        return "for ever"
     if seconds < 120:
         return f"{seconds:.1f} s" if seconds < 10 else f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.0f} h"

@@ -1,0 +1,357 @@
+"""A server of chat completions that fails in a hundred ways, over real HTTP on the loopback."""
+
+from __future__ import annotations
+
+import contextlib
+import gzip
+import json
+import socket
+import struct
+import threading
+import time
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from email.utils import formatdate
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import TracebackType
+from typing import Any
+
+SAID = "<DecisionMaking>end</DecisionMaking>"
+KEY = "sk-check-0a1b2c3d4e5f6a7b"
+DELETE = object()
+_DEEP = 100_000
+
+
+class Exchange(BaseHTTPRequestHandler):
+    """One request; a fault does with it what it likes."""
+
+    protocol_version = "HTTP/1.1"
+    faulty: FaultyServer
+
+    def do_POST(self) -> None:
+        self.rfile.read(int(self.headers.get("Content-Length", 0)))
+        with self.faulty.lock:
+            self.faulty.count += 1
+            number = self.faulty.count
+        good = number <= self.faulty.good_first
+        with contextlib.suppress(OSError):
+            (_ok if good else self.faulty.fault)(self)
+
+    def raw(self, *pieces: bytes, pause: float = 0.0) -> None:
+        """Send bytes as they are, and hang up."""
+        self.close_connection = True
+        for piece in pieces:
+            self.connection.sendall(piece)
+            if pause and self.faulty.closing.wait(pause):
+                return
+
+    def hang(self) -> None:
+        """Say nothing more until the server closes."""
+        self.faulty.closing.wait(600)
+        self.close_connection = True
+
+    def send(
+        self, body: bytes, status: int = 200, headers: Mapping[str, str] | None = None
+    ) -> None:
+        """An answer."""
+        if 200 <= status < 300:
+            with self.faulty.lock:
+                self.faulty.accepted += 1
+        self.raw(head(len(body), status, headers) + body)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing."""
+
+
+def head(length: int | None, status: int = 200, headers: Mapping[str, str] | None = None) -> bytes:
+    """The head of an answer."""
+    given = {"Content-Type": "application/json", "Connection": "close", **(headers or {})}
+    if length is not None:
+        given["Content-Length"] = str(length)
+    lines = "".join(f"{name}: {value}\r\n" for name, value in given.items())
+    return f"HTTP/1.1 {status} Whatever\r\n{lines}\r\n".encode()
+
+
+def completion(**changed: Any) -> dict[str, Any]:
+    """A good answer, with changes by path: ``choices__0__message__content=1``."""
+    answer: Any = {
+        "id": "1",
+        "object": "chat.completion",
+        "created": 0,
+        "model": "faulty",
+        "choices": [
+            {
+                "index": 0,
+                "message": {"role": "assistant", "content": SAID},
+                "finish_reason": "stop",
+            }
+        ],
+        "usage": {"prompt_tokens": 50, "completion_tokens": 9, "total_tokens": 59},
+    }
+    for path, value in changed.items():
+        place = answer
+        *way, last = [int(name) if name.isdecimal() else name for name in path.split("__")]
+        for name in way:
+            place = place[name] if isinstance(name, int) else place.setdefault(name, {})
+        if value is DELETE:
+            del place[last]
+        else:
+            place[last] = value
+    return dict(answer)
+
+
+Fault = Callable[[Exchange], None]
+
+
+def says(**changed: Any) -> Fault:
+    """A good answer but for some fields."""
+    body = json.dumps(completion(**changed)).encode()
+    return lambda exchange: exchange.send(body)
+
+
+def usage(**counts: Any) -> Fault:
+    """A good answer with another count of tokens."""
+    return says(usage=counts)
+
+
+def body(content: bytes, status: int = 200, **headers: str) -> Fault:
+    """An answer of these bytes; ``_`` stands for ``-`` in a header's name."""
+    named = {name.replace("_", "-"): value for name, value in headers.items()}
+    return lambda exchange: exchange.send(content, status, named)
+
+
+def error(status: int, message: str = "no", **headers: str) -> Fault:
+    """An error in OpenAI's form."""
+    return body(json.dumps({"error": {"message": message}}).encode(), status, **headers)
+
+
+_GOOD = json.dumps(completion()).encode()
+_ok = body(_GOOD)
+
+
+def _reset(exchange: Exchange) -> None:
+    exchange.connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    exchange.connection.close()
+    exchange.close_connection = True
+
+
+def _hang_after_head(exchange: Exchange) -> None:
+    exchange.connection.sendall(head(len(_GOOD)))
+    exchange.hang()
+
+
+def _hang_in_body(exchange: Exchange) -> None:
+    exchange.connection.sendall(head(len(_GOOD)) + _GOOD[:40])
+    exchange.hang()
+
+
+def _chunks_without_end(exchange: Exchange) -> None:
+    exchange.connection.sendall(head(None, headers={"Transfer-Encoding": "chunked"}))
+    while not exchange.faulty.closing.wait(0.01):
+        exchange.connection.sendall(b"1\r\nx\r\n")
+
+
+def _continues(exchange: Exchange) -> None:
+    while not exchange.faulty.closing.wait(0.02):
+        exchange.connection.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")
+
+
+def _date(seconds: float) -> str:
+    return formatdate(time.time() + seconds, usegmt=True)
+
+
+def _bomb() -> bytes:
+    packer = zlib.compressobj(9, wbits=31)
+    parts = [packer.compress(bytes(10_000_000)) for _ in range(60)]
+    return b"".join([*parts, packer.flush()])
+
+
+@dataclass(frozen=True)
+class Case:
+    """A fault, and what a client may make of it.
+
+    Attributes:
+        name: of the fault.
+        fault: what the server does.
+        ends: what may come of a request: ``reply``, ``failed`` (its episode is over) or ``stopped``
+            (the run is).
+    """
+
+    name: str
+    fault: Fault
+    ends: frozenset[str]
+
+
+_REPLY, _NONE = frozenset({"reply"}), frozenset({"failed", "stopped"})
+_STOPPED = frozenset({"stopped"})
+_LEAK = {"error": {"message": f"Authorization: Bearer {KEY} is wrong"}}
+
+CASES: list[Case] = [
+    # nothing, or nothing for long
+    Case("hangs before the head", Exchange.hang, _NONE),
+    Case("hangs after the head", _hang_after_head, _NONE),
+    Case("hangs in the body", _hang_in_body, _NONE),
+    Case("drips the head", lambda x: x.raw(*_bytes(head(9)), pause=0.1), _NONE),
+    Case("drips the body", lambda x: x.raw(head(len(_GOOD)), *_bytes(_GOOD), pause=0.1), _NONE),
+    Case("sends chunks without end", _chunks_without_end, _NONE),
+    Case("says 100 Continue without end", _continues, _NONE),
+    Case("hangs up", lambda x: x.raw(), _NONE),
+    Case("resets the connection", _reset, _NONE),
+    Case("hangs up in the head", lambda x: x.raw(b"HTTP/1.1 200 OK\r\nContent-"), _NONE),
+    Case("hangs up in the body", lambda x: x.raw(head(900), _GOOD[:20]), _NONE),
+    Case("promises more than comes", lambda x: x.raw(head(len(_GOOD) + 9) + _GOOD), _NONE),
+    # no HTTP
+    Case("speaks no HTTP", lambda x: x.raw(b"220 mail ready\r\n"), _NONE),
+    Case("sends zeros", lambda x: x.raw(bytes(5000)), _NONE),
+    Case("sends a huge header", lambda x: x.raw(head(2, headers={"X": "x" * 200_000}), b"{}"), _NONE),
+    Case("sends a wrong length", lambda x: x.raw(b"HTTP/1.1 200 OK\r\nContent-Length: -5\r\n\r\n"), _NONE),
+    Case("sends broken chunks", lambda x: x.raw(head(None, headers={"Transfer-Encoding": "chunked"}), b"zz\r\n"), _NONE),
+    Case("sends the status 999", lambda x: x.raw(b"HTTP/1.1 999 X\r\nContent-Length: 0\r\n\r\n"), _NONE),
+    Case("switches protocols", lambda x: x.raw(b"HTTP/1.1 101 X\r\nUpgrade: y\r\n\r\n"), _NONE),
+    # bodies
+    Case("sends nothing", body(b""), _NONE),
+    Case("answers 204", lambda x: x.raw(head(None, 204)), _NONE),
+    Case("sends HTML", body(b"<html>Welcome</html>", Content_Type="text/html"), _NONE),
+    Case("sends good JSON as HTML", body(_GOOD, Content_Type="text/html"), _REPLY),
+    Case("sends good JSON as a picture", body(_GOOD, Content_Type="image/png"), _REPLY),
+    Case("sends half of it", body(_GOOD[: len(_GOOD) // 2]), _NONE),
+    Case("sends it twice", body(_GOOD * 2), _NONE),
+    Case("sends events", body(b"data: " + _GOOD + b"\n\ndata: [DONE]\n\n"), _NONE),
+    Case("sends wrong UTF-8", body(_GOOD.replace(b"end", b"\xff\xfe")), _NONE),
+    Case("sends UTF-16", body(_GOOD.decode().encode("utf-16")), _NONE),
+    Case("nests deeply", body(b"[" * _DEEP + b"]" * _DEEP), _NONE),
+    Case("nests a usage deeply", body(_GOOD.replace(b"50", b"[" * _DEEP + b"]" * _DEEP)), _NONE | _REPLY),
+    Case("sends null", body(b"null"), _NONE),
+    Case("sends a list", body(b"[1]"), _NONE),
+    Case("sends a long number", body(_GOOD.replace(b"50", b"9" * 9000)), _NONE | _REPLY),
+    Case("sends 30 MB", lambda x: x.send(b" " * 30_000_000), _NONE),
+    # encodings
+    Case("compresses", body(gzip.compress(_GOOD), Content_Encoding="gzip"), _REPLY),
+    Case("cuts gzip", body(gzip.compress(_GOOD)[:-20], Content_Encoding="gzip"), _NONE),
+    Case("sends no gzip as gzip", body(_GOOD, Content_Encoding="gzip"), _NONE),
+    Case("sends a bomb", body(_bomb(), Content_Encoding="gzip"), _NONE),
+    Case("sends an unknown encoding", body(_GOOD, Content_Encoding="rot13"), _NONE),
+    # wrong types
+    *(
+        Case(f"sends choices {value!r}", says(choices=value), _NONE)
+        for value in (None, [], {}, "x", 5, [None], [5], [{}], [{"message": None}], [{"message": "x"}])
+    ),
+    *(
+        Case(f"says {value!r}", says(choices__0__message__content=value), _NONE)
+        for value in (5, True, {}, [], [5])
+    ),
+    *(
+        Case(f"sends {path} {value!r}", says(**{path: value}), _REPLY)
+        for path, value in (
+            ("model", 5),
+            ("model", {"a": 1}),
+            ("id", None),
+            ("created", "x"),
+            ("choices__0__finish_reason", 5),
+            ("choices__0__message__role", 5),
+            ("choices__0__message__refusal", {}),
+            ("choices__0__message__reasoning_content", [1]),
+            ("choices__0__message__tool_calls", "x"),
+            ("choices__0__message__tool_calls", [{"function": {"arguments": 5}}]),
+            ("choices__0__message__content", None),
+        )
+    ),
+    # counts of tokens
+    Case("does not count", says(usage=DELETE), _REPLY),
+    *(Case(f"counts {value!r}", says(usage=value), _REPLY) for value in (None, 5, "x", [], {})),
+    *(
+        Case(f"counts {value!r} of both", usage(prompt_tokens=value, completion_tokens=value), _REPLY)
+        for value in (-1_000_000, 0, 10**12, 10**30, 1.5, "7", True, float("nan"), float("inf"), [7])
+    ),
+    *(
+        Case(
+            f"remembers {value!r}",
+            usage(prompt_tokens=50, completion_tokens=9, prompt_tokens_details={"cached_tokens": value}),
+            _REPLY,
+        )
+        for value in (51, 10**9, -10**9, "x", float("nan"))
+    ),
+    # statuses
+    *(Case(f"answers {status}", error(status), _STOPPED) for status in (400, 401, 402, 403, 404, 422)),
+    *(Case(f"answers {status}", error(status), _NONE) for status in (408, 409, 413, 418, 429, 451, 500, 502, 503, 529, 599)),
+    Case("has no quota", body(b'{"error": {"code": "insufficient_quota"}}', 429), _STOPPED),
+    *(
+        Case(f"answers 429, Retry-After {after!r}", error(429, Retry_After=after), _NONE)
+        for after in ("0", "0.05", "-5", "soon", "nan", "1e-9", "", "0x10", "١", _date(-100), _date(1))
+    ),
+    *(
+        Case(f"answers 503, Retry-After {after!r}", error(503, Retry_After=after), _STOPPED)
+        for after in ("300", "86400", "1e400", "inf", _date(3600))
+    ),
+    *(
+        Case(f"sends on to {place}", body(b"", status, Location=place), _STOPPED)
+        for status in (301, 307, 308)
+        for place in ("/v1/chat/completions", "http://127.0.0.1:1/x", "file:///etc/passwd", "")
+    ),
+    # the key, again
+    Case("repeats the key in a reply", says(choices__0__message__content=f"{SAID} {KEY}", model=KEY), _REPLY),
+    Case("repeats the key in its thoughts", says(choices__0__message__reasoning=KEY, choices__0__finish_reason=KEY), _REPLY),
+    Case("repeats the key in a call", says(choices__0__message__tool_calls=[{"function": {"arguments": json.dumps({"action": KEY})}}]), _REPLY),
+    Case("repeats the key in a header", body(_GOOD, X_Request_Id=KEY, **{KEY: "x"}), _REPLY),
+    Case("repeats the key in the status line", lambda x: x.raw(f"HTTP/1.1 500 {KEY}\r\nContent-Length: 0\r\n\r\n".encode()), _NONE),
+    Case("repeats the key in no HTTP", lambda x: x.raw(f"{KEY}: what?\r\n\r\n".encode()), _NONE),
+    Case("repeats the key in HTML", body(f"<b>{KEY}</b>".encode()), _NONE),
+    Case("repeats the key in a Location", body(b"", 302, Location=f"http://x/?key={KEY}"), _STOPPED),
+    *(
+        Case(f"repeats the key with {status}", body(json.dumps(_LEAK).encode(), status), _NONE)
+        for status in (400, 401, 429, 500)
+    ),
+    Case("repeats the key at the end of a long error", error(500, "x" * 395 + KEY), _NONE),
+    Case("writes to the terminal", error(500, "\x1b[2J\x1b]0;owned\x07\r\nline"), _NONE),
+]  # fmt: skip
+
+
+def _bytes(data: bytes) -> list[bytes]:
+    return [data[place : place + 1] for place in range(len(data))]
+
+
+class _Listener(ThreadingHTTPServer):
+    daemon_threads = True
+    block_on_close = False
+    request_queue_size = 64
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Those who hang up are no news."""
+
+
+@dataclass
+class FaultyServer:
+    """Serves one fault; use it as a context manager.
+
+    Attributes:
+        good_first: so many requests are answered well first.
+        count: the requests that came.
+        accepted: the whole answers of status 2xx that were sent.
+        url: for ``server.base_url``.
+    """
+
+    fault: Fault
+    good_first: int = 0
+    count: int = 0
+    accepted: int = 0
+    url: str = ""
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    closing: threading.Event = field(default_factory=threading.Event)
+
+    def __enter__(self) -> FaultyServer:
+        handler = type("_Bound", (Exchange,), {"faulty": self})
+        self._listener = _Listener(("127.0.0.1", 0), handler)
+        self.url = f"http://127.0.0.1:{self._listener.server_port}/v1"
+        threading.Thread(target=self._listener.serve_forever, args=(0.02,), daemon=True).start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.closing.set()
+        self._listener.shutdown()
+        self._listener.server_close()

@@ -1,0 +1,90 @@
+"""Keeps a model's key, and what the query of its address holds, out of Inspect's logs.
+
+Inspect writes down what a server answers, word by word; some servers repeat the key.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from inspect_ai.model import Model, ModelCall, ModelOutput, get_model
+
+from agents.vlm.clients.redaction import Secrets
+from agents.vlm.record import plain_url
+
+_DONE = "_er_gym_discreet"
+
+
+def model_at(name: str, address: str | None) -> Model:
+    """A model of Inspect behind an address, whose query is sent with each request and not logged.
+
+    Raises:
+        ValueError: the address holds a password, or a query that the provider cannot send.
+    """
+    if not address:
+        return discreet(get_model(name))
+    import httpx2
+
+    url = httpx2.URL(address)
+    if url.userinfo:
+        raise ValueError(
+            "--model-base-url holds a user or a password, which Inspect writes into its log; give "
+            "the address alone, and the key in the provider's environment variable"
+        )
+    model = get_model(name, base_url=plain_url(address), memoize=False)
+    if url.query:
+        client = getattr(model.api, "client", None)
+        if not hasattr(client, "with_options"):
+            raise ValueError(f"{name} takes no query in --model-base-url; give the address alone")
+        model.api.client = client.with_options(default_query=dict(url.params))
+    return discreet(model, address)
+
+
+def discreet(model: Model, address: str = "") -> Model:
+    """The model, whose answers and errors no longer hold its key."""
+    api: Any = model.api
+    if getattr(api, _DONE, False):
+        return model
+    secrets = Secrets(api.api_key or "", address or api.base_url or "")
+    ask = api.generate
+
+    async def generate(*args: Any, **named: Any) -> Any:
+        try:
+            result = await ask(*args, **named)
+        except Exception as error:
+            _strike_error(error, secrets)
+            raise
+        if isinstance(result, tuple):
+            output, call = result
+            return _plain(output, secrets), _plain_call(call, secrets)
+        return _plain(result, secrets)
+
+    api.generate = generate
+    setattr(api, _DONE, True)
+    return model
+
+
+def _plain(output: ModelOutput | Exception, secrets: Secrets) -> ModelOutput | Exception:
+    if isinstance(output, Exception):
+        _strike_error(output, secrets)
+        return output
+    said = output.model_dump()
+    plain = secrets.strike_all(said)
+    return output if plain == said else ModelOutput.model_validate(plain)
+
+
+def _plain_call(call: ModelCall | None, secrets: Secrets) -> ModelCall | None:
+    # In place: Inspect may hold it already.
+    if call is not None and call.response is not None:
+        call.response = secrets.strike_all(call.response)
+    return call
+
+
+def _strike_error(error: BaseException | None, secrets: Secrets) -> None:
+    """Strike secrets out of an exception, and of those that it came of."""
+    while error is not None:
+        error.args = tuple(secrets.strike_all(each) for each in error.args)
+        for name, value in vars(error).items():
+            if isinstance(value, (str, dict, list)):
+                setattr(error, name, secrets.strike_all(value))
+        error = error.__cause__ or error.__context__
