@@ -68,7 +68,8 @@ def conversations(out: Path) -> list[ConversationRecord]:
 
 
 def assert_whole(out: Path, tasks: int) -> None:
-    """As many episodes and conversations as tasks, none crashed, and the costs add up."""
+    """As many episodes and conversations as tasks, none crashed, and the costs of all that was no
+    rejected answer add up."""
     episodes = list(RunStore.open(out).episodes())
     assert len(episodes) == tasks
     assert {each.error for each in episodes} == {""}
@@ -77,9 +78,9 @@ def assert_whole(out: Path, tasks: int) -> None:
     for talk, episode in zip(talks, episodes, strict=True):
         assert len(talk.rounds) == len(episode.steps) - 1
         assert [each.feedback for each in talk.rounds] == [s.feedback for s in episode.steps[1:]]
-    paid = sum(entry["cost"] for entry in ledger(out))
-    assert sum(talk.cost for talk in talks) == pytest.approx(paid)
-    assert sum(t.prompt_tokens for t in talks) == sum(entry["prompt"] for entry in ledger(out))
+    good = [entry for entry in ledger(out) if not entry["rejected"]]
+    assert sum(talk.cost for talk in talks) == pytest.approx(sum(entry["cost"] for entry in good))
+    assert sum(talk.prompt_tokens for talk in talks) == sum(entry["prompt"] for entry in good)
 
 
 def test_two_hundred_episodes_with_a_server_that_misbehaves(tmp_path: Path) -> None:
@@ -91,7 +92,15 @@ def test_two_hundred_episodes_with_a_server_that_misbehaves(tmp_path: Path) -> N
         result = bench(server.url, tmp_path, "--limit", "200", "--workers", "2", *PRICES)
     assert result.return_value == 0, result.output
     assert_whole(tmp_path, len(TASKS))
-    assert server.count > len(ledger(tmp_path))  # what went wrong was asked again
+    entries = ledger(tmp_path)
+    assert server.count > len(entries)  # what went wrong was asked again
+    rejected = [entry for entry in entries if entry["rejected"]]
+    assert len(rejected) > 5
+    assert all(entry["cost"] > 0 for entry in rejected)
+    assert {entry["estimated"] for entry in rejected} == {True, False}  # some have a count
+    events = (tmp_path / "server-events.jsonl").read_text().splitlines()
+    tries = [json.loads(line)["event"] for line in events]
+    assert tries.count("retry") == server.count - (len(entries) - len(rejected))
     ends = Counter(each.end_reason for each in RunStore.open(tmp_path).episodes())
     assert set(ends) <= {"end", "no known action"}
     assert ends["end"] > 150
@@ -191,6 +200,59 @@ def test_a_recorded_run_is_played_again_without_a_server(tmp_path: Path) -> None
     assert ledger(tmp_path / "b") == []  # what is replayed has been paid for
 
 
+def test_a_server_that_hangs_is_told_of_and_left_in_time(tmp_path: Path) -> None:
+    with naughty.NaughtyServer(script=["stall"] * 50) as server:
+        began = time.monotonic()
+        hangs = bench(server.url, tmp_path, "--limit", "6", "--set", "server.timeout=0.5")
+        assert hangs.return_value == 3
+        assert "no whole answer within 0.5 s (try 1 of 12); trying again in" in hangs.output
+        assert "(tried 2 times); nothing has answered yet: see whether the server" in hangs.output
+        over = bench(server.url, tmp_path, "--limit", "6", "--max-minutes", "0.01")
+        assert over.return_value == 3
+        assert "the 0.01 minutes are over" in over.output
+        assert time.monotonic() - began < 30
+    assert list(RunStore.open(tmp_path).episodes()) == []
+
+
+def test_how_long_a_server_may_ask_to_wait(tmp_path: Path) -> None:
+    with naughty.NaughtyServer(script=["429"] * 50, retry_after="300") as server:
+        result = bench(server.url, tmp_path, "--limit", "2")
+        assert result.return_value == 3
+        assert "the server asks to wait 5 min: run the same command again" in result.output
+        result = bench(server.url, tmp_path, "--limit", "2", "--max-minutes", "4")
+        assert result.return_value == 3
+        assert "asks to wait 5 min, and 4 min of --max-minutes are left" in result.output
+
+
+def test_ctrl_c_works_while_a_long_wait_is_allowed(tmp_path: Path) -> None:
+    with naughty.NaughtyServer(script=["429"] * 50, retry_after="300") as server:
+        waiting = run(server.url, tmp_path, "--limit", "2", "--max-minutes", "90").process
+        assert waiting.stdout is not None
+        assert "slow down (try 1 of 12); trying again in 5 min" in waiting.stdout.readline()
+        began = time.monotonic()
+        waiting.send_signal(signal.SIGINT)
+        waiting.communicate(timeout=30)
+        assert waiting.returncode == 130
+        assert time.monotonic() - began < 5
+
+
+def test_a_key_that_is_repeated_is_nowhere(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
+    said = "<Thinking>It is sk-very-secret.</Thinking><DecisionMaking>end</DecisionMaking>"
+    extra = ("--set", 'server.extra={"user": "sk-very-secret"}')
+    with naughty.NaughtyServer(said) as server:
+        url = f"{server.url}?tenant=mine&code=also-very-secret"
+        result = bench(url, tmp_path, "--limit", "2", *extra)
+    assert result.return_value == 0, result.output
+    assert {seen.path.partition("?")[2] for seen in server.seen} == {
+        "tenant=mine&code=also-very-secret"
+    }
+    everything = b"".join(file.read_bytes() for file in tmp_path.rglob("*") if file.is_file())
+    assert b"It is ***." in everything
+    assert b"very-secret" not in everything
+    assert "very-secret" not in result.output
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -202,6 +264,16 @@ def test_a_recorded_run_is_played_again_without_a_server(tmp_path: Path) -> None
             ("--agent", "openai:m", "--base-url", "http://127.0.0.1:1/v1", "--max-usd", "1"),
             "--max-usd needs prices",
         ),
+        *(
+            (("--agent", "openai:m", f"--max-{what}", given), f"--max-{what}")
+            for what in ("usd", "tokens", "minutes")
+            for given in ("0", "-1", "nan", "inf")
+        ),
+        (("--agent", "oracle", "--max-usd", "0"), "--max-usd is for agents that speak"),
+        (("--agent", "openai:m", "--set", "prices.prompt=.nan"), "'prices.prompt'"),
+        (("--agent", "openai:m", "--set", "prices.prompt=.inf"), "'prices.prompt'"),
+        (("--agent", "openai:m", "--set", "prices.completion=-1"), "'prices.completion'"),
+        (("--agent", "openai:m", "--set", "prices.prompt=true"), "'prices.prompt'"),
         (("--agent", "recorded:nowhere"), "holds no conversations"),
         (("--agent", "openai:m", "--set", "prompts.profile=x"), "there are no prompts 'x'"),
     ],
@@ -304,8 +376,12 @@ def test_the_server_is_killed_and_comes_back(server: Any, tmp_path: Path) -> Non
     until(tmp_path, 2)
     process.kill()
     code, said = running.end()
-    assert code == 1, said
-    assert "the same command plays them again" in said
+    assert code == 3, said
+    assert "(try 1 of 2); trying again in 0." in said
+    assert "requests in a row, the last with: naughty-1 at http://127.0.0.1:" in said
+    assert "the same command continues" in said
+    crashed = [each for each in RunStore.open(tmp_path).episodes() if each.error]
+    assert len(crashed) <= 2  # not one by one to the last
     port = int(url.rpartition(":")[2].partition("/")[0])
     server(port)
     code, said = run(url, tmp_path, *quick).end()

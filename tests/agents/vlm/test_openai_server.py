@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import gzip
 import json
 import logging
 import math
@@ -27,12 +28,13 @@ import openai
 
 from agents.base import CannotGoOn
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
-from agents.vlm.clients import wire
+from agents.vlm.clients import watch, wire
+from agents.vlm.clients.budget import Budget, Ledger
 from agents.vlm.clients.openai_server import OpenAIClient
 from agents.vlm.clients.tokens import Asked, picture_at_most, usage_of
 from agents.vlm.clients.transport import LARGEST_ANSWER, Pace
 from agents.vlm.clients.watch import Watch
-from agents.vlm.settings import AgentSettings
+from agents.vlm.settings import AgentSettings, Prices, Server
 
 KEY = "sk-test-4f1c9e0b7a2d"
 HELLO = (Message("user", ("hello",)),)
@@ -600,19 +602,19 @@ def test_requests_are_spread(naughty: NaughtyServer, make: Make) -> None:
 
 
 def test_who_waits_for_a_turn_is_let_go() -> None:
-    pace, watch = Pace(1), Watch()
-    pace.wait(watch.request(0))
+    pace, run = Pace(1), Watch()
+    pace.wait(run.request(0))
     raised: list[BaseException] = []
 
     def wait() -> None:
         try:
-            pace.wait(watch.request(0))
+            pace.wait(run.request(0))
         except ModelError as error:
             raised.append(error)
 
     waiting = threading.Thread(target=wait)
     waiting.start()
-    watch.close()
+    run.close()
     waiting.join(10)
     assert str(raised[0]) == "the client has been closed"
 
@@ -679,3 +681,97 @@ def test_identity_is_what_replies_depend_on(naughty: NaughtyServer, make: Make) 
         make(naughty.url, extra={"top_k": 1}),
     ]
     assert len({client.identity for client in others}) == len(others)
+    with NaughtyServer() as same:  # started again, on another port
+        assert make(same.url).identity == make(naughty.url).identity
+    assert "tenant" not in make(naughty.url + "?tenant=a").identity
+
+
+def test_a_query_is_sent_with_each_request(naughty: NaughtyServer, make: Make) -> None:
+    make(naughty.url + "?tenant=a&tenant=b%20c").reply(HELLO, seed=0)
+    assert naughty.seen[0].path == "/v1/chat/completions?tenant=a&tenant=b%20c"
+    place = naughty.url.removesuffix("/v1")
+    make(place + "?tenant=a", api_version="1").reply(HELLO, seed=0)
+    assert naughty.seen[1].path.endswith("/chat/completions?api-version=1&tenant=a")
+
+
+@pytest.mark.parametrize("status", [301, 307, 308])
+def test_requests_are_not_sent_on(naughty: NaughtyServer, make: Make, status: int) -> None:
+    naughty.then(Raw({}, status, {"Location": f"http://elsewhere.invalid/?key={KEY}"}))
+    words = r"not sent on to http://elsewhere\.invalid/\?key=\*\*\*; if the server is there"
+    with pytest.raises(CannotGoOn, match=words):
+        make(naughty.url).reply(HELLO, seed=0)
+    assert naughty.count == 1
+
+
+def test_compressed_answers_are_bounded(naughty: NaughtyServer, make: Make) -> None:
+    good = gzip.compress(json.dumps(completion({"content": "end"})).encode())
+    bomb = gzip.compress(bytes(LARGEST_ANSWER + 1))
+    for body in (good, good[:-9], bomb):
+        naughty.then(Raw(body, headers={"Content-Encoding": "gzip"}))
+    client = make(naughty.url, tries=1)
+    assert client.reply(HELLO, seed=0).text == "end"
+    with pytest.raises(ModelError, match="a gzip answer that is cut off"):
+        client.reply(HELLO, seed=0)
+    with pytest.raises(ModelError, match="more than 20,000,000 bytes"):
+        client.reply(HELLO, seed=0)
+
+
+def test_each_answer_is_entered_before_it_is_judged(naughty: NaughtyServer) -> None:
+    server = Server(base_url=naughty.url, key_from="OUR_TEST_KEY", tries=3)
+    settings = AgentSettings(server=server, prices=Prices(prompt=2, completion=10))
+    ledger = Ledger(Budget(), settings.prices)
+    client = OpenAIClient(MODEL, settings, ledger)
+    naughty.then("empty_choices", "half", "500", "html", "ok", "429")
+    with pytest.raises(ModelError, match="something broke"):
+        client.reply(HELLO, seed=0)
+    assert ledger.spent.requests == 2  # the server may charge for what it began to answer
+    before = ledger.spent.cost
+    reply = client.reply(HELLO, seed=0)
+    assert ledger.spent.requests == 4
+    assert ledger.spent.usage.estimated
+    assert ledger.spent.cost > before + reply.cost > before > 0
+    client.close()
+
+
+def test_a_budget_is_looked_at_before_each_try(naughty: NaughtyServer) -> None:
+    server = Server(base_url=naughty.url, key_from="OUR_TEST_KEY", tries=9)
+    ledger = Ledger(Budget(max_tokens=1000), Prices())
+    client = OpenAIClient(MODEL, AgentSettings(server=server), ledger)
+    naughty.then(*["html"] * 9)
+    with pytest.raises(CannotGoOn, match="the budget is spent"):
+        client.reply(HELLO, seed=0)
+    assert naughty.count == 1
+    client.close()
+
+
+def test_a_server_that_refuses_again_and_again_stops_the_run(
+    naughty: NaughtyServer, make: Make
+) -> None:
+    client = make(naughty.url, tries=1)
+    naughty.then("500", "500", "ok", "500", "500", "500", "ok")
+    for _ in range(2):
+        with pytest.raises(ModelError):
+            client.reply(HELLO, seed=0)
+    client.reply(HELLO, seed=0)
+    for kind in (ModelError, ModelError, CannotGoOn):
+        with pytest.raises(kind, match="500, something broke"):
+            client.reply(HELLO, seed=0)
+    assert client.reply(HELLO, seed=0).text == "observe"  # what is asked later is asked
+
+
+def test_those_who_wait_are_let_go_when_the_run_stops(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(watch, "_GRACE", 0.2)
+    with NaughtyServer(script=["429", "stall", "401"], retry_after="60") as server:
+        client = make(server.url, timeout=60)
+        began = time.monotonic()
+        with ThreadPoolExecutor(3) as pool:
+            asked = []
+            for _ in range(3):
+                asked.append(pool.submit(client.reply, HELLO, 0))
+                time.sleep(0.2)
+            for each in asked:
+                with pytest.raises(CannotGoOn, match="401, incorrect key"):
+                    each.result()
+        assert time.monotonic() - began < 5

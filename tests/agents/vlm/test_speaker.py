@@ -70,7 +70,7 @@ def test_replies_are_kept_and_counted_in_the_run_directory(tmp_path: Path) -> No
         settings = load_settings(None, (f"server.base_url={server.url}", "prices.completion=1000"))
         for kept in (False, True):
             speaker = Speaker("openai:naughty-1", settings, tmp_path, Budget(max_usd=1))
-            reply = speaker._client.reply(HELLO, 0)
+            reply = speaker.client.reply(HELLO, 0)
             assert (reply.text, reply.kept) == ("Good day.", kept)
             assert "tokens in 1 replies, $" in speaker.spent
             speaker.close()
