@@ -85,13 +85,15 @@ class Voice:
         tasks: Sequence[Task],
         workers: int,
         on_episode: Callable[[EpisodeRecord], None],
-        say: Callable[[object], None],
+        say: Callable[[object], None] | None = None,
     ) -> Outcome:
         """Play the tasks that the store has no finished episode of; see :func:`run_together`.
 
-        ``say`` is called with what a user should hear of the server, from any thread.
+        ``say`` is called with what a user should hear of the server, from any thread; without it,
+        a logger warns.
         """
-        speaker.watch.show = say
+        if say is not None:
+            speaker.watch.show = say
 
         def keep(episode: EpisodeRecord, agent: Agent) -> None:
             last = next((step for step in reversed(episode.steps) if not step.appended), None)

@@ -260,7 +260,8 @@ class OpenAIClient:
                 f"{what}; the server asks to wait {duration(pause)}: {AGAIN} after that, or give "
                 "--max-minutes of more, and it is waited for"
             )
-        request.retry(what, pause)
+        of = min(request.of, request.attempt + 1) if failure.late else request.of
+        request.retry(what, pause, of)
         request.wait(pause)
 
     def _line(self, failure: Failure) -> str:

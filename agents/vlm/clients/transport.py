@@ -212,7 +212,9 @@ class _Clock(threading.local):
         """Say that one still waits; raises what ends the run."""
         self.request.left(answering=True)
         waited, most = time.monotonic() - self._began, self._end - self._began
-        self.request.still_waiting(f"no answer for {waited:.0f} s of {most:.0f} s", waited)
+        self.request.still_waiting(
+            f"no answer for {waited:.0f} s; the limit is {most:.0f} s", waited
+        )
 
 
 class _TimedStream(httpcore2.NetworkStream):

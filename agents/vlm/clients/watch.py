@@ -25,7 +25,7 @@ AGAIN = "run the same command again to continue"
 REFUSED = 3
 """So many different requests refused in a row, with no reply between them, end the run."""
 _QUIET = 15.0
-"""Seconds without news after which a waiting request says so; each further time twice as long."""
+"""Seconds without news after which a waiting request says so."""
 _GRACE = 5.0
 """Seconds that an answer under way still has once the server is given up."""
 _LONGEST_WAIT = 3600.0  # seconds of one wait; threads cannot wait for an infinite time
@@ -173,7 +173,6 @@ class Watch:
             if now - self._last_news < self._quiet:
                 return False
             self._last_news = now
-            self._quiet *= 2
             return True
 
     def _answered(self, seconds: float) -> None:
@@ -231,11 +230,11 @@ class Request:
         if self._watch._is_quiet():
             self._watch.tell("waiting", what, self.seed, self.attempt, self.of, seconds)
 
-    def retry(self, what: str, wait: float) -> None:
-        """Say that a try failed, and that another follows."""
+    def retry(self, what: str, wait: float, of: int) -> None:
+        """Say that a try failed, and that another of ``of`` follows."""
         with contextlib.suppress(CannotGoOn):  # the wait that follows raises it
             self._watch._has_refused(self)
-        self._watch.tell("retry", what, self.seed, self.attempt, self.of, wait)
+        self._watch.tell("retry", what, self.seed, self.attempt, of, wait)
 
     def answered(self) -> None:
         """There is a reply."""
