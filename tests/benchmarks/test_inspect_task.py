@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import base64
+import importlib.util
 import io
 import re
+import sys
+import zipfile
+from pathlib import Path
 
 import anyio
 import pytest
@@ -27,6 +31,12 @@ from benchmarks.metrics import METRICS
 from benchmarks.play import episode_seed, play_episode
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks.suites import load_suite
+
+_SERVER = Path(__file__).parents[1] / "agents" / "vlm" / "naughty_server.py"
+_spec = importlib.util.spec_from_file_location("naughty_for_inspect", _SERVER)
+naughty = importlib.util.module_from_spec(_spec)
+sys.modules[_spec.name] = naughty
+_spec.loader.exec_module(naughty)
 
 SUITE = load_suite("mini")
 TASK = next(
@@ -214,8 +224,8 @@ class Mute(ModelAPI):
         return spoken("I do not know.")
 
 
-def run_command(model: str, tmp_path) -> int:
-    given = ["--limit", "1", "--set", "sees=text", "--log-dir", str(tmp_path)]
+def run_command(model: str, tmp_path, *more: str) -> int:
+    given = ["--limit", "1", "--set", "sees=text", "--log-dir", str(tmp_path), *more]
     return inspect.main(["--model", model, *given], standalone_mode=False)
 
 
@@ -239,10 +249,42 @@ def test_the_command_says_what_went_wrong(tmp_path, monkeypatch, capsys):
     assert "not a word" in err
 
 
+KEY, CODE = "sk-inspect-0a1b2c3d4e", "query-secret-0a1b2c"
+
+
+@pytest.mark.parametrize("status", [200, 400, 401])
+def test_no_secret_that_a_server_repeats_is_logged(status, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("INSPECT_DISPLAY", "none")
+    monkeypatch.setenv("LOCAL_API_KEY", KEY)
+    said = naughty.completion({"content": f"<{DECISION}>end</{DECISION}> {KEY} {CODE}"})
+    told = said if status == 200 else {"error": {"message": f"wrong: {KEY} {CODE}"}}
+    with naughty.NaughtyServer(script=[naughty.Raw(told, status)]) as server:
+        url = f"{server.url}?code={CODE}"
+        code = run_command("openai-api/local/m", tmp_path, "--model-base-url", url)
+    assert code == (0 if status == 200 else CRASHED)
+    assert server.seen[0].path.endswith(f"/chat/completions?code={CODE}")
+    (log,) = tmp_path.iterdir()
+    with zipfile.ZipFile(log) as file:
+        everything = b"".join(file.read(name) for name in file.namelist())
+    out, err = capsys.readouterr()
+    assert b"***" in everything
+    for secret in (KEY, CODE):
+        assert secret.encode() not in everything
+        assert secret not in out + err
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
         (["--model", "mockllm/model", "--suite", "maxi"], "unknown suite 'maxi'"),
+        (
+            ["--model", "mockllm/model", "--model-base-url", "http://me:pw@host/v1"],
+            "holds a user or a password",
+        ),
+        (
+            ["--model", "mockllm/model", "--model-base-url", "http://host/v1?a=b"],
+            "mockllm/model takes no query in --model-base-url",
+        ),
         (["--model", "mockllm/model", "--set", "sees=all"], "sees"),
         (["--model", "openai/gpt-4o"], "OPENAI_API_KEY"),
     ],

@@ -42,7 +42,8 @@ class Budget:
     def __post_init__(self) -> None:
         for name, given in vars(self).items():
             kinds = (int,) if name == "max_tokens" else (int, float)
-            if given is None or (type(given) in kinds and 0 < given < math.inf):
+            number = isinstance(given, kinds) and not isinstance(given, bool)
+            if given is None or (number and 0 < given < math.inf):
                 continue
             what = "whole number" if name == "max_tokens" else "finite number"
             raise ValueError(
@@ -167,15 +168,16 @@ class Ledger:
     def check(self) -> None:
         """Raise CannotGoOn where nothing more may be spent."""
         budget, spent = self._budget, self.spent
+        most = "at most " if spent.usage.estimated else ""
         if budget.max_usd is not None and spent.cost >= budget.max_usd:
             raise CannotGoOn(
-                f"the budget is spent: ${spent.cost:.2f} of ${budget.max_usd:.2f}; raise --max-usd "
-                f"and {AGAIN}"
+                f"the budget is spent: {most}${spent.cost:.2f} of ${budget.max_usd:.2f}; raise "
+                f"--max-usd and {AGAIN}{_why(spent)}"
             )
         if budget.max_tokens is not None and spent.usage.total >= budget.max_tokens:
             raise CannotGoOn(
-                f"the budget is spent: {spent.usage.total:,} of {budget.max_tokens:,} tokens; "
-                f"raise --max-tokens and {AGAIN}"
+                f"the budget is spent: {most}{spent.usage.total:,} of {budget.max_tokens:,} "
+                f"tokens; raise --max-tokens and {AGAIN}{_why(spent)}"
             )
 
     def enter(self, entry: Entry) -> None:
@@ -244,6 +246,12 @@ class Metered:
     def close(self) -> None:
         """Close the other client."""
         self._client.close()
+
+
+def _why(spent: Spent) -> str:
+    """Why it may be less."""
+    why = " (where the server's count is missing or cannot be true, upper bounds stand for it)"
+    return why if spent.usage.estimated else ""
 
 
 def _with(spent: Spent, entry: Entry) -> Spent:
