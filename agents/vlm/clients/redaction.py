@@ -49,7 +49,7 @@ class Secrets:
         # As they are, in JSON and in a URL; the longest first, since one may be part of another.
         forms = {form for each in long for form in (each, json.dumps(each)[1:-1], quote(each, ""))}
         patterns = [re.escape(form) for form in sorted(forms, key=len, reverse=True)]
-        told = r"((?:bearer|basic|key|token|authorization|password)\W{1,6})"
+        told = r"((?:bearer|basic|key|token|authorization|password)(?: provided)?\W{1,6})"
         after = "|".join(map(re.escape, sorted(short, key=len, reverse=True)))
         self._anywhere = re.compile("|".join(patterns)) if patterns else None
         self._after = re.compile(rf"(?i:{told})(?:{after})(?!\w)") if after else None

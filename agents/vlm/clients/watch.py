@@ -23,7 +23,7 @@ from agents.vlm.chat import ModelError
 
 AGAIN = "run the same command again to continue"
 REFUSED = 3
-"""So many different requests refused in a row, with no reply between them, end the run."""
+"""So many different requests refused, with no reply between them, end the run."""
 _QUIET = 15.0
 """Seconds without news after which a waiting request says so."""
 _GRACE = 5.0
@@ -85,7 +85,9 @@ class Watch:
         self._ends = math.inf if max_minutes is None else time.monotonic() + 60 * max_minutes
         self._changed = threading.Condition()
         self._numbers = itertools.count()
-        self._refused: set[int] = set()
+        self._refused: set[int] = set()  # those with a failed try since the last reply
+        self._given_up = 0  # how many of them had no further try
+        self._last_reply = -math.inf
         self._stopped: tuple[float, str, bool] | None = None
         self._closed = False
         self._last_news = time.monotonic()
@@ -113,7 +115,7 @@ class Watch:
         """
         with self._changed:
             self._stopped = (time.monotonic(), why, waits_for_answers)
-            self._refused.clear()
+            self._forget_refusals()
             self._changed.notify_all()
         self.tell("stopped", why)
         return CannotGoOn(why)
@@ -141,7 +143,8 @@ class Watch:
         self._last_news = time.monotonic()
         self.keep(notice)
         if event != "stopped":  # what is raised says so
-            self.show(notice)
+            with contextlib.suppress(OSError, ValueError):  # nobody reads what is shown
+                self.show(notice)
 
     # -- for requests ------------------------------------------------------------------------------
 
@@ -177,18 +180,30 @@ class Watch:
 
     def _answered(self, seconds: float) -> None:
         with self._changed:
-            self._refused.clear()
-            self._last_news = time.monotonic()
+            self._forget_refusals()
+            self._last_reply = self._last_news = time.monotonic()
             # A server that always takes long is no news.
             self._quiet = max(_QUIET, 2 * seconds)
 
-    def _has_refused(self, request: Request) -> int:
-        """How many different requests it has refused since its last reply; CannotGoOn where another
-        of these has stopped the run."""
+    def _forget_refusals(self) -> None:
+        self._refused.clear()
+        self._given_up = 0
+
+    def _failed(self, request: Request) -> None:
+        """A try of a request has."""
+        with self._changed:
+            request.failing_since = min(request.failing_since, time.monotonic())
+            self._refused.add(request.number)
+
+    def _gave_up(self, request: Request) -> int:
+        """How many different requests the server has refused in a row, at the end of one of them; 0
+        where that may be the fault of this one. CannotGoOn where the run has stopped meanwhile."""
         with self._changed:
             self._left(request, False)
-            self._refused.add(request.number)
-            return len(self._refused)
+            self._given_up += 1
+            # Nobody has had a reply all the while.
+            dead = self._last_reply < request.failing_since and len(self._refused) >= REFUSED
+            return len(self._refused) if dead or self._given_up >= REFUSED else 0
 
 
 class Request:
@@ -197,7 +212,7 @@ class Request:
     Attributes:
         number: among those of the watch.
         seed: of the episode.
-        began: monotonic seconds.
+        began: monotonic seconds; ``failing_since``: of the first failed try.
         answering: whether the try that is under way has been accepted: there is a status of 2xx.
         attempt: which try is under way; ``of``: how many there are at most.
     """
@@ -205,6 +220,7 @@ class Request:
     def __init__(self, watch: Watch, number: int, seed: int) -> None:
         self.number, self.seed = number, seed
         self.began = time.monotonic()
+        self.failing_since = math.inf
         self.answering = False
         self.attempt = self.of = 0
         self._watch = watch
@@ -232,8 +248,7 @@ class Request:
 
     def retry(self, what: str, wait: float, of: int) -> None:
         """Say that a try failed, and that another of ``of`` follows."""
-        with contextlib.suppress(CannotGoOn):  # the wait that follows raises it
-            self._watch._has_refused(self)
+        self._watch._failed(self)
         self._watch.tell("retry", what, self.seed, self.attempt, of, wait)
 
     def answered(self) -> None:
@@ -246,12 +261,13 @@ class Request:
         The run stops where the server has refused several different requests in a row; otherwise
         something may be wrong with this one alone.
         """
+        self._watch._failed(self)
         try:
-            refused = self._watch._has_refused(self)
+            refused = self._watch._gave_up(self)
         except CannotGoOn as error:
             self._watch.tell("stopped", what, self.seed)
             return error
-        if refused >= REFUSED:
+        if refused:
             return self._watch.stop(
                 f"the server has refused {refused} requests in a row, the last with: {what}; see "
                 f"to it, and {AGAIN}"

@@ -29,6 +29,7 @@ from tiny_qwen import make_tiny_qwen
 from agents.base import CannotGoOn
 from agents.vlm.chat import Message, ModelError, Picture, Reply
 from agents.vlm.clients.local import LocalClient, _Draw, _without_thought
+from agents.vlm.clients.watch import Watch
 from agents.vlm.settings import AgentSettings
 
 LONG = 60.0  # seconds; nothing here waits so long unless it is broken
@@ -624,6 +625,16 @@ def test_closing_stops_it_in_the_middle_of_a_reply(client: Clients) -> None:
     assert len(batches[0][0]) < 16_000
     with pytest.raises(CannotGoOn, match="closed"):
         model.reply([user("Hello")], 0)
+
+
+def test_the_minutes_stop_it_in_the_middle_of_a_reply(client: Clients) -> None:
+    model = client(sampling={"max_tokens": 16_000})  # a minute of words
+    model._model.generation_config.eos_token_id, model._ends = None, frozenset()
+    model._watch = Watch(max_minutes=0.5 / 60)
+    batches = recorded(model)
+    with pytest.raises(CannotGoOn, match="the minutes are over; run the same command again"):
+        model.reply([user("Hello")], 0)
+    assert len(batches[0][0]) < 16_000
 
 
 def test_a_directory_needs_no_network(client: Clients, monkeypatch: pytest.MonkeyPatch) -> None:

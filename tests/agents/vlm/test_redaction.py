@@ -27,7 +27,9 @@ def test_a_short_key_spoils_no_words(key: str) -> None:
     secrets = Secrets(key)
     for text in (f"{key} is a word, and an {key}", f"<DecisionMaking>{key}</DecisionMaking>", ""):
         assert secrets.strike(text) == text
-    assert secrets.strike(f"Incorrect API key: {key}.") == "Incorrect API key: ***."
+    told = f"Incorrect API key provided: {key}."
+    assert secrets.strike(told) == "Incorrect API key provided: ***."
+    assert secrets.strike(f"{{'api_key': '{key}'}}") == "{'api_key': '***'}"
     assert secrets.strike(f"Authorization: Bearer {key}") == "Authorization: Bearer ***"
 
 
