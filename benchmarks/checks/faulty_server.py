@@ -115,9 +115,11 @@ def usage(**counts: Any) -> Fault:
     return says(usage=counts)
 
 
-def body(content: bytes, status: int = 200, **headers: str) -> Fault:
+def body(
+    content: bytes, status: int = 200, more: Mapping[str, str] | None = None, **headers: str
+) -> Fault:
     """An answer of these bytes; ``_`` stands for ``-`` in a header's name."""
-    named = {name.replace("_", "-"): value for name, value in headers.items()}
+    named = {name.replace("_", "-"): value for name, value in headers.items()} | dict(more or {})
     return lambda exchange: exchange.send(content, status, named)
 
 
@@ -185,6 +187,10 @@ class Case:
 
 _REPLY, _NONE = frozenset({"reply"}), frozenset({"failed", "stopped"})
 _STOPPED = frozenset({"stopped"})
+_NO_CHOICES: list[Any] = [None, [], {}, "x", 5, [None], [5], [{}]]
+_NO_CHOICES += [[{"message": None}], [{"message": "x"}]]
+_NO_WORDS: list[Any] = [5, True, {}, [], [5]]
+_NO_COUNT: list[Any] = [None, 5, "x", [], {}]
 _LEAK = {"error": {"message": f"Authorization: Bearer {KEY} is wrong"}}
 
 CASES: list[Case] = [
@@ -207,7 +213,7 @@ CASES: list[Case] = [
     Case("sends a huge header", lambda x: x.raw(head(2, headers={"X": "x" * 200_000}), b"{}"), _NONE),
     Case("sends a wrong length", lambda x: x.raw(b"HTTP/1.1 200 OK\r\nContent-Length: -5\r\n\r\n"), _NONE),
     Case("sends broken chunks", lambda x: x.raw(head(None, headers={"Transfer-Encoding": "chunked"}), b"zz\r\n"), _NONE),
-    Case("sends the status 999", lambda x: x.raw(b"HTTP/1.1 999 X\r\nContent-Length: 0\r\n\r\n"), _NONE),
+    Case("sends the status 999", lambda x: x.raw(b"HTTP/1.1 999 X\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"), _NONE),
     Case("switches protocols", lambda x: x.raw(b"HTTP/1.1 101 X\r\nUpgrade: y\r\n\r\n"), _NONE),
     # bodies
     Case("sends nothing", body(b""), _NONE),
@@ -235,11 +241,11 @@ CASES: list[Case] = [
     # wrong types
     *(
         Case(f"sends choices {value!r}", says(choices=value), _NONE)
-        for value in (None, [], {}, "x", 5, [None], [5], [{}], [{"message": None}], [{"message": "x"}])
+        for value in _NO_CHOICES
     ),
     *(
         Case(f"says {value!r}", says(choices__0__message__content=value), _NONE)
-        for value in (5, True, {}, [], [5])
+        for value in _NO_WORDS
     ),
     *(
         Case(f"sends {path} {value!r}", says(**{path: value}), _REPLY)
@@ -259,7 +265,7 @@ CASES: list[Case] = [
     ),
     # counts of tokens
     Case("does not count", says(usage=DELETE), _REPLY),
-    *(Case(f"counts {value!r}", says(usage=value), _REPLY) for value in (None, 5, "x", [], {})),
+    *(Case(f"counts {value!r}", says(usage=value), _REPLY) for value in _NO_COUNT),
     *(
         Case(f"counts {value!r} of both", usage(prompt_tokens=value, completion_tokens=value), _REPLY)
         for value in (-1_000_000, 0, 10**12, 10**30, 1.5, "7", True, float("nan"), float("inf"), [7])
@@ -293,8 +299,8 @@ CASES: list[Case] = [
     Case("repeats the key in a reply", says(choices__0__message__content=f"{SAID} {KEY}", model=KEY), _REPLY),
     Case("repeats the key in its thoughts", says(choices__0__message__reasoning=KEY, choices__0__finish_reason=KEY), _REPLY),
     Case("repeats the key in a call", says(choices__0__message__tool_calls=[{"function": {"arguments": json.dumps({"action": KEY})}}]), _REPLY),
-    Case("repeats the key in a header", body(_GOOD, X_Request_Id=KEY, **{KEY: "x"}), _REPLY),
-    Case("repeats the key in the status line", lambda x: x.raw(f"HTTP/1.1 500 {KEY}\r\nContent-Length: 0\r\n\r\n".encode()), _NONE),
+    Case("repeats the key in a header", body(_GOOD, X_Request_Id=KEY, more={KEY: "x"}), _REPLY),
+    Case("repeats the key in the status line", lambda x: x.raw(f"HTTP/1.1 500 {KEY}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n".encode()), _NONE),
     Case("repeats the key in no HTTP", lambda x: x.raw(f"{KEY}: what?\r\n\r\n".encode()), _NONE),
     Case("repeats the key in HTML", body(f"<b>{KEY}</b>".encode()), _NONE),
     Case("repeats the key in a Location", body(b"", 302, Location=f"http://x/?key={KEY}"), _STOPPED),

@@ -236,6 +236,24 @@ def test_ctrl_c_works_while_a_long_wait_is_allowed(tmp_path: Path) -> None:
         assert time.monotonic() - began < 5
 
 
+def test_tokens_that_are_not_counted_are_estimated_and_marked(tmp_path: Path) -> None:
+    said = naughty.completion({"content": "<DecisionMaking>end</DecisionMaking>"})
+    with naughty.NaughtyServer(script=[naughty.Raw({**said, "usage": None})] * 9) as server:
+        more = ("--limit", "3", "--concurrency", "1", *PRICES)
+        result = bench(server.url, tmp_path, *more, "--max-tokens", "100")
+    assert result.return_value == 3
+    assert "the budget is spent: at most " in result.output
+    assert server.count == 1
+    (entry,) = ledger(tmp_path)
+    (talk,) = conversations(tmp_path)
+    assert entry["estimated"]
+    assert talk.estimated
+    assert talk.rounds[0].estimated
+    assert talk.prompt_tokens == entry["prompt"] > len(server.seen[0].body) - 100
+    assert talk.cost == pytest.approx(entry["cost"])
+    assert talk.cost > 0
+
+
 def test_a_key_that_is_repeated_is_nowhere(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
     said = "<Thinking>It is sk-very-secret.</Thinking><DecisionMaking>end</DecisionMaking>"

@@ -187,7 +187,7 @@ class OpenAIClient:
             )
         except openai.OpenAIError as error:
             answer = error
-        except CannotGoOn:
+        except BaseException:  # the run ends, or Ctrl-C
             if request.answering:
                 self._enter(b"", asked, None, "the run has ended", request, began)
             raise
@@ -267,7 +267,7 @@ class OpenAIClient:
     def _line(self, failure: Failure) -> str:
         """One line that says who and what; never the key."""
         words = self._plain(failure.words)
-        ends = f"; {self._secrets.strike(failure.ends)}" if failure.ends else ""
+        ends = f"; {self._plain(failure.ends)}" if failure.ends else ""
         return f"{self._model} at {self._where}: {words}{ends}"
 
     def _plain(self, words: str) -> str:
