@@ -125,7 +125,8 @@ def body(
 
 def error(status: int, message: str = "no", **headers: str) -> Fault:
     """An error in OpenAI's form."""
-    return body(json.dumps({"error": {"message": message}}).encode(), status, **headers)
+    named = {name.replace("_", "-"): value for name, value in headers.items()}
+    return body(json.dumps({"error": {"message": message}}).encode(), status, named)
 
 
 _GOOD = json.dumps(completion()).encode()

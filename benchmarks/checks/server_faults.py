@@ -199,7 +199,7 @@ class Run:
         seconds: that it may take.
         crashed: how many episodes may be recorded as crashed.
         good_first: how many requests are answered well first.
-        interrupt: words after which it gets Ctrl-C, and has three seconds to end.
+        interrupt: words after which it gets Ctrl-C, and has six seconds to end.
     """
 
     name: str
@@ -324,7 +324,7 @@ def _run_problems(run: Run) -> Iterator[str]:
         process.wait()
         end.cancel()
         ended = time.monotonic()
-        if interrupted and ended - interrupted > 3:
+        if interrupted and ended - interrupted > 6:
             yield f"took {ended - interrupted:.1f} s to end after Ctrl-C"
         if ended - began > run.seconds:
             yield f"took {ended - began:.1f} s"
