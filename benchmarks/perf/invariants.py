@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 Metadata = Mapping[str, Any]
 
-_PART = re.compile(r"(.+)\|(?:\w+Sliced_\d+|EggCracked)")
+_PART = re.compile(r"(.+)\|(?:\w+Sliced|EggCracked)_\d+")
 """The id of a slice or a cracked egg begins with that of the whole."""
 _OPENS_ELSEWHERE = frozenset({"Toilet"})
 """Receptacles whose lid is not over their contents: things stand on a toilet's cistern."""
@@ -106,12 +106,18 @@ def closed_things_hide_their_contents(metadata: Metadata) -> Iterator[str]:
 
 
 def wholes_are_gone(metadata: Metadata) -> Iterator[str]:
-    """Where there are slices there is no whole any more."""
+    """Where there are slices the whole is listed as cut up, and is nowhere."""
     objects = _by_id(metadata)
     for object_id in objects:
         part = _PART.fullmatch(object_id)
-        if part and part.group(1) in objects:
-            yield f"{part.group(1)} is still there beside {object_id}"
+        whole = objects.get(part.group(1)) if part else None
+        if whole is None:
+            continue
+        if not (whole["isSliced"] or whole["isBroken"]):
+            yield f"{whole['objectId']} is still whole beside {object_id}"
+        for name in ("visible", "isInteractable", "isPickedUp", "parentReceptacles"):
+            if whole[name]:
+                yield f"{whole['objectId']} is cut up, and its {name} is {whole[name]}"
 
 
 def values_are_plain(metadata: Metadata) -> Iterator[str]:

@@ -23,6 +23,7 @@ from er_gym.envs.percept import Percept, perceive
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
 from er_gym.thor import ObjectTable
+from er_gym.thor.floor import floor_of
 
 FORWARD_STEP = 0.5
 """How far "move forward" goes when nothing is in the way, metres."""
@@ -73,7 +74,7 @@ def reachable(controller: Any, scene: Hashable) -> Reachable:
     """
     if scene not in _reachable:
         event = controller.step(action="GetReachablePositions", renderImage=False)
-        _reachable[scene] = Reachable(event.metadata["actionReturn"])
+        _reachable[scene] = Reachable(floor_of(event))
     return _reachable[scene]
 
 

@@ -77,15 +77,25 @@ def own_objects(world: World) -> list[Entry]:
 def _parts(world: World) -> Iterator[tuple[Parts, bool, float]]:
     """What is said of every object, whether the agent sees it, and how far from it it is."""
     entries = world.entries
-    rows = np.flatnonzero(world.exists).tolist()
+    rows = _listed(world)
     stale = [i for i in rows if i not in entries]
-    if world.untouched and len(stale) == len(rows):
+    if world.untouched and len(stale) == len(world):
         entries.update(_as_recorded(world))
     elif stale:
         entries.update(zip(stale, _entries(world, stale), strict=True))
     seen = visible(world).tolist()
     distance = np.linalg.norm(world.position - world.agent.position, axis=1).tolist()
     return ((entries[i], seen[i], distance[i]) for i in rows)
+
+
+def _listed(world: World) -> list[int]:
+    """The rows of the objects that the metadata list: what is there, and wholes cut up."""
+    listed = world.exists
+    if world.remains:
+        listed = listed.copy()
+        listed[list(world.remains)] = True
+    rows: list[int] = np.flatnonzero(listed).tolist()
+    return rows if world.listed is None else [i for i in rows if i in world.listed]
 
 
 _recorded: OrderedDict[str, dict[int, Parts]] = OrderedDict()

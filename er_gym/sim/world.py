@@ -1,7 +1,8 @@
 """The mutable state of a scene: what is where, in which state, and where the agent is.
 
 Struct of arrays: row ``i`` of every array is object ``i``. Rows are never removed; an object that
-is no more (a whole apple after slicing) has ``exists[i]`` False. Whoever changes something says so
+is no more (a whole apple after slicing) has ``exists[i]`` False, and is in ``remains`` if the
+metadata go on listing it, as AI2-THOR's do of what was cut up. Whoever changes something says so
 (:meth:`World.changed`, :meth:`World.restated`), and what is derived from it is worked out anew when
 next asked for.
 """
@@ -89,7 +90,7 @@ class ThirdPartyCamera:
 
 _Entry = tuple[dict[str, Any], dict[str, Any], dict[str, Any]]
 _NOT_OBJECTS = frozenset(
-    {"scene", "settings", "agent", "cameras", "derived", "arrangement", "looks", "base"}
+    {"scene", "settings", "agent", "cameras", "derived", "arrangement", "looks", "base", "listed"}
 )
 """What a snapshot of the objects has no copy of."""
 
@@ -103,6 +104,9 @@ class World:
     ``properties`` and ``states`` are (N, P) and (N, S) bool, see :meth:`has` and :meth:`state`.
     ``untouched`` is True until something has been changed. ``base`` is how the room was arranged
     before, by ``SetObjectPoses``, if it was; it is not to be changed.
+    ``remains`` are the rows of wholes that were cut up; ``disabled`` those of objects that
+    ``EnableObject`` may bring back, with what lay in them. ``listed`` are the only objects that the
+    metadata list, None for all.
     ``parents[i]`` are the receptacles that object i is in, innermost first as recorded.
     ``entries`` is where :mod:`er_gym.sim.metadata` keeps what it said of objects that have not
     changed since, ``looks`` where the renderer does; ``touched`` are the objects that something has
@@ -134,6 +138,9 @@ class World:
     controlled: list[tuple[int, ...] | None]
     salient_materials: list[tuple[str, ...] | None]
     held: int = -1
+    remains: set[int] = field(default_factory=set)
+    disabled: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    listed: frozenset[int] | None = None
     untouched: bool = True
     base: World | None = None
     cameras: tuple[ThirdPartyCamera, ...] = ()
@@ -219,13 +226,16 @@ class World:
         rows = sorted(i for name in types for i in self._by_type.get(name, ()))
         return (i for i in rows if self.exists[i])
 
-    def find(self, object_id: str) -> int:
+    def find(self, object_id: str | None) -> int:
         """The row of an object.
 
         Raises:
-            ActionFailed: there is none of that id.
+            ActionFailed: there is none of that id, or it has been cut up.
         """
-        i = self.index.get(object_id)
+        i = None if object_id is None else self.index.get(object_id)
+        if i is not None and i in self.remains:
+            how = "sliced" if self.state(i, "isSliced") else "broken"
+            raise ActionFailed(f"{object_id} is {how}: only its parts are there.")
         if i is None or not self.exists[i]:
             raise ActionFailed(f"No object with ID {object_id!r:.200} is in {self.scene.name}.")
         return i
@@ -468,6 +478,29 @@ class World:
         self.parents[i] = ()
         self.exists[i] = False
         self._renested()
+
+    def cut_up(self, i: int, state: str) -> None:
+        """Take a whole away of which there are parts now; the metadata go on listing it.
+
+        Args:
+            state: what it is from now on, ``"isSliced"`` or ``"isBroken"``.
+        """
+        self.remove(i)
+        self.remains.add(i)
+        self.set_state(i, state, True)
+
+    def disable(self, i: int) -> None:
+        """Take object i out of the scene until it is brought back by :meth:`enable`."""
+        self.disabled[i] = tuple(self.contents[i])
+        self.remove(i)
+
+    def enable(self, i: int) -> tuple[int, ...]:
+        """Bring back what was disabled, in no receptacle yet; returns what lay in it."""
+        lay_in_it = self.disabled.pop(i)
+        self.exists[i] = True
+        self._displace([i])
+        self._renested()
+        return lay_in_it
 
     def place_agent(self, agent: Agent) -> None:
         """Put the agent somewhere; what it holds goes along."""

@@ -6,6 +6,10 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from er_gym.thor.objects import is_there
+
+_CUT_UP = frozenset({"isSliced", "isBroken"})
+
 State = tuple[tuple[str, bool | str], ...]
 """Fields of AI2-THOR's object metadata, such as ``isToggled``, with the values they must have."""
 
@@ -70,6 +74,8 @@ def unmet(
 def _holds(condition: Condition, entry: Mapping[str, Any], kind_of: Mapping[str, str]) -> bool:
     if entry["objectType"] != condition.object_type:
         return False
+    if not is_there(entry) and _CUT_UP.isdisjoint(name for name, _ in condition.state):
+        return False  # a whole of which only parts are there, and the condition is not about that
     if condition.object_id and entry["objectId"] != condition.object_id:
         return False
     if condition.held and not entry["isPickedUp"]:

@@ -23,7 +23,7 @@ NEAR = 0.25
 _ROUNDED = 0.01
 """Ids tell places to a hundredth of a metre."""
 _NUMBER = re.compile(r"[+-]?\d+\.\d+")
-_NOT_THERE_YET = re.compile(r"(.*)(\|(?:\w+Sliced_\d+|EggCracked))")
+_NOT_THERE_YET = re.compile(r"(.*)(\|(?:\w+Sliced_\d+|EggCracked(?:_0)?))")
 
 Position = tuple[float, float, float]
 """x, y and z in AI2-THOR's world frame, metres."""

@@ -46,7 +46,8 @@ class ObjectTable:
     """The N objects of a scene in one state, in scene order; where the agent is does not matter.
 
     The engine hands out the same table as long as nothing but the agent has changed. Arrays are
-    read-only by agreement. Objects of types that are not in :data:`OBJECT_TYPES` are left out.
+    read-only by agreement. Objects of types that are not in :data:`OBJECT_TYPES` are left out, and
+    wholes of which there are only parts (:func:`is_there`).
 
     Attributes:
         ids: ``objectId`` of each. row: the row of each id.
@@ -122,6 +123,15 @@ class ObjectTable:
         return np.asarray(np.maximum(np.maximum(x * y, y * z), x * z))
 
 
+def is_there(entry: Mapping[str, Any]) -> bool:
+    """Whether an object of the metadata can be found in the scene.
+
+    AI2-THOR goes on listing a whole that was sliced, or an egg that was broken; its parts are
+    objects of their own.
+    """
+    return not (entry["isSliced"] or (entry["isBroken"] and entry["objectType"] == "Egg"))
+
+
 _Seen = tuple[ObjectTable, NDArray[np.bool_], NDArray[np.bool_]]
 
 
@@ -140,7 +150,7 @@ def objects_of(event: Any) -> _Seen:
 
 
 def _of_entries(metadata: Mapping[str, Any]) -> _Seen:
-    entries = [e for e in metadata["objects"] if e["objectType"] in KIND_OF]
+    entries = [e for e in metadata["objects"] if e["objectType"] in KIND_OF and is_there(e)]
     ids = tuple(e["objectId"] for e in entries)
     row = {object_id: k for k, object_id in enumerate(ids)}
 

@@ -43,18 +43,24 @@ class ObjectTypeCount(BaseModel):
 
 @action("SetObjectPoses", server_action=True)
 def set_object_poses(
-    world: World, *, objectPoses: list[ObjectPose] | None = None, placeStationary: bool = True
+    world: World,
+    *,
+    objectPoses: list[ObjectPose] | None = None,
+    placeStationary: bool = True,
+    skipMoveable: bool = False,
 ) -> None:
     """Put what can be carried or pushed exactly where it is wanted, and take the rest away.
 
     As in AI2-THOR, pickupable and moveable objects that are not named leave the scene, one that is
     named again is copied, nobody asks whether there is room, and what has moved gets the id of its
-    new place. ``placeStationary`` False lets things fall from there.
+    new place. ``placeStationary`` False lets things fall from there; ``skipMoveable`` keeps the
+    moveable objects that are not named. Nothing jitters here, so AI2-THOR's
+    ``enablePhysicsJitter`` and ``forceRigidbodySleep`` make no difference.
     """
     if objectPoses is None:
         raise ActionFailed("objectPoses was not initialized correctly: it lists no pose.")
     # Rooms are mostly arranged right after they are loaded, and the same way again and again.
-    wanted = (world.scene.name, placeStationary, *map(_key, objectPoses))
+    wanted = (world.scene.name, placeStationary, skipMoveable, *map(_key, objectPoses))
     fresh = world.untouched
     if fresh and wanted in _arranged:
         _arranged.move_to_end(wanted)
@@ -69,6 +75,8 @@ def set_object_poses(
         for i in np.flatnonzero(world.exists).tolist()
         if world.has(i, "pickupable") or world.has(i, "moveable")
     }
+    cut_up = {world.names[i] for i in world.remains}
+    objectPoses = [pose for pose in objectPoses if pose.objectName not in cut_up]
     for pose in objectPoses:
         if pose.objectName not in loose:
             raise ActionFailed(
@@ -77,8 +85,10 @@ def set_object_poses(
             )
     if not objectPoses:
         return
-    for i in set(loose.values()) - {loose[pose.objectName] for pose in objectPoses}:
-        world.remove(i)
+    named = {loose[pose.objectName] for pose in objectPoses}
+    for i in sorted(set(loose.values()) - named):
+        if not (skipMoveable and world.has(i, "moveable")):
+            world.remove(i)
     placed: set[int] = set()
     moved = []
     for number, pose in enumerate(objectPoses):

@@ -14,7 +14,8 @@ BEYOND_THE_LIMIT = "LookDownCantExceedMin"
 """AI2-THOR's ``errorCode`` of a tilt too far, up or down."""
 LOOK_LIMITS = (-30.0, 60.0)
 """The camera tilts from 30 degrees up to 60 degrees down."""
-_TOLERANCE = 1e-3
+LOOK_TOLERANCE = 1e-3
+"""By so much may an angle exceed them: AI2-THOR itself tells 60.00002 degrees."""
 
 
 def _turn(world: World, degrees: float) -> None:
@@ -28,10 +29,14 @@ def _tilt(world: World, action: str, degrees: float, downwards: float) -> None:
         )
     horizon = world.agent.horizon + downwards * (degrees or LOOK_STEP)
     low, high = LOOK_LIMITS
-    if not low - _TOLERANCE <= horizon <= high + _TOLERANCE:
+    if not low - LOOK_TOLERANCE <= horizon <= high + LOOK_TOLERANCE:
+        limit = (
+            f"down beyond {high:g} degrees below"
+            if downwards > 0.0
+            else f"up beyond {-low:g} degrees above"
+        )
         raise ActionFailed(
-            f"can't look beyond {-low:g} degrees above and {high:g} degrees below the forward "
-            f"horizon; this would tilt the camera to {horizon:g}.",
+            f"can't look {limit} the forward horizon; this would tilt the camera to {horizon:g}",
             BEYOND_THE_LIMIT,
         )
     world.place_agent(replace(world.agent, horizon=horizon))

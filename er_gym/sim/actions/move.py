@@ -8,15 +8,20 @@ from math import remainder
 
 import numpy as np
 
+from er_gym.sim.actions.look import LOOK_LIMITS, LOOK_TOLERANCE
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import ActionFailed
+from er_gym.sim.space.room import room_box
 from er_gym.sim.space.standing import floor_of
 from er_gym.sim.world import Agent, World
 
 _FARTHEST = 1000.0
 """No scene is larger than this, metres."""
+_WALL = "A wall"
 _HEIGHT_TOLERANCE = 0.05
 """A position whose height is farther off than this is not on the floor, metres; AI2-THOR's."""
+_LEVEL = 0.01
+"""Pitch and roll of a teleport have to be less, degrees; AI2-THOR's."""
 
 
 def _step(world: World, magnitude: float | None, heading: float) -> None:
@@ -24,7 +29,7 @@ def _step(world: World, magnitude: float | None, heading: float) -> None:
     if size <= 0:
         raise ActionFailed(f"moveMagnitude must be > 0, not {size:g}.")
     if size > _FARTHEST:
-        raise ActionFailed(f"A wall is blocking the agent from moving by {size:g} m.")
+        raise ActionFailed(f"{_WALL} is blocking Agent 0 from moving by {size:g} m.")
     angle = np.radians(world.agent.rotation + heading)
     start = world.agent.position
     end = start + size * np.array([np.sin(angle), 0.0, np.cos(angle)])
@@ -32,10 +37,8 @@ def _step(world: World, magnitude: float | None, heading: float) -> None:
         grid = world.settings.grid_size
         end[[0, 2]] = np.round(end[[0, 2]] / grid) * grid
     if not floor_of(world.scene.name).path_is_clear(start[[0, 2]], end[[0, 2]]):
-        dx, _, dz = end - start
-        raise ActionFailed(
-            f"{_obstacle(world, end)} is blocking the agent from moving by ({dx:.4f}, {dz:.4f})."
-        )
+        by = ", ".join(f"{part + 0.0:.4f}" for part in (end - start).round(4).tolist())
+        raise ActionFailed(f"{_obstacle(world, end)} is blocking Agent 0 from moving by ({by}).")
     world.place_agent(replace(world.agent, position=end))
 
 
@@ -59,7 +62,7 @@ def snap_to_grid(world: World) -> None:
 
 
 def _obstacle(world: World, end: np.ndarray) -> str:
-    """The standing object nearest to where the agent wanted to go, or a wall.
+    """The name of the standing object nearest to where the agent wanted to go, or a wall.
 
     A box in which the agent stands already is a counter's that bends round it: not that one.
     """
@@ -75,7 +78,7 @@ def _obstacle(world: World, end: np.ndarray) -> str:
     gap = np.clip(end, world.low[rows], world.high[rows]) - end
     distance = np.linalg.norm(gap[:, [0, 2]], axis=1)
     nearest = int(distance.argmin())
-    return world.object_ids[rows[nearest]] if distance[nearest] < 0.25 else "A wall"
+    return world.names[rows[nearest]] if distance[nearest] < 0.25 else _WALL
 
 
 _HEADINGS = {"MoveAhead": 0.0, "MoveRight": 90.0, "MoveBack": 180.0, "MoveLeft": 270.0}
@@ -131,6 +134,35 @@ def _stay_near(world: World, object_id: str, most: float) -> None:
         raise ActionFailed(f"Agent movement would bring it beyond the max distance of {object_id}.")
 
 
+def _only_yaw(rotation: Vector | None) -> None:
+    if rotation is not None and max(abs(rotation.x), abs(rotation.z)) >= _LEVEL:
+        raise ActionFailed(
+            "No agents currently can change in pitch or roll. So, you must set "
+            f"rotation(x=0, y=yaw, z=0). You gave ({rotation.x:g}, {rotation.y:g}, "
+            f"{rotation.z:g}). Consider forceAction=true."
+        )
+
+
+def _not_too_far_up_or_down(horizon: float) -> None:
+    low, high = LOOK_LIMITS
+    if not low - LOOK_TOLERANCE <= horizon <= high + LOOK_TOLERANCE:
+        raise ActionFailed(
+            f"Each horizon must be in [{low:g}:{high:g}]. You gave {horizon:g}."
+        )
+
+
+def _in_bounds(world: World, there: np.ndarray) -> None:
+    low, high = room_box(world.scene.name)
+    here = world.agent.position
+    inside = (low <= there) & (there <= high)
+    # Two rooms were published with a start outside their walls: there one can stay.
+    if not inside.all() and np.abs(there - here).max() > 1e-3:
+        raise ActionFailed(
+            f"Teleport position ({there[0]:.6f}, {there[1]:.6f}, {there[2]:.6f}) out of scene "
+            "bounds! Ignore this by setting forceAction=true."
+        )
+
+
 @action("Teleport", "TeleportFull")
 def teleport(
     world: World,
@@ -144,10 +176,16 @@ def teleport(
     standing: bool | None = None,
     forceAction: bool = False,
 ) -> None:
-    """Put the agent at a pose; what is not given stays as it is."""
+    """Put the agent at a pose; what is not given stays as it is.
+
+    ``forceAction`` waives all conditions but that numbers are sane.
+    """
     agent = world.agent
     if position is not None:
         x, y, z = position.x, position.y, position.z
+    if not forceAction:
+        _only_yaw(rotation)
+        _not_too_far_up_or_down(agent.horizon if horizon is None else horizon)
     here = agent.position
     there = np.array(
         [here[0] if x is None else x, here[1] if y is None else y, here[2] if z is None else z]
@@ -157,6 +195,9 @@ def teleport(
             f"({there[0]:g}, {there[1]:g}, {there[2]:g}) is farther than {_FARTHEST:g} m away, "
             "beyond every wall."
         )
+    moved = any(part is not None for part in (x, y, z))
+    if moved and not forceAction:
+        _in_bounds(world, there)
     standing_at = world.standing_height
     if abs(there[1] - standing_at) > _HEIGHT_TOLERANCE and not forceAction:
         raise ActionFailed(
@@ -168,8 +209,6 @@ def teleport(
             f"Cannot teleport to ({there[0]:.3f}, {there[2]:.3f}): {_obstacle(world, there)} is "
             "there. GetReachablePositions lists where the agent can stand."
         )
-    if horizon is not None and not forceAction and not -90.0 <= horizon <= 90.0:
-        raise ActionFailed(f"horizon must be within -90 and 90 degrees, not {horizon:g}.")
     if not forceAction:
         there[1] = standing_at
     world.place_agent(

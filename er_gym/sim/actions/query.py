@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from er_gym.sim.actions.checks import FARTHEST, target
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.scene import SCENE_NAMES
+from er_gym.sim.space.pieces import places_around
 from er_gym.sim.space.poses import HORIZONS, interactable_poses
 from er_gym.sim.space.standing import floor_of, standing_places
 from er_gym.sim.world import World
@@ -42,41 +42,23 @@ def get_scenes_in_build(world: World) -> list[str]:
     return [f"{name}_physics" for name in SCENE_NAMES]
 
 
-def _grid(world: World, step: float | None) -> np.ndarray:
+def _grid(world: World, step: float | None, ahead: bool = False) -> np.ndarray:
+    """(P, 2) where the agent gets to by steps; the whole floor if it stands nowhere free.
+
+    Args:
+        ahead: lay the steps along its heading and across, not along the axes.
+    """
     size = world.settings.grid_size if step is None else step
     if size < _SMALLEST_STEP:
         raise ActionFailed(f"A grid needs a step of {_SMALLEST_STEP:g} m or more, not {size:g}.")
     here = world.agent.position[[0, 2]]
-    offset = (here % size).round(5) % size  # of the grid that the agent stands on
-    places = standing_places(world.scene.name, float(size), (float(offset[0]), float(offset[1])))
-    listed = (np.abs(places - here).max(axis=1, initial=0.0) < 1e-4).any()
-    if listed or not floor_of(world.scene.name).contains(here):
-        return places
-    return np.concatenate([here[None], places])  # free floor that no way over the grid leads to
-
-
-def _grid_ahead(world: World, step: float | None) -> np.ndarray:
-    """(P, 2) places that the agent gets to by steps along its heading and across."""
-    size = world.settings.grid_size if step is None else step
-    if size < _SMALLEST_STEP:
-        raise ActionFailed(f"A grid needs a step of {_SMALLEST_STEP:g} m or more, not {size:g}.")
-    start = world.agent.position[[0, 2]]
     if size > FARTHEST:
-        return start[None]
-    yaw = np.radians(world.agent.rotation)
-    forward = size * np.array([np.sin(yaw), np.cos(yaw)])
-    right = size * np.array([np.cos(yaw), -np.sin(yaw)])
-    found = {(0, 0): start}
-    todo = deque(found)
-    while todo:
-        i, k = todo.popleft()
-        here = found[i, k]
-        for node in ((i + 1, k), (i, k + 1), (i - 1, k), (i, k - 1)):
-            there = start + node[0] * right + node[1] * forward
-            if node not in found and floor_of(world.scene.name).path_is_clear(here, there):
-                found[node] = there
-                todo.append(node)
-    return np.array(list(found.values()))
+        return here[None]
+    if floor_of(world.scene.name).contains(here):
+        yaw = world.agent.rotation if ahead else 0.0
+        return places_around(world.scene.name, here, float(size), yaw)
+    offset = (here % size).round(5) % size  # of the grid that the agent stands on
+    return standing_places(world.scene.name, float(size), (float(offset[0]), float(offset[1])))
 
 
 @action("GetObjectInFrame")
@@ -96,13 +78,15 @@ def get_reachable_positions(
     directionsRelativeAgent: bool = False,
     gridSize: float | None = None,
 ) -> list[dict[str, float]]:
-    """Every position of the grid where the agent can stand, metres.
+    """Every position that the agent gets to by steps of the grid, and its own; metres.
+
+    Whoever stands nowhere free, being forced into furniture, is told all of the floor.
 
     Args:
         maxStepCount: fail if the grid has more positions than this over the square of its step.
         directionsRelativeAgent: lay the grid out from the agent, along its heading.
     """
-    places = (_grid_ahead if directionsRelativeAgent else _grid)(world, gridSize)
+    places = _grid(world, gridSize, directionsRelativeAgent)
     step = world.settings.grid_size if gridSize is None else gridSize
     if maxStepCount is not None and len(places) > maxStepCount // step**2:
         raise ActionFailed("Too many steps taken in GetReachablePositions.")

@@ -12,8 +12,10 @@ from er_gym.sim.space.visibility import NEAR_PLANE
 from er_gym.sim.world import World
 
 _FAR_PLANE = 20.0
-_SMALLEST_GRID, _LARGEST_GRID = 0.01, 5.0
-"""AI2-THOR takes any gridSize above 0 and up to the second; finer ones would fill the memory."""
+_LARGEST_GRID = 5.0
+"""AI2-THOR takes any gridSize above 0 and up to this, metres."""
+_SMALLEST_LENGTH = 1e-6
+"""What is shorter counts as nothing, metres."""
 _SMALLEST_TURN = 1.0
 _FARTHEST_SIGHT = 1000.0
 """From here on one sees across any room, metres; a larger visibilityDistance means the same."""
@@ -65,10 +67,15 @@ def initialize(
             "rotateStepDegrees must be a non-zero, non-negative float, "
             f"{_SMALLEST_TURN:g} or more, not {rotateStepDegrees:g}."
         )
-    if gridSize and not 0.0 < gridSize <= _LARGEST_GRID:
+    if gridSize and not _SMALLEST_LENGTH < gridSize <= _LARGEST_GRID:
         raise ActionFailed(f"grid size must be in the range (0,5], not {gridSize:g}.")
-    if gridSize:
-        within("gridSize", gridSize, _SMALLEST_GRID, _LARGEST_GRID)
+    step = 90.0 if rotateStepDegrees is None else rotateStepDegrees
+    if snapToGrid is not False and step % 90.0:
+        raise ActionFailed(
+            f"Invalid values 'rotateStepDegrees': {step:g} and 'snapToGrid': True. 'snapToGrid': "
+            "'True' is not supported when 'rotateStepDegrees' is different from grid rotation "
+            "steps of 0, 90, 180, 270 or 360. Give snapToGrid=False as well."
+        )
     sight = min(visibilityDistance, _FARTHEST_SIGHT)
     chosen = {
         "grid_size": gridSize or None,

@@ -30,15 +30,19 @@ def slice_object(world: World, *, objectId: str, forceAction: bool = False) -> N
     require(world, i, "sliceable", "something that can be sliced")
     if i == world.held:
         raise ActionFailed(f"{objectId} is in the agent's hand; put it down before slicing it.")
-    _cut_up(world, i)
+    _cut_up(world, i, "isSliced")
 
 
-def _cut_up(world: World, i: int) -> None:
-    """Put the parts of object i, side by side along its longer side, where it was."""
+def _cut_up(world: World, i: int, state: str) -> None:
+    """Put the parts of object i, side by side along its longer side, where it was.
+
+    Args:
+        state: what the whole is from now on.
+    """
     kind, cookable = parts_of(world.types[i])
     whole = world.object_ids[i]
     count = _SLICES.get(world.types[i], 1)
-    ids = [f"{whole}|{kind}_{k}" for k in range(count)] if count > 1 else [f"{whole}|{kind}"]
+    ids = [f"{whole}|{kind}_{k}" for k in range(count)]
     size = world.high[i] - world.low[i]
     axis = 0 if size[0] >= size[2] else 2
     share = np.ones(3)
@@ -58,9 +62,7 @@ def _cut_up(world: World, i: int) -> None:
             centre = (world.low[part] + world.high[part]) / 2
             world.obb[part, 0] += world.position[part] - centre
             world.position[part] = centre
-    world.exists[i] = False
-    world.states[i] = False
-    world.relocate(i, ())
+    world.cut_up(i, state)
     consequences.apply(world)
 
 
@@ -76,7 +78,7 @@ def break_object(world: World, *, objectId: str, forceAction: bool = False) -> N
             raise ActionFailed(
                 f"{objectId} is in the agent's hand; put it down before breaking it."
             )
-        _cut_up(world, i)
+        _cut_up(world, i, "isBroken")
         return
     world.set_state(i, "isBroken", True)
 

@@ -437,13 +437,13 @@ def _with_points(world: World, before: Sights, elsewhere: NDArray[np.intp]) -> _
     """
     old = len(before.count)
     points, new = [before.points.copy()], {}
-    for i in elsewhere.tolist():
+    for i in elsewhere[elsewhere < old].tolist():
+        # As many as it had: they are spread over a box of the same size.
         own = world.sample_points(i).astype(np.float32)
-        if i < old:  # as many as it had: they are spread over a box of the same size
-            points[0][before.first[i] : before.first[i] + before.count[i]] = own
-        else:
-            points.append(own)
-            new[i] = len(own)
+        points[0][before.first[i] : before.first[i] + before.count[i]] = own
+    for i in range(old, len(world)):  # what is shut away too: this may be another's `before`
+        points.append(world.sample_points(i).astype(np.float32))
+        new[i] = len(points[-1])
     if len(world) == old:
         return points[0], before.of, before.first, before.count
     number = np.zeros(len(world), dtype=np.intp)

@@ -77,6 +77,17 @@ class Floor:
         on_the_way = self._look_up(self.passable, way[:-1]).all()
         return bool(on_the_way and self.contains(end))
 
+    def paths_are_clear(
+        self, starts: NDArray[np.float64], ends: NDArray[np.float64]
+    ) -> Bitmap:
+        """(K,) :meth:`path_is_clear` of (K, 2) starts and ends, all equally far apart."""
+        if not len(starts):
+            return np.zeros(0, dtype=bool)
+        count = max(2, int(np.ceil(np.linalg.norm(ends[0] - starts[0]) / _SIDE)) + 1)
+        shares = np.linspace(0.0, 1.0, count)[1:-1, None]
+        ways = starts[:, None] + shares * (ends - starts)[:, None]
+        return np.asarray(self._look_up(self.passable, ways).all(axis=1) & self.contains(ends))
+
     def grid(self, step: float, offset: tuple[float, float]) -> NDArray[np.float64]:
         """(G, 2) x, z places on a grid, sorted: what one gets to from the recorded floor.
 

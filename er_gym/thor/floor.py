@@ -1,0 +1,28 @@
+"""All of the floor of a scene, wherever the agent stands on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from er_gym.sim.lazy import LazyMetadata
+from er_gym.sim.space.standing import standing_places
+from er_gym.sim.world import World
+
+
+def floor_of(event: Any) -> Sequence[Mapping[str, float]]:
+    """Where one can stand, in metres, by an event of GetReachablePositions.
+
+    AI2-THOR lists the piece of floor that the agent is on. The embedded engine knows the others as
+    well: an episode may begin on any of them, and what is asked once must hold for all episodes.
+    """
+    metadata = event.metadata
+    if isinstance(metadata, LazyMetadata) and isinstance(metadata.source, World):
+        world = metadata.source
+        y = float(world.agent.position[1])
+        size = float(world.settings.grid_size)
+        x, z = ((world.agent.position[[0, 2]] % size).round(5) % size).tolist()
+        places = standing_places(world.scene.name, size, (x, z))
+        return [{"x": x, "y": y, "z": z} for x, z in places.tolist()]
+    positions: Sequence[Mapping[str, float]] = metadata["actionReturn"]
+    return positions
