@@ -28,7 +28,13 @@ NOT_BY_THE_CLIENT = 2
 """The exit code when somebody else than AI2-THOR's client starts the player."""
 _SECONDS_TO_CONNECT = 300
 """As long as the client waits for a player, a player waits for the client."""
-_QUESTIONS = frozenset({"GetReachablePositions", "GetInteractablePoses", "GetObjectInFrame"})
+_QUESTIONS = frozenset(
+    {
+        *("GetReachablePositions", "GetInteractablePoses", "GetObjectInFrame"),
+        *("GetCoordinateFromRaycast", "GetSpawnCoordinatesAboveReceptacle", "GetShortestPath"),
+        *("GetShortestPathToPoint", "ObjectNavExpertAction"),
+    }
+)
 """Actions that Unity answers, with ``fastActionEmit``, by what has changed, which saves the client
 most of its work. After all others it sends everything: of one message the client makes several
 events, so that a program that writes into one event's objects writes into the next event's too."""

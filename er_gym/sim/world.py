@@ -398,6 +398,12 @@ class World:
         self.temperature[i] = temperature
         self._touch([i])
 
+    def set_mass(self, i: int, mass: float) -> None:
+        """Give object i another mass, kilograms."""
+        self.mass[i] = mass
+        self._touch([i])
+        self.restated()
+
     def set_property(self, i: int, name: str, value: bool) -> None:
         """Give object i a property, or take it away."""
         self.properties[i, _PROPERTY[name]] = value

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import radians, tan
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from er_gym.sim.actions.conversion import kind_of
 from er_gym.sim.actions.registry import Parameter, Run, Way, add_way, parameters_of
 from er_gym.sim.errors import ActionFailed
-from er_gym.sim.render.view import object_at
+from er_gym.sim.render.view import draw, object_at
+from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.world import World
 
 
@@ -28,6 +33,28 @@ def pointed_at(world: World, x: float, y: float) -> str:
     if found is None:
         raise ActionFailed(f"No SimObject found at (x: {x:g}, y: {y:g}), only the room.")
     return found
+
+
+def shown_at(world: World, x: float, y: float) -> NDArray[np.float64]:
+    """(3,) metres: the point in the room that is seen at a point of the agent's picture.
+
+    Args:
+        x, y: 0 to 1, from the left and from the top.
+    """
+    settings, cameras = world.settings, world.cameras
+    world.settings, world.cameras = replace(settings, render_depth=True), ()
+    try:
+        depth = draw(world).depth
+    finally:
+        world.settings, world.cameras = settings, cameras
+    assert depth is not None  # it was asked for
+    column = min(int(x * settings.width), settings.width - 1)
+    row = min(int(y * settings.height), settings.height - 1)
+    half = tan(radians(settings.field_of_view / 2))
+    aspect = settings.width / settings.height
+    ahead = np.array([(2 * x - 1) * half * aspect, (1 - 2 * y) * half, 1.0])
+    heading = unity_rotation(np.array([world.agent.horizon, world.agent.rotation, 0.0]))
+    return np.asarray(world.agent.camera + heading @ (ahead * float(depth[row, column])))
 
 
 def object_action(*names: str, server_action: bool = False) -> Callable[[Run], Run]:

@@ -146,9 +146,7 @@ def _only_yaw(rotation: Vector | None) -> None:
 def _not_too_far_up_or_down(horizon: float) -> None:
     low, high = LOOK_LIMITS
     if not low - LOOK_TOLERANCE <= horizon <= high + LOOK_TOLERANCE:
-        raise ActionFailed(
-            f"Each horizon must be in [{low:g}:{high:g}]. You gave {horizon:g}."
-        )
+        raise ActionFailed(f"Each horizon must be in [{low:g}:{high:g}]. You gave {horizon:g}.")
 
 
 def _in_bounds(world: World, there: np.ndarray) -> None:

@@ -92,7 +92,7 @@ def put_object(
     put_down(world, i, yaw, foot, [receptacle, *around])
 
 
-@action("DropHandObject")
+@action("DropHandObject", "DropHeldObject")
 def drop_hand_object(
     world: World, *, forceAction: bool = False, autoSimulation: bool = True
 ) -> None:

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from er_gym.sim.actions.aim import pointed_at
+from er_gym.sim.actions.aim import pointed_at, shown_at
 from er_gym.sim.actions.checks import FARTHEST, target
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import ActionFailed
+from er_gym.sim.object_metadata import vector
 from er_gym.sim.scene import SCENE_NAMES
 from er_gym.sim.space.pieces import places_around
 from er_gym.sim.space.poses import HORIZONS, interactable_poses
@@ -68,6 +69,18 @@ def get_object_in_frame(world: World, *, x: float, y: float, checkVisible: bool 
     if checkVisible:
         target(world, object_id, force=False)
     return object_id
+
+
+@action("GetCoordinateFromRaycast")
+def get_coordinate_from_raycast(world: World, *, x: float, y: float) -> dict[str, float]:
+    """The point in the room that a point of the agent's picture shows, metres.
+
+    Args:
+        x, y: 0 to 1, from the left and from the top.
+    """
+    if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
+        raise ActionFailed(f"x and y must be in [0:1] not (x={x:g}, y={y:g}).")
+    return vector(shown_at(world, x, y))
 
 
 @action("GetReachablePositions")

@@ -141,6 +141,19 @@ def free_spots(
             yield yaw, np.array([x, top + _SKIN, z])
 
 
+def spawn_points(world: World, receptacle: int, seen_by: Agent | None) -> NDArray[np.float64]:
+    """(S, 3) points on the surface of a receptacle, whatever stands there; metres.
+
+    Args:
+        seen_by: leave out what is not in this agent's picture.
+    """
+    height = surface_height(world, receptacle)
+    spots = np.unique(_spots(_places(world, receptacle), np.zeros(2)).round(6), axis=0)
+    if seen_by is not None:
+        spots = spots[_in_picture(world, seen_by, spots, height)]
+    return np.column_stack([spots[:, 0], np.full(len(spots), height), spots[:, 1]])
+
+
 def _distance(spots: NDArray[np.float64], near: NDArray[np.float64]) -> NDArray[np.float64]:
     """(S,) from (S, 2) spots to a (2,) point."""
     return np.asarray(np.hypot(spots[:, 0] - near[0], spots[:, 1] - near[1]))

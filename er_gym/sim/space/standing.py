@@ -21,8 +21,8 @@ from er_gym.sim.space.footprints import RADIUS, Footprints
 from er_gym.sim.space.walk import RECORDED_STEP, Cells, recorded_cells
 from er_gym.sim.world import Settings, World
 
-_SIDE = 0.025
-"""Of the cells that the floor is cut into, metres."""
+CELL = 0.025
+"""Side of the cells that the floor is cut into, metres."""
 _TOUCH = 0.01
 """How deep in a part the agent's middle can be and count as beside it, metres."""
 
@@ -72,18 +72,29 @@ class Floor:
 
         The start itself is not asked about: whoever was forced into furniture can step out of it.
         """
-        count = max(2, int(np.ceil(np.linalg.norm(end - start) / _SIDE)) + 1)
+        count = max(2, int(np.ceil(np.linalg.norm(end - start) / CELL)) + 1)
         way = start + np.linspace(0.0, 1.0, count)[1:, None] * (end - start)
         on_the_way = self._look_up(self.passable, way[:-1]).all()
         return bool(on_the_way and self.contains(end))
 
-    def paths_are_clear(
-        self, starts: NDArray[np.float64], ends: NDArray[np.float64]
-    ) -> Bitmap:
+    def nearest_free(self, point: NDArray[np.float64], error: float) -> tuple[int, int] | None:
+        """The free cell nearest to a (2,) point; None if the nearest is farther off than an error.
+
+        Half a cell is none.
+        """
+        cells = np.argwhere(self.free)
+        away = np.linalg.norm(self.origin + cells * CELL - point, axis=1)
+        nearest = int(away.argmin())
+        if away[nearest] > max(error, CELL):
+            return None
+        column, row = cells[nearest].tolist()
+        return column, row
+
+    def paths_are_clear(self, starts: NDArray[np.float64], ends: NDArray[np.float64]) -> Bitmap:
         """(K,) :meth:`path_is_clear` of (K, 2) starts and ends, all equally far apart."""
         if not len(starts):
             return np.zeros(0, dtype=bool)
-        count = max(2, int(np.ceil(np.linalg.norm(ends[0] - starts[0]) / _SIDE)) + 1)
+        count = max(2, int(np.ceil(np.linalg.norm(ends[0] - starts[0]) / CELL)) + 1)
         shares = np.linspace(0.0, 1.0, count)[1:-1, None]
         ways = starts[:, None] + shares * (ends - starts)[:, None]
         return np.asarray(self._look_up(self.passable, ways).all(axis=1) & self.contains(ends))
@@ -94,7 +105,7 @@ class Floor:
         Args:
             step: of the grid, metres. offset: x and z of any of its points.
         """
-        high = self.origin + np.array(self.free.shape) * _SIDE
+        high = self.origin + np.array(self.free.shape) * CELL
         axes = [
             np.arange(np.ceil((low - by) / step), np.floor((top - by) / step) + 1) * step + by
             for low, top, by in zip(self.origin, high, offset, strict=True)
@@ -109,10 +120,10 @@ class Floor:
         wide, deep = bitmap.shape
         if points.ndim == 1:  # one place, as at every step: ten times as fast
             (x, z), (west, south) = points.tolist(), self.origin.tolist()
-            column = min(max(round((x - west) / _SIDE), 0), wide - 1)
-            row = min(max(round((z - south) / _SIDE), 0), deep - 1)
+            column = min(max(round((x - west) / CELL), 0), wide - 1)
+            row = min(max(round((z - south) / CELL), 0), deep - 1)
             return np.asarray(bitmap[column, row])
-        cells = np.clip(np.round((points - self.origin) / _SIDE), 0.0, (wide - 1, deep - 1))
+        cells = np.clip(np.round((points - self.origin) / CELL), 0.0, (wide - 1, deep - 1))
         columns, rows = np.moveaxis(cells.astype(int), -1, 0)
         return np.asarray(bitmap[columns, rows])
 
@@ -138,19 +149,19 @@ def floor_of(scene_name: str) -> Floor:
 def floor_by(scene_name: str, rules: Rules) -> Floor:
     """As :func:`floor_of`, with other rules; not cached."""
     scene = load_scene(scene_name)
-    recorded = recorded_cells(scene_name, _SIDE)
+    recorded = recorded_cells(scene_name, CELL)
     grown = recorded.grown(rules.beyond)
-    origin, near = grown.origin - _SIDE, np.pad(grown.on, 1)
+    origin, near = grown.origin - CELL, np.pad(grown.on, 1)
     certain, nodes = np.zeros_like(near), np.zeros_like(near)
     _lay(recorded, certain, origin)
-    at = np.round((scene.reachable - origin) / _SIDE).astype(int)
+    at = np.round((scene.reachable - origin) / CELL).astype(int)
     nodes[tuple(at.T)] = True
     prints = Footprints.of(World.load(scene, Settings()), rules.slack)
     touched, covered, bent = _stamped(prints, origin, near, nodes)
     if bent.any():
         passed = np.zeros_like(near)  # what the body sweeps on the recorded floor
         _lay(recorded.grown(RADIUS), passed, origin)
-        _lay(Cells(origin, _SIDE, bent & ~passed).grown(RADIUS - _TOUCH), touched, origin)
+        _lay(Cells(origin, CELL, bent & ~passed).grown(RADIUS - _TOUCH), touched, origin)
     lines = _between_neighbours(certain, at[0])
     certain = certain & ~covered | nodes
     free = near & ~touched & _inside_walls(scene, rules.wall, origin, near.shape)
@@ -182,8 +193,8 @@ def _stamped(
     on the recorded floor.
     """
     touched, covered, bent = (np.zeros_like(nodes) for _ in range(3))
-    x, z = (west + np.arange(n) * _SIDE for west, n in zip(origin, nodes.shape, strict=True))
-    low, high = ((corner - origin) / _SIDE for corner in prints.spans())
+    x, z = (west + np.arange(n) * CELL for west, n in zip(origin, nodes.shape, strict=True))
+    low, high = ((corner - origin) / CELL for corner in prints.spans())
     first = np.clip(np.ceil(low), 0, nodes.shape).astype(int)
     last = np.clip(np.floor(high) + 1, 0, nodes.shape).astype(int)
     for q in np.flatnonzero((first < last).all(axis=1)).tolist():
@@ -202,7 +213,7 @@ def _stamped(
 
 def _lay(cells: Cells, over: Bitmap, origin: NDArray[np.float64]) -> None:
     """Set the cells that are on in a bitmap whose cell [0, 0] has its middle at (2,) origin."""
-    first = np.round((cells.origin - origin) / _SIDE).astype(int)
+    first = np.round((cells.origin - origin) / CELL).astype(int)
     (x0, z0), (x1, z1) = np.maximum(first, 0), np.minimum(first + cells.on.shape, over.shape)
     (i0, k0), (i1, k1) = (x0, z0) - first, (x1, z1) - first
     over[x0:x1, z0:z1] |= cells.on[i0:i1, k0:k1]
@@ -214,7 +225,7 @@ def _inside_walls(
     floor = scene.types.index("Floor")
     half = scene.aabb_size[floor] / 2
     low, high = (scene.aabb_center[floor] - half)[[0, 2]], (scene.aabb_center[floor] + half)[[0, 2]]
-    x, z = (o + np.arange(n) * _SIDE for o, n in zip(origin, shape, strict=True))
+    x, z = (o + np.arange(n) * CELL for o, n in zip(origin, shape, strict=True))
     inside: Bitmap = np.logical_and.outer(
         (x >= low[0] + wall) & (x <= high[0] - wall),
         (z >= low[1] + wall) & (z <= high[1] - wall),
@@ -224,7 +235,7 @@ def _inside_walls(
 
 def _between_neighbours(certain: Bitmap, node: NDArray[np.int64]) -> Bitmap:
     """The recorded floor on the lines of the recorded grid, one point of which is (2,) ``node``."""
-    per_step = round(RECORDED_STEP / _SIDE)
+    per_step = round(RECORDED_STEP / CELL)
     i, k = (
         np.arange(n) % per_step == at % per_step for n, at in zip(certain.shape, node, strict=True)
     )

@@ -1,0 +1,69 @@
+"""Taking things out of the scene, bringing them back, and naming those that metadata list."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er_gym.sim.actions.registry import action
+from er_gym.sim.errors import ActionFailed
+from er_gym.sim.space.containment import receptacles_of
+from er_gym.sim.world import World
+
+
+@action("RemoveFromScene")
+def remove_from_scene(world: World, *, objectId: str) -> None:
+    """Take an object out of the scene for good; what lies in it stays where it is."""
+    world.remove(world.find(objectId))
+
+
+@action("RemoveFromScene", "RemoveObjsFromScene")
+def remove_several_from_scene(world: World, *, objectIds: list[str]) -> None:
+    """Take objects out of the scene for good, or none of them if one is not there."""
+    if not objectIds:
+        raise ActionFailed("objectIds must not be empty!")
+    for i in [world.find(object_id) for object_id in objectIds]:
+        if world.exists[i]:  # one may be named twice
+            world.remove(i)
+
+
+@action("DisableObject")
+def disable_object(world: World, *, objectId: str) -> None:
+    """Take an object out of the scene until EnableObject brings it back."""
+    world.disable(world.find(objectId))
+
+
+@action("DisableAllObjectsOfType", server_action=True)
+def disable_all_of_type(world: World, *, objectType: str = "", objectId: str = "") -> None:
+    """Do so with all objects of a type; AI2-THOR takes the type as ``objectId`` as well."""
+    for i in list(world.of_type(objectType or objectId)):
+        world.disable(i)
+
+
+@action("EnableObject")
+def enable_object(world: World, *, objectId: str) -> None:
+    """Bring a disabled object back to where it was; what is there already stays as it is."""
+    i = None if objectId is None else world.index.get(objectId)
+    if i is None or i not in world.disabled:
+        world.find(objectId)
+        return
+    lay_in_it = world.enable(i)
+    back = [k for k in lay_in_it if world.exists[k] and k not in world.in_hand]
+    # The large first: what a plate lies in is also what lies in the things on the plate.
+    size = np.prod(world.high - world.low, axis=1)
+    for k in sorted({i, *back}, key=lambda k: -float(size[k])):
+        world.relocate_alone(k, receptacles_of(world, k))
+
+
+@action("SetObjectFilter")
+def set_object_filter(world: World, *, objectIds: list[str]) -> None:
+    """Let the metadata list these objects only, until ResetObjectFilter; unknown ids are ignored.
+
+    Nothing else changes: what is not listed is there, and can be acted on.
+    """
+    world.listed = frozenset(world.index[each] for each in objectIds if each in world.index)
+
+
+@action("ResetObjectFilter")
+def reset_object_filter(world: World) -> None:
+    """Let the metadata list all objects again."""
+    world.listed = None
