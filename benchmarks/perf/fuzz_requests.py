@@ -35,7 +35,8 @@ PARAMETERS = {
 }
 """Every action there is, and all that it takes by any way."""
 NAMES = [
-    *PARAMETERS,
+    # A filter leaves out of the metadata what the checks go by.
+    *(name for name in PARAMETERS if name != "SetObjectFilter"),
     # Without them most of the others would be refused.
     *3 * ("PickupObject", "OpenObject", "TeleportFull", "GetInteractablePoses"),
 ]
@@ -165,6 +166,12 @@ def _coordinate(axis: str) -> Draw:
     return lambda room: _position(room)[axis]
 
 
+def _middle(room: Room) -> dict[str, float]:
+    """Somewhere over the middle of some object."""
+    centre = dict(room.random.choice(room.objects)["axisAlignedBoundingBox"]["center"])
+    return {**centre, "y": centre["y"] + room.random.uniform(0.0, 0.5)}
+
+
 def _rotation(room: Room) -> dict[str, float]:
     return {"x": 0.0, "y": 15.0 * room.random.randrange(-24, 48), "z": 0.0}
 
@@ -218,11 +225,27 @@ SUITED = {
     "EmptyLiquidFromObject": ("isFilledWithLiquid",),
 }
 """What an object must be for an action, and what it must not be yet."""
-AIMED = (*SUITED, "UseUpObject", "GetObjectInFrame")
+AIMED = (
+    *(*SUITED, "UseUpObject", "GetObjectInFrame", "GetCoordinateFromRaycast"),
+    *("DirectionalPush", "PushObject", "PullObject", "TouchThenApplyForce"),
+)
 """What is also done to whatever a point of the picture shows."""
 SANE: dict[str, Draw] = {
     **{f"{action}.objectId": _object(*suits) for action, suits in SUITED.items()},
     "UseUpObject.objectId": _used_up,
+    **{
+        f"{action}.objectId": _object("pickupable")
+        for action in ("PlaceObjectAtPoint", "TeleportObject", "DirectionalPush", "PushObject")
+    },
+    "GetSpawnCoordinatesAboveReceptacle.objectId": _object("receptacle"),
+    "DisableAllObjectsOfType.objectId": _object_type,
+    "PlaceObjectAtPoint.position": _middle,
+    "TeleportObject.position": _middle,
+    "objectType": _object_type,
+    "objectIds": _some(_object(), 3),
+    "pushAngle": _between(-360.0, 360.0),
+    "PushObject.moveMagnitude": _between(0.0, 300.0),
+    "DirectionalPush.moveMagnitude": _between(0.0, 300.0),
     "objectId": _object(),
     "sceneName": lambda room: room.random.choice(room.scenes),
     "forceAction": _among(False, True, True),
@@ -246,7 +269,7 @@ SANE: dict[str, Draw] = {
     "gridSize": _among(0.1, 0.25, 0.25, 0.25, 0.5),
     "fieldOfView": _between(30.0, 120.0),
     "visibilityDistance": _among(1.0, 1.5, 1.5, 3.0, 20.0),
-    "rotateStepDegrees": _among(30.0, 45.0, 90.0, 90.0),
+    "rotateStepDegrees": _among(45.0, 90.0, 90.0, 90.0),
     "agentCount": _among(1),
     "maxDistance": _among(0.5, 1.5, 5.0),
     "maxAgentsDistance": _among(-1.0, 0.5, 3.0),

@@ -71,8 +71,8 @@ def _random(scene: str, seed: int) -> np.random.Generator:
 
 def _floor(controller: Any) -> np.ndarray:
     """(P, 2) x and z where the agent can stand, metres."""
-    event = controller.step(action="GetReachablePositions", gridSize=_FLOOR_STEP, renderImage=False)
-    return floor_of(event.metadata["actionReturn"])
+    scene = controller.last_event.metadata["sceneName"].removesuffix("_physics")
+    return standing_places(scene, _FLOOR_STEP)
 
 
 # -- through the environment -----------------------------------------------------------------------

@@ -55,6 +55,7 @@ class Engine:
                 reply = perform(self.world, request)
         except (ActionFailed, WrongCall) as failure:
             error, code = str(failure), failure.code
+            reply = failure.reply if isinstance(failure, ActionFailed) else None
         settings = self.world.settings
         self.world.settings = with_flags(settings, request)
         report = metadata(self.world, name, error, code, reply, self._kind)

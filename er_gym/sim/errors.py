@@ -17,13 +17,15 @@ class ActionFailed(Exception):
 
     Attributes:
         code: AI2-THOR's ``errorCode``, which is None for all refusals but a few.
+        reply: the event's ``actionReturn``.
     """
 
-    def __init__(self, message: str, code: str | None = None) -> None:
+    def __init__(self, message: str, code: str | None = None, reply: str | None = None) -> None:
         if code in CLIENT_ERRORS:
             raise TypeError(f"{code} is for calls that dispatch refuses, not for actions")
         super().__init__(message)
         self.code = code
+        self.reply = reply
 
 
 class WrongCall(Exception):

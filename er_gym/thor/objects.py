@@ -129,7 +129,9 @@ def is_there(entry: Mapping[str, Any]) -> bool:
     AI2-THOR goes on listing a whole that was sliced, or an egg that was broken; its parts are
     objects of their own.
     """
-    return not (entry["isSliced"] or (entry["isBroken"] and entry["objectType"] == "Egg"))
+    if entry.get("isSliced"):
+        return False
+    return not (entry.get("isBroken") and entry["objectType"] == "Egg")
 
 
 _Seen = tuple[ObjectTable, NDArray[np.bool_], NDArray[np.bool_]]

@@ -24,7 +24,7 @@ def test_turning(kitchen, action, arguments, heading):
 
 
 def test_turning_goes_by_rotate_step_degrees(enter):
-    room = enter("FloorPlan1", rotateStepDegrees=30)
+    room = enter("FloorPlan1", rotateStepDegrees=30, snapToGrid=False)
     assert room.agent["rotation"]["y"] == 270
     room.do("RotateRight")
     assert room.agent["rotation"]["y"] == 300

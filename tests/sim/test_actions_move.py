@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 ISLAND = "CounterTop|-00.08|+01.15|00.00"
+ISLAND_NAME = "CounterTop_bafd4140"
 APPLE = "Apple|-00.47|+01.15|+00.48"
 HEIGHT = 0.900999
 """Of the agent's centre in FloorPlan1, whose floor is at 0."""
@@ -73,7 +74,9 @@ def test_a_diagonal_step_ends_on_the_grid_only_if_it_snaps(enter, snap, end):
 
 def test_furniture_blocks_and_is_named(kitchen):
     kitchen.do("TeleportFull", x=-1.0, z=0.0, rotation=90)
-    assert ISLAND in kitchen.refused("MoveAhead")
+    assert kitchen.refused("MoveAhead") == (
+        f"{kitchen[ISLAND]['name']} is blocking Agent 0 from moving by (0.2500, 0.0000, 0.0000)."
+    )
     assert position(kitchen) == (-1.0, 0.0)
 
 
@@ -129,17 +132,32 @@ def test_a_recorded_pose_is_taken_as_it_is_written(kitchen):
 @pytest.mark.parametrize(
     ("where", "why"),
     [
-        ({"x": 0.0, "z": 0.0}, ISLAND),
-        ({"x": 50.0, "z": 0.0}, "wall"),
+        ({"x": 0.0, "z": 0.0}, ISLAND_NAME),
+        ({"x": 50.0, "z": 0.0}, "out of scene bounds"),
+        ({"x": -1.0, "z": 1.5, "horizon": 60.1}, "Each horizon must be in [-30:60]. You gave 60.1"),
+        ({"x": -1.0, "z": 1.5, "horizon": -31}, "Each horizon must be in [-30:60]. You gave -31"),
+        ({"horizon": 75}, "Each horizon"),
+        ({"rotation": {"x": 0.01, "y": 90.0, "z": 0.0}}, "pitch or roll"),
+        ({"rotation": {"x": 0.0, "y": 90.0, "z": -0.5}}, "pitch or roll"),
         ({"x": 1e30, "z": 0.0}, "wall"),
         ({"x": -1.0, "y": 2.0, "z": 1.5}, "height"),
         ({"x": -1.0, "y": HEIGHT + 0.06, "z": 1.5}, "height"),
         ({"x": -1.0, "y": HEIGHT - 0.06, "z": 1.5}, "height"),
-        ({"x": -0.3, "z": 1.15}, ISLAND),  # its edge is at 1.01, the body reaches 0.2 m
+        ({"x": -0.3, "z": 1.15}, ISLAND_NAME),  # its edge is at 1.01, the body reaches 0.2 m
     ],
 )
 def test_teleport_off_the_floor_is_refused(kitchen, where, why):
+    before = kitchen.agent
     assert why in kitchen.refused("TeleportFull", **where)
+    assert kitchen.agent == before
+
+
+def test_force_waives_bounds_horizon_and_tilt(kitchen):
+    kitchen.do(
+        "TeleportFull", x=50.0, z=0.0, horizon=75.0, rotation={"x": 5, "y": 90}, forceAction=True
+    )
+    assert position(kitchen) == (50.0, 0.0)
+    assert kitchen.agent["cameraHorizon"] == 75.0
 
 
 def test_force_teleports_into_furniture(kitchen):

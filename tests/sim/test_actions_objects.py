@@ -53,7 +53,9 @@ def test_it_must_not_be_shut_away(room, action):
 @every_action_and_put
 def test_it_has_to_be_in_view(room, action):
     room.do("RotateRight", degrees=180)
-    assert "not visible" in room.refused(action, FRIDGE)
+    assert room.refused(action, FRIDGE).startswith(
+        "NullReferenceException: Target object not found within the specified visibility."
+    )
 
 
 @every_action_and_put

@@ -123,7 +123,7 @@ def test_an_egg_that_is_cracked_in_a_hot_pan_is_cooked(kitchen):
     switch(kitchen, KNOB)
     assert not kitchen[EGG]["isCooked"]
     kitchen.do("BreakObject", EGG, forceAction=True)
-    assert kitchen[f"{EGG}|EggCracked"]["isCooked"]
+    assert kitchen[f"{EGG}|EggCracked_0"]["isCooked"]
 
 
 def test_a_toaster_toasts_a_slice(kitchen):

@@ -14,6 +14,7 @@ from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.space.rays import blocked_by
 from er_gym.sim.space.reach import Outlines
 from er_gym.sim.space.shapes import Shape
+from er_gym.sim.space.standing import standing_places
 from er_gym.sim.space.visibility import NEAR_PLANE, in_frustum, visible
 from er_gym.sim.world import Agent, Settings, World
 
@@ -50,7 +51,8 @@ def distance_to_walkable(points, recorded):
 
 @pytest.mark.parametrize("scene", SCENE_NAMES)
 def test_one_can_stand_where_the_record_says(enter, scene):
-    found = {tuple(place) for place in reachable(enter(scene), 0.25).tolist()}
+    enter(scene)  # which has to be possible
+    found = {tuple(place) for place in standing_places(scene, 0.25).tolist()}
     recorded = {tuple(place) for place in load_scene(scene).reachable.tolist()}
     assert recorded < found
     assert len(found) < 2 * len(recorded)
@@ -111,6 +113,41 @@ def test_the_grid_is_that_on_which_the_agent_stands(kitchen):
     assert len(found) > 100
     kitchen.do("Teleport", x=0.5, z=1.5)
     assert [0.5, 1.5] in reachable(kitchen, 0.25).tolist()
+
+
+def test_positions_are_those_that_one_walks_to(enter):
+    """FloorPlan204 is in three pieces: 261, 12 and 6 positions."""
+    room = enter("FloorPlan204")
+    whole = {tuple(place) for place in standing_places("FloorPlan204", 0.25).tolist()}
+    main = {tuple(place) for place in reachable(room, 0.25).tolist()}
+    assert (len(whole), len(main)) == (279, 261)
+    assert main < whole
+    x, z = min(whole - main)
+    room.do("Teleport", x=x, z=z)
+    piece = {tuple(place) for place in reachable(room, 0.25).tolist()}
+    assert (x, z) in piece
+    assert len(piece) in (12, 6)
+    assert not piece & main
+
+
+def test_positions_may_be_laid_out_from_the_heading(enter):
+    room = enter("FloorPlan201", snapToGrid=False)
+    room.do("RotateRight", degrees=30)
+    here, yaw = room.agent["position"], np.radians(room.agent["rotation"]["y"])
+    found = room.do("GetReachablePositions", directionsRelativeAgent=True)
+    away = np.array([(p["x"] - here["x"], p["z"] - here["z"]) for p in found])
+    ahead, right = np.array([np.sin(yaw), np.cos(yaw)]), np.array([np.cos(yaw), -np.sin(yaw)])
+    steps = np.stack([away @ ahead, away @ right], axis=1) / 0.25
+    assert np.allclose(steps, steps.round(), atol=1e-3)
+    assert len(np.unique(steps.round(), axis=0)) == len(found) > 200
+    assert (np.abs(away).max(axis=1) < 1e-4).any()
+    first = room.do("MoveAhead") is None and room.agent["position"]
+    assert [first["x"], first["z"]] in np.round([(p["x"], p["z"]) for p in found], 6).tolist() or (
+        np.abs(away - [first["x"] - here["x"], first["z"] - here["z"]]).max(axis=1).min() < 1e-4
+    )
+    assert "Too many steps" in room.refused(
+        "GetReachablePositions", directionsRelativeAgent=True, maxStepCount=1
+    )
 
 
 def test_who_was_forced_into_furniture_is_told_where_to_stand(kitchen):
@@ -311,7 +348,7 @@ def test_filters_narrow_the_search(kitchen):
 
 
 def test_poses_go_by_rotate_step_degrees(enter):
-    room = enter("FloorPlan1", rotateStepDegrees=45)
+    room = enter("FloorPlan1", rotateStepDegrees=45, snapToGrid=False)
     headings = {pose["rotation"] for pose in room.do("GetInteractablePoses", FRIDGE)}
     assert headings <= {45.0 * k for k in range(8)}
     assert headings & {45.0, 135.0, 225.0, 315.0}

@@ -121,6 +121,12 @@ def set_decay_time_of_type(
     within("TimeUntilRoomTemp", TimeUntilRoomTemp, 0.0, 1e9)
 
 
+@action("MakeObjectBreakable", "MakeObjectUnbreakable")
+def make_object_breakable(world: World, *, objectId: str) -> None:
+    """Accepted: nothing breaks here but by BreakObject, which breaks all that can be broken."""
+    require(world, world.find(objectId), "breakable", "something that can be broken")
+
+
 @action("SetMassProperties")
 def set_mass_properties(
     world: World, *, objectId: str, mass: float, drag: float, angularDrag: float

@@ -30,16 +30,25 @@ def _step(world: World, magnitude: float | None, heading: float) -> None:
         raise ActionFailed(f"moveMagnitude must be > 0, not {size:g}.")
     if size > _FARTHEST:
         raise ActionFailed(f"{_WALL} is blocking Agent 0 from moving by {size:g} m.")
-    angle = np.radians(world.agent.rotation + heading)
-    start = world.agent.position
-    end = start + size * np.array([np.sin(angle), 0.0, np.cos(angle)])
-    if world.settings.snap_to_grid:
-        grid = world.settings.grid_size
-        end[[0, 2]] = np.round(end[[0, 2]] / grid) * grid
+    start, end = world.agent.position, step_end(world, size, heading)
     if not floor_of(world.scene.name).path_is_clear(start[[0, 2]], end[[0, 2]]):
         by = ", ".join(f"{part + 0.0:.4f}" for part in (end - start).round(4).tolist())
         raise ActionFailed(f"{_obstacle(world, end)} is blocking Agent 0 from moving by ({by}).")
     world.place_agent(replace(world.agent, position=end))
+
+
+def step_end(world: World, size: float, heading: float) -> np.ndarray:
+    """(3,) metres: where a step leads if nothing is in the way, snapped to the grid if that is on.
+
+    Args:
+        size: of the step, metres. heading: degrees clockwise from where the agent looks.
+    """
+    angle = np.radians(world.agent.rotation + heading)
+    end = world.agent.position + size * np.array([np.sin(angle), 0.0, np.cos(angle)])
+    if world.settings.snap_to_grid:
+        grid = world.settings.grid_size
+        end[[0, 2]] = np.round(end[[0, 2]] / grid) * grid
+    return np.asarray(end)
 
 
 def snap_to_grid(world: World) -> None:

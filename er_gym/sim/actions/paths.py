@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from er_gym.sim.actions.move import step_end
 from er_gym.sim.actions.registry import Vector, action, quoted
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.paths import shortest_path
@@ -122,7 +123,7 @@ def object_nav_expert_action(
     That is MoveAhead, RotateLeft or RotateRight, along a shortest way over the agent's grid.
     """
     here = world.agent.position[_FLOOR]
-    step = max(world.settings.grid_size, 0.05)
+    step = max(world.settings.grid_size, 0.05)  # a finer grid has more places than one needs
     places = places_around(world.scene.name, here, step)
     if position is not None:
         point = np.array([position.x, position.z])
@@ -142,16 +143,17 @@ def object_nav_expert_action(
 
 def _towards(world: World, here: np.ndarray, corner: np.ndarray, step: float) -> str:
     """The step along the grid that brings one nearest to a corner, or the turn before it."""
-    floor = floor_of(world.scene.name)
-    headings = [world.agent.rotation + k * 90.0 for k in range(4)]
-    angles = np.radians(headings)
-    ends = here + step * np.stack([np.sin(angles), np.cos(angles)], axis=1)
-    gaps = [
-        float(np.linalg.norm(corner - end)) if floor.path_is_clear(here, end) else np.inf
-        for end in ends
-    ]
-    best = int(np.argmin(gaps))
-    return ("MoveAhead", "RotateRight", "RotateRight", "RotateLeft")[best]
+    floor, turn = floor_of(world.scene.name), world.settings.rotate_step
+    turns = range(int(360.0 // turn)) if turn < 360.0 else range(1)
+    gaps = {}
+    for k in sorted(turns, key=lambda k: min(k, len(turns) - k)):  # the least turn first
+        end = step_end(world, step, k * turn)[_FLOOR]
+        if floor.path_is_clear(here, end) and np.abs(end - here).max() > step / 4:
+            gaps[k] = round(float(np.linalg.norm(corner - end)), 6)
+    best = min(gaps, key=lambda k: gaps[k], default=1)
+    if best == 0:
+        return "MoveAhead"
+    return "RotateRight" if best <= len(turns) / 2 else "RotateLeft"
 
 
 def _turn_towards(world: World, way: np.ndarray) -> str | None:

@@ -63,6 +63,16 @@ def _settle(world: World, i: int, stays: bool) -> None:
         fall(world, i, (world.low[i] + world.high[i]) / 2)
 
 
+def _around(world: World, point: np.ndarray) -> tuple[int, ...]:
+    """The furniture whose box a (3,) point is in: that box has air in it, as a cabinet's has."""
+    within = ((world.low <= point) & (point <= world.high)).all(axis=1)
+    return tuple(
+        k
+        for k in np.flatnonzero(within).tolist()
+        if world.has(k, "receptacle") and not world.has(k, "pickupable")
+    )
+
+
 def _moved(
     world: World,
     i: int,
@@ -76,19 +86,19 @@ def _moved(
     Args:
         standing: the position is where the middle of its underside goes.
     """
-    kept = world.position[i].copy(), world.rotation[i].copy()
     rows = [i, *world.inside(i)]
     arrays = (world.position, world.rotation, world.low, world.high)
     were = [array[rows].copy() for array in arrays]
-    clearance = Clearance(world, i)
     if rotation is not None:
-        world.set_pose(i, kept[0], _array(rotation))
-        clearance = Clearance(world, i)
+        world.set_pose(i, world.position[i].copy(), _array(rotation))
     if standing:
         foot = (world.low[i] + world.high[i]) / 2
         foot[1] = world.low[i, 1]
         position = world.position[i] + position - foot
     offset = position - world.position[i]
+    foot = (world.low[i] + world.high[i]) / 2 + offset
+    foot[1] = world.low[i, 1] + offset[1]
+    clearance = Clearance(world, i, _around(world, foot))
     obstacle = None if forced else clearance.obstacle(offset, anew=True)
     if obstacle is None:
         world.move_by(i, offset)

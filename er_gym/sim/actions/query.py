@@ -64,10 +64,16 @@ def _grid(world: World, step: float | None, ahead: bool = False) -> np.ndarray:
 
 @action("GetObjectInFrame")
 def get_object_in_frame(world: World, *, x: float, y: float, checkVisible: bool = False) -> str:
-    """The id of the object at a point of the agent's picture, 0 to 1 from its upper left corner."""
-    object_id = pointed_at(world, x, y)
-    if checkVisible:
-        target(world, object_id, force=False)
+    """The id of the object at a point of the agent's picture, 0 to 1 from its upper left corner.
+
+    When there is none, the words of the refusal are the answer as well, as AI2-THOR has it.
+    """
+    try:
+        object_id = pointed_at(world, x, y)
+        if checkVisible:
+            target(world, object_id, force=False)
+    except ActionFailed as failure:
+        raise ActionFailed(str(failure), reply=str(failure)) from None
     return object_id
 
 

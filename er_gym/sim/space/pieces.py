@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from er_gym.sim.space.standing import Floor, floor_of
 
 _STEPS = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)])
-_OFF_GRID = 5
+_OFF_GRID = 7
 """Decimals, in metres, by which places on a grid are told from places off it."""
 
 
