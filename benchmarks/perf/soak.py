@@ -25,13 +25,13 @@ from benchmarks.perf.invariants import (
     Metadata,
     a_refusal_changed_nothing,
     broken,
-    floor_of,
     stands_on_the_floor,
 )
 from benchmarks.perf.jobs import choose_scenes, do_all
 from benchmarks.pool import Lost
 from benchmarks.progress import bar
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.sim.space.standing import standing_places
 from er_gym.tasks import verbs
 from er_gym.tasks.task import KeyAction, Task
 from er_gym.tasks.types import TASK_TYPES

@@ -418,6 +418,7 @@ class World:
         self._displace(moving)
         self.parents[i] = tuple(parents)
         for child in within:
+            self._touch(self.parents[child])
             own = tuple(p for p in self.parents[child] if p in moving)
             self.parents[child] = (*own, *(p for p in parents if p not in own))
         self._renested()

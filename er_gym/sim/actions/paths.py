@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from er_gym.sim.actions.checks import FARTHEST, within
 from er_gym.sim.actions.move import step_end
 from er_gym.sim.actions.registry import Vector, action, quoted
 from er_gym.sim.errors import ActionFailed
@@ -52,7 +53,13 @@ def _views(world: World, i: int, start: np.ndarray) -> np.ndarray:
 def _start(world: World, position: Vector | None) -> np.ndarray:
     if position is None:
         return np.asarray(world.agent.position[_FLOOR])
-    return np.array([position.x, position.z])
+    return _point(position.x, position.z)
+
+
+def _point(x: float, z: float) -> np.ndarray:
+    within("x", x, -FARTHEST, FARTHEST)
+    within("z", z, -FARTHEST, FARTHEST)
+    return np.array([x, z])
 
 
 def _path(
@@ -106,7 +113,7 @@ def get_shortest_path_to_point(
         x, z = target.x, target.z
     if x is None or z is None:
         raise ActionFailed("Give a target, or its x, y and z, to look for a way to.")
-    end = np.array([[x, z]])
+    end = _point(x, z)[None]
     return _path(world, _start(world, position), end, f"({x:.3f}, {z:.3f})", allowedError)
 
 
@@ -126,7 +133,7 @@ def object_nav_expert_action(
     step = max(world.settings.grid_size, 0.05)  # a finer grid has more places than one needs
     places = places_around(world.scene.name, here, step)
     if position is not None:
-        point = np.array([position.x, position.z])
+        point = _point(position.x, position.z)
         ends = places[[np.linalg.norm(places - point, axis=1).argmin()]]
         facing = None
     else:

@@ -54,6 +54,19 @@ def put_down(world: World, i: int, yaw: float, foot: np.ndarray, parents: list[i
     consequences.apply(world)
 
 
+def shift(world: World, i: int, offset: np.ndarray) -> None:
+    """Shift object i by (3,) metres with what can be carried in it; the rest is in it no more.
+
+    By the record a table may lie in the chairs around it: it stays.
+    """
+    inside = world.inside(i)
+    loose = [k for k in inside if world.has(k, "pickupable")]
+    for k in (i, *loose):
+        world.set_pose(k, world.position[k] + offset, world.rotation[k].copy())
+    for k in sorted(set(inside) - set(loose)):
+        world.relocate_alone(k, tuple(p for p in world.parents[k] if p not in (i, *loose)))
+
+
 @object_action("PutObject")
 def put_object(
     world: World,

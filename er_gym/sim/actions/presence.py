@@ -10,10 +10,17 @@ from er_gym.sim.space.containment import receptacles_of
 from er_gym.sim.world import World
 
 
+def _to_go(world: World, object_id: str) -> int:
+    i = world.find(object_id)
+    if world.types[i] == "Floor":
+        raise ActionFailed(f"{object_id} cannot be taken away: the agent stands on it.")
+    return i
+
+
 @action("RemoveFromScene")
 def remove_from_scene(world: World, *, objectId: str) -> None:
     """Take an object out of the scene for good; what lies in it stays where it is."""
-    world.remove(world.find(objectId))
+    world.remove(_to_go(world, objectId))
 
 
 @action("RemoveFromScene", "RemoveObjsFromScene")
@@ -21,7 +28,7 @@ def remove_several_from_scene(world: World, *, objectIds: list[str]) -> None:
     """Take objects out of the scene for good, or none of them if one is not there."""
     if not objectIds:
         raise ActionFailed("objectIds must not be empty!")
-    for i in [world.find(object_id) for object_id in objectIds]:
+    for i in [_to_go(world, object_id) for object_id in objectIds]:
         if world.exists[i]:  # one may be named twice
             world.remove(i)
 
@@ -29,13 +36,14 @@ def remove_several_from_scene(world: World, *, objectIds: list[str]) -> None:
 @action("DisableObject")
 def disable_object(world: World, *, objectId: str) -> None:
     """Take an object out of the scene until EnableObject brings it back."""
-    world.disable(world.find(objectId))
+    world.disable(_to_go(world, objectId))
 
 
 @action("DisableAllObjectsOfType", server_action=True)
 def disable_all_of_type(world: World, *, objectType: str = "", objectId: str = "") -> None:
     """Do so with all objects of a type; AI2-THOR takes the type as ``objectId`` as well."""
-    for i in list(world.of_type(objectType or objectId)):
+    rows = [_to_go(world, world.object_ids[i]) for i in world.of_type(objectType or objectId)]
+    for i in rows:
         world.disable(i)
 
 

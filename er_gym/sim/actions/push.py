@@ -9,7 +9,7 @@ import numpy as np
 from er_gym.sim import consequences
 from er_gym.sim.actions.aim import object_action, pointed_at
 from er_gym.sim.actions.checks import target, within
-from er_gym.sim.actions.pick_place import fall
+from er_gym.sim.actions.pick_place import fall, shift
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.clearance import Clearance
@@ -39,7 +39,7 @@ def _slide(world: World, i: int, heading: float, newtons: float) -> None:
     if far <= 0.0:
         return
     under = next(iter(world.parents[i]), None)
-    world.move_by(i, far * ahead)
+    shift(world, i, far * ahead)
     centre = (world.low[i] + world.high[i]) / 2
     if under is None or world.types[under] == "Floor" or _is_over(world, under, centre):
         world.relocate(i, receptacles_of(world, i))

@@ -6,7 +6,7 @@ import numpy as np
 
 from er_gym.sim import consequences
 from er_gym.sim.actions.checks import FARTHEST, within
-from er_gym.sim.actions.pick_place import fall
+from er_gym.sim.actions.pick_place import fall, shift
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.clearance import Clearance
@@ -101,7 +101,7 @@ def _moved(
     clearance = Clearance(world, i, _around(world, foot))
     obstacle = None if forced else clearance.obstacle(offset, anew=True)
     if obstacle is None:
-        world.move_by(i, offset)
+        shift(world, i, offset)
         return None
     for array, was in zip(arrays, were, strict=True):
         array[rows] = was
