@@ -77,7 +77,7 @@ def test_state_follows_what_happens(state_env: EmbodiedEnv) -> None:
     obs, *_ = state_env.step("pickup Egg")
     assert entry(obs, "held:Egg") == 1.0
     assert entry(obs, "holding") == 1.0
-    obs, *_ = state_env.step("navigate to Window")
+    obs, *_ = state_env.step("navigate to Stool")
     assert entry(obs, "visible:Fridge") == 0.0
     assert entry(obs, "open:Fridge") == 1.0  # remembered
     assert entry(obs, "at:Fridge") == 0.0

@@ -166,7 +166,6 @@ def test_a_mass_is_told(kitchen):
     [
         ({"gridSize": 5.1}, "(0,5]"),
         ({"gridSize": -1}, "(0,5]"),
-        ({"rotateStepDegrees": 45}, "snap"),
     ],
 )
 def test_initialize_refuses_in_words(kitchen, settings, why):

@@ -69,13 +69,6 @@ def initialize(
         )
     if gridSize and not _SMALLEST_LENGTH < gridSize <= _LARGEST_GRID:
         raise ActionFailed(f"grid size must be in the range (0,5], not {gridSize:g}.")
-    step = 90.0 if rotateStepDegrees is None else rotateStepDegrees
-    if snapToGrid is not False and step % 90.0:
-        raise ActionFailed(
-            f"Invalid values 'rotateStepDegrees': {step:g} and 'snapToGrid': True. 'snapToGrid': "
-            "'True' is not supported when 'rotateStepDegrees' is different from grid rotation "
-            "steps of 0, 90, 180, 270 or 360. Give snapToGrid=False as well."
-        )
     sight = min(visibilityDistance, _FARTHEST_SIGHT)
     chosen = {
         "grid_size": gridSize or None,
