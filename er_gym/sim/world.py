@@ -32,6 +32,8 @@ CAMERA_STANDING, CAMERA_CROUCHING = 0.675, 0.0
 """Height of the camera above the agent's centre, metres."""
 HAND_OFFSET = np.array([0.0, -0.16, 0.38])
 """Where the hand is in the camera's frame (right, up, forward), metres."""
+_STEP = 2.0**-40
+"""Metres, a picometre: recorded coordinates, and whole steps beside them, add without rounding."""
 _PROPERTY = {name: column for column, name in enumerate(PROPERTIES)}
 _STATE = {name: column for column, name in enumerate(STATES)}
 
@@ -40,6 +42,15 @@ def settled(rotation: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
     """(3,) degrees: a rotation with its tilts rounded to quarter turns, and another heading."""
     x, _, z = np.round(rotation / 90.0) * 90.0 % 360.0
     return np.array([x, yaw % 360.0, z])
+
+
+def whole_steps(offset: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,) metres: an offset after which the opposite one leads back to the same place exactly.
+
+    The sums of others do not: what is carried about or slid out and in would end up elsewhere by
+    its last bits, which a picture may show.
+    """
+    return np.asarray(np.round(offset / _STEP) * _STEP)
 
 
 @dataclass(frozen=True)
@@ -345,6 +356,7 @@ class World:
         return points
 
     def _shift(self, rows: list[int], offset: NDArray[np.float64]) -> None:
+        offset = whole_steps(offset)
         self.position[rows] += offset
         self.low[rows] += offset
         self.high[rows] += offset

@@ -8,7 +8,7 @@ from er_gym.sim import consequences
 from er_gym.sim.actions.aim import object_action
 from er_gym.sim.actions.checks import require, target
 from er_gym.sim.errors import ActionFailed
-from er_gym.sim.world import World
+from er_gym.sim.world import World, whole_steps
 
 _ONLY_SHUT = frozenset({"Microwave"})
 """Types that run only when shut, and open only when off."""
@@ -22,7 +22,8 @@ def _slide(world: World, i: int, openness: float) -> None:
     depth = np.ptp(shape.upright[:, :, 2])
     heading = np.radians(shape.yaw)
     ahead = np.array([np.sin(heading), 0.0, np.cos(heading)])
-    world.move_by(i, ahead * depth * (openness - world.openness[i]))
+    before, after = (whole_steps(ahead * depth * share) for share in (world.openness[i], openness))
+    world.move_by(i, after - before)
 
 
 @object_action("OpenObject")
