@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from contextlib import suppress
 from itertools import islice
 
 import numpy as np
@@ -62,9 +63,11 @@ def set_object_poses(
     # Rooms are mostly arranged right after they are loaded, and the same way again and again.
     wanted = (world.scene.name, placeStationary, skipMoveable, *map(_key, objectPoses))
     fresh = world.untouched
-    if fresh and wanted in _arranged:
-        _arranged.move_to_end(wanted)
-        world.become(_arranged[wanted])
+    known = _arranged.get(wanted) if fresh else None
+    if known is not None:
+        with suppress(KeyError):  # another thread has just dropped it
+            _arranged.move_to_end(wanted)
+        world.become(known)
         return
     for pose in objectPoses:
         for axis in "xyz":

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import count as counter
@@ -234,10 +235,13 @@ class Sights:
 def _kept(
     memory: OrderedDict[Any, Found], question: Any, limit: int, answer: Callable[[], Found]
 ) -> Found:
-    """What is remembered, or worked out and remembered now; the longest unused is forgotten."""
-    if question in memory:
-        memory.move_to_end(question)
+    """What is remembered, or worked out and remembered now; the longest unused is forgotten.
+
+    Several threads may ask: what one finds there another may forget in the meantime.
+    """
+    with suppress(KeyError):
         known: Found = memory[question]
+        memory.move_to_end(question)
         return known
     memory[question] = found = answer()
     if len(memory) > limit:
