@@ -3,9 +3,11 @@
 On the CPU by its software rasteriser; where there is a GPU with EGL and :func:`use_device` has
 asked for it, by OpenGL, from the same scene graph.
 
-One engine and one buffer a process. Instances come with the colours, as the pictures' alpha, which
-is why there are at most :data:`MOST_INSTANCES` of them. Panda's frame is right-handed with z up: x,
-y and z here are its x, z and y.
+One engine and one buffer a process; whoever changes a scene graph or draws one holds
+:data:`DRAWING`. A picture depends on the scene graph alone: of surfaces at the same depth the one
+drawn first is seen, so everything is drawn in an order that the graph itself says. Instances come
+with the colours, as the pictures' alpha, which is why there are at most :data:`MOST_INSTANCES` of
+them. Panda's frame is right-handed with z up: x, y and z here are its x, z and y.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from math import atan, degrees, radians, tan
-from threading import Lock
+from threading import RLock
 from typing import Any
 
 import numpy as np
@@ -40,7 +42,12 @@ window-type offscreen
 notify-level error
 textures-power-2 down
 garbage-collect-states 0
+uniquify-transforms 0
+transform-cache 0
 """
+"""Of transforms that are nearly the same Panda would make one, whichever was there first."""
+DRAWING = RLock()
+"""Held while a scene graph is made, changed or drawn: Panda's objects are shared by all threads."""
 _DEPTH_STEPS = float(1 << 20)
 _VERTEX = np.dtype([("at", "<f4", 3), ("colour", "u1", 4), ("uv", "<f4", 2)])
 
@@ -97,6 +104,9 @@ def core() -> Any:
     from panda3d import core as module
 
     module.loadPrcFileData("er-gym", _CONFIGURATION.format(module=DEVICES[_device()][0]))
+    # Panda would sort what is opaque by the addresses of its states.
+    bins = module.CullBinManager.getGlobalPtr()
+    bins.setBinType(bins.findBin("opaque"), module.CullBinManager.BTFixed)
     return module
 
 
@@ -148,13 +158,13 @@ class Rasteriser:
         region = self._buffer.makeDisplayRegion()
         region.setCamera(self._camera)
         self._show_depth = p3d.ConfigVariableBool("td-show-zbuffer", False)
-        self._lock = Lock()  # two threads that draw at once would mix their pictures
 
     def draw(self, root: Any, camera: Camera, depth: bool = False) -> Frames:
         """What a camera sees of a scene graph; the arrays are the caller's own."""
-        with self._lock:
+        with DRAWING:
             width, height = camera.width, camera.height
             if (width, height) != self._size:
+                self._size = (0, 0)  # if it is interrupted now, nobody knows
                 self._buffer.setSize(width, height)
                 self._size = (width, height)
             half = tan(radians(camera.fov) / 2)
@@ -216,9 +226,11 @@ def state(material: str) -> Any:
             p3d.ColorAttrib.makeFlat(p3d.LColor(0.75, 0.9, 0.95, 0.22)),
         )
     colours = p3d.ColorAttrib.makeVertex()
+    # One material after the other, and within each in the order of the graph.
+    order = p3d.CullBinAttrib.make("opaque", list(MATERIALS).index(material))
     if surface.texture is None:
-        return p3d.RenderState.make(colours)
-    return p3d.RenderState.make(p3d.TextureAttrib.make(_texture(surface.texture)), colours)
+        return p3d.RenderState.make(colours, order)
+    return p3d.RenderState.make(p3d.TextureAttrib.make(_texture(surface.texture)), colours, order)
 
 
 def geometry(

@@ -2,6 +2,9 @@
 
 Nothing is drawn anew that looks as it did: a thing's triangles are kept by its look, its node by
 its look, heading and number, and of a world's objects only those are looked at that have changed.
+
+Yet a picture depends on the world alone, whatever was drawn before. Of surfaces at the same depth
+the one drawn first is seen: the room's, then the objects', in an order that they themselves say.
 """
 
 from __future__ import annotations
@@ -15,7 +18,14 @@ from er_gym.sim.render.carcasses import carcasses
 from er_gym.sim.render.fixtures import fixtures
 from er_gym.sim.render.look import Look
 from er_gym.sim.render.mesh import Patch
-from er_gym.sim.render.panda import MOST_INSTANCES, Frames, core, geometry, rasteriser
+from er_gym.sim.render.panda import (
+    DRAWING,
+    MOST_INSTANCES,
+    Frames,
+    core,
+    geometry,
+    rasteriser,
+)
 from er_gym.sim.render.portrait import look
 from er_gym.sim.render.room import room_shell
 from er_gym.sim.render.shade import shaded
@@ -26,6 +36,8 @@ from er_gym.sim.world import World
 _SCENES = 64
 """Rooms whose graphs are kept."""
 _NODES = 2048
+_BEFORE = 8
+"""What is no object is drawn before what is: the order of that begins here, below zero."""
 _HEADING = 1.0
 """Things are lit as if they stood at a multiple of so many degrees."""
 
@@ -36,6 +48,7 @@ class _Placed:
 
     look: Look
     shape: Shape
+    order: int
     path: Any
 
 
@@ -43,61 +56,87 @@ class Stage:
     """The graph of one scene; use :func:`stage`."""
 
     def __init__(self, scene_name: str) -> None:
-        self._root = core().NodePath(scene_name)
-        self._placed: dict[int, _Placed] = {}
-        shell = room_shell(scene_name)
-        self._root.attachNewNode(_drawn(shell.rest, 0, "room"))
-        self._root.attachNewNode(_drawn(fixtures(scene_name), 0, "fixtures"))
-        self._root.attachNewNode(_drawn(carcasses(scene_name), 0, "carcasses"))
-        self._floor, self._floor_number = shell.floor, -1
-        self._state = object()
+        self._name = scene_name
+        self._build()
+        self._state: object | None = object()  # whose world it shows; None while it changes
 
     def draw(self, world: World, camera: Camera, depth: bool = False) -> Frames:
-        """What a camera sees of a world of this scene; object i is instance i + 1."""
-        self._follow(world)
-        return rasteriser().draw(self._root, camera, depth)
+        """What a camera sees of a world of this scene; object i is instance i + 1.
+
+        Several threads may draw at once; they take turns.
+        """
+        with DRAWING:
+            self._follow(world)
+            return rasteriser().draw(self._root, camera, depth)
+
+    def _build(self) -> None:
+        """The room without its objects."""
+        self._root = core().NodePath(self._name)
+        self._placed: dict[int, _Placed] = {}
+        shell = room_shell(self._name)
+        around = {"room": shell.rest, "fixtures": fixtures(self._name)}
+        for k, (name, patches) in enumerate({**around, "carcasses": carcasses(self._name)}.items()):
+            self._root.attachNewNode(_drawn(patches, 0, name), k - _BEFORE)
+        self._floor, self._floor_number = shell.floor, -1
 
     def _follow(self, world: World) -> None:
         """Change what has changed in the world."""
-        if world.derived.get("staged") is self._state:  # nothing has, but where the hand is
-            for i in world.in_hand:
-                self._place(world, i)
+        before, self._state = self._state, None
+        if before is None:  # an exception left it half changed
+            self._build()
+        elif world.derived.get("staged") is before:
+            for i in world.in_hand:  # nothing has changed, but where the hand is
+                if i in self._placed:
+                    self._place(world, i, self._placed[i].order)
+            self._state = before
             return
-        self._state = world.derived["staged"] = object()
-        shown = (~world.hidden).tolist()
+        shown, order = (~world.hidden).tolist(), _order(world)
         for i in range(max(len(world), max(self._placed, default=-1) + 1)):
             if i >= len(world) or not shown[i]:
                 self._remove(i)
             elif world.types[i] in UNSEEN:
                 self._lay_floor(i)
             else:
-                self._place(world, i)
+                self._place(world, i, order[i])
+        self._state = world.derived["staged"] = object()
 
     def _lay_floor(self, i: int) -> None:
         if self._floor_number != i + 1:
+            self._root.attachNewNode(_drawn(self._floor, i + 1, "floor"), -1)
             self._floor_number = i + 1
-            self._root.attachNewNode(_drawn(self._floor, i + 1, "floor"))
 
     def _remove(self, i: int) -> None:
         placed = self._placed.pop(i, None)
         if placed is not None:
             placed.path.removeNode()
 
-    def _place(self, world: World, i: int) -> None:
+    def _place(self, world: World, i: int, order: int) -> None:
         seen, shape, before = look(world, i), world.shape(i), self._placed.get(i)
-        if before is not None and before.shape is shape and before.look == seen:
+        same = before is not None and before.look == seen and before.order == order
+        if before is not None and same and before.shape is shape:
             return
         heading = _heading(shape)
-        if before is not None and before.look == seen and _heading(before.shape) == heading:
+        if before is not None and same and _heading(before.shape) == heading:
             path = before.path
         else:
             self._remove(i)
             number = i + 1 if i < MOST_INSTANCES else 0  # copies without end have no instance
-            path = self._root.attachNewNode(_node(seen, heading, number))
+            # A copy, with the same triangles: where it stands is a property of the node.
+            path = self._root.attachNewNode(_node(seen, heading, number).makeCopy(), order)
         x, y, z = shape.middle.tolist()
-        path.setPos(x, z, y + float(shape.upright[:, 0, 1].min()))
-        path.setH(-shape.yaw)
-        self._placed[i] = _Placed(seen, shape, path)
+        path.setPosHpr(x, z, y + float(shape.upright[:, 0, 1].min()), -shape.yaw, 0.0, 0.0)
+        self._placed[i] = _Placed(seen, shape, order, path)
+
+
+def _order(world: World) -> list[int]:
+    """Which objects are drawn first: the recorded ones by row, then the others by name.
+
+    In which rows slices and copies are depends on what was made first.
+    """
+    recorded = len(world.scene)
+    others = sorted(range(recorded, len(world)), key=lambda i: world.names[i])
+    rank = {i: recorded + k for k, i in enumerate(others)}
+    return [*range(recorded), *(rank[i] for i in range(recorded, len(world)))]
 
 
 def _heading(shape: Shape) -> float:
@@ -120,6 +159,11 @@ def _node(seen: Look, heading: float, number: int) -> Any:
 
 
 @lru_cache(maxsize=_SCENES)
+def _stage(scene_name: str) -> Stage:
+    return Stage(scene_name)
+
+
 def stage(scene_name: str) -> Stage:
     """The graph of a scene; those of the scenes last drawn are kept."""
-    return Stage(scene_name)
+    with DRAWING:  # or two threads would make two
+        return _stage(scene_name)
