@@ -1,1 +1,1 @@
-"""Programs that look for what er-gym does wrong; in the repository only, not in the wheel."""
+"""Checks of what er-gym promises, run by hand; not in the wheel."""
