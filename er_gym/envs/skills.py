@@ -100,8 +100,8 @@ def _outcome(event: Any) -> Outcome:
     return Outcome(perceive(event), metadata["lastActionSuccess"], metadata["errorMessage"])
 
 
-def place(controller: Any, pose: AgentPose) -> Outcome:
-    """Put the agent at a pose."""
+def place(controller: Any, pose: AgentPose, *, force: bool = False) -> Outcome:
+    """Put the agent at a pose; ``force``: whether there is room for it or not."""
     return _outcome(
         controller.step(
             action="TeleportFull",
@@ -109,6 +109,7 @@ def place(controller: Any, pose: AgentPose) -> Outcome:
             rotation={"x": 0.0, "y": pose.rotation, "z": 0.0},
             horizon=pose.horizon,
             standing=pose.standing,
+            forceAction=force,
         )
     )
 

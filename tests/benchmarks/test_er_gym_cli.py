@@ -83,7 +83,7 @@ def one_line(err: str) -> str:
 
 
 @pytest.mark.parametrize(("change", "words"), BAD_TASKS.values(), ids=BAD_TASKS)
-def test_a_bad_task_is_set_aside_and_named(er_gym, tasks_file, paper_tasks, tmp_path, change, words):
+def test_a_bad_task_is_set_aside(er_gym, tasks_file, paper_tasks, tmp_path, change, words):
     change(paper_tasks)
     tasks_file.write_text(json.dumps(paper_tasks))
     out = tmp_path / "out"

@@ -176,3 +176,20 @@ def test_initialize_takes_what_is_legal(enter):
     room = enter("FloorPlan1", gridSize=0.001, fieldOfView=179.5, visibilityDistance=-1)
     assert room.event.metadata["fov"] == 179.5
     room.do("MoveAhead", moveMagnitude=0.01)
+
+
+def test_the_hand_touches_what_the_picture_shows_and_pushes_it(kitchen):
+    pose = kitchen.do("GetInteractablePoses", objectId=APPLE, horizons=[30.0], maxPoses=1)[0]
+    kitchen.do("TeleportFull", **pose)
+    points = [(k % 20 / 20, k // 20 / 20) for k in range(400)]
+    shown = (p for p in points if kitchen.step("GetObjectInFrame", x=p[0], y=p[1]).metadata)
+    x, y = next(p for p in shown if kitchen.event.metadata["actionReturn"] == APPLE)
+    before = kitchen[APPLE]["position"]
+    ahead = {"x": 0.0, "y": 0.0, "z": 1.0}
+    push = {"x": x, "y": y, "direction": ahead, "moveMagnitude": 10.0}
+    assert not kitchen.do("TouchThenApplyForce", **push, handDistance=0.1)["didHandTouchSomething"]
+    assert kitchen[APPLE]["position"] == before
+    touched = kitchen.do("TouchThenApplyForce", **push, handDistance=2.0)
+    assert touched["objectId"] == APPLE
+    assert 0.0 < touched["armsLength"] < 2.0
+    assert kitchen[APPLE]["position"] != before

@@ -166,7 +166,8 @@ def _in_bounds(world: World, there: np.ndarray) -> None:
     if not inside.all() and np.abs(there - here).max() > 1e-3:
         raise ActionFailed(
             f"Teleport position ({there[0]:.6f}, {there[1]:.6f}, {there[2]:.6f}) out of scene "
-            "bounds! Ignore this by setting forceAction=true."
+            "bounds! Ignore this by setting forceAction=true. GetReachablePositions lists where "
+            "the agent can stand."
         )
 
 
