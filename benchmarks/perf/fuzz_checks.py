@@ -186,9 +186,6 @@ class Witness:
                 yield f"{name}, which changes nothing, changed {self._settings}"
         # Whoever forces a teleport may stand in a wall.
         forced = name in _TELEPORTS and "forceAction" in request
-        # Initialize snaps whoever was forced into a wall to the grid, where it stands.
-        floor = _floor_points(scene_of(before))
-        forced = forced or (name == "Initialize" and any(stands_on_the_floor(before, floor)))
         if before["agent"]["position"] != after["agent"]["position"] and not forced:
             yield from stands_on_the_floor(after, _floor_points(scene_of(after)))
 

@@ -107,3 +107,13 @@ def test_initialize_takes_the_lower_corner_that_can_be_walked_to(enter):
     room.do("Teleport", x=-0.91, z=0.24)  # the island begins at -0.62
     room.do("Initialize", gridSize=0.5)
     assert [room.agent["position"][axis] for axis in "xz"] == [-1.0, 0.0]
+
+
+def test_initialize_puts_nobody_into_furniture(enter):
+    """Whoever was forced onto the island gets to the free place of the grid nearest to it."""
+    room = enter("FloorPlan1")
+    room.do("Teleport", x=0.1, z=0.1, forceAction=True)
+    room.do("Initialize", gridSize=0.25)
+    here = [room.agent["position"][axis] for axis in "xz"]
+    assert floor_of("FloorPlan1").contains(np.array(here))
+    assert np.hypot(*np.array(here) - 0.1) < 1.5

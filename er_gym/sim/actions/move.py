@@ -12,7 +12,7 @@ from er_gym.sim.actions.look import LOOK_LIMITS, LOOK_TOLERANCE
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.room import room_box
-from er_gym.sim.space.standing import floor_of
+from er_gym.sim.space.standing import floor_of, standing_places
 from er_gym.sim.world import Agent, World
 
 _FARTHEST = 1000.0
@@ -51,11 +51,15 @@ def step_end(world: World, size: float, heading: float) -> np.ndarray:
     return np.asarray(end)
 
 
+_FINEST = 0.05
+"""Grids with a smaller step than this are not searched for a free place, metres."""
+
+
 def snap_to_grid(world: World) -> None:
     """Bring the agent to a corner of the grid square that it is in, as AI2-THOR's Initialize does.
 
-    The corner of lowest x and z that it can walk to is taken. Where it can walk to none, it ends up
-    at the nearest, so that what follows is on the grid.
+    The corner of lowest x and z that it can walk to is taken. Where it can walk to none, it goes to
+    the nearest free place of the grid, if there is one, so that what follows is on the grid.
     """
     grid = world.settings.grid_size
     here = world.agent.position
@@ -64,9 +68,16 @@ def snap_to_grid(world: World) -> None:
     if any(np.abs(corner - here[[0, 2]]).max() < 1e-5 for corner in corners):
         return
     floor = floor_of(world.scene.name)
-    nearest = min(corners, key=lambda corner: float(np.linalg.norm(corner - here[[0, 2]])))
     way_to = (corner for corner in corners if floor.path_is_clear(here[[0, 2]], corner))
-    x, z = next(way_to, nearest)
+    found = next(way_to, None)
+    if found is None:
+        if grid < _FINEST:
+            return
+        places = standing_places(world.scene.name, grid)
+        if not len(places):
+            return
+        found = places[np.linalg.norm(places - here[[0, 2]], axis=1).argmin()]
+    x, z = found
     world.place_agent(replace(world.agent, position=np.array([x, here[1], z])))
 
 

@@ -69,10 +69,14 @@ def points_to_see(world: World, i: int) -> Floats:
         return points_on_top(np.array([world.low[i], world.high[i]]))
     if kind == "CounterTop" and i < len(world.scene):
         return np.concatenate([_slab(box) for box in carcass(world.scene.name, i).slab])
-    if kind in _FROM_OUTSIDE:
+    if kind == "Drawer" or kind in _FROM_OUTSIDE:
         middle, size, yaw = upright_box(world, i)
         built_in = i in hosts(world.scene.name)
-        points: Floats = _FROM_OUTSIDE[kind](np.array([-size / 2, size / 2]), built_in)
+        box = np.array([-size / 2, size / 2])
+        if kind == "Drawer":
+            points: Floats = _drawer(box, world.state(i, "isOpen"))
+        else:
+            points = _FROM_OUTSIDE[kind](box, built_in)
         return np.asarray(points @ unity_rotation((0.0, yaw, 0.0)).T + middle)
     inset = INSET
     if kind in _ROUND or (kind not in _SQUARE and world.has(i, "pickupable")):
@@ -85,17 +89,23 @@ def points_to_see(world: World, i: int) -> Floats:
     return np.asarray(points @ unity_rotation(world.rotation[i]).T + world.position[i])
 
 
-def _front(box: Floats, built_in: bool) -> Floats:
+def _front(box: Floats) -> Floats:
     return points_on_face(box, 2, 1, _OUT, _CLOSE)
+
+
+def _drawer(box: Floats, is_open: bool) -> Floats:
+    """The front; of one that is open also the upper side, which whoever opened it looks down on."""
+    front, top = _front(box), points_on_face(box, 1, 1, _OUT)
+    return np.concatenate([front, top if is_open else np.resize(front, top.shape)])
 
 
 def _cabinet(box: Floats, built_in: bool) -> Floats:
     """The front, and all but the back of one that is not built in."""
     if built_in:
-        return _front(box, built_in)
+        return _front(box)
     # Every other one: the front is what shows, and each point costs time.
     sides = [points_on_face(box, axis, sign, _OUT)[::2] for axis in (0, 1) for sign in (-1, 1)]
-    return np.concatenate([_front(box, built_in), *sides])
+    return np.concatenate([_front(box), *sides])
 
 
 def _shelf(box: Floats, built_in: bool) -> Floats:
@@ -105,7 +115,7 @@ def _shelf(box: Floats, built_in: bool) -> Floats:
     return _slab(board, 0.005, 0.0)
 
 
-_FROM_OUTSIDE = {"Drawer": _front, "Cabinet": _cabinet, "Shelf": _shelf}
+_FROM_OUTSIDE = {"Cabinet": _cabinet, "Shelf": _shelf}
 
 
 def _slab(box: Floats, above: float = _OUT, out: float = _OUT) -> Floats:
