@@ -20,8 +20,9 @@ ALLOWED = {
     "er_gym": _ENVS,
     "agents": _AGENTS,
     "benchmarks": _BENCHMARKS,
-    # Speed and fidelity scripts look at the engine itself.
+    # Scripts that measure or check look at the engine itself.
     "benchmarks.perf": {*_BENCHMARKS, "benchmarks.perf", "er_gym.sim"},
+    "benchmarks.checks": {*_BENCHMARKS, "benchmarks.checks", "er_gym.sim"},
     "benchmarks.gallery": {*_BENCHMARKS, "benchmarks.gallery", "er_gym.sim"},
 }
 """Layer to the layers that it may import; ``er_gym`` alone is its own top-level modules."""
