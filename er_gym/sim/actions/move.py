@@ -22,6 +22,8 @@ _HEIGHT_TOLERANCE = 0.05
 """A position whose height is farther off than this is not on the floor, metres; AI2-THOR's."""
 _LEVEL = 0.01
 """Pitch and roll of a teleport have to be less, degrees; AI2-THOR's."""
+_FINEST = 0.05
+"""Grids with a smaller step than this are not searched for a free place, metres."""
 
 
 def _step(world: World, magnitude: float | None, heading: float) -> None:
@@ -49,10 +51,6 @@ def step_end(world: World, size: float, heading: float) -> np.ndarray:
         grid = world.settings.grid_size
         end[[0, 2]] = np.round(end[[0, 2]] / grid) * grid
     return np.asarray(end)
-
-
-_FINEST = 0.05
-"""Grids with a smaller step than this are not searched for a free place, metres."""
 
 
 def snap_to_grid(world: World) -> None:
