@@ -10,6 +10,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from er_gym.tasks.judge import search_targets
 from er_gym.tasks.paper_records import odd_spellings
 from er_gym.tasks.task import Task
 from er_gym.tasks.verbs import INIT
@@ -87,6 +88,8 @@ class EpisodeRecord(_Record):
         steps: from ``init`` to the last.
         success: what the environment said at the end; scores are computed from the steps.
         goal_unmet: what of the task's goal did not hold at ``end``, in words.
+        search_targets: the types that the task searches for, empty if it is no search; None in a
+            record that was written before records had this field.
         end_reason: why it ended, in the environment's words; ``""`` if it crashed.
         total_reward: the sum over the steps.
         seconds: wall-clock time.
@@ -106,6 +109,7 @@ class EpisodeRecord(_Record):
     steps: list[StepRecord]
     success: bool
     goal_unmet: list[str] = []
+    search_targets: list[str] | None = None
     end_reason: str
     total_reward: float
     seconds: float
@@ -163,6 +167,7 @@ def record_episode(
         steps=steps,
         success=success,
         goal_unmet=goal_unmet or [],
+        search_targets=sorted(search_targets(task)),
         end_reason=end_reason,
         total_reward=sum(step.reward for step in steps),
         seconds=seconds,

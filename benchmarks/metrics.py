@@ -22,16 +22,14 @@ _Z = 1.959963984540054  # the 97.5 % point of the normal distribution
 
 
 def completeness(counted: Tally) -> float:
-    """The share of the scoring key actions that were done; 0 for a task that has none.
+    """The share of the scoring key actions that were done; whether it succeeded if it has none.
 
+    An ``end`` is done where the scorer says so: to the judge, only an ``end`` that is a success.
     Above 1 under ``paper`` in a task that does not ask for the ``end`` that scored.
     """
-    return counted.points / len(counted.expected) if counted.expected else 0.0
-
-
-def success(counted: Tally) -> bool:
-    """Whether all of them were, and the goal holds."""
-    return bool(counted.expected) and counted.points >= len(counted.expected) and counted.goal_holds
+    if not counted.expected:
+        return float(counted.success)
+    return counted.points / len(counted.expected)
 
 
 def search_efficiency(episode: EpisodeRecord, counted: Tally) -> float:
@@ -40,7 +38,7 @@ def search_efficiency(episode: EpisodeRecord, counted: Tally) -> float:
     Navigations and ``end`` are among the key actions; ``init``, the one more, and ``end`` are among
     the steps. Above 1 if the agent found a shorter way than the task's.
     """
-    return (len(episode.key_actions) + 1) / counted.steps if success(counted) else 0.0
+    return (len(episode.key_actions) + 1) / counted.steps if counted.success else 0.0
 
 
 def ordered_completeness(episode: EpisodeRecord, counted: Tally) -> float:
@@ -90,12 +88,12 @@ def _longest_common(first: Sequence[str], second: Sequence[str]) -> int:
 
 @dataclass(frozen=True)
 class Score:
-    """An episode's metrics under one scorer; each is the function of its name.
+    """An episode's metrics under one scorer; each but ``success`` is the function of its name.
 
     Attributes:
         task_id, task_type, group: what was played.
-        success: also where the paper's program gives more than 1, as it does in a task whose only
-            other key action was done and that does not ask for ``end``.
+        success: the tally's; also where the paper's program gives more than 1, as it does in a task
+            whose only other key action was done and that does not ask for ``end``.
         missing: the scoring key actions that were not done, as ``"verb Type"``.
     """
 
@@ -134,7 +132,7 @@ def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
         task_id=episode.task_id,
         task_type=episode.task_type,
         group=task_type(episode.task_type).group,
-        success=success(counted),
+        success=counted.success,
         search_efficiency=search_efficiency(episode, counted),
         completeness=completeness(counted),
         ordered_completeness=ordered_completeness(episode, counted),

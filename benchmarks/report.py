@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks.episode import EpisodeRecord
 from benchmarks.metrics import METRICS, Score, Summary, score_episode, summarise, summarise_by
-from benchmarks.scorers import CORRECTED, PAPER, SCORERS
+from benchmarks.scorers import CORRECTED, PAPER, SCORERS, lacks_search_targets
 from benchmarks.store import Manifest, RunStore
 from er_gym.tasks.errors import told_once
 from er_gym.tasks.types import BY_NAME, GROUPS
@@ -91,6 +91,11 @@ class RunReport:
     def crashed(self) -> int:
         """How many episodes crashed; the same command as before plays them again."""
         return sum(bool(episode.error) for episode in self.episodes)
+
+    @property
+    def without_targets(self) -> int:
+        """How many searches have records that do not say what is searched for."""
+        return sum(map(lacks_search_targets, self.episodes))
 
     def shown(self, scorer: str) -> dict[str, tuple[Score, ...]]:
         """The scores to show for a choice of :data:`SCORER_CHOICES`, by the name to show."""

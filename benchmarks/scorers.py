@@ -2,9 +2,8 @@
 
 * ``paper`` counts as the evaluation program of Embodied-Reasoner (arXiv 2503.21696) does, quirks
   included, so that numbers stand beside the paper's table.
-* ``corrected`` mends what that program gets wrong. It takes a key action's type from its object id,
-  where task files leave the type empty or name another, and counts Sink and SinkBasin as one. Where
-  a task singles an object out, it asks for that object; and a task's goal must hold for a success.
+* ``corrected`` asks the judge of the environment (:mod:`er_gym.tasks.judge`) again, from the
+  episode's record. Success and key actions done are what the environment said.
 
 A scorer walks through an episode once and returns a :class:`Tally`; the metrics
 (:mod:`benchmarks.metrics`) are functions of the tally and the episode.
@@ -16,12 +15,14 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from benchmarks.episode import ERROR, EpisodeRecord, KeyActionRecord, StepRecord
-from er_gym.tasks.task import type_of_id
-from er_gym.tasks.verbs import END, INIT, MOVE_FORWARD, NAVIGATE, OBSERVE, UNSCORED, canonical_verb
+from benchmarks.episode import ERROR, EpisodeRecord, KeyActionRecord
+from er_gym.tasks.judge import Criteria, Progress, replay
+from er_gym.tasks.task import KeyAction
+from er_gym.tasks.types import task_type
+from er_gym.tasks.verbs import END, INIT, MOVE_FORWARD, NAVIGATE, OBSERVE, canonical_verb
 
 JUDGED_BY_NAME = "single_search"
-"""The one task type whose ``end`` scores only if the task's name was answered."""
+"""The task type whose ``end`` the paper scores only if the task's name was answered."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +32,12 @@ class Tally:
     Attributes:
         expected: the key actions that score, as ``"verb Type"``, in the order of the task.
         scored: those that were done, in the order of the episode. ``end`` is left out where the
-            task's name decides about it.
+            task's name decides about it, which it does in the paper's reading only.
         points: how many scored, that ``end`` included.
         routes: key actions done besides, which score nothing: navigations that the task lists.
         gone_to: the types that navigations named, failed ones too.
         steps: how many steps the episode took, ``init`` and ``end`` included.
-        goal_holds: whether the final state is as the task asks, where the scorer heeds that.
+        success: whether the task was done.
     """
 
     expected: tuple[str, ...]
@@ -45,7 +46,7 @@ class Tally:
     routes: int
     gone_to: tuple[str, ...]
     steps: int
-    goal_holds: bool = True
+    success: bool
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,10 @@ def paper_label(key: KeyActionRecord) -> str:
     """A key action as the paper's program reads it from the task's file: ``put Bowl``."""
     verb = key.spelled or (_PUT if key.verb.startswith(_PUT) else key.verb)
     return f"{verb} {key.object_type}".strip()
+
+
+def _label(verb: str, object_type: str) -> str:
+    return f"{verb} {object_type}".rstrip()
 
 
 def _paper(episode: EpisodeRecord) -> Tally:
@@ -117,81 +122,69 @@ def _paper(episode: EpisodeRecord) -> Tally:
                 scored.append(label)
                 points += 1
         last = label
-    return Tally(tuple(expected), tuple(scored), points, routes, tuple(gone_to), len(episode.steps))
-
-
-# -- corrected -------------------------------------------------------------------------------------
-
-
-def _one_sink(object_type: str) -> str:
-    return "SinkBasin" if object_type == "Sink" else object_type
-
-
-def _label(verb: str, object_type: str) -> str:
-    return f"{verb} {object_type}".rstrip()
-
-
-def _key_label(key: KeyActionRecord) -> str:
-    object_type = _one_sink(type_of_id(key.object_id) or key.object_type)
-    label = _label(canonical_verb(key.verb), object_type)
-    return f"{label} {key.object_id}" if key.exact else label
-
-
-def _search_answered(episode: EpisodeRecord, end: StepRecord, came_from_key_action: bool) -> bool:
-    """Whether ``end`` answers a search: a type within reach is named by the task, or the last look
-    or move was a key action (going to where the target is)."""
-    return any(kind in episode.name for kind in end.interactable) or came_from_key_action
-
-
-def _corrected(episode: EpisodeRecord) -> Tally:
-    """Match an episode's steps with its task's key actions.
-
-    Failed steps count for nothing. Each key action is matched at most once, in any order. ``end``
-    scores where the task asks for it, save in a ``single_search`` that it does not answer. A step
-    counts as the type that the agent named: the environment found the object by it, so unlike a
-    file it cannot name another type.
-    """
-    keys = [(key, _key_label(key)) for key in episode.key_actions]
-    expected = [label for key, label in keys if canonical_verb(key.verb) not in UNSCORED]
-    open_keys = Counter(label for _, label in keys)
-    every_key = frozenset(open_keys)
-    scored: list[str] = []
-    points = routes = 0
-    previous = ""
-    for step in episode.steps:
-        if not step.success:
-            continue
-        label = _label(canonical_verb(step.verb), _one_sink(step.object_type))
-        if step.verb == END:
-            if label not in every_key:
-                break  # a task that does not ask for it
-            if episode.task_type != JUDGED_BY_NAME:
-                scored.append(label)
-                points += 1
-            elif _search_answered(episode, step, previous in every_key):
-                points += 1
-            break
-        if open_keys[f"{label} {step.object_id}"] > 0:
-            label = f"{label} {step.object_id}"
-        # An object is needed: a key action whose type the file left empty has a label without one,
-        # and must stay unmatched.
-        if step.object_type and open_keys[label] > 0:
-            open_keys[label] -= 1
-            if step.verb in UNSCORED:
-                routes += 1
-            else:
-                scored.append(label)
-                points += 1
-        if step.verb in UNSCORED:
-            previous = label
     return Tally(
         tuple(expected),
         tuple(scored),
         points,
         routes,
-        tuple(step.object_type for step in episode.steps if step.verb == NAVIGATE),
-        episode.num_steps,
-        goal_holds=not episode.goal_unmet,
+        tuple(gone_to),
+        len(episode.steps),
+        success=bool(expected) and points >= len(expected),
+    )
+
+
+# -- corrected -------------------------------------------------------------------------------------
+
+
+def judged(episode: EpisodeRecord) -> Progress:
+    """What the environment's judge says of an episode, from its record alone.
+
+    A record can lack the search targets (:func:`lacks_search_targets`). Whether the agent could
+    interact with them at ``end`` then follows from what the environment said, whose rule for that
+    has not changed.
+    """
+    kind = task_type(episode.task_type)
+    criteria = Criteria(
+        key_actions=tuple(
+            KeyAction(canonical_verb(key.verb), key.object_id, key.object_type, reward=key.reward)
+            for key in episode.key_actions
+        ),
+        ordered=kind.ordered,
+        named=frozenset(key.object_id for key in episode.key_actions if key.exact),
+        targets=frozenset(episode.search_targets or ()),
+    )
+    found = episode.success if lacks_search_targets(episode) else True
+    return replay(criteria, episode.steps, goal_holds=found and not episode.goal_unmet)
+
+
+def lacks_search_targets(episode: EpisodeRecord) -> bool:
+    """Whether the episode was a search and its record, an old one, does not say for what."""
+    return episode.search_targets is None and task_type(episode.task_type).search
+
+
+def _corrected(episode: EpisodeRecord) -> Tally:
+    """Count what the judge says."""
+    progress = judged(episode)
+    named = progress.criteria.named
+
+    def labels(keys: tuple[KeyAction, ...]) -> tuple[str, ...]:
+        """Of the key actions that score; with the id where only one object will do."""
+        ids = (key.object_id if key.object_id in named else "" for key in keys)
+        return tuple(
+            f"{_label(key.verb, key.actual_type)} {object_id}".rstrip()
+            for key, object_id in zip(keys, ids, strict=True)
+            if key.scored
+        )
+
+    scored = labels(progress.done)
+    return Tally(
+        expected=labels(progress.criteria.key_actions),
+        scored=scored,
+        points=len(scored),
+        routes=len(progress.done) - len(scored),
+        gone_to=tuple(step.object_type for step in episode.steps if step.verb == NAVIGATE),
+        steps=episode.num_steps,
+        success=progress.success,
     )
 
 

@@ -135,6 +135,11 @@ def _notes(run: RunReport) -> list[str]:
             f"{run.path}: the scorers differ in {len(run.differ)} of {len(run.episodes)} "
             f"episodes: {ids}{more}"
         )
+    if run.without_targets:
+        notes.append(
+            f"{run.path}: {run.without_targets} of {len(run.episodes)} episodes are searches whose "
+            "old records do not say for what; whether it was found is taken from the environment"
+        )
     if run.crashed:
         notes.append(
             f"{run.path}: {run.crashed} of {len(run.episodes)} episodes crashed and count as "

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.thor import OBJECT_TYPES
 
 
@@ -43,9 +44,7 @@ _PROPERTY_FOR = {
     verbs.TOGGLE: "toggleable",
     verbs.SLICE: "sliceable",
 }
-STANDS_FOR = {"Sink": "SinkBasin", "Bathtub": "BathtubBasin"}
-"""Types that one puts things into by way of a part of theirs."""
-_ALSO = {verbs.TOGGLE: {"StoveBurner"}, verbs.PUT: set(STANDS_FOR)}
+_ALSO = {verbs.TOGGLE: {"StoveBurner"}, verbs.PUT: set(BASIN_OF)}
 """Types that lack the property but take the verb: a burner is toggled by its knob."""
 NOWHERE = frozenset({"Floor"})
 """Types that cannot be navigated to: one is there already."""

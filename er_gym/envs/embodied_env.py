@@ -27,10 +27,10 @@ from er_gym.envs.observations import (
 )
 from er_gym.envs.percept import Percept
 from er_gym.envs.protocol import DEFAULT, protocol_named
-from er_gym.envs.reward import Progress, search_targets
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.tasks import verbs
 from er_gym.tasks.goal import Condition, unmet
+from er_gym.tasks.judge import Criteria, Progress
 from er_gym.tasks.start import begin
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import task_type as look_up_type
@@ -82,8 +82,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     is ordered; which instance of a type it is done to does not matter, unless the task singles one
     out. ``end`` is worth its own only when all others but navigation are done, the task's goal
     holds (``info["goal_unmet"]`` says what of it does not), and, for a search, when the target can
-    be interacted with. ``step_penalty`` and ``illegal_penalty`` are subtracted for each counted
-    step and each illegal action.
+    be interacted with. :mod:`er_gym.tasks.judge` states the rules in full. ``step_penalty`` and
+    ``illegal_penalty`` are subtracted for each counted step and each illegal action.
 
     ## Starting State
     The agent stands at the reachable position nearest to a corner of the scene's bounds and looks
@@ -206,7 +206,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         floor = skills.reachable(controller, (self._backend, self.task.scene, self._grid_size))
         pose = self._protocol.start(bounds, floor)
         self._memory = Memory(pose, goal_row(self.task.instruction))
-        self._progress = Progress.start(self.task)
+        self._progress = Progress.start(Criteria.of(self.task))
         self._known = Known(self.task.navigable_objects)
         self._conduct = self._protocol.conduct(
             Setting(self.task, controller, floor, pose, self._grid_size, self._instances)
@@ -215,7 +215,6 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._limit = self._max_steps or self.task.max_steps
         self._unknown = 0
         self._end_reason = ""
-        self._success = False
         self._goal_unmet: tuple[Condition, ...] = ()
         placed = skills.place(controller, pose)
         self._take_in(placed)
@@ -350,22 +349,18 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         return None if row is None else int(objects.kinds[row])
 
     def _judge(self, action: Action, outcome: skills.Outcome, object_id: str) -> float:
-        """The reward that an action earned; decides success at ``end``."""
+        """The reward that an action earned, by the rules of :mod:`er_gym.tasks.judge`."""
         if not outcome.success:
             return 0.0
-        if action.verb == verbs.END:
-            targets = search_targets(self.task) if self.task.type.search else frozenset()
-            in_reach = self._around.in_reach
-            if self.task.goal:
-                self._goal_unmet = unmet(self.task.goal, self._objects_of_goal(), in_reach)
-            if (
-                not self._progress.only_end_left
-                or not targets.issubset(in_reach)
-                or self._goal_unmet
-            ):
-                return 0.0
-            self._success = True
-        self._progress, reward = self._progress.after(action, object_id)
+        if action.verb == verbs.END and self.task.goal:
+            self._goal_unmet = unmet(self.task.goal, self._objects_of_goal(), self._around.in_reach)
+        self._progress, reward = self._progress.after(
+            action.verb,
+            action.object_type,
+            object_id,
+            in_reach=self._around.in_reach,
+            goal_holds=not self._goal_unmet,
+        )
         return reward
 
     def _objects_of_goal(self) -> Sequence[Mapping[str, Any]]:
@@ -438,7 +433,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             "action_success": success,
             "object_id": object_id,
             "feedback": feedback,
-            "success": self._success,
+            "success": self._progress.success,
             "goal_unmet": self._goal_unmet,
             "key_actions_done": self._progress.done,
             "key_actions_left": self._progress.left,

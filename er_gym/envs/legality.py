@@ -13,9 +13,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.actions import ACTIONS, INDEX, INDICES, NOWHERE, STANDS_FOR, Action, applies
+from er_gym.envs.actions import ACTIONS, INDEX, INDICES, NOWHERE, Action, applies
 from er_gym.envs.percept import Percept, marked, names
 from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.thor.objects import KIND_OF, ObjectTable
 
 _FACES, _WITHIN_BY_FACE = (0.08, 0.15, 0.5), np.array([1.0, 2.5, 4.0, 10.0])
@@ -55,7 +56,7 @@ def _of_type(*object_types: str) -> NDArray[np.bool_]:
     return marked(np.array([KIND_OF[name] for name in object_types]))
 
 
-_STANDS_FOR_ANOTHER = _of_type(*STANDS_FOR)
+_HAS_BASIN = _of_type(*BASIN_OF)
 _BURNER = _of_type("StoveBurner")
 _KNIFE = _of_type("Knife", "ButterKnife")
 _NO_GOAL = _of_type(*NOWHERE)
@@ -63,8 +64,7 @@ _CONDITIONS = {
     verbs.PICKUP: _Condition(lambda table: table.pickupable, "It cannot be picked up."),
     verbs.PUT: _Condition(
         lambda table: (
-            (table.receptacle | _STANDS_FOR_ANOTHER[table.kinds])
-            & (table.is_open | ~table.openable)
+            (table.receptacle | _HAS_BASIN[table.kinds]) & (table.is_open | ~table.openable)
         ),
         "It is closed, or nothing can be put into it.",
     ),

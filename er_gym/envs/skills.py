@@ -18,9 +18,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.actions import STANDS_FOR
 from er_gym.envs.percept import Percept, perceive
 from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.tasks.task import AgentPose
 from er_gym.thor import ObjectTable
 from er_gym.thor.floor import floor_of
@@ -265,7 +265,7 @@ def move_forward(controller: Any, grid_size: float) -> Outcome:
 
 def _part_to_put_into(objects: ObjectTable, row: int) -> str:
     """The id of the receptacle proper: a Sink's basin rather than the Sink."""
-    part = f"{objects.ids[row]}|{STANDS_FOR.get(objects.type_of(row), '')}"
+    part = f"{objects.ids[row]}|{BASIN_OF.get(objects.type_of(row), '')}"
     return part if part in objects.row else objects.ids[row]
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from er_gym.envs.actions import INDEX, STANDS_FOR, Action
-from er_gym.envs.reward import same_type
+from er_gym.envs.actions import INDEX, Action
 from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import BASIN_OF, same_type
 from er_gym.tasks.task import KeyAction, type_of_id
 
 
@@ -50,7 +50,7 @@ class Solver:
         stuck = info["action"] == Action(key.verb, key.actual_type) and not info["action_success"]
         if stuck and key.verb == verbs.OPEN and _legal(Action(verbs.TOGGLE, name), info):
             return Action(verbs.TOGGLE, name)  # an appliance opens only when it is off
-        for candidate in (key.actual_type, STANDS_FOR.get(key.actual_type, key.actual_type)):
+        for candidate in (key.actual_type, BASIN_OF.get(key.actual_type, key.actual_type)):
             action = Action(key.verb, candidate)
             if _legal(action, info):
                 return action

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from er_gym.tasks.equivalence import BASIN_OF, is_among
 from er_gym.thor.objects import is_there
 
 _CUT_UP = frozenset({"isSliced", "isBroken"})
@@ -23,7 +24,8 @@ class Condition:
         object_id: which one it must be, where the task says which; ``""`` otherwise.
         held: it must be in the agent's hand.
         in_reach: the agent must be where an object of that type can be seen and handled.
-        inside: the type of a receptacle that it must lie in or on, ``""`` for anywhere.
+        inside: the type of a receptacle that it must lie in or on, ``""`` for anywhere. What lies
+            in a SinkBasin is in the Sink, too; what lies on the rim of a Sink is not in its basin.
         state: what its metadata must say.
     """
 
@@ -66,7 +68,7 @@ def unmet(
     return tuple(
         condition
         for condition in goal
-        if (condition.in_reach and condition.object_type not in in_reach)
+        if (condition.in_reach and not is_among(condition.object_type, in_reach))
         or not any(_holds(condition, entry, kind_of) for entry in objects)
     )
 
@@ -81,6 +83,7 @@ def _holds(condition: Condition, entry: Mapping[str, Any], kind_of: Mapping[str,
     if condition.held and not entry["isPickedUp"]:
         return False
     holders = {kind_of.get(holder) for holder in entry["parentReceptacles"] or ()}
-    if condition.inside and condition.inside not in holders:
+    places = {condition.inside, BASIN_OF.get(condition.inside, condition.inside)}
+    if condition.inside and places.isdisjoint(holders):
         return False
     return all(entry[name] == value for name, value in condition.state)

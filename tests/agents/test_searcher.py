@@ -13,10 +13,10 @@ from agents.scripted.searcher.words import Goal, understand
 from benchmarks.metrics import score_episode
 from benchmarks.play import episode_seed, play_episode
 from benchmarks.scorers import CORRECTED
-from er_gym.envs.actions import STANDS_FOR
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.reward import search_targets
 from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import BASIN_OF
+from er_gym.tasks.judge import search_targets
 from er_gym.tasks.paper_format import read_tasks
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
@@ -45,7 +45,7 @@ def deeds_of(goals: Iterable[Goal]) -> Deeds:
     def put(thing: str, place: str) -> None:
         nonlocal held
         take(thing)
-        found.append((verbs.PUT, STANDS_FOR.get(place, place)))
+        found.append((verbs.PUT, BASIN_OF.get(place, place)))
         held = ""
 
     goals = list(goals)
@@ -79,7 +79,7 @@ def deeds_asked(task: Task) -> Deeds:
         return [(words.FIND, name) for name in search_targets(task)]
     handled = (verbs.PICKUP, verbs.PUT, verbs.TOGGLE, verbs.SLICE)
     return [
-        (key.verb, STANDS_FOR.get(key.actual_type, key.actual_type))
+        (key.verb, BASIN_OF.get(key.actual_type, key.actual_type))
         for key in task.key_actions
         if key.verb in handled
     ]

@@ -48,6 +48,7 @@ def make_episode(
     task_id: str = "task-1",
     max_steps: int = 30,
     end_reason: str = "end",
+    search_targets: list[str] | None = None,
     error: str = "",
 ) -> EpisodeRecord:
     """An episode whose first step, ``init``, is added."""
@@ -65,6 +66,7 @@ def make_episode(
         steps=played,
         success=False,
         end_reason=end_reason,
+        search_targets=search_targets,
         total_reward=0.0,
         seconds=0.5,
         error=error,

@@ -22,7 +22,7 @@ GOLDEN = """
            {"verb": "error", "object_type": "", "object_id": "", "success": false,
             "feedback": "no such action", "navigable": ["Bed"], "interactable": [],
             "reward": -0.5, "thought": "hm", "text": "dance", "appended": false}],
- "success": false, "goal_unmet": ["Mug is held"],
+ "success": false, "goal_unmet": ["Mug is held"], "search_targets": ["Mug"],
  "end_reason": "no known action", "total_reward": -0.5, "seconds": 1.25,
  "error": ""}
 """
@@ -44,11 +44,12 @@ def test_other_formats_are_not_misread(change):
         EpisodeRecord.model_validate({**json.loads(GOLDEN), **change})
 
 
-def test_what_was_written_before_goals_is_read_still() -> None:
+def test_what_was_written_before_goals_and_search_targets_is_read_still() -> None:
     old = json.loads(GOLDEN)
-    del old["goal_unmet"], old["key_actions"][0]["exact"]
+    del old["goal_unmet"], old["search_targets"], old["key_actions"][0]["exact"]
     read = EpisodeRecord.model_validate(old)
-    assert (read.goal_unmet, read.key_actions[0].exact) == ([], False)
+    assert (read.goal_unmet, read.search_targets) == ([], None)
+    assert not read.key_actions[0].exact
 
 
 def test_write_and_read(store, episode):

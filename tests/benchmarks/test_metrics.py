@@ -154,7 +154,14 @@ SEARCH = ("navigate to CounterTop", "end")
 
 
 def search(episode, steps, keys=SEARCH, name="Look for the CreditCard in the room."):
-    return episode(keys, steps, task_type="single_search", name=name, max_steps=22)
+    return episode(
+        keys,
+        steps,
+        task_type="single_search",
+        name=name,
+        max_steps=22,
+        search_targets=["CreditCard"],
+    )
 
 
 def test_a_search_is_answered_by_what_is_within_reach(episode, step):
@@ -175,19 +182,21 @@ def test_a_search_is_answered_by_having_gone_where_the_task_says(episode, step):
 
 
 @pytest.mark.parametrize(
-    ("between", "paper", "corrected"),
+    ("between", "paper"),
     [
-        (("open Drawer",), False, True),  # the paper forgets where it went
-        (("!navigate to Shelf",), True, True),
-        (("observe",), False, False),
+        (("open Drawer",), False),  # the paper forgets where it went
+        (("!navigate to Shelf",), True),
+        (("observe",), False),
     ],
     ids=["interaction", "failure", "look"],
 )
-def test_what_is_remembered_of_where_it_went(episode, step, between, paper, corrected):
-    end = step("end", interactable=("Mug",))
-    played = search(episode, ("navigate to CounterTop", *between, end))
-    assert score_episode(played, PAPER).success is paper
-    assert score_episode(played, CORRECTED).success is corrected
+def test_where_it_went_is_an_answer_to_the_paper_only(episode, step, between, paper):
+    for within_reach in (("Mug",), ("CreditCard",)):
+        end = step("end", interactable=within_reach)
+        played = search(episode, ("navigate to CounterTop", *between, end))
+        assert score_episode(played, CORRECTED).success is (within_reach == ("CreditCard",))
+    not_there = search(episode, ("navigate to CounterTop", *between, step("end", ("Mug",))))
+    assert score_episode(not_there, PAPER).success is paper
 
 
 def test_the_paper_finds_a_type_in_any_part_of_the_name_whatever_the_case(episode, step):
@@ -199,7 +208,7 @@ def test_the_paper_finds_a_type_in_any_part_of_the_name_whatever_the_case(episod
         assert not score_episode(named, CORRECTED).success
     pencil = search(episode, steps, name="Look for the Pencil in the room.")
     assert score_episode(pencil, PAPER).success
-    assert score_episode(pencil, CORRECTED).success
+    assert not score_episode(pencil, CORRECTED).success
 
 
 @pytest.mark.parametrize(
@@ -272,7 +281,8 @@ def test_an_unmet_goal_is_no_success_to_the_corrected_scorer(episode):
     assert [score_episode(unmet, scorer).success for scorer in (PAPER, CORRECTED)] == [True, False]
     assert score_episode(played, CORRECTED).success
     assert score_episode(unmet, CORRECTED).search_efficiency == 0.0
-    assert score_episode(unmet, CORRECTED).completeness == 1.0
+    assert score_episode(unmet, CORRECTED).completeness == 1 / 2  # not the end
+    assert score_episode(unmet, CORRECTED).missing == ("end",)
 
 
 def test_an_object_that_is_singled_out_is_the_only_one_that_counts_to_the_corrected_scorer(
@@ -290,7 +300,7 @@ def test_an_object_that_is_singled_out_is_the_only_one_that_counts_to_the_correc
 
     assert [scored(i, CORRECTED).success for i in (wanted, other)] == [True, False]
     assert [scored(i, PAPER).success for i in (wanted, other)] == [True, True]
-    assert scored(other, CORRECTED).missing == (f"pickup Egg {wanted}",)
+    assert scored(other, CORRECTED).missing == (f"pickup Egg {wanted}", "end")
 
 
 def test_wilson():

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from er_gym.envs.actions import ACTIONS, STANDS_FOR, Action
+from er_gym.envs.actions import ACTIONS, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.reward import Progress
 from er_gym.envs.solver import Solver
 from er_gym.tasks import TASK_TYPES, Task, TaskType, load_suite, verbs
+from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.tasks.generate import Generator
 from er_gym.tasks.goal import unmet
+from er_gym.tasks.judge import Criteria, Progress
 from er_gym.tasks.types import SEARCH
 
 PER_TYPE = 8
@@ -54,7 +55,7 @@ def strive(env: EmbodiedEnv, task: Task, other: Task) -> list[Deed]:
     Nothing if that cannot be done: what the names of types stand for is the task's affair.
     """
     info = begin(env, task)
-    solver, progress, over = Solver(), Progress.start(other), False
+    solver, progress, over = Solver(), Progress.start(Criteria.of(other)), False
     deeds: list[Deed] = []
     while not over:
         action, key = solver.next({**info, "key_actions_left": progress.left})
@@ -63,7 +64,7 @@ def strive(env: EmbodiedEnv, task: Task, other: Task) -> list[Deed]:
         _, reward, ended, cut, info = env.step(action)
         over = ended or cut
         if info["action_success"]:
-            progress, _ = progress.after(action, info["object_id"])
+            progress, _ = progress.after(action.verb, action.object_type, info["object_id"])
             deeds.append(Deed(action, info["object_id"], float(reward)))
     return deeds if progress.only_end_left and not over else []
 
@@ -114,7 +115,7 @@ def test_who_ends_at_once_earns_nothing(env: EmbodiedEnv, kind: TaskType) -> Non
 
 def alike(verb: str, object_type: str) -> tuple[str, str]:
     """A verb and a type, a Sink and its basin being one."""
-    return verb, STANDS_FOR.get(object_type, object_type)
+    return verb, BASIN_OF.get(object_type, object_type)
 
 
 @KINDS

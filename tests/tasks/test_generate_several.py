@@ -27,13 +27,12 @@ from rooms_by_hand import (
     thing,
 )
 
-from er_gym.envs.actions import Action
-from er_gym.envs.reward import Progress
 from er_gym.tasks import verbs
 from er_gym.tasks.generate import generate_tasks
 from er_gym.tasks.generate.generator import AMBIGUOUS
 from er_gym.tasks.generate.room import read_room
 from er_gym.tasks.goal import Condition
+from er_gym.tasks.judge import Criteria, Progress
 from er_gym.tasks.start import ObjectPose, Start
 
 # -- several objects of a type -------------------------------------------------------------------
@@ -46,10 +45,10 @@ def test_two_in_equal_circumstances_make_one_task_that_either_fulfils() -> None:
         assert task.related_objects == (first["objectId"],)
         assert task.id == f"FloorPlan1-{name}-Book"
         assert not task.named
-    progress = Progress.start(task)
-    pickup = Action(verbs.PICKUP, "Book")
-    assert progress.after(pickup, first["objectId"])[1] == 1
-    assert progress.after(pickup, second["objectId"])[1] == 1
+    progress = Progress.start(Criteria.of(task))
+    pickup = (verbs.PICKUP, "Book")
+    assert progress.after(*pickup, first["objectId"])[1] == 1
+    assert progress.after(*pickup, second["objectId"])[1] == 1
 
 
 def test_two_in_closed_drawers_are_one_task_too() -> None:
@@ -90,10 +89,10 @@ def test_one_that_is_shut_away_and_one_that_is_not_are_told_apart_by_their_place
         assert f"the Book that is {words}" in task.instruction
         assert task.goal == (Condition("Book", meant["objectId"], held=True),)
         assert task.named == {meant["objectId"]}
-        progress = Progress.start(task)
-        pickup = Action(verbs.PICKUP, "Book")
-        assert progress.after(pickup, other["objectId"]) == (progress, 0.0)
-        after, reward = progress.after(pickup, meant["objectId"])
+        progress = Progress.start(Criteria.of(task))
+        pickup = (verbs.PICKUP, "Book")
+        assert progress.after(*pickup, other["objectId"]) == (progress, 0.0)
+        after, reward = progress.after(*pickup, meant["objectId"])
         assert reward == 1
         assert [key.verb for key in after.done] == [verbs.PICKUP]
 

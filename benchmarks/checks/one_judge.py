@@ -1,0 +1,263 @@
+"""Whether the corrected scorer judges episodes, from their records, as the environment did live.
+
+    python -m benchmarks.checks.one_judge [--suite er-1k] [--per-type N] [--protocol paper]
+
+Several players play every task of a suite (see ``PLAYERS``). Each episode's record goes through its
+JSON and is then judged again. Success, the key actions left and the rewards must be the same.
+
+Prints how many episodes each player played, how many were a success to each judge, and every
+disagreement; exit code 1 if there is one.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import click
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from agents import make_agent
+from agents.base import Agent, Decision
+from benchmarks.episode import EpisodeRecord
+from benchmarks.metrics import score_episode
+from benchmarks.play import episode_seed, play_episode
+from benchmarks.scorers import CORRECTED, judged
+from er_gym.envs.actions import INDEX, Action
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.protocol import PROTOCOLS
+from er_gym.envs.solver import Solver
+from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import BASIN_OF
+from er_gym.tasks.judge import Criteria, Progress
+from er_gym.tasks.suites import load_suite
+from er_gym.tasks.task import KeyAction, Task
+
+_CARELESS = 0.25
+"""How often a careless oracle does any legal thing, ``end`` among them."""
+
+
+def shuffled(keys: Sequence[KeyAction], draw: random.Random) -> tuple[KeyAction, ...]:
+    """Key actions with their transfers in another order: the last two change places, or all are
+    shuffled. What there is only one of stays."""
+    parts: list[list[KeyAction]] = [[]]
+    for key in keys:
+        if key.verb in (verbs.NAVIGATE, verbs.END) and any(
+            earlier.verb in (verbs.PUT, verbs.TOGGLE, verbs.SLICE) for earlier in parts[-1]
+        ):
+            parts.append([])
+        parts[-1].append(key)
+    *parts, ends = parts if parts[-1][0].verb == verbs.END else (*parts, [])
+    before = list(parts)
+    draw.shuffle(parts)
+    if len(parts) > 1 and parts == before:
+        parts.append(parts.pop(-2))
+    return tuple(key for part in (*parts, ends) for key in part)
+
+
+def by_the_whole(action: Action, info: Mapping[str, Any]) -> Action:
+    """``put in Sink`` for ``put in SinkBasin`` where that is legal; another action as it is."""
+    for whole, basin in BASIN_OF.items():
+        named = Action(action.verb, whole)
+        if action == Action(verbs.PUT, basin) and info["action_mask"][INDEX[named]]:
+            return named
+    return action
+
+
+class ShuffledOracle:
+    """Does a task's key actions, the transfers in another order, and says Sink for SinkBasin.
+
+    Args:
+        seed: of the order.
+    """
+
+    obs_mode = "text"
+
+    def __init__(self, seed: int = 0) -> None:
+        self._draw = random.Random(seed)
+
+    def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        """Choose an order."""
+        self._solver = Solver()
+        self._progress = Progress.start(Criteria(shuffled(task.key_actions, self._draw)))
+
+    def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
+        """The next step in that order."""
+        action = info["action"]
+        if action is not None and info["action_success"]:
+            self._progress, _ = self._progress.after(
+                action.verb, action.object_type, info["object_id"]
+            )
+        to_come = {
+            "key_actions_left": self._progress.left,
+            "key_actions_done": self._progress.done,
+        }
+        return Decision(by_the_whole(self._solver.next({**info, **to_come})[0], info))
+
+
+class CarelessOracle:
+    """Does the key actions, and any legal thing now and then.
+
+    Args:
+        seed: of what it does.
+    """
+
+    obs_mode = "text"
+
+    def __init__(self, seed: int = 0) -> None:
+        self._draw = random.Random(seed)
+
+    def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        """Begin an episode."""
+        self._solver = Solver()
+
+    def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
+        """The solver's next step, or any."""
+        if self._draw.random() < _CARELESS:
+            return Decision(self._draw.choice(np.flatnonzero(info["action_mask"]).tolist()))
+        return Decision(self._solver.next(info)[0])
+
+
+PLAYERS: dict[str, Callable[[int], Agent]] = {
+    "oracle": lambda seed: make_agent("oracle", seed),
+    "searcher": lambda seed: make_agent("searcher", seed),
+    "random": lambda seed: make_agent("random", seed),
+    "shuffled oracle": ShuffledOracle,
+    "careless oracle": CarelessOracle,
+}
+"""By name: how to make the player, given a seed."""
+
+
+class _Watched:
+    """An environment whose last ``info`` is kept."""
+
+    def __init__(self, env: EmbodiedEnv) -> None:
+        self._env = env
+        self.info: dict[str, Any] = {}
+
+    def reset(self, **arguments: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+        obs, self.info = self._env.reset(**arguments)
+        return obs, self.info
+
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        *rest, self.info = self._env.step(action)
+        return (*rest, self.info)  # type: ignore[return-value]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An episode, judged twice.
+
+    Attributes:
+        player: one of :data:`PLAYERS`.
+        record: read back from its JSON.
+        apart: what the environment and the corrected scorer disagree about, in words.
+    """
+
+    player: str
+    record: EpisodeRecord
+    apart: tuple[str, ...]
+
+
+def judge_twice(env: EmbodiedEnv, task: Task, player: str, seed: int = 0) -> Judged:
+    """Play an episode, and judge its record.
+
+    Args:
+        env: with no step penalties.
+        player: one of :data:`PLAYERS`.
+        seed: of the run.
+    """
+    number = episode_seed(seed, task.id)
+    watched = _Watched(env)
+    played = play_episode(watched, PLAYERS[player](number), task, number)
+    if played.error:
+        raise RuntimeError(f"{player} in {task.id}: {played.error}")
+    record = EpisodeRecord.model_validate_json(played.model_dump_json())
+    progress, score = judged(record), score_episode(record, CORRECTED)
+
+    def names(keys: Sequence[KeyAction]) -> list[str]:
+        return [f"{key.verb} {key.object_id}".rstrip() for key in keys]
+
+    said = {
+        "success": (record.success, score.success),
+        "left": (names(watched.info["key_actions_left"]), names(progress.left)),
+        "done": (names(watched.info["key_actions_done"]), names(progress.done)),
+        "reward": (record.total_reward, sum(key.reward for key in progress.done)),
+        "missing": (
+            sum(key.scored for key in watched.info["key_actions_left"]),
+            len(score.missing),
+        ),
+    }
+    apart = tuple(
+        f"{name}: {live!r} live, {again!r} from the record"
+        for name, (live, again) in said.items()
+        if live != again
+    )
+    return Judged(player, record, apart)
+
+
+def judge_all(tasks: Sequence[Task], protocol: str = "default", seed: int = 0) -> Iterator[Judged]:
+    """Every task, played by every player."""
+    env = EmbodiedEnv([], obs_mode="text", protocol=protocol)
+    try:
+        for task in tasks:
+            for player in PLAYERS:
+                yield judge_twice(env, task, player, seed)
+    finally:
+        env.close()
+
+
+def some_of_each_type(tasks: Sequence[Task], number: int, seed: int = 0) -> list[Task]:
+    """So many tasks of each type, the same for the same seed."""
+    by_type: dict[str, list[Task]] = defaultdict(list)
+    for task in tasks:
+        by_type[task.type.name].append(task)
+    draw = random.Random(seed)
+    return [one for each in by_type.values() for one in draw.sample(each, min(number, len(each)))]
+
+
+@click.command()
+@click.option("--suite", default="er-1k", show_default=True)
+@click.option("--per-type", type=click.IntRange(1), help="So many tasks of each type only.")
+@click.option("--protocol", default="default", type=click.Choice(list(PROTOCOLS)))
+@click.option("--seed", default=0, show_default=True)
+def main(suite: str, per_type: int | None, protocol: str, seed: int) -> None:
+    """Play every task of a suite with every player, and judge each episode twice."""
+    console = Console(width=None if sys.stdout.isatty() else 140)
+    tasks: Sequence[Task] = load_suite(suite).tasks
+    if per_type is not None:
+        tasks = some_of_each_type(tasks, per_type, seed)
+    counts: dict[str, Counter[str]] = {player: Counter() for player in PLAYERS}
+    apart = 0
+    episodes = judge_all(tasks, protocol, seed)
+    for found in track(episodes, "Judging", len(tasks) * len(PLAYERS), console=console):
+        count, record = counts[found.player], found.record
+        count["episodes"] += 1
+        count["env"] += record.success
+        count["scorer"] += score_episode(record, CORRECTED).success
+        count["end"] += record.end_reason == "end"
+        count["apart"] += bool(found.apart)
+        for what in found.apart:
+            apart += 1
+            console.print(
+                f"{record.task_id}, {found.player}: {what}", markup=False, highlight=False
+            )
+    table = Table(title=f"{suite}, protocol {protocol}", title_justify="left")
+    for name in ("player", "episodes", "ended by end", "env: success", "scorer: success", "apart"):
+        table.add_column(name, justify="left" if name == "player" else "right")
+    for player, count in counts.items():
+        columns = ("episodes", "end", "env", "scorer", "apart")
+        table.add_row(player, *(str(count[name]) for name in columns))
+    console.print(table)
+    sys.exit(1 if apart else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,209 @@
+"""The one judge: which key actions of its task an episode has done, and whether it succeeded.
+
+The environment asks the judge at every step. The corrected scorer asks it again, from the record of
+an episode (:func:`replay`). Only the paper's scorer keeps rules of its own. These are the judge's
+rules:
+
+1. **Steps.** A step counts if it was legal and the simulator did it. ``init``, the placing of the
+   agent, and replies that name no known action never count.
+2. **Key actions.** A step does one key action of its verb and type, if one is left, and earns its
+   reward. Each key action can be done once.
+3. **Types.** A key action's type is read from its object id, where it has one. A Sink and its
+   SinkBasin are one type for key actions and search targets, and so are a Bathtub and its
+   BathtubBasin (:mod:`er_gym.tasks.equivalence`). In a goal, what lies in the basin is in the
+   whole, too, but what lies on the rim is not in the basin.
+4. **Instances.** Any object of the type will do, unless the task's goal names an object by its id.
+   A key action on an object that is named must be done to that very object, and it goes first where
+   a step fits several key actions.
+5. **Order.** The key actions of an ordered task type count only in the order of the task: a step
+   out of turn earns nothing, and the same key action can still be done in its turn. Navigations are
+   free: one that the task lists before the next scored key action may be done or left out. In all
+   other task types the order does not matter.
+6. **Success** is decided by the first ``end`` that counts, and by nothing else. That ``end`` is a
+   success, and only then does its own key action, if the task lists one, if three things hold:
+
+   - All key actions are done, apart from navigations, ``observe`` and ``move forward``.
+   - In a search, the agent can interact with an object of each type that is searched for
+     (:func:`search_targets`) when it says ``end``. How it got there, and whether it does the listed
+     navigations, does not matter.
+   - The task's goal holds (:mod:`er_gym.tasks.goal`), if it has one.
+
+7. **After ``end``** nothing counts, whether ``end`` was a success or not.
+8. **The step limit** ends an episode without success, even if only ``end`` was missing. An ``end``
+   that is itself the last step within the limit counts. The paper's protocol appends an ``end``
+   when it cuts an episode off, and that ``end`` is judged like any other. A fourth repetition in a
+   row and a crash are no ``end``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import is_among, same_type
+from er_gym.tasks.task import KeyAction, Task, type_of_id
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """What an episode is judged by, apart from the goal's conditions on the final state.
+
+    Attributes:
+        key_actions: in the order of the task.
+        ordered: whether they count in that order only.
+        named: ids of the objects that the task singles out.
+        targets: the types that are searched for; empty if the task is no search.
+    """
+
+    key_actions: tuple[KeyAction, ...]
+    ordered: bool = False
+    named: frozenset[str] = frozenset()
+    targets: frozenset[str] = frozenset()
+
+    @staticmethod
+    def of(task: Task) -> Criteria:
+        """A task's."""
+        return Criteria(task.key_actions, task.type.ordered, task.named, search_targets(task))
+
+
+def search_targets(task: Task) -> frozenset[str]:
+    """The types that a search is for; empty if the task is no search.
+
+    They are the types of the task's related objects, or of the last related object of its ``end``.
+    """
+    if not task.type.search:
+        return frozenset()
+    ids = task.related_objects or next(
+        (key.related_objects[-1:] for key in task.key_actions if key.verb == verbs.END), ()
+    )
+    return frozenset(type_of_id(i) for i in ids)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far an episode has come. It is immutable: :meth:`after` gives the next.
+
+    Attributes:
+        criteria: what it is judged by.
+        done: the key actions done, in the order in which they were done.
+        left: those that are not, in the order of the task.
+        ended: whether ``end`` was said.
+        success: whether it was said rightly.
+    """
+
+    criteria: Criteria
+    done: tuple[KeyAction, ...]
+    left: tuple[KeyAction, ...]
+    ended: bool = False
+    success: bool = False
+
+    @staticmethod
+    def start(criteria: Criteria) -> Progress:
+        """Nothing is done yet."""
+        return Progress(criteria, (), criteria.key_actions)
+
+    @property
+    def only_end_left(self) -> bool:
+        """Whether every key action is done that success asks for, apart from ``end``."""
+        return all(key.verb == verbs.END or not key.scored for key in self.left)
+
+    def after(
+        self,
+        verb: str,
+        object_type: str = "",
+        object_id: str = "",
+        *,
+        in_reach: Collection[str] = (),
+        goal_holds: bool = True,
+    ) -> tuple[Progress, float]:
+        """The progress after a step that counts, and the reward that the step earns.
+
+        Args:
+            verb: canonical.
+            object_type: as the agent named it.
+            object_id: of the object that it was done to.
+            in_reach: the types of which the agent can interact with an object; only ``end`` asks.
+            goal_holds: whether the task's goal holds, if it has one; only ``end`` asks.
+        """
+        if self.ended or verb == verbs.INIT:
+            return self, 0.0
+        if verb == verbs.END:
+            return self._after_end(in_reach, goal_holds)
+        fitting = [
+            k
+            for k in self._in_turn()
+            if self.left[k].verb == verb
+            and same_type(self.left[k].actual_type, object_type)
+            and (self.left[k].object_id == object_id or not self._is_named(k))
+        ]
+        if not fitting:
+            return self, 0.0
+        k = next((k for k in fitting if self._is_named(k)), fitting[0])
+        key, left = self.left[k], (*self.left[:k], *self.left[k + 1 :])
+        return replace(self, done=(*self.done, key), left=left), key.reward
+
+    def _after_end(self, in_reach: Collection[str], goal_holds: bool) -> tuple[Progress, float]:
+        found = all(is_among(target, in_reach) for target in self.criteria.targets)
+        if not (self.only_end_left and found and goal_holds):
+            return replace(self, ended=True), 0.0
+        ends = tuple(key for key in self.left if key.verb == verbs.END)
+        left = tuple(key for key in self.left if key.verb != verbs.END)
+        after = replace(self, done=(*self.done, *ends), left=left, ended=True, success=True)
+        return after, sum(key.reward for key in ends)
+
+    def _is_named(self, k: int) -> bool:
+        return self.left[k].object_id in self.criteria.named
+
+    def _in_turn(self) -> Iterable[int]:
+        """The places in ``left`` of the key actions whose turn it is."""
+        if not self.criteria.ordered:
+            return range(len(self.left))
+        scored = (k for k, key in enumerate(self.left) if key.scored)
+        return range(next(scored, len(self.left) - 1) + 1)
+
+
+class RecordedStep(Protocol):
+    """What the judge reads of a step in an episode's record."""
+
+    @property
+    def verb(self) -> str:
+        """What was done."""
+
+    @property
+    def object_type(self) -> str:
+        """As the agent named it, ``""`` for none."""
+
+    @property
+    def object_id(self) -> str:
+        """Of the object that it was done to, ``""`` for none."""
+
+    @property
+    def success(self) -> bool:
+        """Whether the step was legal and the simulator did it."""
+
+    @property
+    def interactable(self) -> Collection[str]:
+        """The types of which the agent could interact with an object after the step."""
+
+
+def replay(criteria: Criteria, steps: Iterable[RecordedStep], *, goal_holds: bool) -> Progress:
+    """Judge an episode from its record.
+
+    Args:
+        criteria: what it is judged by.
+        steps: all of them, in order.
+        goal_holds: whether the task's goal held when the agent said ``end``.
+    """
+    progress = Progress.start(criteria)
+    for step in steps:
+        if step.success:
+            progress, _ = progress.after(
+                verbs.canonical_verb(step.verb),
+                step.object_type,
+                step.object_id,
+                in_reach=step.interactable,
+                goal_holds=goal_holds,
+            )
+    return progress
