@@ -30,7 +30,7 @@ from benchmarks.episode import EpisodeRecord
 from benchmarks.metrics import score_episode
 from benchmarks.play import episode_seed, play_episode
 from benchmarks.scorers import CORRECTED, judged
-from er_gym.envs.actions import INDEX, Action
+from er_gym.envs.actions import ACTIONS, INDEX, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.protocol import PROTOCOLS
 from er_gym.envs.solver import Solver
@@ -40,6 +40,7 @@ from er_gym.tasks.judge import Criteria, Progress
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import KeyAction, Task
 
+_UNDOING = frozenset({verbs.PUT, verbs.PICKUP, verbs.TOGGLE})
 _CARELESS = 0.25
 """How often a careless oracle does any legal thing, ``end`` among them."""
 
@@ -125,12 +126,45 @@ class CarelessOracle:
         return Decision(self._solver.next(info)[0])
 
 
+class UndoingOracle:
+    """Does the key actions, then one more thing to what is in reach, and says ``end``.
+
+    The goal may hold no longer: what was taken is put down, what was switched on is switched off.
+
+    Args:
+        seed: of what it does.
+    """
+
+    obs_mode = "text"
+
+    def __init__(self, seed: int = 0) -> None:
+        self._draw = random.Random(seed)
+
+    def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        """Begin an episode."""
+        self._solver, self._undone = Solver(), False
+
+    def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
+        """The solver's next step; before ``end``, one of :data:`_UNDOING`."""
+        action, _ = self._solver.next(info)
+        undoing = [
+            ACTIONS[k]
+            for k in np.flatnonzero(info["action_mask"]).tolist()
+            if ACTIONS[k].verb in _UNDOING
+        ]
+        if action.verb == verbs.END and undoing and not self._undone:
+            self._undone = True
+            action = self._draw.choice(undoing)
+        return Decision(action)
+
+
 PLAYERS: dict[str, Callable[[int], Agent]] = {
     "oracle": lambda seed: make_agent("oracle", seed),
     "searcher": lambda seed: make_agent("searcher", seed),
     "random": lambda seed: make_agent("random", seed),
     "shuffled oracle": ShuffledOracle,
     "careless oracle": CarelessOracle,
+    "undoing oracle": UndoingOracle,
 }
 """By name: how to make the player, given a seed."""
 

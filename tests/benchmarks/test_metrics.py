@@ -181,6 +181,17 @@ def test_a_search_is_answered_by_having_gone_where_the_task_says(episode, step):
     assert scored.key_action_precision == 1.0
 
 
+@pytest.mark.parametrize("found", [True, False])
+def test_an_old_record_of_a_search_says_by_its_success_whether_it_was_found(episode, step, found):
+    end = step("end", interactable=("Mug",))
+    old = search(episode, ("navigate to CounterTop", end)).model_copy(
+        update={"search_targets": None, "success": found}
+    )
+    assert score_episode(old, CORRECTED).success is found
+    new = old.model_copy(update={"search_targets": ["CreditCard"]})
+    assert not score_episode(new, CORRECTED).success  # whatever the environment said
+
+
 @pytest.mark.parametrize(
     ("between", "paper"),
     [

@@ -76,6 +76,7 @@ def test_a_search_whose_old_record_does_not_say_for_what(
     """What was found follows from what the environment said; a report says so in a line."""
     searches = [task for task in ER_1K if task.type.search][:4]
     records = [judge_twice(text_env, task, player).record for task in searches]
+    assert all(record.search_targets for record in records)
     old = [record.model_copy(update={"search_targets": None}) for record in records]
     assert [score_episode(r, CORRECTED) for r in old] == [
         score_episode(r, CORRECTED) for r in records
