@@ -113,7 +113,7 @@ class VLMAgent:
             sees=self._settings.sees,
             scene_text=obs.get("text", ""),
             steps=info["steps"],
-            max_steps=self._task.max_steps,
+            max_steps=info["max_steps"],
         )
         if not self._rounds:
             return Message("user", parts_of(self._prompts.first(now), pictures))

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import click
-import numpy as np
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
@@ -30,7 +29,7 @@ from benchmarks.episode import EpisodeRecord
 from benchmarks.metrics import score_episode
 from benchmarks.play import episode_seed, play_episode
 from benchmarks.scorers import CORRECTED, judged
-from er_gym.envs.actions import ACTIONS, INDEX, Action
+from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.protocol import PROTOCOLS
 from er_gym.envs.solver import Solver
@@ -67,7 +66,7 @@ def by_the_whole(action: Action, info: Mapping[str, Any]) -> Action:
     """``put in Sink`` for ``put in SinkBasin`` where that is legal; another action as it is."""
     for whole, basin in BASIN_OF.items():
         named = Action(action.verb, whole)
-        if action == Action(verbs.PUT, basin) and info["action_mask"][INDEX[named]]:
+        if action == Action(verbs.PUT, basin) and named in info["legal"]:
             return named
     return action
 
@@ -122,7 +121,7 @@ class CarelessOracle:
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """The solver's next step, or any."""
         if self._draw.random() < _CARELESS:
-            return Decision(self._draw.choice(np.flatnonzero(info["action_mask"]).tolist()))
+            return Decision(self._draw.choice(info["legal"]))
         return Decision(self._solver.next(info)[0])
 
 
@@ -147,11 +146,7 @@ class UndoingOracle:
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """The solver's next step; before ``end``, one of :data:`_UNDOING`."""
         action, _ = self._solver.next(info)
-        undoing = [
-            ACTIONS[k]
-            for k in np.flatnonzero(info["action_mask"]).tolist()
-            if ACTIONS[k].verb in _UNDOING
-        ]
+        undoing = [legal for legal in info["legal"] if legal.verb in _UNDOING]
         if action.verb == verbs.END and undoing and not self._undone:
             self._undone = True
             action = self._draw.choice(undoing)

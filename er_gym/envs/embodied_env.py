@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
@@ -16,6 +16,7 @@ from er_gym.envs import instances as which
 from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS, Action, AnyAction
 from er_gym.envs.conduct import Setting
+from er_gym.envs.info import Info, LegalActions
 from er_gym.envs.legality import Known
 from er_gym.envs.observations import (
     MAX_REPEATS,
@@ -76,6 +77,11 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     - ``rgb``: the agent's view, ``(height, width, 3)`` uint8.
     - ``state``: ``(D,)`` float32 in [-1, 1], see :data:`er_gym.envs.observations.STATE_LAYOUT`.
     - ``text``: the task, what is seen, held and possible, and feedback, in words.
+
+    ## Info
+    ``reset`` and ``step`` return an :class:`er_gym.envs.info.Info`: what is ``visible``, ``held``,
+    ``navigable``, ``interactable`` and ``legal`` now, what came of the action, the steps taken and
+    allowed, and how far the task has come.
 
     ## Rewards
     Each key action of the task is worth its reward (1) once, in any order unless the type of task
@@ -218,9 +224,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._goal_unmet: tuple[Condition, ...] = ()
         placed = skills.place(controller, pose)
         self._take_in(placed)
-        return self._observation("You look around the room.", True), self._info(
-            None, "", placed.success, "", "You look around the room."
-        )
+        feedback = "You look around the room."
+        info = self._info(None, "", placed.success, "", feedback)
+        return self._observation(feedback, True), cast(dict[str, Any], info)
 
     def step(self, action: AnyAction) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Do an action: an index, an :class:`~er_gym.envs.actions.Action` or its text.
@@ -406,7 +412,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         info["end_appended"] = appended
         if views:
             info["views"] = {name: view.picture for name, view in views.items()}
-        return self._observation(feedback, success), reward, terminated, truncated, info
+        obs = self._observation(feedback, success)
+        return obs, reward, terminated, truncated, cast(dict[str, Any], info)
 
     def _observation(self, feedback: str, success: bool) -> dict[str, Any]:
         situation = Situation(
@@ -425,7 +432,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     def _info(
         self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
-    ) -> dict[str, Any]:
+    ) -> Info:
+        mask = self.action_masks()
         return {
             "task": self.task,
             "action": action,
@@ -437,11 +445,15 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             "goal_unmet": self._goal_unmet,
             "key_actions_done": self._progress.done,
             "key_actions_left": self._progress.left,
+            "visible": self._percept.visible_names,
+            "held": self._percept.held_name,
             "navigable": self._known.names,
             "interactable": self._around.in_reach,
+            "legal": LegalActions(mask),
+            "action_mask": mask,
             "steps": self._steps,
+            "max_steps": self._limit,
             "end_reason": self._end_reason,
-            "action_mask": self.action_masks(),
         }
 
 

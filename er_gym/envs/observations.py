@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from er_gym.envs.actions import Action
 from er_gym.envs.legality import Known, Surroundings
-from er_gym.envs.percept import Percept, names
+from er_gym.envs.percept import Percept
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
 from er_gym.thor.objects import KIND_OF, TYPES
@@ -268,13 +268,12 @@ def _plain(text: str) -> str:
 
 
 def _text(situation: Situation) -> str:
-    objects = situation.percept.objects
-    held = "nothing" if objects.held < 0 else objects.type_of(objects.held)
+    percept = situation.percept
     lines = (
         f"Task: {situation.instruction}",
         f"Step {situation.steps} of {situation.max_steps}. {situation.feedback}",
-        f"You see: {', '.join(names(situation.percept.visible_types)) or 'nothing'}.",
-        f"You hold: {held}.",
+        f"You see: {', '.join(percept.visible_names) or 'nothing'}.",
+        f"You hold: {percept.held_name or 'nothing'}.",
         f"You can navigate to: {', '.join(situation.known.names) or 'nothing'}.",
         f"Within reach: {', '.join(situation.around.in_reach) or 'nothing'}.",
     )

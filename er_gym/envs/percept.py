@@ -47,6 +47,17 @@ class Percept:
         return annotated(self.frame, self.boxes)
 
     @cached_property
+    def visible_names(self) -> tuple[str, ...]:
+        """The names of the types of which something is visible, in alphabetical order."""
+        return names(self.visible_types)
+
+    @property
+    def held_name(self) -> str:
+        """The type of what is in the hand, ``""`` when that is empty."""
+        held = self.objects.held
+        return "" if held < 0 else self.objects.type_of(held)
+
+    @cached_property
     def visible_types(self) -> NDArray[np.bool_]:
         """(T,) bool: the types of which something is visible."""
         return marked(self.objects.kinds[self.visible])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from er_gym.envs.actions import INDEX, Action
+from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import BASIN_OF, same_type
 from er_gym.tasks.task import KeyAction, type_of_id
@@ -48,15 +48,15 @@ class Solver:
                 return Action(verbs.NAVIGATE, name)
             return self._explore(info)
         stuck = info["action"] == Action(key.verb, key.actual_type) and not info["action_success"]
-        if stuck and key.verb == verbs.OPEN and _legal(Action(verbs.TOGGLE, name), info):
+        if stuck and key.verb == verbs.OPEN and Action(verbs.TOGGLE, name) in info["legal"]:
             return Action(verbs.TOGGLE, name)  # an appliance opens only when it is off
         for candidate in (key.actual_type, BASIN_OF.get(key.actual_type, key.actual_type)):
             action = Action(key.verb, candidate)
-            if _legal(action, info):
+            if action in info["legal"]:
                 return action
         if key.verb == verbs.PUT:
             to_open = Action(verbs.OPEN, name)
-            if _legal(to_open, info):
+            if to_open in info["legal"]:
                 return to_open
         tried = self._tried[key] = self._tried.get(key, -1) + 1
         nearer = list(_nearer(key, name, info))
@@ -114,8 +114,3 @@ def _name_in(wanted: str, *lists: Sequence[str]) -> str:
             if same_type(name, wanted):
                 return name
     return wanted
-
-
-def _legal(action: Action, info: Mapping[str, Any]) -> bool:
-    index = INDEX.get(action)
-    return index is not None and bool(info["action_mask"][index])

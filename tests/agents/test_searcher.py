@@ -144,7 +144,12 @@ class Blinkered:
     """An agent from whom all is kept that only the environment should know."""
 
     obs_mode = "text"
-    told = frozenset({"navigable", "interactable", "action_mask", "action_success", "feedback"})
+    told = frozenset(
+        {
+            *("visible", "held", "navigable", "interactable", "legal", "action_mask"),
+            *("action_success", "feedback", "steps", "max_steps"),
+        }
+    )
 
     def __init__(self) -> None:
         self.agent = make_agent("searcher")

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Container, Generator, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 from agents.base import Decision
 from agents.scripted.searcher import places, words
 from agents.scripted.searcher.words import Goal, understand
-from er_gym.envs.actions import INDEX, Action
+from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 
@@ -33,36 +32,32 @@ class _OutOfSteps(Exception):
 
 @dataclass
 class View:
-    """What is perceived after a step, read from the text observation and ``info``."""
+    """What ``info`` tells of what is perceived after a step."""
 
     sees: frozenset[str]
     holds: str
     navigable: tuple[str, ...]
     reach: frozenset[str]
-    mask: Any
+    legal: Container[Action]
     done: bool
     left: int
 
     @staticmethod
-    def of(obs: Mapping[str, Any], info: Mapping[str, Any]) -> View:
+    def of(info: Mapping[str, Any]) -> View:
         """Read it."""
-        text = obs["text"]
-        said = dict(re.findall(r"^(You see|You hold): (.*)\.$", text, re.MULTILINE))
-        step, limit = re.findall(r"^Step (\d+) of (\d+)\.", text, re.MULTILINE)[0]
         return View(
-            sees=frozenset(said["You see"].split(", ")),
-            holds=said["You hold"].replace("nothing", ""),
-            navigable=tuple(info["navigable"]),
+            sees=frozenset(info["visible"]),
+            holds=info["held"],
+            navigable=info["navigable"],
             reach=frozenset(info["interactable"]),
-            mask=info["action_mask"],
-            done=bool(info["action_success"]),
-            left=int(limit) - int(step) - _RESERVE,
+            legal=info["legal"],
+            done=info["action_success"],
+            left=info["max_steps"] - info["steps"] - _RESERVE,
         )
 
     def may(self, verb: str, object_type: str) -> bool:
         """Whether an action is legal."""
-        index = INDEX.get(Action(verb, object_type))
-        return index is not None and bool(self.mask[index])
+        return Action(verb, object_type) in self.legal
 
 
 @dataclass
@@ -113,7 +108,7 @@ class SearcherAgent:
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """The next step of the plan, given what came of the last one."""
-        self._view = View.of(obs, info)
+        self._view = View.of(info)
         self._note()
         try:
             action = next(self._play)

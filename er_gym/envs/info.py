@@ -1,0 +1,112 @@
+"""What ``reset`` and ``step`` return as ``info``: a documented record, :class:`Info`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TypedDict, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.envs.actions import ACTIONS, INDEX, Action, parse
+from er_gym.tasks.goal import Condition
+from er_gym.tasks.task import KeyAction, Task
+
+
+class LegalActions(Sequence[Action]):
+    """The actions that a mask allows, in the order of :data:`er_gym.envs.actions.ACTIONS`.
+
+    They are worked out when they are asked for, which a step need not wait for.
+    ``"open Fridge" in legal``, or the same as an :class:`~er_gym.envs.actions.Action`, looks at
+    one place of the mask only.
+
+    Args:
+        mask: (len(ACTIONS),) int8: 1 for each action that is legal.
+    """
+
+    def __init__(self, mask: NDArray[np.int8]) -> None:
+        self._mask = mask
+
+    def __contains__(self, action: object) -> bool:
+        named = parse(action) if isinstance(action, str) else action
+        index = INDEX.get(named) if isinstance(named, Action) else None
+        return index is not None and bool(self._mask[index])
+
+    def __iter__(self) -> Iterator[Action]:
+        return (ACTIONS[k] for k in self._mask.nonzero()[0].tolist())
+
+    def __len__(self) -> int:
+        return int(np.count_nonzero(self._mask))
+
+    @overload
+    def __getitem__(self, place: int) -> Action: ...
+    @overload
+    def __getitem__(self, place: slice) -> tuple[Action, ...]: ...
+    def __getitem__(self, place: int | slice) -> Action | tuple[Action, ...]:
+        return tuple(self)[place]
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, LegalActions):
+            return NotImplemented
+        return np.array_equal(self._mask, other._mask)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"LegalActions({', '.join(map(str, self))})"
+
+
+class _Always(TypedDict):
+    """What every ``info`` has."""
+
+    task: Task
+    """What is asked. It holds the key actions, which an agent should not look at."""
+    action: Action | None
+    """What was done; None after ``reset`` and after a reply that names no known action."""
+    action_text: str
+    """The action as it was given to ``step``; ``""`` after ``reset``."""
+    action_success: bool
+    """Whether it was legal and the simulator did it; after ``reset``, whether the agent could be
+    placed."""
+    object_id: str
+    """The object that the action was done to, ``""`` for none."""
+    feedback: str
+    """What the agent is told about the action, a sentence or two."""
+    visible: tuple[str, ...]
+    """Types of which the agent sees an object now, in alphabetical order."""
+    held: str
+    """The type of the object in the agent's hand, ``""`` for none."""
+    navigable: tuple[str, ...]
+    """Types that may be gone to: what was plain to see since ``reset``, and what the task lists."""
+    interactable: tuple[str, ...]
+    """Types of which an object is in reach now, in alphabetical order. Which verbs it takes,
+    ``legal`` says."""
+    legal: LegalActions
+    """The actions that are legal now."""
+    action_mask: NDArray[np.int8]
+    """The same by index, for learners: (len(ACTIONS),) int8, 1 for each that is legal."""
+    steps: int
+    """How many steps were taken; placing the agent is the first."""
+    max_steps: int
+    """The step limit of this episode, the placing included."""
+    key_actions_done: tuple[KeyAction, ...]
+    """In the order in which they were done (:mod:`er_gym.tasks.judge`)."""
+    key_actions_left: tuple[KeyAction, ...]
+    """In the order of the task."""
+    success: bool
+    """Whether the task is done: decided at ``end``, False before."""
+    goal_unmet: tuple[Condition, ...]
+    """What of the task's goal did not hold at ``end``; empty before."""
+    end_reason: str
+    """Why the episode is over, ``""`` while it is not: ``"end"``, ``"step limit"``,
+    ``"repeated action"`` or ``"no known action"``."""
+
+
+class Info(_Always, total=False):
+    """What ``reset`` and ``step`` tell beside the observation."""
+
+    end_appended: bool
+    """After ``step``: whether the paper's protocol appended an ``end`` to the episode."""
+    views: dict[str, NDArray[np.uint8] | None]
+    """After ``observe``: the picture of each view by its direction, (height, width, 3) uint8; None
+    where none is drawn."""
