@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.envs.arguments import shown
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.thor import OBJECT_TYPES
@@ -32,8 +33,9 @@ class Action:
         return f"{self.verb} {self.object_type}".rstrip()
 
 
-AnyAction: TypeAlias = Action | str | int | np.integer[Any]
-"""What an environment takes: an action, its text, or its index in :data:`ACTIONS`."""
+AnyAction: TypeAlias = Action | str | int | np.integer[Any] | NDArray[np.integer[Any]]
+"""What an environment takes: an action, its text, or its index in :data:`ACTIONS`; the index may be
+an array of one element, shape () or (1,), as learners' ``predict`` returns it."""
 NO_ACTION = "(no action) "
 """A text that begins with this names no action, whatever follows."""
 _PROPERTY_FOR = {
@@ -93,12 +95,12 @@ def understand(action: AnyAction) -> tuple[Action | None, str]:
     """The action meant, None if a text names none; and the text.
 
     Raises:
-        gymnasium.error.InvalidAction: it is neither text nor an action nor its index.
+        gymnasium.error.InvalidAction: see :func:`text_of`.
     """
     text = text_of(action)
     if isinstance(action, str | Action):
         return parse(text), text
-    return ACTIONS[int(action)], text
+    return ACTIONS[_index_of(action)], text
 
 
 def text_of(action: AnyAction) -> str:
@@ -109,9 +111,19 @@ def text_of(action: AnyAction) -> str:
     """
     if isinstance(action, str | Action):
         return str(action)
-    if isinstance(action, int | np.integer | np.ndarray) and 0 <= int(action) < len(ACTIONS):
-        return str(ACTIONS[int(action)])
+    index = _index_of(action)
+    if 0 <= index < len(ACTIONS):
+        return str(ACTIONS[index])
     raise gymnasium.error.InvalidAction(
-        f"{action!r} is no action: give an index from 0 to {len(ACTIONS) - 1}, an Action, or text "
-        "such as 'navigate to Fridge'"
+        f"{shown(action)} is no action: give an index from 0 to {len(ACTIONS) - 1} (an int, or an "
+        "array with one integer), an Action, or text such as 'navigate to Fridge'"
     )
+
+
+def _index_of(action: object) -> int:
+    """The index that a number stands for; -1 for what stands for none."""
+    if isinstance(action, int | np.integer) and not isinstance(action, bool):
+        return int(action)
+    if isinstance(action, np.ndarray) and action.shape in ((), (1,)) and action.dtype.kind in "iu":
+        return int(action.item())
+    return -1

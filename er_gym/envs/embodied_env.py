@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, cast
@@ -15,7 +17,9 @@ from numpy.typing import NDArray
 from er_gym.envs import instances as which
 from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS, Action, AnyAction
+from er_gym.envs.arguments import flag, number, one_of, shown, whole
 from er_gym.envs.conduct import Setting
+from er_gym.envs.errors import ResetNeeded
 from er_gym.envs.info import Info, LegalActions
 from er_gym.envs.legality import Known
 from er_gym.envs.observations import (
@@ -34,14 +38,24 @@ from er_gym.tasks.goal import Condition, unmet
 from er_gym.tasks.judge import Criteria, Progress
 from er_gym.tasks.start import begin
 from er_gym.tasks.task import AgentPose, Task
+from er_gym.tasks.types import TaskType
 from er_gym.tasks.types import task_type as look_up_type
-from er_gym.thor import make_controller
+from er_gym.thor import BACKENDS, RENDER_DEVICES, make_controller
 from er_gym.thor.objects import ENTRY_KEYS
 
 MAX_UNKNOWN = 3
 """So many replies in a row that name no known action end the episode."""
 _CUT_OFF = frozenset({"step limit", "no known action"})
 """Why an episode ends that the agent does not end."""
+_NOT_BEGUN, _CLOSED = "no episode has begun", "the environment is closed"
+_BROKEN_OFF = "the last reset or step was broken off by an error"
+"""Why there is no episode to ask about."""
+_LARGEST_SIDE = 4096
+"""Of a picture, pixels."""
+_SMALLEST_GRID, _LARGEST_GRID = 0.01, 5.0
+"""Metres. AI2-THOR allows less, but working out where the agent can stand then takes minutes."""
+_LONGEST_QUOTE = 200
+"""An answer quotes no more characters than this of what it does not understand."""
 
 
 class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
@@ -56,7 +70,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     ``Discrete`` over :data:`er_gym.envs.actions.ACTIONS`, the same in every scene: ``observe``,
     ``move forward``, ``end``, and a verb with an object type for ``navigate to``, ``pickup``, ``put
     in``, ``open``, ``close``, ``toggle`` and ``slice``. ``step`` also takes an
-    :class:`~er_gym.envs.actions.Action` or its text (``"navigate to Fridge"``).
+    :class:`~er_gym.envs.actions.Action` or its text (``"navigate to Fridge"``), and the index as an
+    array of one integer, as learners' ``predict`` returns it.
     ``info["action_mask"]`` and :meth:`action_masks` say which are legal now.
 
     - ``navigate to`` goes to where the object can be handled. Legal for what is, or was once in
@@ -101,7 +116,14 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     ## Episode End
     Terminates on ``end``; on the fourth same action in a row; on the third reply in a row that
     names no known action (such a reply costs no step). Truncates at ``max_steps``, placing the
-    agent counting as the first step. ``info["end_reason"]`` says which.
+    agent counting as the first step. ``info["end_reason"]`` says which, and ``info["max_steps"]``
+    how many steps this episode has.
+
+    ## Copies and Threads
+    ``copy.deepcopy`` and ``pickle`` keep the episode: the copy plays the same task and the same
+    actions again when it is made, and goes on with equal observations. On ``backend="unity"``,
+    which does not repeat itself exactly, only an environment without an episode can be copied.
+    Threads that share an environment wait for each other.
 
     ## Arguments
     - ``episode_source``: what episodes are drawn from: a list of tasks; the name of a suite
@@ -117,7 +139,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
       (interaction), whatever the task.
     - ``protocol``: ``"default"``, or ``"paper"`` to play by the rules of the paper's evaluation
       program (:mod:`er_gym.envs.protocol`).
-    - ``max_steps``: default: the task type's own.
+    - ``max_steps``: 1 or more; default: the task type's own.
+    - ``step_penalty``, ``illegal_penalty``: 0 or more, see Rewards.
     - ``render_device``: what the embedded engine draws with, one for all environments of a process:
       ``"cpu"``, or ``"gpu"`` where there is one with EGL.
     - ``annotate``: write the types of things into the pictures, as set-of-marks prompting does.
@@ -156,44 +179,53 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             max_steps=max_steps, step_penalty=step_penalty, illegal_penalty=illegal_penalty,
             annotate=annotate, render_device=render_device, render_mode=render_mode,
         )  # fmt: skip
-        if instances not in which.POLICIES:
-            raise ValueError(
-                f"unknown instances {instances!r}; choose one of: {', '.join(which.POLICIES)}"
-            )
+        # Everything is looked at before anything is started.
+        one_of("instances", instances, which.POLICIES)
         self._protocol = protocol_named(protocol)
         if self._protocol.chooses_instances and instances != which.TARGET:
             raise ValueError(
                 f"the {protocol} protocol decides itself what a type name stands for; "
                 f"leave out instances={instances!r}"
             )
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"unknown render_mode {render_mode!r}; choose 'rgb_array' or None")
-        self._live: EpisodeSource | None = None
-        self._generates = isinstance(episode_source, str) and episode_source == GENERATE
-        self._source = self._from(episode_source)
-        self._task_type = look_up_type(task_type) if task_type else None
-        self.render_mode = render_mode
+        if render_mode is not None:
+            one_of("render_mode", render_mode, self.metadata["render_modes"])
+        width = whole("width", width, 1, _LARGEST_SIDE)
+        height = whole("height", height, 1, _LARGEST_SIDE)
+        annotate = flag("annotate", annotate)
+        self._backend = one_of("backend", backend, BACKENDS)
+        self._grid_size = number("grid_size", grid_size, _SMALLEST_GRID, _LARGEST_GRID)
+        self._step_penalty = number("step_penalty", step_penalty, 0)
+        self._illegal_penalty = number("illegal_penalty", illegal_penalty, 0)
+        self._max_steps = None if max_steps is None else whole("max_steps", max_steps, 1)
+        self._task_type: TaskType | None = None
+        if task_type is not None:
+            self._task_type = look_up_type(task_type)
         self._obs = parse_obs_mode(obs_mode)
         self._draws = "rgb" in self._obs
         self._instances = instances
-        self._max_steps = max_steps
-        self._step_penalty, self._illegal_penalty = step_penalty, illegal_penalty
-        self._grid_size = grid_size
-        self._backend = backend
+        self.render_mode = render_mode
         self._controller_arguments: dict[str, Any] = {
             "width": width,
             "height": height,
-            "fieldOfView": field_of_view,
-            "gridSize": grid_size,
-            "visibilityDistance": visibility_distance,
+            "fieldOfView": number("field_of_view", field_of_view, 0, 180, above=True),
+            "gridSize": self._grid_size,
+            "visibilityDistance": number("visibility_distance", visibility_distance, 0, above=True),
             "snapToGrid": False,
             "headless": not self._draws,
             "renderInstanceSegmentation": annotate and self._draws,
         }
+        one_of("render_device", render_device, RENDER_DEVICES)
         if self._draws and backend == "embedded":
             self._controller_arguments["render_device"] = render_device
+        self._live: EpisodeSource | None = None
+        self._generates = isinstance(episode_source, str) and episode_source == GENERATE
+        self._source = self._from(episode_source)
         self._controller: Any = None
         self._percept: Percept  # what was taken in last; nothing before the first reset
+        self._alone = threading.RLock()
+        self._missing = _NOT_BEGUN  # why there is no episode, "" if there is one
+        self._end_reason = ""
+        self._done: list[AnyAction] = []  # in this episode, so that a copy can do it again
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = spaces.Dict(
             {name: OBSERVATIONS[name].space(width, height) for name in self._obs}
@@ -204,21 +236,157 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin an episode; ``options`` may pin its ``task``, ``scene`` or ``suite``."""
-        super().reset(seed=seed)
-        self.task = self._choose(**_checked(options or {}))
-        controller = self._started_controller(self.task.scene)
-        bounds = begin(controller, self.task.scene, self.task.start).metadata["sceneBounds"]
-        floor = skills.reachable(controller, (self._backend, self.task.scene, self._grid_size))
+        """Begin an episode; ``options`` may pin its ``task``, ``scene`` or ``suite``.
+
+        Raises:
+            ValueError: an option does not fit, or there is no such task; what was under way goes
+                on.
+            gymnasium.error.Error: the seed is no whole number from 0.
+        """
+        checked = _checked({} if options is None else options)
+        with self._alone:
+            super().reset(seed=seed)
+            return self._begin(self._choose(**checked))
+
+    def step(self, action: AnyAction) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Do an action: an index, an :class:`~er_gym.envs.actions.Action` or its text.
+
+        Raises:
+            ResetNeeded: there is no episode, or it is over.
+            gymnasium.error.InvalidAction: an index that is out of range, or something else that is
+                no action at all; the episode goes on. (Text that names no known action is answered,
+                not raised, numbers included: models write them.)
+        """
+        with self._alone:
+            self._need_episode("step()")
+            if self._end_reason:
+                raise ResetNeeded(
+                    f"the episode is over ({self._end_reason}): call reset() before step()"
+                )
+            return self._do(action)
+
+    def action_masks(self) -> NDArray[np.int8]:
+        """(len(ACTIONS),) int8: 1 for each action that is legal now."""
+        with self._alone:
+            self._need_episode("action_masks()")
+            return self._conduct.legal(self._around, self._known)
+
+    @property
+    def task(self) -> Task:
+        """The task of the episode."""
+        self._need_episode("asking for the task")
+        return self._task
+
+    @property
+    def agent_pose(self) -> AgentPose:
+        """Where the agent is now."""
+        self._need_episode("asking for the agent's pose")
+        return self._percept.pose
+
+    @property
+    def objects(self) -> Sequence[Mapping[str, Any]]:
+        """AI2-THOR's metadata of all objects, as they are now; a copy of the caller's own."""
+        with self._alone:
+            self._need_episode("asking for the objects")
+            # Nine times as quick as deepcopy, and metadata are plain.
+            return pickle.loads(pickle.dumps(self._all_objects()))  # type: ignore[no-any-return]
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``; the array
+        is the caller's own."""
+        with self._alone:
+            self._need_episode("render()")
+            if self.render_mode is None:
+                gymnasium.logger.warn(
+                    "render() draws nothing, since the environment was made without a render_mode; "
+                    "make it with render_mode='rgb_array'"
+                )
+                return None
+            if self._percept.frame is None:
+                headless, self._controller.headless = self._controller.headless, False
+                frame = self._controller.step(action="Pass").frame
+                self._controller.headless = headless
+                self._percept = replace(self._percept, frame=frame)
+            return np.array(self._percept.picture)
+
+    def close(self) -> None:
+        """Stop the controller, and the generator if there is one; ``reset`` opens them again."""
+        with self._alone:
+            if self._controller is not None:
+                self._controller.stop()
+                self._controller = None
+            self._missing = _CLOSED
+            live, self._live = self._live, None
+            getattr(live, "close", lambda: None)()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy is made of: the arguments, the task, and what has been done so far.
+
+        Raises:
+            gymnasium.error.Error: there is an episode, and it is Unity's.
+        """
+        with self._alone:
+            if not self._missing and self._backend != "embedded":
+                raise gymnasium.error.Error(
+                    f"an episode on backend {self._backend!r} cannot be copied, since it does not "
+                    "repeat itself exactly: copy the environment before reset(), or reset another "
+                    "with options={'task': env.unwrapped.task} and do the same actions there"
+                )
+            return {
+                **EzPickle.__getstate__(self),
+                "random": (self._np_random, self._np_random_seed, self.action_space),
+                "missing": self._missing,
+                "episode": None if self._missing else (self._task, self._done, self._standing),
+            }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Make the environment anew, and do again what has been done.
+
+        Raises:
+            gymnasium.error.Error: that has led elsewhere, as in a changed version of er-gym.
+        """
+        EzPickle.__setstate__(self, state)
+        if state["episode"] is not None:
+            task, done, standing = state["episode"]
+            self._begin(task)
+            for action in done:
+                self._do(action)
+            if self._standing != standing:
+                self.close()
+                raise gymnasium.error.Error(
+                    f"the episode of task {task.id} did not come out the same when it was played "
+                    "again; reset a new environment instead"
+                )
+        self._missing = state["missing"]
+        self._np_random, self._np_random_seed, self.action_space = state["random"]
+
+    # -- the loop's parts ------------------------------------------------------------------------
+
+    def _need_episode(self, before: str) -> None:
+        if self._missing:
+            raise ResetNeeded(f"{self._missing}: call reset() before {before}")
+
+    @property
+    def _standing(self) -> tuple[Any, ...]:
+        """What tells two courses of an episode apart."""
+        return self._percept.pose, self._steps, self._end_reason, self._known.names
+
+    def _begin(self, task: Task) -> tuple[dict[str, Any], dict[str, Any]]:
+        self._missing = _BROKEN_OFF  # until all of it is done
+        self._task = task
+        self._done = []
+        controller = self._started_controller(task.scene)
+        bounds = begin(controller, task.scene, task.start).metadata["sceneBounds"]
+        floor = skills.reachable(controller, (self._backend, task.scene, self._grid_size))
         pose = self._protocol.start(bounds, floor)
-        self._memory = Memory(pose, goal_row(self.task.instruction))
-        self._progress = Progress.start(Criteria.of(self.task))
-        self._known = Known(self.task.navigable_objects)
+        self._memory = Memory(pose, goal_row(task.instruction))
+        self._progress = Progress.start(Criteria.of(task))
+        self._known = Known(task.navigable_objects)
         self._conduct = self._protocol.conduct(
-            Setting(self.task, controller, floor, pose, self._grid_size, self._instances)
+            Setting(task, controller, floor, pose, self._grid_size, self._instances)
         )
         self._steps = 1
-        self._limit = self._max_steps or self.task.max_steps
+        self._limit = self._max_steps or task.max_steps
         self._unknown = 0
         self._end_reason = ""
         self._goal_unmet: tuple[Condition, ...] = ()
@@ -226,19 +394,21 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._take_in(placed)
         feedback = "You look around the room."
         info = self._info(None, "", placed.success, "", feedback)
-        return self._observation(feedback, True), cast(dict[str, Any], info)
+        answer = self._observation(feedback, True), cast(dict[str, Any], info)
+        self._missing = ""
+        return answer
 
-    def step(self, action: AnyAction) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Do an action: an index, an :class:`~er_gym.envs.actions.Action` or its text.
-
-        Raises:
-            gymnasium.error.ResetNeeded: there is no episode, or it is over.
-            gymnasium.error.InvalidAction: an index that is out of range, or something else that is
-                no action at all. (Text that names no known action is answered, not raised.)
-        """
-        if self._controller is None or self._end_reason:
-            raise gymnasium.error.ResetNeeded("call reset() first: no episode is under way")
+    def _do(self, action: AnyAction) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         understood, text = self._protocol.understand(action, self._percept.objects)
+        self._missing = _BROKEN_OFF  # until all of it is done
+        self._done.append(int(action) if isinstance(action, np.ndarray) else action)
+        answer = self._answer(understood, text)
+        self._missing = ""
+        return answer
+
+    def _answer(
+        self, understood: Action | None, text: str
+    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         if understood is None:
             return self._not_understood(text)
         self._unknown = 0
@@ -269,41 +439,6 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         return self._reply(
             understood, text, outcome.success, object_id, feedback, reward, outcome.views
         )
-
-    def action_masks(self) -> NDArray[np.int8]:
-        """(len(ACTIONS),) int8: 1 for each action that is legal now."""
-        return self._conduct.legal(self._around, self._known)
-
-    @property
-    def agent_pose(self) -> AgentPose:
-        """Where the agent is now."""
-        return self._percept.pose
-
-    @property
-    def objects(self) -> Sequence[Mapping[str, Any]]:
-        """AI2-THOR's metadata of all objects, as they are now."""
-        return self._controller.last_event.metadata["objects"]  # type: ignore[no-any-return]
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``."""
-        if self.render_mode is None or self._controller is None:
-            return None
-        if self._percept.frame is None:
-            headless, self._controller.headless = self._controller.headless, False
-            frame = self._controller.step(action="Pass").frame
-            self._controller.headless = headless
-            self._percept = replace(self._percept, frame=frame)
-        return np.ascontiguousarray(self._percept.picture)
-
-    def close(self) -> None:
-        """Stop the controller, and the generator if there is one."""
-        if self._controller is not None:
-            self._controller.stop()
-            self._controller = None
-        live, self._live = self._live, None
-        getattr(live, "close", lambda: None)()
-
-    # -- the loop's parts ------------------------------------------------------------------------
 
     def _started_controller(self, scene: str) -> Any:
         if self._controller is None:
@@ -358,8 +493,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         """The reward that an action earned, by the rules of :mod:`er_gym.tasks.judge`."""
         if not outcome.success:
             return 0.0
-        if action.verb == verbs.END and self.task.goal:
-            self._goal_unmet = unmet(self.task.goal, self._objects_of_goal(), self._around.in_reach)
+        if action.verb == verbs.END and self._task.goal:
+            self._goal_unmet = unmet(self._task.goal, self._objects_of_goal(), self._around.in_reach)
         self._progress, reward = self._progress.after(
             action.verb,
             action.object_type,
@@ -372,10 +507,13 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _objects_of_goal(self) -> Sequence[Mapping[str, Any]]:
         """Metadata of the objects that the goal is about; of all, where it asks for more than is
         at hand, since that takes longer than the rest of a step."""
-        goal = self.task.goal
+        goal = self._task.goal
         if all(name in ENTRY_KEYS for condition in goal for name, _ in condition.state):
             return self._percept.objects.entries({condition.object_type for condition in goal})
-        return self.objects
+        return self._all_objects()
+
+    def _all_objects(self) -> Sequence[Mapping[str, Any]]:
+        return self._controller.last_event.metadata["objects"]  # type: ignore[no-any-return]
 
     def _not_understood(
         self, text: str
@@ -385,8 +523,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             self._memory.forget_last()
         if self._unknown >= MAX_UNKNOWN:
             self._end_reason = "no known action"
+        quoted = text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
         feedback = (
-            f"{text!r} names no action. Say one of: {', '.join(verbs.BARE_VERBS)}; or one of "
+            f"{quoted!r} names no action. Say one of: {', '.join(verbs.BARE_VERBS)}; or one of "
             f"{', '.join(verbs.OBJECT_VERBS)} with an object type, such as 'navigate to Fridge'."
         )
         return self._reply(None, text, False, "", feedback, 0.0)
@@ -411,7 +550,11 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         info = self._info(action, text, success, object_id, feedback)
         info["end_appended"] = appended
         if views:
-            info["views"] = {name: view.picture for name, view in views.items()}
+            # Copies: a view's frame may be what the next observation is made of.
+            info["views"] = {
+                name: None if view.picture is None else np.array(view.picture)
+                for name, view in views.items()
+            }
         obs = self._observation(feedback, success)
         return obs, reward, terminated, truncated, cast(dict[str, Any], info)
 
@@ -421,7 +564,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             around=self._around,
             memory=self._memory,
             known=self._known,
-            instruction=self.task.instruction,
+            instruction=self._task.instruction,
             feedback=feedback,
             at=self._at_kind,
             success=success,
@@ -433,9 +576,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _info(
         self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
     ) -> Info:
-        mask = self.action_masks()
+        mask = self._conduct.legal(self._around, self._known)
         return {
-            "task": self.task,
+            "task": self._task,
             "action": action,
             "action_text": text,
             "action_success": success,
@@ -458,13 +601,18 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
 
 def _checked(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    unknown = options.keys() - {"task", "scene", "suite"}
+    if not isinstance(options, Mapping):
+        raise ValueError(
+            f"options at reset are {shown(options)}; give a dictionary such as "
+            "{'scene': 'FloorPlan1'}"
+        )
+    unknown = sorted(shown(name) for name in options if name not in ("task", "scene", "suite"))
     if unknown:
-        raise ValueError(f"unknown option {min(unknown)!r} at reset; there are: task, scene, suite")
+        raise ValueError(f"unknown option {unknown[0]} at reset; there are: task, scene, suite")
     for name, kinds in (("task", Task | str), ("scene", str)):
-        if not isinstance(options.get(name), kinds | None):
+        if not isinstance(options.get(name), kinds | None) or options.get(name) == "":
             raise ValueError(
-                f"option {name!r} at reset is {options[name]!r}; give a "
+                f"option {name!r} at reset is {shown(options[name])}; give a "
                 f"{'Task or its id' if name == 'task' else 'scene such as FloorPlan1'}"
             )
     return options

@@ -45,6 +45,10 @@ class Live:
         self._room: Callable[[str, int], Generator]
         self._room = lru_cache(_KEPT)(partial(arranged, self._controller))
 
+    def __reduce__(self) -> tuple[type[Live], tuple[Making]]:
+        # A copy has engines of its own; what is drawn depends on the random generator alone.
+        return Live, (self._making,)
+
     def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
         """A task that the solver has just done."""
         if scene and scene not in SCENE_NAMES:

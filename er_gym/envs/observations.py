@@ -19,6 +19,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from er_gym.envs.actions import Action
+from er_gym.envs.arguments import shown
 from er_gym.envs.legality import Known, Surroundings
 from er_gym.envs.percept import Percept
 from er_gym.tasks import verbs
@@ -309,10 +310,10 @@ def parse_obs_mode(obs_mode: str) -> tuple[str, ...]:
     Raises:
         ValueError: it names something that is no kind of observation, or nothing, or one twice.
     """
-    kinds = tuple(obs_mode.split("+"))
+    kinds = tuple(obs_mode.split("+")) if isinstance(obs_mode, str) else ("",)
     if len(set(kinds)) < len(kinds) or not set(kinds) <= OBSERVATIONS.keys():
         raise ValueError(
-            f"unknown obs_mode {obs_mode!r}; join any of {', '.join(OBSERVATIONS)} with '+', "
+            f"unknown obs_mode {shown(obs_mode)}; join any of {', '.join(OBSERVATIONS)} with '+', "
             "such as 'rgb+text'"
         )
     return kinds

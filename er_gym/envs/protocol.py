@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from er_gym.envs.actions import Action, AnyAction, understand
+from er_gym.envs.arguments import one_of
 from er_gym.envs.conduct import Conduct, DefaultConduct, Setting
 from er_gym.envs.paper_approach import start_in_corner
 from er_gym.envs.paper_conduct import PaperConduct, understand_as_paper
@@ -75,6 +76,4 @@ def protocol_named(name: str) -> EpisodeProtocol:
     Raises:
         ValueError: there is none of that name; the message lists those there are.
     """
-    if name not in PROTOCOLS:
-        raise ValueError(f"unknown protocol {name!r}; choose one of: {', '.join(PROTOCOLS)}")
-    return PROTOCOLS[name]
+    return PROTOCOLS[one_of("protocol", name, PROTOCOLS)]

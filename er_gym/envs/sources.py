@@ -11,6 +11,7 @@ from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
+from er_gym.envs.arguments import shown
 from er_gym.tasks.errors import TaskFileError, in_short, told_once
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite, suite_file, suite_from_file
@@ -113,7 +114,7 @@ def make_source(source: Source) -> EpisodeSource:
     Raises:
         ValueError: there is no such suite, or the file cannot be used.
     """
-    if source == GENERATE:
+    if isinstance(source, str) and source == GENERATE:
         # Late: what verifies tasks is made of environments, which are made of sources.
         from er_gym.envs.live import Live
 
@@ -134,7 +135,7 @@ def make_source(source: Source) -> EpisodeSource:
         if len(tasks) == len(source):
             return TaskList(tasks)
     raise ValueError(
-        f"{source!r} is no source of episodes; give a suite's name, a task file, "
+        f"{shown(source)} is no source of episodes; give a suite's name, a task file, "
         f"{GENERATE!r}, a list of tasks, or an EpisodeSource"
     )
 

@@ -66,7 +66,7 @@ def task_type(name: str) -> TaskType:
     Raises:
         ValueError: there is no such type; the message lists those there are.
     """
-    found = BY_NAME.get(name) or BY_ENV_ID.get(name)
+    found = BY_NAME.get(name) or BY_ENV_ID.get(name) if isinstance(name, str) else None
     if found is None:
         raise ValueError(f"unknown task type {name!r}; choose one of: {', '.join(BY_NAME)}")
     return found

@@ -2,7 +2,7 @@
 
 from er_gym.sim.compatibility import accepts, placement_table
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError
-from er_gym.thor.backends import BACKENDS, BackendError, make_controller
+from er_gym.thor.backends import BACKENDS, RENDER_DEVICES, BackendError, make_controller
 from er_gym.thor.launcher import thor_executable
 from er_gym.thor.object_types import OBJECT_TYPES, ObjectType
 from er_gym.thor.objects import ObjectTable, objects_of
@@ -10,6 +10,7 @@ from er_gym.thor.objects import ObjectTable, objects_of
 __all__ = [
     "BACKENDS",
     "OBJECT_TYPES",
+    "RENDER_DEVICES",
     "SCENE_NAMES",
     "BackendError",
     "ObjectTable",

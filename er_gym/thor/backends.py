@@ -16,6 +16,11 @@ class BackendError(RuntimeError):
     """An engine cannot be started on this machine; the message says what would mend it."""
 
 
+RENDER_DEVICES = ("cpu", "gpu")
+"""What the embedded engine can draw with. As in the engine, which is too heavy to import for this;
+a test compares."""
+
+
 def _embedded(arguments: dict[str, Any]) -> Controller:
     from er_gym.sim.controller import EmbeddedController
 

@@ -15,6 +15,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.envs.arguments import shown
+
 HASHED = "hashed"
 MODEL = "sentence-transformers:"
 """What the name of an encoder begins with that is a model of sentence-transformers."""
@@ -73,7 +75,7 @@ def make_encoder(name: str = HASHED) -> Encoder:
     # A configuration may hold anything.
     is_model = isinstance(name, str) and name.startswith(MODEL) and name != MODEL
     if name != HASHED and not is_model:
-        raise ValueError(f"unknown encoder {name!r}; give {_ALLOWED}")
+        raise ValueError(f"unknown encoder {shown(name)}; give {_ALLOWED}")
     return _made(name)
 
 

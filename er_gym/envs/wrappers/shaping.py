@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
 from typing import Any
 
 import gymnasium
 from gymnasium.utils import RecordConstructorArgs
 
+from er_gym.envs.arguments import number
 from er_gym.envs.wrappers.base import TaskWrapper, told
 
 
@@ -51,10 +51,8 @@ class KeyActionShaping(TaskWrapper, RecordConstructorArgs):
         Raises:
             ValueError: gamma or scale is out of its range.
         """
-        if not 0.0 <= gamma <= 1.0:
-            raise ValueError(f"gamma is {gamma!r}; give the learner's discount, from 0 to 1")
-        if not (isfinite(scale) and scale >= 0.0):
-            raise ValueError(f"scale is {scale!r}; give a finite number, 0 or more")
+        gamma = number("gamma", gamma, 0, 1, allowed="the learner's discount, from 0 to 1")
+        scale = number("scale", scale, 0, allowed="a finite number, 0 or more")
         RecordConstructorArgs.__init__(self, gamma=gamma, scale=scale)
         TaskWrapper.__init__(self, env)
         self._gamma, self._scale = gamma, scale
