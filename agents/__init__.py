@@ -32,15 +32,17 @@ AGENTS: dict[str, Callable[[int], Agent]] = {
 """By name: how to make the agent, given a seed."""
 
 
-def make_agent(name: str, seed: int = 0) -> Agent:
+def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
     """An agent by name: one of :data:`AGENTS`, ``rl:RUN`` for a trained policy, or, with the
     settings that are the default, one that speaks (:mod:`agents.vlm.speaker`).
+
+    ``trust``: whether a policy may be read from a file that can run code (:mod:`agents.rl.saved`).
 
     Raises:
         ValueError: there is none of that name; the message lists those there are.
     """
     if name.startswith(RL):
-        return _trained(name.removeprefix(RL))
+        return _trained(name.removeprefix(RL), trust)
     if speaks(name):
         return _speaker(name).agent(seed)
     make = AGENTS.get(name)
@@ -57,11 +59,11 @@ def _speaker(name: str) -> Speaker:
     return Speaker(name, AgentSettings())
 
 
-def _trained(path: str) -> Agent:
+def _trained(path: str, trust: bool) -> Agent:
     try:
         from agents.rl.agent import RLAgent  # late: torch
     except ImportError as error:
         raise ValueError(
             f"agent {RL}{path} needs {error.name}, which is not installed: pip install 'er-gym[rl]'"
         ) from error
-    return RLAgent(path)
+    return RLAgent(path, trust)

@@ -25,8 +25,10 @@ import numpy as np
 from rich.console import Console
 
 from agents import make_agent
-from agents.rl.callbacks import MODEL, read_curve
+from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig, load_config
+from agents.rl.saved import FOREIGN, MODEL
+from benchmarks.cli_options import trust_option
 from benchmarks.curves import draw_curves
 from benchmarks.metrics import Score, score_episode, wilson
 from benchmarks.progress import Progress
@@ -65,7 +67,7 @@ class Trained:
         Raises:
             ValueError: it is none, or its training is not at its end.
         """
-        if not (path / MODEL).exists():
+        if not any((path / name).exists() for name in (MODEL, FOREIGN)):
             raise ValueError(f"{path} has no {MODEL}; give run directories of er-gym train-rl")
         trained = Trained(path, load_config(path / "config.yaml"))
         if trained.steps < trained.config.total_steps:
@@ -102,10 +104,11 @@ class Player:
     Args:
         work: where the episodes are kept.
         workers: how many processes.
+        trust: whether policies may be read from files of Stable-Baselines3.
     """
 
-    def __init__(self, work: Path, workers: int) -> None:
-        self._work, self._workers = work, workers
+    def __init__(self, work: Path, workers: int, trust: bool = False) -> None:
+        self._work, self._workers, self._trust = work, workers, trust
         self._console = Console(stderr=True)
 
     def play(self, agent: str, tasks: Sequence[Task], where: str, name: str) -> list[Score]:
@@ -115,7 +118,7 @@ class Player:
             suite_digest=jsonl_format.digest(tasks),
             suite_size=len(tasks),
             agent=agent,
-            env={"instances": "explore", "obs_mode": make_agent(agent).obs_mode}
+            env={"instances": "explore", "obs_mode": make_agent(agent, trust=self._trust).obs_mode}
             | _picture_size(agent),
             seed=_SEED,
             er_gym=__version__,
@@ -128,6 +131,7 @@ class Player:
                 store,
                 tasks,
                 workers=self._workers,
+                trust=self._trust,
                 on_episode=lambda episode: progress.episode(
                     score_episode(episode, CORRECTED).success
                 ),
@@ -196,13 +200,16 @@ def machine() -> str:
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True)
 @click.option("--each", type=click.IntRange(min=1), default=_EACH, help="Tasks of a type.")
 @click.option("--out", type=click.Path(path_type=Path), default=_DOCS / "baselines.md")
-def main(runs: tuple[Path, ...], work: Path, workers: int, each: int, out: Path) -> None:
+@trust_option
+def main(
+    runs: tuple[Path, ...], work: Path, workers: int, each: int, out: Path, trust: bool
+) -> None:
     """Write docs/baselines.md and its pictures."""
     families: defaultdict[str, list[Trained]] = defaultdict(list)
     for path in runs:
         trained = Trained.load(path)
         families[trained.name].append(trained)
-    player = Player(work, workers)
+    player = Player(work, workers, trust)
     unseen = load_suite(UNSEEN).tasks
     parts = []
     for name, members in families.items():

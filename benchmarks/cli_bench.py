@@ -27,6 +27,7 @@ from benchmarks.cli_options import (
     scorer_option,
     split,
     stdout,
+    trust_option,
 )
 
 if TYPE_CHECKING:
@@ -106,6 +107,7 @@ def _spoken_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--shard", metavar="I/N", help="Play the I-th of N parts, such as 2/8.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--backend", help="The engine: embedded or unity.  [default: the suite's]")
+@trust_option
 @click.option("--instances", help="What a type name stands for.  [default: the suite's]")
 @protocol_option
 @scorer_option
@@ -122,6 +124,7 @@ def bench(
     shard: str | None,
     seed: int,
     backend: str | None,
+    trust: bool,
     instances: str | None,
     protocol: str,
     scorer: str,
@@ -135,6 +138,7 @@ def bench(
     """
     from rich.console import Console
 
+    from agents import RL
     from agents.base import CannotGoOn
     from benchmarks.metrics import score_episode
     from benchmarks.pool import WorkerSetupError
@@ -154,7 +158,11 @@ def bench(
         part = Shard.parse(shard) if shard else None
         asked = _load_suite(suite, tasks_file, poses, protocol)
         voice = _voice(agent, spoken)
-        env = _env_kwargs(asked, agent, seed, voice, protocol, backend=backend, instances=instances)
+        if trust and not agent.startswith(RL):
+            raise BadInput(f"--trust is for trained policies, {RL}RUN, not for {agent}")
+        env = _env_kwargs(
+            asked, agent, seed, voice, protocol, trust, backend=backend, instances=instances
+        )
         fitted = resolve_tasks(asked.tasks, env["backend"])
         aside = (*asked.set_aside, *fitted.set_aside)
         if aside and not fitted.tasks:
@@ -184,7 +192,7 @@ def bench(
     before = finished(store, chosen)
     succeeded = sum(score_episode(episode, judge).success for episode in before)
     try:
-        with _player(store, chosen, workers, voice) as (play, spent):
+        with _player(store, chosen, workers, voice, trust) as (play, spent):
             progress = Progress(
                 terminal, f"{asked.name}, {agent}", len(chosen), len(before), succeeded, spent
             )
@@ -218,14 +226,19 @@ def bench(
 
 @contextmanager
 def _player(
-    store: RunStore, chosen: Sequence[Task], workers: int, voice: Voice | None
+    store: RunStore, chosen: Sequence[Task], workers: int, voice: Voice | None, trust: bool
 ) -> Iterator[tuple[Callable[[OnEpisode, Say], Outcome], Callable[[], str]]]:
     """How the chosen tasks are played, and how to hear what that has cost."""
     from agents.base import CannotGoOn
     from benchmarks.runner import run
 
     if voice is None:
-        yield lambda on_episode, _: run(store, chosen, workers=workers, on_episode=on_episode), str
+        yield (
+            lambda on_episode, _: run(
+                store, chosen, workers=workers, on_episode=on_episode, trust=trust
+            ),
+            str,
+        )
         return
     with bad_input(CannotGoOn):  # no key, no such model
         speaker = voice.speaker(store.path)
@@ -264,7 +277,13 @@ def _load_suite(
 
 
 def _env_kwargs(
-    suite: Suite, agent: str, seed: int, voice: Voice | None, protocol: str, **given: str | None
+    suite: Suite,
+    agent: str,
+    seed: int,
+    voice: Voice | None,
+    protocol: str,
+    trust: bool,
+    **given: str | None,
 ) -> dict[str, Any]:
     """The environment's arguments: the suite's, overruled by the options that were given, and the
     observations that the agent needs. Agent and environment are made once, to hear of what is wrong
@@ -285,7 +304,7 @@ def _env_kwargs(
             f"unknown backend {env['backend']!r}; choose one of: {', '.join(BACKENDS)}"
         )
     if voice is None:
-        env["obs_mode"] = make_agent(agent, seed=seed).obs_mode
+        env["obs_mode"] = make_agent(agent, seed=seed, trust=trust).obs_mode
     else:
         env |= voice.env
     EmbodiedEnv((), **env)

@@ -45,6 +45,12 @@ agent_config_option = click.option(
     "--agent-config", metavar="FILE", help="An agent's settings, in YAML, or their name."
 )
 
+trust_option = click.option(
+    "--trust",
+    is_flag=True,
+    help="Read a policy from a file of Stable-Baselines3 too, which runs whatever code is in it.",
+)
+
 
 def overrides_option(example: str) -> Any:
     """``--set NAME=VALUE``, which overrules settings of a file."""

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from benchmarks.cli_errors import INTERRUPTED, BadInput, bad_input, complain
-from benchmarks.cli_options import overrides_option
+from benchmarks.cli_options import overrides_option, trust_option
 
 
 @click.command(name="train-rl")
@@ -25,7 +25,10 @@ from benchmarks.cli_options import overrides_option
     type=click.Path(file_okay=False, path_type=Path),
     help="The run directory.  [default: runs/rl/CONFIG-SEED]",
 )
-def train_rl(config: str, overrides: tuple[str, ...], seed: int | None, out: Path | None) -> int:
+@trust_option
+def train_rl(
+    config: str, overrides: tuple[str, ...], seed: int | None, out: Path | None, trust: bool
+) -> int:
     """Train a policy by reinforcement learning; needs the extra rl.
 
     The same command again continues from the last checkpoint. `er-gym bench --agent rl:RUN` plays a
@@ -46,7 +49,7 @@ def train_rl(config: str, overrides: tuple[str, ...], seed: int | None, out: Pat
         ) from error
     try:
         with bad_input():
-            model = training.train(wanted, run, show_progress=True)
+            model = training.train(wanted, run, show_progress=True, trust=trust)
     except (RuntimeError, EOFError) as error:
         raise click.ClickException(f"{error}; what has been learnt is in {run}") from error
     except KeyboardInterrupt:

@@ -55,7 +55,8 @@ def play_episode(
         task: what to play.
         seed: passed to ``env.reset``.
         agent_name: how the record names the agent; its class name by default.
-        max_steps: the step limit if ``env`` was made with one; the task's own by default.
+        max_steps: the step limit that ``env`` was made with, for the record of an episode that
+            crashes before ``env`` tells it; the task's own by default.
 
     Raises:
         CannotGoOn: the agent says that no further episode can be played; there is no record of
@@ -85,7 +86,7 @@ def play_episode(
         task,
         agent=agent_name or type(agent).__name__,
         seed=seed,
-        max_steps=max_steps,
+        max_steps=info.get("max_steps", max_steps),
         steps=steps,
         success=bool(info.get("success", False)) and not error,
         goal_unmet=[str(condition) for condition in info.get("goal_unmet", ())],

@@ -81,8 +81,8 @@ class Player:
     not depend on what this worker played before.
     """
 
-    def __init__(self, agent: str, env: Mapping[str, Any], seed: int) -> None:
-        self._agent = agent
+    def __init__(self, agent: str, env: Mapping[str, Any], seed: int, trust: bool = False) -> None:
+        self._agent, self._trust = agent, trust
         self._kwargs = dict(env)
         self._seed = seed
         self._env: EmbodiedEnv | None = self._make_env()
@@ -95,9 +95,15 @@ class Player:
         try:
             if self._env is None:
                 self._env = self._make_env()
-            agent = make_agent(self._agent, seed=seed)
+            agent = make_agent(self._agent, seed=seed, trust=self._trust)
         except Exception as error:  # as in play_episode, one must not end the run
-            return record_episode(task, agent=self._agent, seed=seed, error=one_line(error))
+            return record_episode(
+                task,
+                agent=self._agent,
+                seed=seed,
+                max_steps=self._kwargs.get("max_steps"),
+                error=one_line(error),
+            )
         record = play_episode(
             self._env,
             agent,
@@ -145,6 +151,7 @@ def run(
     *,
     workers: int = 1,
     on_episode: Callable[[EpisodeRecord], None] = lambda episode: None,
+    trust: bool = False,
 ) -> Outcome:
     """Play the tasks that the store has no finished episode of.
 
@@ -156,6 +163,7 @@ def run(
         tasks: what to play.
         workers: how many processes.
         on_episode: called in this process with each episode once it is kept.
+        trust: see :func:`agents.make_agent`. It is no part of the manifest, which may be anybody's.
 
     Raises:
         WorkerSetupError: the environment cannot be made in a worker.
@@ -164,7 +172,7 @@ def run(
     manifest = store.manifest
     done = {episode.task_id for episode in finished(store, tasks)}
     todo = [task for task in tasks if task.id not in done]
-    player = partial(Player, manifest.agent, manifest.env, manifest.seed)
+    player = partial(Player, manifest.agent, manifest.env, manifest.seed, trust)
     crashed = []
     with closing(do_jobs(player, todo, workers=workers)) as results:
         for task, result in results:
@@ -182,5 +190,6 @@ def lost_episode(task: Task, lost: Lost, store: RunStore) -> EpisodeRecord:
         task,
         agent=store.manifest.agent,
         seed=episode_seed(store.manifest.seed, task.id),
+        max_steps=store.manifest.env.get("max_steps"),
         error=f"the worker process died {lost.tries} times, last with exit code {lost.exitcode}",
     )

@@ -195,7 +195,11 @@ class _Run:
             raise
         except Exception as error:  # as in play_episode, one must not end the run
             return None, record_episode(
-                task, agent=manifest.agent, seed=seed, error=one_line(error)
+                task,
+                agent=manifest.agent,
+                seed=seed,
+                max_steps=manifest.env.get("max_steps"),
+                error=one_line(error),
             )
         record = play_episode(
             env,

@@ -10,10 +10,10 @@ from typing import Any
 import torch
 
 from agents.base import Decision
-from agents.rl.callbacks import MODEL
 from agents.rl.config import load_config
 from agents.rl.perception import Perception
-from agents.rl.train import CONFIG, FAMILIES, load_last
+from agents.rl.saved import FOREIGN, MODEL, untrusted
+from agents.rl.train import CONFIG, FAMILIES, load_model
 from er_gym.envs.actions import ACTIONS
 from er_gym.tasks.task import Task
 
@@ -25,24 +25,22 @@ class RLAgent:
     Of ``info`` it reads the action mask.
 
     Args:
-        path: the run directory, or the model in it.
+        path: the run directory; or a file, whose ``config.yaml`` is beside it: ``model.npz``, or,
+            with ``trust``, one that Stable-Baselines3 wrote.
+        trust: whether whatever code is in the latter may run.
 
     Raises:
+        UntrustedModel: the file can run code, and ``trust`` does not allow that.
         ValueError: there is no such run, or its model cannot be read.
     """
 
-    def __init__(self, path: str | Path) -> None:
-        run = Path(path)
-        run = run.parent if run.name == MODEL else run
-        file = run / MODEL
-        if not file.exists():
-            raise ValueError(
-                f"there is no trained model {file}; give rl: and a directory that "
-                "er-gym train-rl has made"
-            )
-        config = load_config(run / CONFIG)
+    def __init__(self, path: str | Path, trust: bool = False) -> None:
+        file = _model_file(Path(path))
+        if file.suffix == ".zip" and not trust:
+            raise untrusted(file)
+        config = load_config(file.parent / CONFIG)
         family = FAMILIES[config.algorithm.name]
-        self._model = _loaded(run, file.stat().st_mtime_ns)
+        self._model = _loaded(file, file.stat().st_mtime_ns, trust)
         self._masks = not family.needs_mask
         self._perception = Perception(config.env, family.needs_mask)
         self.obs_mode: str = config.env.obs_mode
@@ -63,8 +61,18 @@ class RLAgent:
         return Decision(ACTIONS[int(action)])
 
 
+def _model_file(path: Path) -> Path:
+    for file in (path, path / MODEL, path / FOREIGN):
+        if file.is_file() and (file.name == MODEL or file.suffix == ".zip"):
+            return file
+    raise ValueError(
+        f"there is no trained model {path / MODEL}; give rl: and a directory that er-gym train-rl "
+        "has made"
+    )
+
+
 @lru_cache(maxsize=4)
-def _loaded(run: Path, changed: int) -> Any:
-    """The model of a run, read once for many episodes as long as it does not change."""
+def _loaded(file: Path, changed: int, trust: bool) -> Any:
+    """The model in a file, read once for many episodes as long as it does not change."""
     torch.set_num_threads(1)  # one observation at a time; and there may be several workers
-    return load_last(run)
+    return load_model(file, trust)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,24 +10,14 @@ from typing import Any
 
 import torch
 from sb3_contrib.common.maskable.callbacks import MaskableEvalCallback
-from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import KVWriter
 from stable_baselines3.common.vec_env import VecEnv
 
 from agents.rl.config import Phase
+from agents.rl.saved import save
 
-MODEL = "model.zip"
 CURVE = "curve.jsonl"
-
-
-def save(model: BaseAlgorithm, run: Path) -> None:
-    """Write the model so that whatever is found under its name is whole."""
-    beside = run / f".{MODEL}.{os.getpid()}.zip"
-    model.save(beside)
-    with beside.open("rb") as file:
-        os.fsync(file.fileno())
-    beside.replace(run / MODEL)
 
 
 class Checkpoints(BaseCallback):
@@ -98,14 +87,16 @@ def _is_number(value: object) -> bool:
 
 
 def read_curve(run: Path) -> list[dict[str, float]]:
-    """The lines of a run's curve so far; a half-written last line is left out."""
+    """The lines of a run's curve so far; a half-written line is left out."""
     file = run / CURVE
     lines = []
     for text in file.read_text().splitlines() if file.exists() else ():
         try:
-            lines.append(json.loads(text))
+            line = json.loads(text)
         except json.JSONDecodeError:
-            break
+            continue
+        if isinstance(line, dict) and "steps" in line and "seconds" in line:
+            lines.append(line)
     return lines
 
 

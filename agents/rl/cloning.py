@@ -20,7 +20,11 @@ from agents.rl.vec import WorkerVecEnv
 
 
 def watch(config: TrainConfig, how: WarmStart, seed: int) -> Demonstrations:
-    """Let the teacher play, in as many processes as training has."""
+    """Let the teacher play, in as many processes as training has.
+
+    Raises:
+        ValueError: nothing that it did can be learnt.
+    """
     make = partial(make_env, config.env, config.algorithm.gamma, with_text=True)
     env = WorkerVecEnv([make] * config.vec.workers, config.vec.workers)
     try:
@@ -32,7 +36,14 @@ def watch(config: TrainConfig, how: WarmStart, seed: int) -> Demonstrations:
         )
     finally:
         env.close()
-    return joined(parts)
+    seen = joined(parts)
+    if not len(seen):
+        raise ValueError(
+            f"{how.teacher} showed nothing to learn in {seen.episodes} episodes ({seen.successes} "
+            f"succeeded, {seen.refused} illegal actions, {seen.unread} texts that name no action); "
+            "choose another teacher or easier tasks"
+        )
+    return seen
 
 
 def clone(model: MaskablePPO, seen: Demonstrations, how: WarmStart, seed: int) -> float:

@@ -23,7 +23,7 @@ Rate = Annotated[float, Field(gt=0)]
 
 
 class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 def _known_types(types: tuple[str, ...]) -> tuple[str, ...]:

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from agents import make_agent
 from agents.rl.perception import Obs
-from er_gym.envs.actions import INDEX, Action, parse
+from er_gym.envs.actions import ACTIONS, INDEX, Action, understand
 
 
 @dataclass(frozen=True, eq=False)
 class Demonstrations:
-    """N steps of some episodes.
+    """N steps of some episodes: those in which the teacher did something legal.
 
     Attributes:
         obs: by the observation's keys, (N, …).
@@ -25,6 +26,8 @@ class Demonstrations:
         actions: (N,) what was done.
         returns: (N,) float32, the discounted rewards from there to the end of the episode.
         episodes, successes: how many were played, and how many of them succeeded.
+        refused, unread: how many steps are left out because what the teacher did was illegal, or
+            was text that names no action.
     """
 
     obs: Obs
@@ -33,6 +36,8 @@ class Demonstrations:
     returns: NDArray[np.float32]
     episodes: int
     successes: int
+    refused: int = 0
+    unread: int = 0
 
     def __len__(self) -> int:
         return len(self.actions)
@@ -47,11 +52,8 @@ def demonstrate(
         teacher: its name.
         gamma: the discount of ``returns``.
         successes_only: whether the steps of episodes that fail are left out.
-
-    Raises:
-        ValueError: it never succeeded.
     """
-    kept: list[Demonstrations] = []
+    kept = [_of(env, [], gamma)]
     successes = 0
     for _ in range(episodes):
         agent = make_agent(teacher)
@@ -59,21 +61,14 @@ def demonstrate(
         agent.reset(info["task"], info["seen"], info)
         steps, done = [], False
         while not done:
-            action = _index(agent.act(info["seen"], info).action)
-            mask = info["action_mask"]
-            before = obs
+            action = agent.act(info["seen"], info).action
+            mask, before = info["action_mask"], obs
             obs, reward, terminated, truncated, info = env.step(action)
             done = terminated or truncated
-            if mask[action]:  # what was refused is nothing to learn
-                steps.append((before, mask, action, reward))
+            steps.append(_Step(before, mask, understand(action)[0], float(reward)))
         successes += info["success"]
-        if steps and (info["success"] or not successes_only):
-            kept.append(_of(steps, gamma))
-    if not kept:
-        raise ValueError(
-            f"{teacher} succeeded in none of {episodes} episodes; choose another teacher or "
-            "easier tasks"
-        )
+        if info["success"] or not successes_only:
+            kept.append(_of(env, steps, gamma))
     return replace(joined(kept), episodes=episodes, successes=successes)
 
 
@@ -86,25 +81,44 @@ def joined(parts: Sequence[Demonstrations]) -> Demonstrations:
         returns=np.concatenate([part.returns for part in parts]),
         episodes=sum(part.episodes for part in parts),
         successes=sum(part.successes for part in parts),
+        refused=sum(part.refused for part in parts),
+        unread=sum(part.unread for part in parts),
     )
 
 
-def _of(steps: Sequence[tuple[Obs, NDArray[np.int8], int, float]], gamma: float) -> Demonstrations:
-    all_obs, masks, actions, rewards = zip(*steps, strict=True)
+class _Step(NamedTuple):
+    obs: Obs
+    mask: NDArray[np.int8]
+    action: Action | None
+    reward: float
+
+    @property
+    def index(self) -> int:
+        """Of the action; -1 for one that is not in the action space."""
+        return -1 if self.action is None else INDEX.get(self.action, -1)
+
+
+def _of(env: gymnasium.Env[Obs, Any], steps: Sequence[_Step], gamma: float) -> Demonstrations:
+    """An episode. What is left out of it is nothing to learn, but its reward and the time that it
+    took count in the returns of the steps before."""
     returns = np.zeros(len(steps), np.float32)
     ahead = 0.0
     for number in reversed(range(len(steps))):
-        returns[number] = ahead = rewards[number] + gamma * ahead
+        returns[number] = ahead = steps[number].reward + gamma * ahead
+    rows = [n for n, step in enumerate(steps) if step.index >= 0 and step.mask[step.index]]
+    unread = sum(step.index < 0 for step in steps)
+    space = env.observation_space
+    assert isinstance(space, spaces.Dict)
     return Demonstrations(
-        obs={key: np.stack([each[key] for each in all_obs]) for key in all_obs[0]},
-        masks=np.stack(masks),
-        actions=np.array(actions),
-        returns=returns,
+        obs={
+            key: np.array([steps[n].obs[key] for n in rows], box.dtype).reshape(-1, *box.shape)
+            for key, box in space.spaces.items()
+        },
+        masks=np.array([steps[n].mask for n in rows], np.int8).reshape(-1, len(ACTIONS)),
+        actions=np.array([steps[n].index for n in rows], np.intp),
+        returns=returns[rows] if rows else returns[:0],
         episodes=0,
         successes=0,
+        refused=len(steps) - len(rows) - unread,
+        unread=unread,
     )
-
-
-def _index(action: Action | str | int) -> int:
-    understood = parse(action) if isinstance(action, str) else action
-    return INDEX[understood] if isinstance(understood, Action) else int(understood or 0)

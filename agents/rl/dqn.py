@@ -212,11 +212,11 @@ def make(config: TrainConfig, settings: DQNSettings, env: VecEnv) -> BaseAlgorit
     )
 
 
-def load_dqn(file: Path, env: VecEnv | None = None) -> LegalDQN:
-    """A learner as it was saved, its buffer empty."""
-    return LegalDQN.load(file, env=env, device="cpu")
+def load_foreign_dqn(file: Path) -> LegalDQN:
+    """A learner as Stable-Baselines3 saved it, which may run what is in the file."""
+    return LegalDQN.load(file, device="cpu")
 
 
-def load_qrdqn(file: Path, env: VecEnv | None = None) -> LegalQRDQN:
-    """A learner as it was saved, its buffer empty."""
-    return LegalQRDQN.load(file, env=env, device="cpu")
+def load_foreign_qrdqn(file: Path) -> LegalQRDQN:
+    """A learner as Stable-Baselines3 saved it, which may run what is in the file."""
+    return LegalQRDQN.load(file, device="cpu")

@@ -16,7 +16,7 @@ from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.envs.wrappers import KeyActionShaping
 from er_gym.tasks.task import Task
-from er_gym.tasks.types import BY_NAME, TaskType
+from er_gym.tasks.types import TaskType, task_type
 
 _TRAINING_ONLY = ("step_penalty", "illegal_penalty", "success_bonus", "shaping")
 """What changes the reward."""
@@ -64,8 +64,12 @@ class LearningEnv(gymnasium.Wrapper[Obs, Any, Any, Any]):
         self.observation_space = perception.space
 
     def set_types(self, types: Sequence[str]) -> None:
-        """Draw tasks of these types from the next episode on."""
-        self._types: tuple[TaskType | None, ...] = tuple(BY_NAME[name] for name in types) or (None,)
+        """Draw tasks of these types from the next episode on.
+
+        Raises:
+            ValueError: there is none of that name.
+        """
+        self._types: tuple[TaskType | None, ...] = tuple(map(task_type, types)) or (None,)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

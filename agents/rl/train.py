@@ -1,14 +1,15 @@
 """A training run from its configuration: begun, or continued from its last checkpoint.
 
-A run directory holds ``config.yaml`` (all of the configuration), ``model.zip`` (the last
-checkpoint, whole at any time), ``curve.jsonl`` (what was logged, with steps and seconds) and
-``tensorboard/``. Running the same again continues; when all steps are done it does nothing.
+A run directory holds ``config.yaml`` (all of the configuration), ``model.npz`` (the last
+checkpoint, whole at any time, see :mod:`agents.rl.saved`), ``curve.jsonl`` (what was logged, with
+steps and seconds) and ``tensorboard/``. Running the same again continues; when all steps are done
+it does nothing.
 """
 
 from __future__ import annotations
 
 import json
-import zipfile
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -27,7 +28,6 @@ from torch.distributions import Distribution
 from agents.configs import dump
 from agents.rl import dqn, ppo
 from agents.rl.callbacks import (
-    MODEL,
     ByType,
     Checkpoints,
     Curriculum,
@@ -38,7 +38,10 @@ from agents.rl.callbacks import (
 from agents.rl.cloning import clone, watch
 from agents.rl.config import Episodes, Evaluation, TrainConfig, WarmStart, load_config
 from agents.rl.envs import for_evaluation, make_env
+from agents.rl.perception import Perception
+from agents.rl.saved import FOREIGN, MODEL, nothing, restore, save, untrusted
 from agents.rl.vec import WorkerVecEnv
+from er_gym.envs.actions import ACTIONS
 
 CONFIG = "config.yaml"
 _EVALUATION_SEED = 10_000
@@ -49,15 +52,16 @@ class Family(NamedTuple):
     """How the learners of a family are made and loaded."""
 
     make: Callable[[TrainConfig, Any, VecEnv], BaseAlgorithm]
-    load: Callable[..., BaseAlgorithm]
+    load_foreign: Callable[[Path], BaseAlgorithm]
+    """Reads a file of Stable-Baselines3, which may run what is in it."""
     needs_mask: bool
     """Whether the observation has to hold the action mask."""
 
 
 FAMILIES = {
-    "ppo": Family(ppo.make, ppo.load, needs_mask=False),
-    "dqn": Family(dqn.make, dqn.load_dqn, needs_mask=True),
-    "qrdqn": Family(dqn.make, dqn.load_qrdqn, needs_mask=True),
+    "ppo": Family(ppo.make, ppo.load_foreign, needs_mask=False),
+    "dqn": Family(dqn.make, dqn.load_foreign_dqn, needs_mask=True),
+    "qrdqn": Family(dqn.make, dqn.load_foreign_qrdqn, needs_mask=True),
 }
 
 
@@ -70,6 +74,7 @@ def train(
     run: Path,
     *,
     show_progress: bool = False,
+    trust: bool = False,
     more: tuple[BaseCallback, ...] = (),
 ) -> BaseAlgorithm:
     """Train until ``config.total_steps`` are done; returns the learner.
@@ -77,14 +82,18 @@ def train(
     Args:
         run: the run directory.
         show_progress: whether to draw a bar.
+        trust: whether to read a checkpoint of before that Stable-Baselines3 wrote.
         more: callbacks of the caller's own.
 
     Raises:
         RunConflict: the directory holds a run of another configuration.
+        UntrustedModel: its checkpoint can run code, and ``trust`` does not allow that.
         KeyboardInterrupt: Ctrl-C; what has been learnt is saved.
     """
     prepare(config, run)
-    model = load_last(run)
+    model = load_last(run, trust)
+    if model is not None and not (run / MODEL).exists():
+        save(model, run)  # from now on it needs no trust
     steps = 0 if model is None else model.num_timesteps
     if model is not None and steps >= config.total_steps:
         return model
@@ -152,9 +161,21 @@ def _warm(model: BaseAlgorithm, config: TrainConfig, how: WarmStart, run: Path, 
     seen = watch(config, how, seed)
     agreement = clone(model, seen, how, seed)
     rate = seen.successes / seen.episodes
-    (run / "warm_start.json").write_text(
-        json.dumps({"teacher_success": rate, "steps": len(seen), "agreement": agreement})
-    )
+    told = {
+        "teacher_success": rate,
+        "steps": len(seen),
+        "refused": seen.refused,
+        "unread": seen.unread,
+        "agreement": agreement,
+    }
+    (run / "warm_start.json").write_text(json.dumps(told))
+    if seen.refused or seen.unread:
+        warnings.warn(
+            f"cloning {how.teacher}: of its {len(seen) + seen.refused + seen.unread:,} steps "
+            f"{seen.refused:,} illegal ones and {seen.unread:,} whose text names no action are "
+            "left out",
+            stacklevel=2,
+        )
 
 
 def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOut:
@@ -196,20 +217,44 @@ def _differences(one: dict[str, Any], other: dict[str, Any], path: str = "") -> 
     return ", ".join(filter(None, found))
 
 
-def load_last(run: Path) -> BaseAlgorithm | None:
-    """The learner of a run's last checkpoint, None if there is none yet.
+def load_last(run: Path, trust: bool = False) -> BaseAlgorithm | None:
+    """The learner of a run's last checkpoint, None if there is none yet; see :func:`load_model`."""
+    file = next((run / name for name in (MODEL, FOREIGN) if (run / name).exists()), None)
+    return None if file is None else load_model(file, trust)
+
+
+def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
+    """The learner of a file, as ``config.yaml`` beside it describes it.
+
+    Args:
+        file: ``model.npz``; or, with ``trust``, a file of Stable-Baselines3.
+        trust: whether whatever code is in the latter may run.
 
     Raises:
-        ValueError: it cannot be read.
+        UntrustedModel: it may not. (It is a ValueError.)
+        ValueError: the file cannot be read, or is that of another learner.
     """
-    file = run / MODEL
-    if not file.exists():
-        return None
-    config = load_config(run / CONFIG)
+    foreign = file.suffix == ".zip"
+    if foreign and not trust:
+        raise untrusted(file)
+    config = load_config(file.parent / CONFIG)
+    family = FAMILIES[config.algorithm.name]
+    space = Perception(config.env, family.needs_mask).space
+    model = family.make(config, config.algorithm, nothing(space, len(ACTIONS), config.vec.envs))
+    if not foreign:
+        restore(file, model)
+        return model
     try:
-        return FAMILIES[config.algorithm.name].load(file)
-    except (zipfile.BadZipFile, RuntimeError, KeyError, ValueError) as error:
+        found = family.load_foreign(file)
+    except Exception as error:  # its classes may be anybody's, and raise anything
         raise ValueError(f"{file} cannot be read as a model: {error}") from error
+    for name in ("observation_space", "action_space"):
+        if getattr(found, name) != getattr(model, name):
+            raise ValueError(
+                f"{file} has the {name} {getattr(found, name)}, and {CONFIG} beside it asks for "
+                f"{getattr(model, name)}; give the {CONFIG} of its own run"
+            )
+    return found
 
 
 def vectorised(config: TrainConfig, options: Episodes, seed: int) -> VecEnv:

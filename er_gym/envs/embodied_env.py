@@ -401,7 +401,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _do(self, action: AnyAction) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         understood, text = self._protocol.understand(action, self._percept.objects)
         self._missing = _BROKEN_OFF  # until all of it is done
-        self._done.append(int(action) if isinstance(action, np.ndarray) else action)
+        self._done.append(int(action.item()) if isinstance(action, np.ndarray) else action)
         answer = self._answer(understood, text)
         self._missing = ""
         return answer

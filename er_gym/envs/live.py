@@ -7,6 +7,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
+from er_gym.envs.arguments import shown
 from er_gym.envs.verify import Verifier, unwanted, with_difficulty
 from er_gym.tasks.generate import Generator, arranged
 from er_gym.tasks.making import Making
@@ -52,7 +53,7 @@ class Live:
     def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
         """A task that the solver has just done."""
         if scene and scene not in SCENE_NAMES:
-            raise ValueError(f"unknown scene {scene!r}; give a name such as FloorPlan1")
+            raise ValueError(f"unknown scene {shown(scene)}; give a name such as FloorPlan1")
         kinds = [task_type] if task_type else self._kinds
         rooms = (scene,) if scene else self._making.rooms
         for _ in range(_ROOMS):
@@ -78,7 +79,7 @@ class Live:
     def find(self, task_id: str) -> Task:
         """There are no tasks to be found by their ids."""
         raise ValueError(
-            f"no task {task_id!r}: tasks that are generated live cannot be asked for by id; "
+            f"no task {shown(task_id)}: tasks that are generated live cannot be asked for by id; "
             "pass the Task itself"
         )
 

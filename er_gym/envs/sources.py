@@ -18,6 +18,8 @@ from er_gym.tasks.suites import load_suite, suite_file, suite_from_file
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TaskType
 
+_LONGEST_NAME = 80
+"""No message quotes more of a name."""
 GENERATE = "generate"
 """The name of the endless source."""
 
@@ -72,7 +74,7 @@ class TaskList:
         kind = task_type.name if task_type else ""
         fitting = self._fitting.get((kind, scene or ""))
         if not fitting:
-            asked = " ".join(filter(None, [kind, "tasks", scene and f"in {scene}"]))
+            asked = " ".join(filter(None, [kind, "tasks", scene and f"in {scene[:_LONGEST_NAME]}"]))
             among = f" among its {len(self.tasks)} tasks" if self.tasks else ""
             raise ValueError(f"{self._name} has no {asked}{among}")
         return fitting[int(rng.integers(len(fitting)))]
@@ -98,7 +100,7 @@ class TaskList:
         for task in self.tasks:
             if task.id == task_id:
                 return task
-        raise ValueError(f"no task {task_id!r} among the {len(self.tasks)} of {self._name}")
+        raise ValueError(f"no task {shown(task_id)} among the {len(self.tasks)} of {self._name}")
 
 
 def make_source(source: Source) -> EpisodeSource:

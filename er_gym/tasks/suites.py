@@ -23,6 +23,8 @@ from er_gym.tasks.making import Making
 from er_gym.tasks.task import Task
 
 _PACKAGE = Path(__file__).resolve().parents[1]
+_LONGEST_QUOTE = 80
+"""No message quotes more of a name."""
 _DATA = _PACKAGE / "tasks" / "data"
 _READERS = {
     ".json": paper_format.read_file,
@@ -105,7 +107,7 @@ def suite_config(name: str) -> SuiteConfig:
     """
     if name not in suite_names():
         raise ValueError(
-            f"unknown suite {name!r}; choose one of: {', '.join(suite_names())}; "
+            f"unknown suite {name[:_LONGEST_QUOTE]!r}; choose one of: {', '.join(suite_names())}; "
             "or give a task file"
         )
     file = config_directory("suites") / f"{name}.yaml"

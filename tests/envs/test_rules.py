@@ -138,7 +138,11 @@ def test_an_ended_episode_takes_no_more_actions(env: EmbodiedEnv, play: Play) ->
         env.step("observe")
 
 
-@pytest.mark.parametrize("action", [-1, len(ACTIONS), 2.5, None])
+@pytest.mark.parametrize(
+    "action",
+    [-1, len(ACTIONS), 2.5, None, True, np.array([np.nan]), np.array([True]), [3, 4],
+     np.array([3, 4]), np.array([3.0]), b"observe"],
+)  # fmt: skip
 def test_what_is_no_action_at_all_is_an_error(env: EmbodiedEnv, play: Play, action: object) -> None:
     play(FETCH_CUP)
     with pytest.raises(gymnasium.error.InvalidAction, match="no action"):
@@ -153,8 +157,10 @@ def test_text_index_and_action_are_one(env: EmbodiedEnv) -> None:
     ):
         env.reset(options={"task": FETCH_CUP})
         assert env.step(action)[1] == 1.0
-    env.reset(options={"task": FETCH_CUP})
-    assert env.step(INDEX[Action("navigate to", "Cabinet")])[1] == 1.0
+    index = INDEX[Action("navigate to", "Cabinet")]
+    for action in (index, np.int64(index), np.array(index), np.array([index])):  # as predict says
+        env.reset(options={"task": FETCH_CUP})
+        assert env.step(action)[1] == 1.0
 
 
 @pytest.mark.parametrize(

@@ -42,8 +42,8 @@ class InstructionEmbedding(TaskWrapper, RecordConstructorArgs):
         space = env.observation_space
         if not isinstance(space, spaces.Dict) or KEY in space.spaces:
             raise ValueError(
-                f"cannot add {KEY!r} to the observations {space}; wrap an environment, once, whose "
-                "observation space is a Dict, as those of er-gym are"
+                f"cannot add {KEY!r} to observations that are a {_kind(space)}; wrap an "
+                "environment, once, whose observation space is a Dict, as those of er-gym are"
             )
         # The name, not the encoder: it is short to pickle, and a process loads a model only once.
         self._encoder = encoder
@@ -69,3 +69,9 @@ class InstructionEmbedding(TaskWrapper, RecordConstructorArgs):
     def _with_instruction(self, obs: dict[str, Any]) -> dict[str, Any]:
         # A copy: whoever writes into one observation must not change the next.
         return {**obs, KEY: self._embedding.copy()}
+
+
+def _kind(space: spaces.Space[Any]) -> str:
+    if isinstance(space, spaces.Dict):
+        return f"Dict of {', '.join(map(str, space.spaces))}"
+    return type(space).__name__

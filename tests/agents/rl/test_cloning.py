@@ -9,10 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import agents.rl.demonstrations
+from agents.base import Decision
 from agents.rl.cloning import clone, watch
 from agents.rl.config import TrainConfig, WarmStart
+from agents.rl.demonstrations import demonstrate
 from agents.rl.envs import make_env
 from agents.rl.train import FAMILIES, train, vectorised
+from er_gym.envs.actions import INDEX, Action
 
 Make = Callable[..., TrainConfig]
 
@@ -65,3 +69,58 @@ def test_a_run_begins_warm(make_config: Make, tmp_path: Path) -> None:
     noted = json.loads((tmp_path / "run" / "warm_start.json").read_text())
     assert 0 < noted["agreement"] <= 1
     assert 0 < noted["teacher_success"] <= 1
+
+
+class Mumbler:
+    """Says nonsense, then what cannot be done, then the end."""
+
+    def __init__(self) -> None:
+        self.says = iter(("hm", "open Apple", "pickup Mug", "end"))
+
+    def reset(self, *_: object) -> None:
+        """Nothing to prepare."""
+
+    def act(self, *_: object) -> Decision:
+        return Decision(next(self.says))
+
+
+def test_what_names_no_action_is_left_out_and_counted(
+    make_config: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(agents.rl.demonstrations, "make_agent", lambda _: Mumbler())
+    config = make_config(
+        env={"episodes": "mini", "types": ["single_toggle"], "illegal_penalty": 0.5}
+    )
+    env = make_env(config.env, with_text=True)
+    env.reset(seed=0)
+    seen = demonstrate(env, "mumbler", 2, 0.9, False)
+    assert (seen.episodes, seen.unread, seen.refused) == (2, 4, 2)
+    assert seen.actions.tolist() == [INDEX[Action("end")]] * 2
+    assert len(demonstrate(env, "mumbler", 1, 0.9, True)) == 0  # it never succeeds
+    env.close()
+
+
+def test_a_step_left_out_counts_in_the_returns_before_it(
+    make_config: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Backward(Mumbler):
+        def __init__(self) -> None:
+            self.says = iter(("observe", "pickup Mug", "end"))
+
+    monkeypatch.setattr(agents.rl.demonstrations, "make_agent", lambda _: Backward())
+    config = make_config(
+        env={"episodes": "mini", "types": ["single_toggle"], "illegal_penalty": 0.5}
+    )
+    env = make_env(config.env, with_text=True)
+    env.reset(seed=0)
+    seen = demonstrate(env, "backward", 1, 0.9, False)
+    step = config.env.step_penalty
+    assert seen.returns[1] == pytest.approx(-step)
+    assert seen.returns[0] == pytest.approx(-step - 0.9 * (step + 0.5) - 0.81 * step)
+    env.close()
+
+
+def test_a_teacher_that_shows_nothing_is_one_clear_error(make_config: Make) -> None:
+    config = make_config(env={"episodes": "mini", "types": ["single_pickup"], "max_steps": 1})
+    with pytest.raises(ValueError, match=r"oracle showed nothing to learn in 2 episodes \(0 succ"):
+        watch(config, WarmStart(teacher="oracle", episodes=2), seed=0)

@@ -19,10 +19,10 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
 from agents.rl import dqn
 from agents.rl.agent import RLAgent
-from agents.rl.callbacks import save
 from agents.rl.config import Episodes, Network, TrainConfig, Vectorised
 from agents.rl.envs import make_env
-from agents.rl.train import FAMILIES, prepare
+from agents.rl.saved import save
+from agents.rl.train import FAMILIES, load_last, prepare
 from er_gym.envs.actions import INDEX
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks.suites import load_suite
@@ -149,8 +149,9 @@ def test_learning_stays_finite(env: VecEnv, name: str) -> None:
 def test_what_is_loaded_acts_alike(env: VecEnv, name: str, tmp_path: Path) -> None:
     model = learner(env, name)
     model.learn(60, log_interval=None)
-    model.save(tmp_path / "model.zip")
-    loaded = FAMILIES[name].load(tmp_path / "model.zip")
+    prepare(configured(name), tmp_path)
+    save(model, tmp_path)
+    loaded = load_last(tmp_path)
     rows = slice(0, model.replay_buffer.pos)
     obs = {key: value[rows, 0] for key, value in model.replay_buffer.observations.items()}
     one, other = (each.predict(obs, deterministic=True)[0] for each in (model, loaded))
@@ -161,8 +162,10 @@ def test_what_is_loaded_acts_alike(env: VecEnv, name: str, tmp_path: Path) -> No
 def test_a_continued_run_fills_its_buffer_before_it_learns(env: VecEnv, tmp_path: Path) -> None:
     model = learner(env, "qrdqn")
     model.learn(80, log_interval=None)
-    model.save(tmp_path / "model.zip")
-    loaded = dqn.load_qrdqn(tmp_path / "model.zip", env)
+    prepare(configured("qrdqn"), tmp_path)
+    save(model, tmp_path)
+    loaded = load_last(tmp_path)
+    loaded.set_env(env)
     updates = loaded._n_updates
     assert updates > 0
     loaded.learn(32, reset_num_timesteps=False, log_interval=None)

@@ -48,7 +48,7 @@ def test_it_plays_legally_and_the_same_again(run: Path) -> None:
     agent = make_agent(f"rl:{run}")
     assert agent.obs_mode == "state"
     env = EmbodiedEnv((), obs_mode="state", instances="explore")
-    assert played(agent, env, MINI[0]) == played(RLAgent(run / "model.zip"), env, MINI[0])
+    assert played(agent, env, MINI[0]) == played(RLAgent(run / "model.npz"), env, MINI[0])
 
 
 def test_the_benchmark_runner_takes_it(run: Path, tmp_path: Path) -> None:

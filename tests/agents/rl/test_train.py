@@ -16,8 +16,9 @@ import pytest
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.configs import dump
-from agents.rl.callbacks import MODEL, read_curve
+from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig
+from agents.rl.saved import MODEL
 from agents.rl.train import RunConflict, load_last, train
 
 Make = Callable[..., TrainConfig]
@@ -90,7 +91,7 @@ def test_the_run_directory(make_config: Make, tmp_path: Path) -> None:
     assert model.num_timesteps == 512
     assert np.array([5e-324]) * 1.0 > 0  # arithmetic is as it was before
     assert {file.name for file in run.iterdir()} == {
-        "config.yaml", "curve.jsonl", "model.zip", "tensorboard"
+        "config.yaml", "curve.jsonl", "model.npz", "tensorboard"
     }  # fmt: skip
     curve = read_curve(run)
     assert [line["steps"] for line in curve] == sorted(line["steps"] for line in curve)
@@ -134,7 +135,7 @@ def test_a_damaged_model_is_one_clear_error(make_config: Make, tmp_path: Path) -
     run = tmp_path / "run"
     train(make_config(), run)
     (run / MODEL).write_bytes(b"PK")
-    with pytest.raises(ValueError, match=r"model.zip cannot be read as a model"):
+    with pytest.raises(ValueError, match=r"model.npz cannot be read as a model"):
         load_last(run)
 
 

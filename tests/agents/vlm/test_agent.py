@@ -94,6 +94,18 @@ def test_a_model_that_knows_the_way_solves_the_task(env: Callable[..., EmbodiedE
     assert "You see:" in texts(script.sent[0][-1])
 
 
+def test_a_model_is_told_the_limit_that_the_environment_keeps(
+    env: Callable[..., EmbodiedEnv],
+) -> None:
+    script = Script(*decided("observe", "move forward", "observe", "observe"))
+    _, episode = play(env("rgb", max_steps=4), script, settings(sees="pictures"))
+    told = [texts(sent[-1]) for sent in script.sent]
+    assert "You have 3 actions." in told[0]
+    assert ["Actions left: 2." in told[1], "Actions left: 1." in told[2]] == [True, True]
+    assert len(told) == 3
+    assert (episode.max_steps, episode.end_reason) == (4, "step limit")
+
+
 def test_what_was_sent_is_sent_again_unchanged(env: Callable[..., EmbodiedEnv]) -> None:
     script = Script(*decided(*WAY))
     play(env("rgb"), script, settings(sees="pictures"))

@@ -1,0 +1,190 @@
+"""A learner in a file: arrays and JSON, nothing that is run when it is read.
+
+``model.npz`` is NumPy's archive of arrays, read without pickle: ``policy/…`` (the weights),
+``optimizer/N/…`` (what Adam remembers of the N-th of them) and ``about``, JSON in UTF-8 (which
+algorithm, what it sees, how far it has come). What else a learner is, its hyper-parameters and the
+shape of its network, ``config.yaml`` beside it says.
+
+Stable-Baselines3's own files, ``model.zip`` of runs of before among them, hold pickled objects.
+Reading one runs whatever code its maker put there, so that takes an explicit ``trust``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections import deque
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium import spaces
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
+
+MODEL = "model.npz"
+FOREIGN = "model.zip"
+"""What Stable-Baselines3 writes, and what runs of er-gym 0.1.0 hold."""
+_FORMAT = 1
+_ABOUT = "about"
+_COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_n_calls", "exploration_rate")
+"""How far a learner has come; not every algorithm has all of them."""
+_HEADER = 4096
+"""Bytes that an array's header may take in the archive."""
+_LONGEST_ABOUT = 1_000_000
+
+Arrays = dict[str, NDArray[Any]]
+
+
+class UntrustedModel(ValueError):
+    """A file that can run code when it is read; the message says how to read it all the same."""
+
+
+def untrusted(file: Path) -> UntrustedModel:
+    """The refusal of one of Stable-Baselines3's files."""
+    return UntrustedModel(
+        f"{file} is a file of Stable-Baselines3, and reading it runs whatever code is in it: "
+        "if you know who made it, give --trust (in Python: trust=True); "
+        f"er-gym's own runs hold {MODEL}, which needs no trust"
+    )
+
+
+# -- writing -------------------------------------------------------------------------------------
+
+
+def save(model: BaseAlgorithm, run: Path) -> None:
+    """Write the model so that whatever is found under its name is whole."""
+    beside = run / f".{MODEL}.{os.getpid()}.tmp"
+    about = np.frombuffer(json.dumps(_about(model)).encode(), np.uint8)
+    with beside.open("wb") as file:
+        np.savez(file, **{_ABOUT: about}, **_arrays(model))
+        file.flush()
+        os.fsync(file.fileno())
+    beside.replace(run / MODEL)
+
+
+def _arrays(model: BaseAlgorithm) -> Arrays:
+    """By name in the archive: the weights, and what the optimizer remembers."""
+    found = {f"policy/{name}": value for name, value in model.policy.state_dict().items()}
+    for number, entries in model.policy.optimizer.state_dict()["state"].items():
+        found |= {f"optimizer/{number}/{name}": value for name, value in entries.items()}
+    return {name: value.detach().cpu().numpy() for name, value in found.items()}
+
+
+def _about(model: BaseAlgorithm) -> dict[str, Any]:
+    return {
+        "format": _FORMAT,
+        "algorithm": type(model).__name__,
+        "sees": _shapes(model.observation_space),
+        "actions": int(model.action_space.n),
+        "counters": {name: getattr(model, name) for name in _COUNTERS if hasattr(model, name)},
+        # Of the last episodes, for the means in the curve.
+        "episodes": [
+            {"r": float(each["r"]), "l": int(each["l"]), "t": float(each["t"])}
+            for each in model.ep_info_buffer or ()
+        ],
+        "successes": [bool(each) for each in model.ep_success_buffer or ()],
+    }
+
+
+def _shapes(space: spaces.Space[Any]) -> dict[str, list[int]]:
+    assert isinstance(space, spaces.Dict)
+    return {name: list(box.shape or ()) for name, box in space.spaces.items()}
+
+
+# -- reading -------------------------------------------------------------------------------------
+
+
+def restore(file: Path, model: BaseAlgorithm) -> None:
+    """Give a learner that has learnt nothing yet the weights of a file, and how far it had come.
+
+    Raises:
+        ValueError: the file is damaged, or is that of another learner.
+    """
+    try:
+        with zipfile.ZipFile(file) as archive:
+            about = json.loads(_array(archive, _ABOUT, _LONGEST_ABOUT).tobytes().decode())
+            _check(about, model)
+            weights = model.policy.state_dict()
+            policy = {
+                name: _tensor(archive, f"policy/{name}", value) for name, value in weights.items()
+            }
+            optimizer = _optimizer(archive, model)
+        model.set_parameters({"policy": policy, "policy.optimizer": optimizer}, device="cpu")
+        for name in _COUNTERS:
+            if hasattr(model, name):
+                setattr(model, name, type(getattr(model, name))(about["counters"][name]))
+        for name, kept in (("ep_info_buffer", "episodes"), ("ep_success_buffer", "successes")):
+            setattr(model, name, deque(about[kept], maxlen=model._stats_window_size))
+    except (
+        zipfile.BadZipFile, OSError, KeyError, TypeError, ValueError, RuntimeError, MemoryError,
+        NotImplementedError, EOFError,
+    ) as error:  # fmt: skip
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise ValueError(f"{file} cannot be read as a model: {why}") from error
+
+
+def _check(about: Mapping[str, Any], model: BaseAlgorithm) -> None:
+    wanted = _about(model)
+    for name in ("format", "algorithm", "sees", "actions"):
+        if about[name] != wanted[name]:
+            raise ValueError(
+                f"its {name} is {about[name]}, and {wanted[name]} is needed here; use the er-gym "
+                "that it was trained with, or train again"
+            )
+
+
+def _array(archive: zipfile.ZipFile, name: str, most: int) -> NDArray[Any]:
+    """An array of at most so many bytes."""
+    entry = archive.getinfo(f"{name}.npy")
+    if entry.file_size > most + _HEADER:
+        raise ValueError(f"{name} is larger than it can be")
+    with archive.open(entry) as stream:
+        return npy.read_array(stream, allow_pickle=False)
+
+
+def _tensor(archive: zipfile.ZipFile, name: str, like: torch.Tensor) -> torch.Tensor:
+    array = _array(archive, name, like.numel() * like.element_size())
+    wanted = like.detach().cpu().numpy()
+    if array.shape != wanted.shape or array.dtype != wanted.dtype:
+        raise ValueError(
+            f"{name} is {array.dtype} {array.shape}, and {wanted.dtype} {wanted.shape} is needed"
+        )
+    return torch.from_numpy(array)
+
+
+def _optimizer(archive: zipfile.ZipFile, model: BaseAlgorithm) -> dict[str, Any]:
+    """The optimizer's state; what is remembered of a weight is a number or has its shape."""
+    state: dict[int, dict[str, torch.Tensor]] = {}
+    weights = [each for group in model.policy.optimizer.param_groups for each in group["params"]]
+    number = torch.zeros(())
+    for entry in archive.namelist():
+        if not entry.startswith("optimizer/"):
+            continue
+        place, _, name = entry.removeprefix("optimizer/").removesuffix(".npy").partition("/")
+        if not place.isdecimal() or int(place) >= len(weights):
+            raise ValueError(f"{entry} belongs to no weight")
+        like = number if name == "step" else weights[int(place)]
+        state.setdefault(int(place), {})[name] = _tensor(archive, entry[:-4], like)
+    return {"state": state, "param_groups": model.policy.optimizer.state_dict()["param_groups"]}
+
+
+# -- where no environment is needed --------------------------------------------------------------
+
+
+class _Nothing(gymnasium.Env[Any, Any]):
+    """Has spaces, and cannot be played."""
+
+    def __init__(self, sees: spaces.Space[Any], actions: spaces.Discrete) -> None:
+        self.observation_space, self.action_space = sees, actions
+
+
+def nothing(sees: spaces.Space[Any], actions: int, count: int) -> VecEnv:
+    """In place of environments, to make a learner with that only plays, or gets them later."""
+    return DummyVecEnv([lambda: _Nothing(sees, spaces.Discrete(actions))] * count)

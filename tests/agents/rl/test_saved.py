@@ -1,0 +1,177 @@
+"""Runs are weights and JSON; a file that could run code is read only when that is allowed."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import pickle
+import shutil
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from agents import make_agent
+from agents.rl.agent import RLAgent
+from agents.rl.config import TrainConfig
+from agents.rl.saved import FOREIGN, MODEL, UntrustedModel
+from agents.rl.train import CONFIG, load_last, train
+from benchmarks.cli import cli
+
+Make = Callable[..., TrainConfig]
+SMALL = {"vec": {"envs": 2, "workers": 1}, "algorithm": {"name": "ppo", "n_steps": 16}}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory, make_config: Make) -> Path:
+    path = tmp_path_factory.mktemp("rl") / "run"
+    train(make_config(total_steps=64, **SMALL), path)
+    return path
+
+
+@pytest.fixture
+def copied(run: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(run, tmp_path / "copied")
+
+
+class Writes:
+    """Unpickled, it writes a file."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Path.write_text, (self.file, "ran")
+
+
+@pytest.fixture
+def hostile(copied: Path) -> tuple[Path, Path]:
+    """A run directory with a model of Stable-Baselines3 that writes a file, and that file."""
+    written = copied / "written"
+    load_last(copied).save(copied / FOREIGN)
+    with zipfile.ZipFile(copied / FOREIGN) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    data = json.loads(parts["data"])
+    code = base64.b64encode(pickle.dumps(Writes(written))).decode()
+    data["policy_class"] = {":type:": "x", ":serialized:": code}
+    with zipfile.ZipFile(copied / FOREIGN, "w") as archive:
+        for name, content in {**parts, "data": json.dumps(data).encode()}.items():
+            archive.writestr(name, content)
+    (copied / MODEL).unlink()
+    return copied, written
+
+
+def test_a_zip_that_runs_code_is_refused_and_does_not_run(hostile: tuple[Path, Path]) -> None:
+    path, written = hostile
+    for refused in (
+        lambda: make_agent(f"rl:{path}"),
+        lambda: RLAgent(path / FOREIGN),
+        lambda: load_last(path),
+    ):
+        with pytest.raises(UntrustedModel, match=r"runs whatever code is in it.*give --trust"):
+            refused()
+    assert not written.exists()
+    with pytest.raises(ValueError, match="cannot be read as a model"):
+        load_last(path, trust=True)
+    assert written.exists()  # so this test tests what it says
+
+
+def test_the_commands_refuse_it_in_one_line(hostile: tuple[Path, Path], tmp_path: Path) -> None:
+    path, written = hostile
+    bench = ["bench", "--suite", "mini", "--limit", "1", "--agent", f"rl:{path}"]
+    commands = [
+        [*bench, "--out", str(tmp_path / "out")],
+        ["train-rl", "--config", str(path / CONFIG), "--out", str(path)],
+    ]
+    for command in commands:
+        result = CliRunner().invoke(cli, command)
+        assert result.exit_code == 2, result.output
+        assert "give --trust" in result.output
+        assert len(result.output.strip().splitlines()) == 1
+    assert not written.exists()
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_of_before_is_read_with_trust_and_then_needs_none(
+    copied: Path, make_config: Make, tmp_path: Path
+) -> None:
+    before = load_last(copied)
+    before.save(copied / FOREIGN)
+    (copied / MODEL).unlink()
+    command = ["bench", "--suite", "mini", "--limit", "1", "--agent", f"rl:{copied}"]
+    command += ["--instances", "explore", "--out", str(tmp_path / "out"), "--trust"]
+    result = CliRunner().invoke(cli, command)
+    assert result.exit_code == 0, result.output
+    train(make_config(total_steps=64, **SMALL), copied, trust=True)  # all its steps are done
+    assert load_last(copied).num_timesteps == 64
+
+
+def test_trust_is_for_trained_policies() -> None:
+    result = CliRunner().invoke(cli, ["bench", "--suite", "mini", "--agent", "random", "--trust"])
+    assert result.exit_code == 2
+    assert "--trust is for trained policies" in result.output
+
+
+def test_a_run_goes_on_from_all_that_it_was(run: Path) -> None:
+    one, other = load_last(run), load_last(run)
+    for model in (one, other):
+        assert (model.num_timesteps, model._n_updates) == (64, 2)
+        assert model.policy.optimizer.state_dict()["state"][0]["step"] > 0
+    for mine, its in zip(one.policy.parameters(), other.policy.parameters(), strict=True):
+        assert (mine == its).all()
+    assert list(one.ep_success_buffer) == list(other.ep_success_buffer)
+
+
+def arrays(run: Path) -> dict[str, Any]:
+    with np.load(run / MODEL) as found:
+        return dict(found)
+
+
+def about(run: Path, **changes: Any) -> np.ndarray:
+    told = {**json.loads(arrays(run)["about"].tobytes()), **changes}
+    return np.frombuffer(json.dumps(told).encode(), np.uint8)
+
+
+def pickled(run: Path) -> np.ndarray:
+    return np.array([Writes(run / "written")], dtype=object)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        (lambda run: {"about": pickled(run)}, "Object arrays cannot be loaded"),
+        (lambda run: {"policy/value_net.0.bias": pickled(run)}, "Object arrays cannot be loaded"),
+        (lambda run: {"policy/value_net.0.bias": np.zeros(3, np.float32)}, r"\(16,\) is needed"),
+        (lambda run: {"policy/value_net.0.bias": np.zeros(10**6)}, "larger than it can be"),
+        (lambda run: {"optimizer/99/exp_avg": np.zeros(3, np.float32)}, "belongs to no weight"),
+        (lambda run: {"about": about(run, actions=7)}, "its actions is 7, and 286 is needed"),
+        (lambda run: {"about": about(run, counters={})}, "num_timesteps"),
+        (lambda run: {"about": np.zeros(5, np.uint8)}, "Expecting value"),
+    ],
+)
+def test_a_changed_file_is_one_clear_error(
+    copied: Path, changed: Callable[[Path], dict[str, Any]], message: str
+) -> None:
+    np.savez(copied / MODEL, **{**arrays(copied), **changed(copied)})
+    with pytest.raises(ValueError, match=rf"{MODEL} cannot be read as a model: .*{message}"):
+        load_last(copied)
+    assert not (copied / "written").exists()
+
+
+def test_a_pickle_under_the_name_of_ours_is_refused(copied: Path) -> None:
+    for content in (pickle.dumps(Writes(copied / "written")), b"", b"PK", _npy(pickled(copied))):
+        (copied / MODEL).write_bytes(content)
+        with pytest.raises(ValueError, match="cannot be read as a model"):
+            load_last(copied)
+    assert not (copied / "written").exists()
+
+
+def _npy(array: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, array)
+    return stream.getvalue()
