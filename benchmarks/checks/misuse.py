@@ -594,6 +594,7 @@ def vectors() -> Iterator[Try]:
         obs, _ = env.reset(seed=1)
         masks = env.action_masks()
         env.step(model.predict(obs, action_masks=masks)[0])
+        env.reset(seed=1)  # it may have been "end"
         batch = {name: value[None] for name, value in obs.items()}
         env.step(model.predict(batch, action_masks=masks[None])[0])
 
