@@ -494,7 +494,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         if not outcome.success:
             return 0.0
         if action.verb == verbs.END and self._task.goal:
-            self._goal_unmet = unmet(self._task.goal, self._objects_of_goal(), self._around.in_reach)
+            self._goal_unmet = unmet(
+                self._task.goal, self._objects_of_goal(), self._around.in_reach
+            )
         self._progress, reward = self._progress.after(
             action.verb,
             action.object_type,
