@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 
-_TASKS = {"er_gym.thor", "er_gym.tasks"}
+_TASKS = {"er_gym.thor", "er_gym.tasks", "er_gym.plugins"}
 _ENVS = {*_TASKS, "er_gym.envs"}
 _AGENTS = {*_ENVS, "er_gym", "agents"}
 _BENCHMARKS = {*_AGENTS, "benchmarks"}
 ALLOWED = {
+    "er_gym.plugins": {"er_gym.plugins"},
     "er_gym.sim": {"er_gym.sim"},
     "er_gym.thor": {"er_gym.sim", "er_gym.thor"},
     "er_gym.tasks": _TASKS,

@@ -50,35 +50,7 @@ OBJECT_FIELDS = (
     "name", "argument", "arguments", "args", "arg", "parameter", "input", "物体", "对象", "目标",
 )  # fmt: skip
 
-_PHRASES: Mapping[str, str] = {
-    verbs.NAVIGATE: "navigate to/navigate towards/navigate toward/navigate/go to/go towards/"
-    "go toward/go over to/go back to/walk to/walk towards/walk toward/walk over to/move to/"
-    "move towards/move toward/move over to/head to/head towards/head toward/"
-    "head over to/get to/get closer to/move closer to/return to/travel to/approach/"
-    "导航到/导航至/导航去/前往/走到/走向/走去/移动到/去到/去往",
-    verbs.PICKUP: "pick up/pick up object/pick/grab/grasp/take/take out/get/collect/"
-    "拿起/捡起/拾取/拾起/拿取/取出/拿出/抓起/抓取/拿",
-    verbs.PUT: "put in/put into/put/put down/put object/place/place in/"
-    "放入/放进/放到/放在/放置在/放置到/放下",
-    verbs.OPEN: "open/open up/open object/打开",
-    verbs.CLOSE: "close/close object/shut/关闭/关上/合上",
-    verbs.TOGGLE: "toggle/toggle on/toggle off/toggle object/toggle object on/toggle object off/"
-    "turn on/turn off/switch/switch on/switch off/power on/power off/activate/deactivate/"
-    "开关/切换/启动/开启/按下",
-    verbs.SLICE: "slice/slice up/slice object/cut/cut up/chop/切/切开/切片/切割",
-    verbs.OBSERVE: "observe/look around/look about/look at/look/take a look/"
-    "take a look around/scan/观察/环顾/环视/查看/环顾四周",
-    verbs.MOVE_FORWARD: "move forward/move forwards/move ahead/move straight/go forward/go ahead/"
-    "walk forward/walk ahead/step forward/forward/前进/向前移动/向前走/往前走",
-    verbs.END: "end/end task/end episode/finish/finished/done/stop/complete/completed/terminate/"
-    "exit/quit/task completed/task complete/task finished/task done/task is completed/"
-    "task is complete/task is done/task is finished/the task is complete/the task is completed/"
-    "the task is done/the task is finished/mission accomplished/"
-    "结束/完成/停止/任务完成/任务已完成/任务已经完成/完成了任务/任务结束/结束任务/完成任务",
-}
-VERBS: Mapping[str, str] = {
-    phrase: verb for verb, phrases in _PHRASES.items() for phrase in phrases.split("/")
-}
+VERBS: Mapping[str, str] = {phrase: verb.name for verb in verbs.table() for phrase in verb.said}
 """Every way of saying a verb, in lower case with single spaces, to the verb."""
 ALONE = frozenset(phrase for phrase, verb in VERBS.items() if verb == verbs.END) | {"look"}
 """Phrases that mean their verb only if nothing but :data:`FILLER` follows: who would "stop the

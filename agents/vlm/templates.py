@@ -19,6 +19,7 @@ from agents.vlm.prompt_set import IMAGE, MARK, THOUGHTS, Decide, Did, Now, Sees,
 from er_gym.tasks import verbs
 from er_gym.tasks.files import read_text
 from er_gym.tasks.suites import config_directory
+from er_gym.tasks.verbs import Verb
 
 if TYPE_CHECKING:
     from jinja2.sandbox import SandboxedEnvironment
@@ -128,13 +129,16 @@ def load_templates(directory: Path) -> Templates:
         raise ValueError(f"{directory} lacks {min(missing)}; copy it from another set of prompts")
     listed = directory / _ACTIONS
     sources = {file.name: read_text(file) for file in (*files.values(), listed)}
+    actions = _rows(sources[_ACTIONS], listed, directory.name)
     digest = hashlib.sha256(repr(sorted(sources.items())).encode())
+    if verbs.ADDED:
+        digest.update(repr(actions).encode())
     templates = Templates(
         name=f"{directory.parent.name}/{directory.name}",
         digest=digest.hexdigest(),
         about=f"prompts of {directory}",
         files=files,
-        actions=_rows(sources[_ACTIONS], listed),
+        actions=actions,
         environment=_environment(files, sources),
     )
     _try_out(templates)
@@ -172,19 +176,28 @@ def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> Sandb
     return environment
 
 
-def _rows(text: str, file: Path) -> tuple[ActionRow, ...]:
-    """The actions and what they mean, in the file's order."""
-    known = (*verbs.OBJECT_VERBS, *verbs.BARE_VERBS)
+def _rows(text: str, file: Path, language: str) -> tuple[ActionRow, ...]:
+    """The actions and what they mean, in the file's order; then the verbs of other packages that
+    the file does not explain, in their own words."""
     try:
         meanings = yaml.safe_load(text)
     except yaml.YAMLError as error:
         raise ValueError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
-    if not isinstance(meanings, dict) or {*meanings} != {*known}:
-        raise ValueError(f"{file}: say what each of these means, and no other: {', '.join(known)}")
+    own = [verb.name for verb in verbs.OWN]
+    added = {verb.name: _meaning(verb, language) for verb in verbs.ADDED}
+    if not isinstance(meanings, dict) or not {*own} <= {*meanings} <= {*own, *added}:
+        known = ", ".join((*own, *added))
+        raise ValueError(f"{file}: say what each of these means, and no other: {known}")
     return tuple(
         ActionRow(f"{verb} <object>" if verb in verbs.OBJECT_VERBS else verb, unmarked(str(words)))
-        for verb, words in meanings.items()
+        for verb, words in {**meanings, **(added | meanings)}.items()
     )
+
+
+def _meaning(verb: Verb, language: str) -> str:
+    """What prompts say that a verb means: in their language, else in English, else its name."""
+    stated = (verb.words[each].meaning for each in (language, "en") if each in verb.words)
+    return next(filter(None, stated), f"{verb.name}{'' if verb.alone else ' an object'}.")
 
 
 def _try_out(templates: Templates) -> None:

@@ -38,32 +38,18 @@ AnyAction: TypeAlias = Action | str | int | np.integer[Any] | NDArray[np.integer
 an array of one element, shape () or (1,), as learners' ``predict`` returns it."""
 NO_ACTION = "(no action) "
 """A text that begins with this names no action, whatever follows."""
-_PROPERTY_FOR = {
-    verbs.PICKUP: "pickupable",
-    verbs.PUT: "receptacle",
-    verbs.OPEN: "openable",
-    verbs.CLOSE: "openable",
-    verbs.TOGGLE: "toggleable",
-    verbs.SLICE: "sliceable",
-}
-_ALSO = {verbs.TOGGLE: {"StoveBurner"}, verbs.PUT: set(BASIN_OF)}
-"""Types that lack the property but take the verb: a burner is toggled by its knob."""
-NOWHERE = frozenset({"Floor"})
-"""Types that cannot be navigated to: one is there already."""
 
 
 def applies(verb: str, object_type: str) -> bool:
     """Whether a verb makes sense for a type at all, in some scene and some state."""
-    if verb == verbs.NAVIGATE:
-        return object_type not in NOWHERE
-    needed = _PROPERTY_FOR[verb]
-    return needed in OBJECT_TYPES[object_type].properties or object_type in _ALSO.get(verb, ())
+    return verbs.verb_named(verb).takes(object_type)
 
 
 def _all_actions() -> Iterator[Action]:
-    yield from (Action(verb) for verb in verbs.BARE_VERBS)
-    for verb in verbs.OBJECT_VERBS:
-        yield from (Action(verb, name) for name in OBJECT_TYPES if applies(verb, name))
+    own = sorted(verbs.OWN, key=lambda verb: not verb.alone)
+    for verb in (*own, *verbs.ADDED):  # the numbers of er-gym's own actions stay the same
+        names = ("",) if verb.alone else filter(verb.takes, OBJECT_TYPES)
+        yield from (Action(verb.name, name) for name in names)
 
 
 ACTIONS: tuple[Action, ...] = tuple(_all_actions())
@@ -83,8 +69,9 @@ _VERBS_LONGEST_FIRST = sorted(
 def parse(text: str) -> Action | None:
     """The action that a text names, None if it names none. Case and spacing do not matter."""
     words = " ".join(text.lower().split())
-    if words in _BY_TEXT:
-        return _BY_TEXT[words]
+    alone = _BY_TEXT.get(words) or _BY_TEXT.get(verbs.canonical_verb(words))
+    if alone is not None:
+        return alone
     for verb in _VERBS_LONGEST_FIRST:
         if words.startswith(f"{verb} "):
             return _BY_TEXT.get(f"{verbs.canonical_verb(verb)} {words[len(verb) + 1 :]}")

@@ -106,6 +106,8 @@ class DefaultConduct:
             return "", skills.move_forward(setting.controller, setting.grid_size)
         if action.verb == verbs.END:
             return "", Outcome(None, True)
+        if action.verb in verbs.BARE_VERBS:
+            return "", skills.do_alone(setting.controller, action.verb)
         if action.verb == verbs.NAVIGATE:
             return self._navigate(action.object_type, percept, left)
         able = legality.suited(action, around)

@@ -69,7 +69,7 @@ def redirected(task: Task, goal: int, objects: ObjectTable) -> int:
     Going to a receptacle that does not open and holds one of the task's related objects means going
     to that object.
     """
-    if objects.receptacle[goal] and not objects.openable[goal]:
+    if objects.has["receptacle"][goal] and not objects.has["openable"][goal]:
         for object_id in task.related_objects:
             row = objects.row.get(object_id)
             if row is not None and row in objects.contents[goal]:
@@ -82,6 +82,6 @@ def container_in_the_way(goal: int, objects: ObjectTable) -> int | None:
     shut = [
         parent
         for parent in objects.parents[goal]
-        if objects.openable[parent] and not objects.is_open[parent]
+        if objects.has["openable"][parent] and not objects.has["isOpen"][parent]
     ]
     return shut[-1] if shut else None

@@ -6,18 +6,18 @@ given by their rows there. Positions are metres in AI2-THOR's world frame.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.actions import ACTIONS, INDEX, INDICES, NOWHERE, Action, applies
+from er_gym.envs.actions import ACTIONS, INDEX, INDICES, Action, applies
 from er_gym.envs.percept import Percept, marked, names
 from er_gym.tasks import verbs
-from er_gym.tasks.equivalence import BASIN_OF
-from er_gym.thor.objects import KIND_OF, ObjectTable
+from er_gym.tasks.verbs import Verb
+from er_gym.thor.objects import KIND_OF, PROPERTY_OF_STATE, TYPES, ObjectTable
 
 _FACES, _WITHIN_BY_FACE = (0.08, 0.15, 0.5), np.array([1.0, 2.5, 4.0, 10.0])
 _VOLUMES, _WITHIN_BY_VOLUME = (0.001, 0.005), np.array([1.0, 1.5, 2.0])
@@ -44,61 +44,57 @@ def navigable_within(volume: NDArray[np.float64], face: NDArray[np.float64]) -> 
     return np.asarray(np.maximum(within, volume / _VOLUME_PER_METRE))
 
 
-@dataclass(frozen=True)
-class _Condition:
-    """Which objects a verb can be done to in their present state, and what to say of others."""
-
-    holds: Callable[[ObjectTable], NDArray[np.bool_]]
-    otherwise: str
+def _of_type(object_types: Iterable[str]) -> NDArray[np.bool_]:
+    return marked(np.array([KIND_OF[name] for name in object_types], np.intp))
 
 
-def _of_type(*object_types: str) -> NDArray[np.bool_]:
-    return marked(np.array([KIND_OF[name] for name in object_types]))
-
-
-_HAS_BASIN = _of_type(*BASIN_OF)
-_BURNER = _of_type("StoveBurner")
-_KNIFE = _of_type("Knife", "ButterKnife")
-_NO_GOAL = _of_type(*NOWHERE)
-_CONDITIONS = {
-    verbs.PICKUP: _Condition(lambda table: table.pickupable, "It cannot be picked up."),
-    verbs.PUT: _Condition(
-        lambda table: (
-            (table.receptacle | _HAS_BASIN[table.kinds]) & (table.is_open | ~table.openable)
-        ),
-        "It is closed, or nothing can be put into it.",
-    ),
-    verbs.OPEN: _Condition(
-        lambda table: table.openable & ~table.is_open, "It is open already, or does not open."
-    ),
-    verbs.CLOSE: _Condition(
-        lambda table: table.openable & table.is_open, "It is closed already, or does not close."
-    ),
-    verbs.TOGGLE: _Condition(
-        lambda table: table.toggleable | _BURNER[table.kinds], "It has no switch."
-    ),
-    verbs.SLICE: _Condition(lambda table: table.sliceable, "It cannot be sliced."),
-}
-
-
-def _empty(table: ObjectTable) -> bool:
-    return table.held < 0
-
-
-def _holds_knife(table: ObjectTable) -> bool:
-    return table.held >= 0 and bool(_KNIFE[table.kinds[table.held]])
-
-
-_HAND: Mapping[str, Callable[[ObjectTable], bool]] = {
-    verbs.PICKUP: _empty,
-    verbs.PUT: lambda table: not _empty(table),
-    verbs.SLICE: _holds_knife,
-}
-"""What verbs ask of the hand."""
+_INTERACTIONS = tuple(map(verbs.verb_named, verbs.INTERACTIONS))
+_NUMBER = {verb.name: number for number, verb in enumerate(_INTERACTIONS)}
+_INDICES = np.stack([INDICES[verb.name] for verb in _INTERACTIONS], axis=1)
+_TAKES = {verb.name: _of_type(filter(verb.takes, TYPES)) for verb in _INTERACTIONS}
+_ALSO = {verb.name: _of_type(verb.object_types) for verb in _INTERACTIONS}
+_IN_HAND = [_NUMBER[verb.name] for verb in _INTERACTIONS if verb.in_hand]
 _BARE = [INDEX[Action(verb)] for verb in verbs.BARE_VERBS]
-_NUMBER = {verb: number for number, verb in enumerate(verbs.INTERACTIONS)}
+_BARE_WITH_HAND = [
+    verb for verb in map(verbs.verb_named, verbs.BARE_VERBS) if verb.hand != verbs.ANY
+]
+_BURNER = _of_type(["StoveBurner"])
 _TOGGLE_BURNER = INDEX[Action(verbs.TOGGLE, "StoveBurner")]
-_INTERACTION_INDICES = np.stack([INDICES[verb] for verb in verbs.INTERACTIONS], axis=1)
+_NO_GOAL = _of_type(verbs.NOWHERE)
+
+
+def _possible(verb: Verb, table: ObjectTable) -> NDArray[np.bool_]:
+    """(N,) which objects a verb can be done to in their present state, whatever the hand does."""
+    if verb.object_property:
+        able = table.has[verb.object_property] | _ALSO[verb.name][table.kinds]
+    else:
+        able = _TAKES[verb.name][table.kinds]
+    if verb.object_state is None:
+        return able
+    name, value = verb.object_state
+    return np.asarray(able & ((table.has[name] == value) | ~table.has[PROPERTY_OF_STATE[name]]))
+
+
+def _hand_fits(verb: Verb, table: ObjectTable) -> bool:
+    """Whether the hand is as a verb needs it."""
+    if verb.hand == verbs.ANY:
+        return True
+    if verb.hand in (verbs.EMPTY, verbs.FULL):
+        return (table.held < 0) == (verb.hand == verbs.EMPTY)
+    return table.held >= 0 and table.type_of(table.held) in verb.hand
+
+
+def _hand_objection(action: Action, verb: Verb, table: ObjectTable) -> str:
+    """What is wrong with the hand, in words for the agent."""
+    if verb.hand == verbs.EMPTY:
+        return f"You hold {table.type_of(table.held)} already; put it down first."
+    if verb.hand == verbs.FULL:
+        return "Your hand is empty; pick something up first."
+    tools = [f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in verb.hand]
+    return (
+        f"You cannot {action} without {verb.tool or ' or '.join(tools)} in your hand; "
+        f"pick up {' or '.join(tools)} first."
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,15 +121,15 @@ class Affordances:
         """Work them out."""
         within = navigable_within(table.volume, table.face)
         within[_NO_GOAL[table.kinds]] = 0.0
-        possible = np.stack([_CONDITIONS[verb].holds(table) for verb in verbs.INTERACTIONS], axis=1)
-        for verb, fits in _HAND.items():
-            if not fits(table):
-                possible[:, _NUMBER[verb]] = False
+        possible = np.zeros((len(table), len(_INTERACTIONS)), dtype=bool)
+        for verb in _INTERACTIONS:
+            if _hand_fits(verb, table):
+                possible[:, _NUMBER[verb.name]] = _possible(verb, table)
         if table.held >= 0:
             within[table.held] = 0.0
         return Affordances(
             within=within,
-            actions=np.where(possible, _INTERACTION_INDICES[table.kinds], -1),
+            actions=np.where(possible, _INDICES[table.kinds], -1),
             on_burners=_on_burners(table),
         )
 
@@ -220,7 +216,7 @@ class Known:
     """
 
     def __init__(self, object_types: Iterable[str]) -> None:
-        self._told = {*object_types} - NOWHERE  # tasks name types that no scene has, too
+        self._told = {*object_types} - verbs.NOWHERE  # tasks name types that no scene has, too
         self.types = marked(np.array([KIND_OF[t] for t in self._told & KIND_OF.keys()], np.intp))
         self._update()
 
@@ -242,9 +238,11 @@ class Known:
 
 def suited(action: Action, around: Surroundings) -> list[int]:
     """Rows of the objects that an interaction can be done to as things are now."""
-    rows = around.interactable
+    rows, held = around.interactable, around.objects.held
     if action.verb == verbs.TOGGLE and len(around.covered):
         rows = np.union1d(rows, around.covered)
+    if held >= 0 and verbs.verb_named(action.verb).in_hand:
+        rows = np.union1d(rows, [held])
     actions = affordances(around.objects).actions[rows, _NUMBER[action.verb]]
     index = INDEX.get(action)
     return [
@@ -256,9 +254,10 @@ def suited(action: Action, around: Surroundings) -> list[int]:
 
 def objection(action: Action, around: Surroundings, known: Known) -> str:
     """Why an action is illegal now, in words for the agent; "" when it is legal."""
-    name, held = action.object_type, around.objects.held
-    if action.verb in verbs.BARE_VERBS:
-        return ""
+    name, objects = action.object_type, around.objects
+    verb = verbs.verb_named(action.verb)
+    if verb.alone:
+        return "" if _hand_fits(verb, objects) else _hand_objection(action, verb, objects)
     if action.verb == verbs.NAVIGATE:
         if name in known:
             return ""
@@ -269,30 +268,30 @@ def objection(action: Action, around: Surroundings, known: Known) -> str:
     if suited(action, around):
         return ""
     if applies(action.verb, name):
-        if action.verb == verbs.PICKUP and held >= 0:
-            return f"You hold {around.objects.type_of(held)} already; put it down first."
-        if action.verb == verbs.PUT and held < 0:
-            return "Your hand is empty; pick something up first."
-        if action.verb == verbs.SLICE and not _holds_knife(around.objects):
+        if not _hand_fits(verb, objects):
+            return _hand_objection(action, verb, objects)
+        in_hand = verb.in_hand and objects.held >= 0 and objects.type_of(objects.held) == name
+        if not around.interactable_types[KIND_OF[name]] and not in_hand:
             return (
-                f"You cannot slice {name} without a knife in your hand; "
-                "pick up a Knife or a ButterKnife first."
-            )
-        if not around.interactable_types[KIND_OF[name]]:
-            return (
-                f"You cannot {action.verb} {name}: none is within reach and in view. "
+                f"You cannot {action}: none is within reach and in view. "
                 f"There is: {_listing(around.in_reach)}."
             )
-    return f"You cannot {action.verb} {name}. {_CONDITIONS[action.verb].otherwise}"
+    return f"You cannot {action}. {verb.otherwise or 'It is not in the state for that.'}"
 
 
 def legal_actions(around: Surroundings, known: Known) -> NDArray[np.int8]:
     """(len(ACTIONS),) int8: 1 for each action to which :func:`objection` has none."""
-    legal = known.legal.copy()
-    interactions = affordances(around.objects).actions[around.interactable]
+    legal, objects = known.legal.copy(), around.objects
+    possible = affordances(objects).actions
+    interactions = possible[around.interactable]
     legal[interactions[interactions >= 0]] = 1
     if len(around.covered):
         legal[_TOGGLE_BURNER] = 1
+    if _IN_HAND and objects.held >= 0:
+        with_held = possible[objects.held, _IN_HAND]
+        legal[with_held[with_held >= 0]] = 1
+    for verb in _BARE_WITH_HAND:
+        legal[INDEX[Action(verb.name)]] = _hand_fits(verb, objects)
     return legal
 
 

@@ -53,8 +53,10 @@ GOAL_VERBS: Mapping[str, str] = {
     "open": r"open",
     "close": r"close|shut",
     "then": r"then|after|before|first",
+    **{verb.name: "|".join(map(re.escape, verb.said)) for verb in verbs.ADDED},
 }
-"""Words of an instruction that say what to do, by what they say."""
+"""Words of an instruction that say what to do, by what they say; those of the verbs that other
+packages add as well."""
 SCALARS = (
     *_POSE,
     *_EPISODE,
@@ -122,7 +124,7 @@ class Memory:
         objects, visible = percept.objects, percept.visible
         self.seen |= percept.visible_types
         out_of_sight = ~percept.visible_types
-        for remembered, now in ((self.is_open, objects.is_open), (self.is_on, objects.is_toggled)):
+        for remembered, now in ((self.is_open, objects.has["isOpen"]), (self.is_on, objects.has["isToggled"])):
             remembered &= out_of_sight
             remembered[objects.kinds[visible & now]] = True
         if at is not None:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.actions import INDICES, NO_ACTION, NOWHERE, Action, AnyAction, text_of
+from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
 from er_gym.envs.conduct import Done, Setting
 from er_gym.envs.legality import Known, Surroundings, navigable_within
 from er_gym.envs.paper_approach import Thing, approach, current, thing_of
@@ -25,14 +25,16 @@ from er_gym.thor.objects import KIND_OF, TYPES, ObjectTable
 NO_OBJECT = "No Suitable Object"
 """The type of what a reply names that is not in the scene."""
 _PUT_IN = "put in"
+_BARE = (verbs.OBSERVE, verbs.MOVE_FORWARD, verbs.END)
 _SPOKEN = {
     **{verb: verb for verb in (verbs.INIT, verbs.NAVIGATE, verbs.PICKUP)},
     "put": verbs.PUT,
-    **{verb: verb for verb in (verbs.TOGGLE, verbs.OPEN, verbs.CLOSE, *verbs.BARE_VERBS)},
+    **{verb: verb for verb in (verbs.TOGGLE, verbs.OPEN, verbs.CLOSE, *_BARE)},
 }
 """What a reply may begin with, in the order in which it is looked for, and the verb meant."""
-_NAMELESS = (*verbs.BARE_VERBS, "error")
-_INTERACTIONS = tuple(verb for verb in verbs.INTERACTIONS if verb != verbs.SLICE)
+_NAMELESS = (*_BARE, "error")
+_INTERACTIONS = (verbs.PICKUP, verbs.PUT, verbs.OPEN, verbs.CLOSE, verbs.TOGGLE)
+_NOT_BARE = [INDEX[Action(verb)] for verb in verbs.BARE_VERBS if verb not in _BARE]
 _SECOND_WHEN_HOLDING = frozenset({"84", "85"})
 """Identities of the paper's tasks in which going to a type means the second of the targets when
 something is held: both places are of one type."""
@@ -59,7 +61,7 @@ def understand_as_paper(action: AnyAction, objects: ObjectTable) -> tuple[Action
         if start is None:
             return None, text
         verb = _SPOKEN[start]
-    if verb in (verbs.INIT, *verbs.BARE_VERBS) or text.startswith(_NAMELESS):
+    if verb in (verbs.INIT, *_BARE) or text.startswith(_NAMELESS):
         return Action(verb), text
     word = text.split(" ")[-1].strip()
     there = {TYPES[kind] for kind in set(objects.kinds.tolist())}
@@ -111,7 +113,7 @@ class PaperConduct:
     def objection(self, action: Action, around: Surroundings, known: Known) -> str:
         """A type must be known to go there, and at hand to do anything else to it."""
         name = action.object_type
-        if action.verb in (verbs.INIT, *verbs.BARE_VERBS):
+        if action.verb in (verbs.INIT, *_BARE):
             return ""
         if action.verb == verbs.NAVIGATE:
             return "" if name in known else f"You cannot navigate to {name or 'nothing'}."
@@ -120,8 +122,9 @@ class PaperConduct:
         return f"You cannot {action.verb} {name or 'nothing'}: it is not available for interaction."
 
     def legal(self, around: Surroundings, known: Known) -> NDArray[np.int8]:
-        """(len(ACTIONS),) int8: every interaction with what is at hand is legal, but ``slice``."""
+        """(len(ACTIONS),) int8: the paper's interactions with what is at hand are legal."""
         legal = known.legal.copy()
+        legal[_NOT_BARE] = 0
         for verb in _INTERACTIONS:
             indices = INDICES[verb][around.interactable_types]
             legal[indices[indices >= 0]] = 1
@@ -174,7 +177,7 @@ class PaperConduct:
         return thing
 
 
-_FLOOR = marked(np.array([KIND_OF[name] for name in NOWHERE]))
+_FLOOR = marked(np.array([KIND_OF[name] for name in verbs.NOWHERE]))
 
 
 def _within(table: ObjectTable) -> NDArray[np.float64]:

@@ -270,11 +270,9 @@ def _part_to_put_into(objects: ObjectTable, row: int) -> str:
 
 
 def _put(controller: Any, objects: ObjectTable, row: int) -> Any:
-    # forceAction waives which types AI2-THOR thinks belong there: the paper asks for a Cup in the
-    # GarbageCan. Room, reach and a closed door still count.
-    return controller.step(
-        action="PutObject", objectId=_part_to_put_into(objects, row), forceAction=True
-    )
+    verb = verbs.verb_named(verbs.PUT)
+    part = _part_to_put_into(objects, row)
+    return controller.step(action=verb.thor_action, objectId=part, **verb.parameters)
 
 
 def _toggle(controller: Any, objects: ObjectTable, row: int) -> Any:
@@ -284,27 +282,29 @@ def _toggle(controller: Any, objects: ObjectTable, row: int) -> Any:
         for other, controlled in enumerate(objects.controlled):
             if row in controlled:
                 switch = other
-    action = "ToggleObjectOff" if objects.is_toggled[switch] else "ToggleObjectOn"
+    action = "ToggleObjectOff" if objects.has["isToggled"][switch] else "ToggleObjectOn"
     # The agent sees the burner; whether its knob is in the picture is no matter.
     return controller.step(action=action, objectId=objects.ids[switch], forceAction=switch != row)
 
 
-def _simple(action: str) -> Callable[[Any, ObjectTable, int], Any]:
-    return lambda controller, objects, row: controller.step(
-        action=action, objectId=objects.ids[row]
+_OTHERWISE: Mapping[str, Callable[[Any, ObjectTable, int], Any]] = {
+    verbs.PUT: _put,
+    verbs.TOGGLE: _toggle,
+}
+"""Verbs that take more than a call of their AI2-THOR action with the object's id."""
+
+
+def interact(controller: Any, name: str, objects: ObjectTable, row: int) -> Outcome:
+    """Do an interaction, such as "open", to an object."""
+    if name in _OTHERWISE:
+        return _outcome(_OTHERWISE[name](controller, objects, row))
+    verb = verbs.verb_named(name)
+    return _outcome(
+        controller.step(action=verb.thor_action, objectId=objects.ids[row], **verb.parameters)
     )
 
 
-_INTERACTIONS: dict[str, Callable[[Any, ObjectTable, int], Any]] = {
-    verbs.PICKUP: _simple("PickupObject"),
-    verbs.OPEN: _simple("OpenObject"),
-    verbs.CLOSE: _simple("CloseObject"),
-    verbs.PUT: _put,
-    verbs.TOGGLE: _toggle,
-    verbs.SLICE: _simple("SliceObject"),
-}
-
-
-def interact(controller: Any, verb: str, objects: ObjectTable, row: int) -> Outcome:
-    """Pick up, put into, open, close, toggle or slice an object."""
-    return _outcome(_INTERACTIONS[verb](controller, objects, row))
+def do_alone(controller: Any, name: str) -> Outcome:
+    """Do a verb that goes with no object, by its AI2-THOR action."""
+    verb = verbs.verb_named(name)
+    return _outcome(controller.step(action=verb.thor_action, **verb.parameters))

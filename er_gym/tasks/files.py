@@ -22,7 +22,6 @@ from er_gym.tasks.types import BY_NAME, TaskType
 Model = TypeVar("Model", bound=BaseModel)
 
 _FILE_NAME_SAFE = re.compile(r"[\w+=.-]+")
-_VERBS = frozenset(verbs.OBJECT_VERBS + verbs.BARE_VERBS)
 _LONGEST_QUOTE = 60
 
 
@@ -96,9 +95,11 @@ def known_scene(name: str, where: str) -> str:
 def known_verb(name: str, where: str) -> str:
     """The canonical spelling of a verb; a :class:`TaskFileError` lists those there are."""
     verb = verbs.canonical_verb(name)
-    if verb not in _VERBS:
-        allowed = ", ".join(verbs.OBJECT_VERBS + verbs.BARE_VERBS)
-        raise TaskFileError(f"{where} has unknown action {name!r}; choose one of: {allowed}")
+    known = verbs.OBJECT_VERBS + verbs.BARE_VERBS
+    if verb not in known:
+        raise TaskFileError(
+            f"{where} has unknown action {name!r}; choose one of: {', '.join(known)}"
+        )
     return verb
 
 

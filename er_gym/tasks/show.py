@@ -16,21 +16,6 @@ from er_gym.tasks.task import KeyAction, Task, type_of_id
 
 _WIDTH = 100
 
-_STEPS = {
-    verbs.INIT: "begin",
-    verbs.NAVIGATE: "go to {the}{reason}",
-    verbs.OPEN: "open {it}",
-    verbs.CLOSE: "close {it}",
-    verbs.PICKUP: "pick up {the}",
-    verbs.PUT: "put {held} {inside}",
-    verbs.TOGGLE: "switch {it} on or off",
-    verbs.SLICE: "slice {it}",
-    verbs.OBSERVE: "look around",
-    verbs.MOVE_FORWARD: "take a step forward",
-    verbs.END: "say that it is done",
-}
-"""Verb to what it is in plain words; {it} is the name unless the action before named the thing."""
-
 _STATES: dict[tuple[str, bool | str], str] = {
     ("isToggled", True): "on",
     ("isToggled", False): "off",
@@ -149,9 +134,9 @@ def _plan(task: Task, names: _Names) -> list[str]:
 def _step(action: KeyAction, names: _Names, held: str, before: str) -> str:
     name = _name(action)
     reasons = [other for other in action.related_objects if other != action.object_id]
-    template = _STEPS.get(action.verb, "{verb} {the}")
+    # {it} is the name unless the action before named the thing.
+    template = "begin" if action.verb == verbs.INIT else verbs.verb_named(action.verb).in_plan
     words = {
-        "verb": action.verb,
         "the": names.the(name),
         "it": it(type_of_id(name)) if name and name == before else names.the(name),
         "inside": names.inside(name),

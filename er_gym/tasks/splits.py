@@ -35,12 +35,16 @@ SCENES: Mapping[str, tuple[str, ...]] = {
 """Sets of rooms by name."""
 
 
+_ABOUT_PLACES = frozenset({verbs.PUT, verbs.OPEN, verbs.CLOSE})
+"""Interactions with what a thing is in, rather than with the thing."""
+
+
 def subject_types(task: Task) -> frozenset[str]:
-    """The types that a task is about: what is looked for, taken, switched or sliced."""
+    """The types that a task is about: what is looked for, taken, switched, sliced and so on."""
     acted_on = {
         action.actual_type
         for action in task.key_actions
-        if action.verb in (verbs.PICKUP, verbs.TOGGLE, verbs.SLICE)
+        if action.verb in verbs.INTERACTIONS and action.verb not in _ABOUT_PLACES
     }
     return frozenset(acted_on or {type_of_id(object_id) for object_id in task.related_objects})
 

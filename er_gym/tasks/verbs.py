@@ -1,11 +1,125 @@
-"""The high-level verbs of the paper, spelled as its files spell them, and one more, "slice".
+"""The high-level verbs: one table, :func:`table`, from which everything about a verb derives.
 
-Plain strings, because they are what files, models and people write. An action is a verb, alone
-(:data:`BARE_VERBS`) or with an object type (:data:`OBJECT_VERBS`).
+An action is a verb, alone (:data:`BARE_VERBS`) or with an object type (:data:`OBJECT_VERBS`). Names
+are plain strings, because they are what files, models and people write; they are spelled as the
+paper's files spell them.
+
+The action space, the legality mask, the ``state`` and ``text`` observations, task files, the words
+by which replies are read, prompts and tool calls all derive from the rows. Other packages add rows
+(``docs/extending.md``):
+
+- with an entry point in the group ``er_gym.verbs``;
+- with dotted names in the environment variable ``ER_GYM_VERBS``, separated by commas;
+- with :func:`register`, before anything derives from the table.
+
+The table is put together when it is first asked for, and not while this module is imported: a
+module that defines a verb has to import this one first.
 """
 
 from __future__ import annotations
 
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import lru_cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from er_gym.plugins import PluginError, entry_points, load_dotted, load_entry_point
+from er_gym.thor.object_types import OBJECT_TYPES
+from er_gym.thor.objects import PROPERTY_OF_STATE
+
+GROUP = "er_gym.verbs"
+"""The entry points in which packages declare verbs."""
+VARIABLE = "ER_GYM_VERBS"
+"""The environment variable that names verbs, such as ``my_package.verbs:CLEAN``."""
+ANY, EMPTY, FULL = "any", "empty", "full"
+"""What a verb may ask of the hand, besides certain types in it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Words:
+    """A verb in one language.
+
+    Attributes:
+        said: how models may say it, in lower case with single spaces.
+        meaning: the sentence by which a prompt explains the verb. Prompts whose ``actions.yaml``
+            explains the verb do without; the bundled prompts explain er-gym's own verbs there.
+    """
+
+    said: tuple[str, ...] = ()
+    meaning: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verb:
+    """A high-level verb: what it takes, what it does, and how people say it.
+
+    Attributes:
+        name: in lower case with single spaces: ``"put in"``.
+        aliases: other spellings, which task files and ``EmbodiedEnv.step`` accept as well.
+        thor_action: the AI2-THOR action that does it. It gets the ``objectId``, unless the verb is
+            ``alone``.
+        parameters: what that action gets besides.
+        alone: the verb goes with no object.
+        object_property: AI2-THOR's name of the property that an object must have,
+            ``"dirtyable"``; ``""`` if any object will do, or only those of ``object_types``.
+        object_types: those that take the verb without the property.
+        object_state: a field of AI2-THOR's metadata and the value that it must have before,
+            ``("isDirty", True)``; it is asked only of objects that can have it. None for any.
+        hand: :data:`ANY`, :data:`EMPTY`, :data:`FULL`, or the object types of which one must be in
+            the hand.
+        tool: what these types are together, in words: ``"a knife"``.
+        in_hand: the verb can be done to what is in the hand, too.
+        makes: fields of the object's metadata and their values afterwards, for the goal of tasks
+            that are generated.
+        scored: success asks for key actions with this verb.
+        plan: what one does, in a list of steps for people: ``{it}`` is the object.
+        otherwise: what an agent is told when the object or its state does not allow the verb.
+        words: language code (``"en"``) to the words of that language.
+    """
+
+    name: str
+    aliases: tuple[str, ...] = ()
+    thor_action: str = ""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    alone: bool = False
+    object_property: str = ""
+    object_types: tuple[str, ...] = ()
+    object_state: tuple[str, bool] | None = None
+    hand: str | tuple[str, ...] = ANY
+    tool: str = ""
+    in_hand: bool = False
+    makes: tuple[tuple[str, bool | str], ...] = ()
+    scored: bool = True
+    plan: str = ""
+    otherwise: str = ""
+    words: Mapping[str, Words] = field(default_factory=dict)
+
+    def takes(self, object_type: str) -> bool:
+        """Whether the verb makes sense for an object type, in some scene and some state."""
+        if object_type in self.object_types:
+            return True
+        if self.object_property:
+            return self.object_property in OBJECT_TYPES[object_type].properties
+        return not self.object_types and object_type not in NOWHERE
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """Every way of saying it, in any language."""
+        phrases = (phrase for words in self.words.values() for phrase in words.said)
+        return tuple(dict.fromkeys((*phrases, self.name, *self.aliases)))
+
+    @property
+    def in_plan(self) -> str:
+        """:attr:`plan`, or the name where there is none."""
+        return self.plan or (self.name if self.alone else f"{self.name} {{it}}")
+
+
+NOWHERE = frozenset({"Floor"})
+"""Types that one is always at: one cannot go there."""
 NAVIGATE = "navigate to"
 PICKUP = "pickup"
 PUT = "put in"
@@ -13,25 +127,302 @@ OPEN = "open"
 CLOSE = "close"
 TOGGLE = "toggle"
 SLICE = "slice"
-"""Ours, not the paper's: needs a knife in the hand."""
 OBSERVE = "observe"
 MOVE_FORWARD = "move forward"
 END = "end"
 INIT = "init"
 """Not an action: the name of an episode's first recorded step, in which the agent is placed."""
 
-BARE_VERBS = (OBSERVE, MOVE_FORWARD, END)
-OBJECT_VERBS = (NAVIGATE, PICKUP, PUT, OPEN, CLOSE, TOGGLE, SLICE)
-INTERACTIONS = (PICKUP, PUT, OPEN, CLOSE, TOGGLE, SLICE)
-"""Verbs that change the object they name."""
 
-UNSCORED = frozenset({INIT, OBSERVE, MOVE_FORWARD, NAVIGATE})
-"""Verbs that success does not ask for: how one gets about is the agent's own affair."""
+def _say(en: str, zh: str) -> Mapping[str, Words]:
+    """Words of er-gym's own verbs, ``/`` between the phrases."""
+    return {"en": Words(said=tuple(en.split("/"))), "zh": Words(said=tuple(zh.split("/")))}
 
-ALIASES = {"put": PUT, "pick up": PICKUP, "navigate": NAVIGATE, "go to": NAVIGATE, "cut": SLICE}
+
+OWN: tuple[Verb, ...] = (
+    Verb(
+        name=NAVIGATE,
+        aliases=("navigate", "go to"),
+        scored=False,
+        plan="go to {the}{reason}",
+        words=_say(
+            "navigate to/navigate towards/navigate toward/navigate/go to/go towards/"
+            "go toward/go over to/go back to/walk to/walk towards/walk toward/walk over to/move to/"
+            "move towards/move toward/move over to/head to/head towards/head toward/"
+            "head over to/get to/get closer to/move closer to/return to/travel to/approach",
+            "导航到/导航至/导航去/前往/走到/走向/走去/移动到/去到/去往",
+        ),
+    ),
+    Verb(
+        name=PICKUP,
+        aliases=("pick up",),
+        thor_action="PickupObject",
+        object_property="pickupable",
+        hand=EMPTY,
+        plan="pick up {the}",
+        otherwise="It cannot be picked up.",
+        words=_say(
+            "pick up/pick up object/pick/grab/grasp/take/take out/get/collect",
+            "拿起/捡起/拾取/拾起/拿取/取出/拿出/抓起/抓取/拿",
+        ),
+    ),
+    Verb(
+        name=PUT,
+        aliases=("put",),
+        thor_action="PutObject",
+        # forceAction waives which types AI2-THOR thinks belong there: the paper asks for a Cup in
+        # the GarbageCan. Room, reach and a closed door still count.
+        parameters={"forceAction": True},
+        object_property="receptacle",
+        object_types=("Sink", "Bathtub"),  # one puts things into their basins
+        object_state=("isOpen", True),
+        hand=FULL,
+        plan="put {held} {inside}",
+        otherwise="It is closed, or nothing can be put into it.",
+        words=_say(
+            "put in/put into/put/put down/put object/place/place in",
+            "放入/放进/放到/放在/放置在/放置到/放下",
+        ),
+    ),
+    Verb(
+        name=OPEN,
+        thor_action="OpenObject",
+        object_property="openable",
+        object_state=("isOpen", False),
+        otherwise="It is open already, or does not open.",
+        words=_say("open/open up/open object", "打开"),
+    ),
+    Verb(
+        name=CLOSE,
+        thor_action="CloseObject",
+        object_property="openable",
+        object_state=("isOpen", True),
+        otherwise="It is closed already, or does not close.",
+        words=_say("close/close object/shut", "关闭/关上/合上"),
+    ),
+    Verb(
+        name=TOGGLE,
+        thor_action="ToggleObjectOn",  # or ToggleObjectOff, see er_gym/envs/skills.py
+        object_property="toggleable",
+        object_types=("StoveBurner",),  # by its knob
+        plan="switch {it} on or off",
+        otherwise="It has no switch.",
+        words=_say(
+            "toggle/toggle on/toggle off/toggle object/toggle object on/toggle object off/"
+            "turn on/turn off/switch/switch on/switch off/power on/power off/activate/deactivate",
+            "开关/切换/启动/开启/按下",
+        ),
+    ),
+    Verb(
+        name=SLICE,  # ours, not the paper's
+        aliases=("cut",),
+        thor_action="SliceObject",
+        object_property="sliceable",
+        hand=("Knife", "ButterKnife"),
+        tool="a knife",
+        otherwise="It cannot be sliced.",
+        words=_say("slice/slice up/slice object/cut/cut up/chop", "切/切开/切片/切割"),
+    ),
+    Verb(
+        name=OBSERVE,
+        alone=True,
+        scored=False,
+        plan="look around",
+        words=_say(
+            "observe/look around/look about/look at/look/take a look/take a look around/scan",
+            "观察/环顾/环视/查看/环顾四周",
+        ),
+    ),
+    Verb(
+        name=MOVE_FORWARD,
+        alone=True,
+        scored=False,
+        plan="take a step forward",
+        words=_say(
+            "move forward/move forwards/move ahead/move straight/go forward/go ahead/"
+            "walk forward/walk ahead/step forward/forward",
+            "前进/向前移动/向前走/往前走",
+        ),
+    ),
+    Verb(
+        name=END,
+        alone=True,
+        plan="say that it is done",
+        words=_say(
+            "end/end task/end episode/finish/finished/done/stop/complete/completed/terminate/"
+            "exit/quit/task completed/task complete/task finished/task done/task is completed/"
+            "task is complete/task is done/task is finished/the task is complete/"
+            "the task is completed/the task is done/the task is finished/mission accomplished",
+            "结束/完成/停止/任务完成/任务已完成/任务已经完成/完成了任务/任务结束/结束任务/完成任务",
+        ),
+    ),
+)
+"""The verbs that come with er-gym: the paper's, and "slice"."""
+
+
+# -- what other packages add -----------------------------------------------------------------------
+
+_registered: list[Verb] = []
+_ABOUT_OBJECTS = ("object_property", "object_types", "object_state", "in_hand", "makes")
+_PHRASE = re.compile(r"[^\W_]+(?: [^\W_]+)*")
+_SLOT = re.compile(r"\{(\w*)\}")
+_SLOTS = frozenset({"it", "the", "held", "inside", "reason"})
+
+
+def register(verb: Verb) -> None:
+    """Add a verb in this process; worker processes need one of the other two ways.
+
+    Raises:
+        PluginError: the verb cannot be used, or the action space has been put together already.
+    """
+    if table.cache_info().currsize:
+        raise PluginError(
+            f"verb {verb.name!r} comes too late: the action space has been put together. Register "
+            f"it before er_gym.envs or agents are imported, or name it in ${VARIABLE}"
+        )
+    _merged(_merged({each.name: each for each in OWN}, _registered), [verb])
+    _registered.append(verb)
+
+
+@lru_cache(maxsize=1)
+def table() -> tuple[Verb, ...]:
+    """Every verb: er-gym's own, then those that were added, in the order of their names.
+
+    Raises:
+        PluginError: a verb cannot be loaded or used.
+    """
+    named = [name.strip() for name in os.environ.get(VARIABLE, "").split(",") if name.strip()]
+    expected = f"a {__name__}.Verb"
+    given = [
+        *((verb, "register()") for verb in _registered),
+        *((load_dotted(name, "verb", expected), f"{name} in ${VARIABLE}") for name in named),
+        *(
+            (load_entry_point(entry, "verb"), f"entry point {name!r} of {GROUP}")
+            for name, entry in sorted(entry_points(GROUP).items())
+        ),
+    ]
+    for verb, origin in given:
+        if not isinstance(verb, Verb):
+            raise PluginError(f"{origin} is {verb!r}; give {expected}")
+    found = _merged({verb.name: verb for verb in OWN}, [verb for verb, _ in given])
+    # In the order of names: the number of an action may not depend on who is asked first.
+    return (*OWN, *(found[name] for name in sorted(found.keys() - {each.name for each in OWN})))
+
+
+def _merged(known: Mapping[str, Verb], verbs: list[Verb]) -> dict[str, Verb]:
+    """The known verbs and others by name; one that is added twice counts once."""
+    found = dict(known)
+    for verb in verbs:
+        if verb == found.get(verb.name):
+            continue
+        taken = {phrase: other.name for other in found.values() for phrase in other.said}
+        problem = _problem(verb, taken)
+        if problem:
+            raise PluginError(f"verb {verb.name!r}: {problem}")
+        found[verb.name] = verb
+    return found
+
+
+def _problem(verb: Verb, taken: Mapping[str, str]) -> str:
+    """What is wrong with a row, "" if nothing."""
+    said = {f"words[{language!r}].said": words.said for language, words in verb.words.items()}
+    tuples = {"aliases": verb.aliases, "object_types": verb.object_types, **said}
+    if strings := [name for name, value in tuples.items() if isinstance(value, str)]:
+        return f"{strings[0]} is a string; give a tuple of strings, ({tuples[strings[0]]!r},)"
+    for phrase in verb.said:
+        if not _PHRASE.fullmatch(phrase) or phrase != phrase.lower():
+            return f"{phrase!r} is no phrase; write lower-case words with single spaces"
+        if phrase in {*taken, INIT}:
+            return f"{phrase!r} is a way to say {taken.get(phrase, INIT)!r} already; choose another"
+    if not verb.thor_action:
+        return "it has no thor_action; give the AI2-THOR action that does it"
+    if strange := {*_SLOT.findall(verb.in_plan)} - _SLOTS:
+        return f"plan has {{{min(strange)}}}; it can have {{it}}"
+    return _problem_of_object(verb) or _problem_of_hand(verb)
+
+
+def _problem_of_object(verb: Verb) -> str:
+    about = [name for name in _ABOUT_OBJECTS if getattr(verb, name)]
+    if verb.alone and about:
+        return f"it goes with no object, so that {about[0]} means nothing; leave one of them out"
+    properties = sorted({name for kind in OBJECT_TYPES.values() for name in kind.properties})
+    if verb.object_property not in ("", *properties):
+        return (
+            f"no object has the property {verb.object_property!r}; "
+            f"choose one of: {', '.join(properties)}"
+        )
+    if verb.object_state is not None and verb.object_state[0] not in PROPERTY_OF_STATE:
+        return (
+            f"{verb.object_state[0]!r} is no state; choose one of: {', '.join(PROPERTY_OF_STATE)}"
+        )
+    return _unknown_type(verb.object_types)
+
+
+def _problem_of_hand(verb: Verb) -> str:
+    if not isinstance(verb.hand, str):
+        return _unknown_type(verb.hand)
+    if verb.hand in (ANY, EMPTY, FULL):
+        return ""
+    return f"hand is {verb.hand!r}; give {ANY!r}, {EMPTY!r}, {FULL!r} or a tuple of object types"
+
+
+def _unknown_type(names: tuple[str, ...]) -> str:
+    unknown = [name for name in names if name not in OBJECT_TYPES]
+    if not unknown:
+        return ""
+    near = get_close_matches(unknown[0], OBJECT_TYPES, n=3)
+    hint = f"; did you mean {' or '.join(near)}?" if near else ""
+    return f"there is no object type {unknown[0]!r}{hint}"
+
+
+# -- what derives from the table -------------------------------------------------------------------
+
+
+def verb_named(name: str) -> Verb:
+    """A row of the table by its canonical name."""
+    return _by_name()[name]
 
 
 def canonical_verb(verb: str) -> str:
     """The spelling used here of a verb as files write it ("put" and "put in" are one verb)."""
     verb = " ".join(verb.lower().split())
-    return ALIASES.get(verb, verb)
+    return _derived()["ALIASES"].get(verb, verb)  # type: ignore[no-any-return]
+
+
+@lru_cache(maxsize=1)
+def _by_name() -> Mapping[str, Verb]:
+    return MappingProxyType({verb.name: verb for verb in table()})
+
+
+@lru_cache(maxsize=1)
+def _derived() -> Mapping[str, Any]:
+    with_object = tuple(verb.name for verb in table() if not verb.alone)
+    return {
+        "BARE_VERBS": tuple(verb.name for verb in table() if verb.alone),
+        "OBJECT_VERBS": with_object,
+        "INTERACTIONS": tuple(name for name in with_object if name != NAVIGATE),
+        "ADDED": table()[len(OWN) :],
+        "UNSCORED": frozenset({INIT, *(verb.name for verb in table() if not verb.scored)}),
+        "ALIASES": {alias: verb.name for verb in table() for alias in verb.aliases},
+    }
+
+
+if TYPE_CHECKING:
+    BARE_VERBS: tuple[str, ...]
+    """Verbs that go with no object."""
+    OBJECT_VERBS: tuple[str, ...]
+    """Verbs that go with an object type."""
+    INTERACTIONS: tuple[str, ...]
+    """Verbs that change the object they name: all of these but "navigate to"."""
+    ADDED: tuple[Verb, ...]
+    """The rows that other packages added."""
+    UNSCORED: frozenset[str]
+    """Verbs that success does not ask for: how the agent gets about is its own affair."""
+    ALIASES: Mapping[str, str]
+    """Other spellings of verbs."""
+else:
+
+    def __getattr__(name: str) -> Any:
+        if name in ("BARE_VERBS", "OBJECT_VERBS", "INTERACTIONS", "ADDED", "UNSCORED", "ALIASES"):
+            return _derived()[name]
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -25,16 +25,18 @@ from er_gym.thor.object_types import OBJECT_TYPES
 TYPES = tuple(OBJECT_TYPES)
 """Object types by number."""
 KIND_OF = {name: number for number, name in enumerate(TYPES)}
-_FLAGS = {
-    "pickupable": "pickupable",
-    "receptacle": "receptacle",
-    "openable": "openable",
-    "toggleable": "toggleable",
-    "sliceable": "sliceable",
-    "is_open": "isOpen",
-    "is_toggled": "isToggled",
+PROPERTY_OF_STATE: Mapping[str, str] = {
+    "isOpen": "openable",
+    "isToggled": "toggleable",
+    "isBroken": "breakable",
+    "isSliced": "sliceable",
+    "isCooked": "cookable",
+    "isDirty": "dirtyable",
+    "isFilledWithLiquid": "canFillWithLiquid",
+    "isUsedUp": "canBeUsedUp",
 }
-"""Columns of truth values, by what the metadata calls them."""
+"""AI2-THOR's states, and the property of the objects that can have each."""
+_FLAGS = (*PROPERTIES, *STATES)
 ENTRY_KEYS = frozenset(
     {"objectId", "objectType", "isPickedUp", "parentReceptacles", "isOpen", "isToggled"}
 )
@@ -52,7 +54,8 @@ class ObjectTable:
     Attributes:
         ids: ``objectId`` of each. row: the row of each id.
         kinds: (N,) index of each one's type in :data:`TYPES`.
-        pickupable, receptacle, openable, toggleable, sliceable, is_open, is_toggled: (N,) bool.
+        has: (N,) bool for each of AI2-THOR's properties and states, by its name in the metadata:
+            ``"pickupable"``, ``"isOpen"``.
         centre, size: (N, 3) of each one's axis-aligned box, world frame, metres.
         parents: rows of the receptacles that each lies in, innermost first.
         contents: rows of what lies in each.
@@ -65,13 +68,7 @@ class ObjectTable:
     ids: tuple[str, ...]
     row: Mapping[str, int]
     kinds: NDArray[np.intp]
-    pickupable: NDArray[np.bool_]
-    receptacle: NDArray[np.bool_]
-    openable: NDArray[np.bool_]
-    toggleable: NDArray[np.bool_]
-    sliceable: NDArray[np.bool_]
-    is_open: NDArray[np.bool_]
-    is_toggled: NDArray[np.bool_]
+    has: Mapping[str, NDArray[np.bool_]]
     centre: NDArray[np.float64]
     size: NDArray[np.float64]
     parents: Sequence[Sequence[int]]
@@ -105,8 +102,8 @@ class ObjectTable:
                 "objectType": self.type_of(k),
                 "isPickedUp": k == self.held,
                 "parentReceptacles": [self.ids[holder] for holder in self.parents[k]],
-                "isOpen": bool(self.is_open[k]),
-                "isToggled": bool(self.is_toggled[k]),
+                "isOpen": bool(self.has["isOpen"][k]),
+                "isToggled": bool(self.has["isToggled"][k]),
             }
             for k in sorted({*rows, *holders})
         ]
@@ -163,10 +160,7 @@ def _of_entries(metadata: Mapping[str, Any]) -> _Seen:
         boxes = [entry["axisAlignedBoundingBox"][name] for entry in entries]
         return np.array([(b["x"], b["y"], b["z"]) for b in boxes]).reshape(-1, 3)
 
-    flags: dict[str, Any] = {
-        column: np.array([bool(e[name]) for e in entries], dtype=bool)
-        for column, name in _FLAGS.items()
-    }
+    has = {name: np.array([bool(e[name]) for e in entries], dtype=bool) for name in _FLAGS}
     held = metadata["inventoryObjects"]
     table = ObjectTable(
         ids=ids,
@@ -178,17 +172,13 @@ def _of_entries(metadata: Mapping[str, Any]) -> _Seen:
         contents=rows("receptacleObjectIds"),
         controlled=rows("controlledObjects"),
         held=row.get(held[0]["objectId"], -1) if held else -1,
-        **flags,
+        has=has,
     )
     seen, in_reach = (
         np.array([bool(entry[name]) for entry in entries], dtype=bool)
         for name in ("visible", "isInteractable")
     )
     return table, seen, in_reach
-
-
-_HAS = {c: PROPERTIES.index(name) for c, name in _FLAGS.items() if name in PROPERTIES}
-_IS = {c: STATES.index(name) for c, name in _FLAGS.items() if name in STATES}
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,14 +226,12 @@ def _of_world(world: World) -> ObjectTable:
 def _table(world: World) -> ObjectTable:
     names = _names(world)
     low, high = boxes(world)
-    has = world.properties[:, list(_HAS.values())].T.copy()
-    states = world.states[:, list(_IS.values())].T.copy()
+    flags = np.concatenate([world.properties, world.states], axis=1).T.copy()
     return ObjectTable(
         ids=names.ids,
         row=names.row,
         kinds=names.kinds,
-        **dict(zip(_HAS, has, strict=True)),
-        **dict(zip(_IS, states, strict=True)),
+        has=dict(zip(_FLAGS, flags, strict=True)),
         centre=(low + high) / 2,
         size=high - low,
         parents=tuple(world.parents),

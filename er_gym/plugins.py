@@ -1,0 +1,176 @@
+"""What other packages add to er-gym, found by name.
+
+There are two ways to name a thing that er-gym does not bring itself:
+
+- ``package.module:Name``, a dotted name: the module is imported, and has ``Name``;
+- the name of an entry point that an installed package declares in one of er-gym's groups, such as
+  ``er_gym.agents``.
+
+A :class:`Registry` looks a name up among er-gym's own things, then in both of these ways.
+``docs/extending.md`` has a walk-through for each registry.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import lru_cache
+from importlib import import_module, metadata
+from types import MappingProxyType, ModuleType
+from typing import Any, Generic, TypeVar, cast
+
+T = TypeVar("T")
+
+
+class PluginError(ValueError):
+    """A name stands for nothing that can be used; the message says why, and what can be given."""
+
+
+@dataclass(frozen=True)
+class Registry(Generic[T]):
+    """Things of one kind that a user chooses by name.
+
+    Attributes:
+        kind: what they are, for messages: ``"agent"``.
+        group: the group of entry points in which other packages declare theirs.
+        own: those that come with er-gym, by name.
+        expected: what one has to be, for messages: ``"a class with reset and act"``.
+        fits: whether an object is one, as far as that can be told without calling it.
+        others: further ways to name one, for messages.
+    """
+
+    kind: str
+    group: str
+    own: Mapping[str, T]
+    expected: str
+    fits: Callable[[object], bool]
+    others: str = ""
+
+    def names(self) -> tuple[str, ...]:
+        """The names of er-gym's own, then those of installed packages, each once."""
+        return tuple(dict.fromkeys((*self.own, *sorted(entry_points(self.group)))))
+
+    def get(self, name: str) -> T:
+        """What a name stands for; er-gym's own come before those of other packages.
+
+        Raises:
+            PluginError: the name is unknown, or what it stands for cannot be imported or used.
+        """
+        if name in self.own:
+            return self.own[name]
+        entry = entry_points(self.group).get(name)
+        if entry is not None:
+            return self._checked(load_entry_point(entry, self.kind), f"entry point {name!r}")
+        if not is_dotted(name):
+            raise PluginError(self.unknown(name))
+        return self._checked(load_dotted(name, self.kind, self.expected), repr(name))
+
+    def unknown(self, name: str) -> str:
+        """The message for a name that stands for nothing: what there is, and what is near."""
+        near = get_close_matches(name, self.names(), n=3)
+        hint = f" (did you mean {' or '.join(near)}?)" if near else ""
+        ways = [", ".join(self.names()), "package.module:Name", self.others]
+        return f"unknown {self.kind} {name!r}{hint}; choose one of: {'; '.join(filter(None, ways))}"
+
+    def _checked(self, found: object, name: str) -> T:
+        if not self.fits(found):
+            raise PluginError(f"{self.kind} {name} is {found!r}; give {self.expected}")
+        return cast(T, found)
+
+
+@lru_cache(maxsize=32)
+def entry_points(group: str) -> Mapping[str, metadata.EntryPoint]:
+    """The entry points of a group by name, of all installed packages.
+
+    Raises:
+        PluginError: two packages declare different things under one name.
+    """
+    found: dict[str, metadata.EntryPoint] = {}
+    for entry in metadata.entry_points(group=group):
+        other = found.setdefault(entry.name, entry)
+        if other.value != entry.value:
+            raise PluginError(
+                f"two packages declare {entry.name!r} in the entry points {group!r}: "
+                f"{_package(other)} ({other.value}) and {_package(entry)} ({entry.value}); "
+                "uninstall one of them"
+            )
+    return MappingProxyType(found)
+
+
+def load_entry_point(entry: metadata.EntryPoint, kind: str) -> Any:
+    """What an entry point stands for.
+
+    Raises:
+        PluginError: it cannot be loaded.
+    """
+    try:
+        return entry.load()
+    except Exception as error:  # a module can raise anything
+        raise PluginError(
+            f"{kind} {entry.name!r} of the package {_package(entry)} cannot be loaded from "
+            f"{entry.value} ({_reason(error)}); mend or uninstall that package"
+        ) from error
+
+
+def is_dotted(name: str) -> bool:
+    """Whether a name is spelled as ``package.module:Name``, or ``package.module:Class.method``."""
+    module, colon, attributes = name.partition(":")
+    parts = (*module.split("."), *attributes.split("."))
+    return bool(colon) and all(part.isidentifier() for part in parts)
+
+
+def load_dotted(name: str, kind: str, expected: str) -> Any:
+    """What ``package.module:Name`` stands for.
+
+    A module is looked for as ``import`` does, then in the working directory.
+
+    Raises:
+        PluginError: it is no such name, its module cannot be imported, or lacks the attribute.
+    """
+    if not is_dotted(name):
+        raise PluginError(f"{kind} {name!r} is no package.module:Name; give {expected}")
+    module_name, _, attributes = name.partition(":")
+    try:
+        found: Any = _imported(module_name)
+    except Exception as error:  # a module can raise anything
+        raise PluginError(
+            f"{kind} {name!r}: cannot import {module_name!r} ({_reason(error)}); give {expected}, "
+            "in an installed package, the working directory or a folder on PYTHONPATH"
+        ) from error
+    for attribute in attributes.split("."):
+        if not hasattr(found, attribute):
+            near = get_close_matches(attribute, dir(found), n=3)
+            hint = f" (did you mean {' or '.join(near)}?)" if near else ""
+            raise PluginError(
+                f"{kind} {name!r}: {module_name!r} has no {attribute!r}{hint}; give {expected}"
+            )
+        found = getattr(found, attribute)
+    return found
+
+
+def _imported(name: str) -> ModuleType:
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        here = os.getcwd()
+        # A console script, unlike "python -m", does not look in the working directory.
+        if error.name != name.split(".")[0] or here in sys.path or "" in sys.path:
+            raise
+        sys.path.append(here)
+        try:
+            return import_module(name)
+        except ModuleNotFoundError:
+            sys.path.remove(here)
+            raise
+
+
+def _package(entry: metadata.EntryPoint) -> str:
+    return entry.dist.name if entry.dist else "unknown"
+
+
+def _reason(error: Exception) -> str:
+    first_line = (str(error).strip().splitlines() or [""])[0]
+    return f"{type(error).__name__}: {first_line}"
