@@ -23,7 +23,10 @@ from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
 
 TYPES = tuple(OBJECT_TYPES)
-_PROPERTIES = tuple(sorted({name for kind in OBJECT_TYPES.values() for name in kind.properties}))
+_PROPERTIES = tuple(
+    sorted({name for kind in OBJECT_TYPES.values() for name in kind.properties} - {"canBeUsedUp"})
+)
+"""Policies were trained without the one that is left out: it would change the sizes of layers."""
 _MATTERS = [FEATURES.index(name) for name in ("navigable", "interactable", "held", "goal")]
 _GOAL = FEATURES.index("goal")
 _MANY = 8

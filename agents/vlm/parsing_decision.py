@@ -70,6 +70,7 @@ _PUT = re.compile(
     r"(?P<name>.*)",
     re.IGNORECASE,
 )
+_PARTICLE = re.compile(r"[a-z]+ (?:up|down|on|off|out|away|over)")
 _PARTED: tuple[tuple[str, str, re.Pattern[str]], ...] = (
     ("put form", verbs.PUT, _PUT),
     (
@@ -86,6 +87,12 @@ _PARTED: tuple[tuple[str, str, re.Pattern[str]], ...] = (
         "verb parted",
         verbs.PICKUP,
         re.compile(r"(?:pick|take)\s(?P<name>\S.*?)\s(?:up|out)\W*$", re.I),
+    ),
+    *(
+        ("verb parted", verb.name, re.compile(rf"{first}\s(?P<name>\S.*?)\s{last}\W*$", re.I))
+        for verb in verbs.ADDED
+        for first, last in (phrase.split() for phrase in verb.said if _PARTICLE.fullmatch(phrase))
+        if not verb.alone
     ),
     *(
         ("verb parted", verb, re.compile(rf"[把将](?P<name>.+?)(?:{phrase})(?:起来|了)?\W*$"))

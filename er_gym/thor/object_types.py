@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from importlib.resources import files
 from types import MappingProxyType
 
+from er_gym.sim.recorded import USED_UP
+
 
 @dataclass(frozen=True)
 class ObjectType:
@@ -25,7 +27,12 @@ class ObjectType:
 
 def _load() -> dict[str, ObjectType]:
     text = files("er_gym.sim.data").joinpath("object_types.json").read_text()
-    return {name: ObjectType(name, frozenset(has)) for name, has in json.loads(text).items()}
+    recorded = {name: frozenset(has) for name, has in json.loads(text).items()}
+    used_up = {name: frozenset({"canBeUsedUp"}) for name in USED_UP}  # the record leaves it out
+    return {
+        name: ObjectType(name, has | used_up.get(name, frozenset()))
+        for name, has in recorded.items()
+    }
 
 
 OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(_load())

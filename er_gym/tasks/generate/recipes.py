@@ -15,6 +15,7 @@ from pathlib import Path
 import yaml
 from pydantic import BaseModel, ConfigDict, Field
 
+from er_gym.tasks import verbs
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import read_text, validated
 from er_gym.tasks.generate.plan import Plan, Row, plan_of
@@ -22,6 +23,7 @@ from er_gym.tasks.generate.room import Room, Thing, largest, may_fill
 from er_gym.tasks.generate.script import Impossible, Script
 from er_gym.tasks.generate.templates import STYLES, in_order
 from er_gym.tasks.generate.words import in_the
+from er_gym.tasks.verbs import Verb
 from er_gym.thor import OBJECT_TYPES
 
 SHORTEST, LONGEST = 9, 28
@@ -38,7 +40,7 @@ class Recipe(BaseModel):
     Attributes:
         name: a part of task ids: letters, digits and underscores.
         roles: who takes part: a list of object types, or one of :data:`KINDS`.
-        steps: one of :data:`STEPS` each, with the roles that it is about.
+        steps: one of :func:`steps` each, with the roles that it is about.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -273,6 +275,51 @@ def _switch_off(cooking: Cooking, what: str) -> str:
     return f"turn off the {thing.type}"
 
 
+def steps() -> Mapping[str, Callable[..., str]]:
+    """:data:`STEPS`, and ``do VERB`` for each verb that another package adds and that goes with an
+    object: its roles are the object and, where the verb needs certain types in the hand, one of
+    these."""
+    added = {f"do {verb.name}": _doing(verb) for verb in verbs.ADDED if not verb.alone}
+    return {**STEPS, **added}
+
+
+def _doing(verb: Verb) -> Callable[..., str]:
+    if isinstance(verb.hand, str):
+        return partial(_do, verb)
+    return partial(_do_with, verb)
+
+
+def _do(verb: Verb, cooking: Cooking, what: str) -> str:
+    """Do a verb to a thing where it is, or in the hand."""
+    thing, script = cooking.cast[what], cooking.script
+    if not verb.takes(thing.type):
+        raise Impossible(f"one cannot {verb.name} {thing.type}")
+    if script.held is not None and verb.hand == verbs.EMPTY:
+        raise Impossible(f"the hand holds {script.held.type}")
+    if script.held is None and verb.hand == verbs.FULL:
+        raise Impossible("the hand is empty")
+    if script.held == thing and not verb.in_hand:
+        raise Impossible(f"one cannot {verb.name} what is in the hand")
+    if verb.object_state == ("isDirty", True):
+        cooking.dirty.append(thing.id)
+    script.do(verb, thing)
+    return f"{verb.name} the {thing.type}"
+
+
+def _do_with(verb: Verb, cooking: Cooking, what: str, tool: str) -> str:
+    """Fetch a tool, do a verb with it to a thing where that is, and lay the tool down there."""
+    thing, instrument, script = cooking.cast[what], cooking.cast[tool], cooking.script
+    place = script.place_of(thing)
+    if instrument.type not in verb.hand:
+        raise Impossible(f"one cannot {verb.name} with {instrument.type}")
+    if not may_fill(place) or not cooking.room.accepts(instrument.type, place.type):
+        raise Impossible(f"{place.type} does not take {instrument.type}")
+    script.fetch(instrument)
+    said = _do(verb, cooking, what)
+    script.put(place)
+    return f"{said} with the {instrument.type} and leave that {in_the(place.type)}"
+
+
 # -- recipes as rows -----------------------------------------------------------------------------
 
 
@@ -312,10 +359,11 @@ def _check(recipe: Recipe, where: str) -> None:
             raise TaskFileError(f"{where}: role {role!r} has unknown object type {unknown[0]!r}")
     if not recipe.steps:
         raise TaskFileError(f"{where}: it has no steps")
+    known = steps()
     for step in recipe.steps:
-        if len(step) != 1 or not set(step) <= set(STEPS):
+        if len(step) != 1 or not set(step) <= set(known):
             raise TaskFileError(
-                f"{where}: a step is {list(step)}; it must be one of: {', '.join(STEPS)}"
+                f"{where}: a step is {list(step)}; it must be one of: {', '.join(known)}"
             )
         ((name, roles),) = step.items()
         strange = [role for role in roles if role not in recipe.roles]
@@ -323,7 +371,7 @@ def _check(recipe: Recipe, where: str) -> None:
             raise TaskFileError(
                 f"{where}: a step names {strange[0]!r}; its roles are: {', '.join(recipe.roles)}"
             )
-        takes = len(signature(STEPS[name]).parameters) - 1
+        takes = len(signature(known[name]).parameters) - 1
         if len(roles) != takes:
             raise TaskFileError(
                 f"{where}: the step {name!r} is about {len(roles)} roles; it takes {takes}"
@@ -361,7 +409,8 @@ def _plan(recipe: Recipe, room: Room, *cast: Thing) -> Plan:
     """Act a recipe out."""
     roles = dict(zip(recipe.roles, cast, strict=True))
     cooking = Cooking(room, Script(room, stays=True), roles, [])
-    clauses = [STEPS[name](cooking, *args) for step in recipe.steps for name, args in step.items()]
+    do = steps()
+    clauses = [do[name](cooking, *args) for step in recipe.steps for name, args in step.items()]
     moved = [thing for thing in cast if thing.pickupable]
     return plan_of(cooking.script, *moved, dirty=cooking.dirty, clauses=clauses)
 

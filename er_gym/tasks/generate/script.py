@@ -9,6 +9,7 @@ from er_gym.tasks import verbs
 from er_gym.tasks.generate.room import Room, Thing
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.task import KeyAction
+from er_gym.tasks.verbs import Verb
 from er_gym.thor import OBJECT_TYPES
 
 
@@ -160,6 +161,15 @@ class Script:
         if thing.id in self._inside:
             self._inside[part.id] = self._inside.pop(thing.id)
         return part
+
+    def do(self, verb: Verb, thing: Thing) -> None:
+        """Do a verb to a thing, going to where that is unless it is in the hand."""
+        if thing != self.held:
+            self.visit(thing)
+        self._do(verb.name, thing)
+        self._handle(thing)
+        if verb.makes:
+            self.becomes(thing, **dict(verb.makes))
 
     def becomes(self, thing: Thing, **state: bool | str) -> None:
         """Note what a thing's metadata must say in the end."""
