@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from inspect import signature
 
 from agents.base import Agent, Decision
 from agents.scripted.oracle import OracleAgent
@@ -11,6 +12,7 @@ from agents.scripted.random import RandomAgent
 from agents.scripted.searcher import SearcherAgent
 from agents.vlm.settings import AgentSettings
 from agents.vlm.speaker import Speaker, speaks, ways_to_name
+from er_gym.plugins import PluginError, Registry, reason
 
 __all__ = [
     "AGENTS",
@@ -24,34 +26,57 @@ __all__ = [
 
 RL = "rl:"
 """What the name of a trained policy begins with; its run directory follows."""
-AGENTS: dict[str, Callable[[int], Agent]] = {
-    "oracle": lambda seed: OracleAgent(),
-    "random": RandomAgent,
-    "searcher": lambda seed: SearcherAgent(),
-}
-"""By name: how to make the agent, given a seed."""
+AGENTS: Registry[Callable[..., Agent]] = Registry(
+    kind="agent",
+    group="er_gym.agents",
+    own={"oracle": OracleAgent, "random": RandomAgent, "searcher": SearcherAgent},
+    expected="an agent's class (agents.base.Agent), or a function that makes an agent",
+    fits=callable,
+    others=f"{RL}RUN with a run directory of er-gym train-rl; {ways_to_name()}",
+)
+"""By name: how to make the agent. It is called with ``seed=`` if it takes that, else without
+arguments."""
 
 
 def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
-    """An agent by name: one of :data:`AGENTS`, ``rl:RUN`` for a trained policy, or, with the
-    settings that are the default, one that speaks (:mod:`agents.vlm.speaker`).
+    """An agent by name: one of :data:`AGENTS`, ``package.module:Class``, ``rl:RUN`` for a trained
+    policy, or, with the settings that are the default, a model's (:mod:`agents.vlm.speaker`).
 
     ``trust``: whether a policy may be read from a file that can run code (:mod:`agents.rl.saved`).
 
     Raises:
-        ValueError: there is none of that name; the message lists those there are.
+        ValueError: there is none of that name, or it cannot be made; the message lists those there
+            are.
     """
     if name.startswith(RL):
         return _trained(name.removeprefix(RL), trust)
     if speaks(name):
         return _speaker(name).agent(seed)
     make = AGENTS.get(name)
-    if make is None:
-        raise ValueError(
-            f"unknown agent {name!r}; choose one of: {', '.join(AGENTS)}; "
-            f"{RL}RUN with a run directory of er-gym train-rl; {ways_to_name()}"
+    if name in AGENTS.own:
+        return _called(make, seed)
+    try:
+        agent = _called(make, seed)
+    except Exception as error:  # another package's code can raise anything
+        raise PluginError(
+            f"agent {name!r} cannot be made ({reason(error)}); it is called with seed= if it takes "
+            "that, else without arguments"
+        ) from error
+    lacking = [part for part in ("obs_mode", "reset", "act") if not hasattr(agent, part)]
+    if lacking:
+        raise PluginError(
+            f"agent {name!r} makes {type(agent).__name__}, which has no {lacking[0]!r}; "
+            "an agent has obs_mode, reset and act (agents.base.Agent)"
         )
-    return make(seed)
+    return agent
+
+
+def _called(make: Callable[..., Agent], seed: int) -> Agent:
+    try:
+        takes_seed = "seed" in signature(make).parameters
+    except ValueError:  # built in, without a signature
+        takes_seed = False
+    return make(seed=seed) if takes_seed else make()
 
 
 @lru_cache(maxsize=4)

@@ -108,11 +108,17 @@ def suites() -> None:
     """List the suites."""
     from collections import Counter
 
-    from er_gym.tasks.suites import load_suite, suite_config, suite_file, suite_names
+    from er_gym.tasks.suites import (
+        load_suite,
+        suite_config,
+        suite_file,
+        suite_names,
+        suite_registry,
+    )
     from er_gym.tasks.types import GROUPS
 
-    for name in suite_names():
-        if not suite_file(name).exists():
+    for name in suite_registry().names():
+        if name in suite_names() and not suite_file(name).exists():
             click.echo(
                 f"{name}: not made yet (er-gym tasks generate --suite {name}); "
                 f"{suite_config(name).description}"

@@ -66,7 +66,14 @@ class Registry(Generic[T]):
             return self._checked(load_entry_point(entry, self.kind), f"entry point {name!r}")
         if not is_dotted(name):
             raise PluginError(self.unknown(name))
-        return self._checked(load_dotted(name, self.kind, self.expected), repr(name))
+        try:
+            found = load_dotted(name, self.kind, self.expected)
+        except PluginError as error:
+            cause, package = error.__cause__, name.partition(":")[0].partition(".")[0]
+            if isinstance(cause, ModuleNotFoundError) and cause.name == package:
+                raise PluginError(f"{self.unknown(name)}. {error}") from cause
+            raise
+        return self._checked(found, repr(name))
 
     def unknown(self, name: str) -> str:
         """The message for a name that stands for nothing: what there is, and what is near."""
@@ -111,7 +118,7 @@ def load_entry_point(entry: metadata.EntryPoint, kind: str) -> Any:
     except Exception as error:  # a module can raise anything
         raise PluginError(
             f"{kind} {entry.name!r} of the package {_package(entry)} cannot be loaded from "
-            f"{entry.value} ({_reason(error)}); mend or uninstall that package"
+            f"{entry.value} ({reason(error)}); mend or uninstall that package"
         ) from error
 
 
@@ -137,7 +144,7 @@ def load_dotted(name: str, kind: str, expected: str) -> Any:
         found: Any = _imported(module_name)
     except Exception as error:  # a module can raise anything
         raise PluginError(
-            f"{kind} {name!r}: cannot import {module_name!r} ({_reason(error)}); give {expected}, "
+            f"Cannot import {module_name!r} of {kind} {name!r} ({reason(error)}); give {expected}, "
             "in an installed package, the working directory or a folder on PYTHONPATH"
         ) from error
     for attribute in attributes.split("."):
@@ -171,6 +178,7 @@ def _package(entry: metadata.EntryPoint) -> str:
     return entry.dist.name if entry.dist else "unknown"
 
 
-def _reason(error: Exception) -> str:
+def reason(error: Exception) -> str:
+    """What was raised, in one line."""
     first_line = (str(error).strip().splitlines() or [""])[0]
     return f"{type(error).__name__}: {first_line}"

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agents import configs
 from agents.vlm.chat import Client
+from agents.vlm.clients.kinds import client_named, speaks, ways_to_name
 from agents.vlm.record import without_secrets
 from agents.vlm.settings import AgentSettings, Prices
 
 if TYPE_CHECKING:
     from agents.vlm.agent import VLMAgent
-    from agents.vlm.clients.budget import Budget, Ledger
-    from agents.vlm.clients.kept import Identified
+    from agents.vlm.clients.budget import Budget
     from agents.vlm.clients.lines import Lines
-    from agents.vlm.clients.watch import Notice, Watch
+    from agents.vlm.clients.watch import Notice
+
+__all__ = ["Speaker", "consequential", "load_settings", "speaks", "ways_to_name"]
 
 _WHAT = "agent"
 SPENDING = "spending.jsonl"
@@ -32,41 +34,6 @@ _OF_NO_CONSEQUENCE: Mapping[str, Any] = {
 }
 """Settings that change when and where a model answers, and not what it says. Prompts are known by
 their digest."""
-
-
-def _openai(model: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
-    from agents.vlm.clients.openai_server import OpenAIClient
-
-    return OpenAIClient(model, settings, ledger, watch)
-
-
-def _local(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
-    from agents.vlm.clients.budget import Metered
-    from agents.vlm.clients.local import LocalClient
-
-    return Metered(LocalClient(path, settings, watch), ledger, watch)
-
-
-def _recorded(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
-    from agents.vlm.clients.budget import Metered
-    from agents.vlm.clients.scripted import RecordedClient
-
-    return Metered(RecordedClient(Path(path)), ledger, watch)
-
-
-CLIENTS: Mapping[str, Callable[[str, AgentSettings, Ledger, Watch], Identified]] = {
-    "openai": _openai,
-    "hf": _local,
-    "recorded": _recorded,
-}
-"""By what the name of an agent begins with, before the colon: how its client is made of the rest,
-the settings, and the run's ledger and watch."""
-
-
-def speaks(name: str) -> bool:
-    """Whether an agent of this name is one that speaks, such as ``openai:MODEL``."""
-    kind, colon, rest = name.partition(":")
-    return kind in CLIENTS and bool(colon and rest)
 
 
 def load_settings(name: str | None, overrides: Sequence[str] = ()) -> AgentSettings:
@@ -87,7 +54,8 @@ class Speaker:
         watch: the run's time and news; ``watch.show`` is called with what a user should hear.
 
     Args:
-        name: ``openai:MODEL``, ``hf:PATH`` or ``recorded:RUN``.
+        name: a model client's name and what it is to open: ``openai:MODEL``
+            (:data:`agents.vlm.clients.kinds.CLIENTS`).
         settings: of the agent.
         directory: where replies are kept, so that none is paid for twice, what has been spent, and
             what went wrong with the server; without it, nothing is kept.
@@ -109,13 +77,11 @@ class Speaker:
         from agents.vlm.matching import Matcher
         from agents.vlm.prompts import load_prompts
 
-        if not speaks(name):
-            raise ValueError(f"{name!r} is no agent that speaks; give {ways_to_name()}")
+        kind, opened = client_named(name)
         self.name, self.settings = name, settings
         self.prompts = load_prompts(settings.prompts)
         self._matcher = Matcher(settings.matching)
         self._matcher.prepare()
-        kind, _, rest = name.partition(":")
         self._events: Lines | None = None
         self._keeping = threading.Lock()
         self._directory = directory
@@ -125,9 +91,8 @@ class Speaker:
 
             asked = budget or Budget()
             self.watch = Watch(asked.max_minutes)
-            prices = settings.prices if kind == "openai" else Prices()
-            self._ledger = Ledger(asked, prices)
-            client = CLIENTS[kind](rest, settings, self._ledger, self.watch)
+            self._ledger = Ledger(asked, settings.prices if kind.priced else Prices())
+            client = kind.open(opened, settings, self._ledger, self.watch)
             self.client: Client = client
             if directory is not None:
                 from agents.vlm.clients.kept import Kept
@@ -136,10 +101,9 @@ class Speaker:
                 self.watch.keep = self._keep
                 self.client = Kept(client, directory / REPLIES)
         except ImportError as error:
-            extra = "local" if kind == "hf" else "vlm"
             raise ValueError(
                 f"agent {name} needs {error.name}, which is not installed: "
-                f"pip install 'er-gym[{extra}]'"
+                f"pip install '{kind.install}'"
             ) from error
 
     def agent(self, seed: int) -> VLMAgent:
@@ -176,11 +140,6 @@ class Speaker:
         with contextlib.suppress(OSError, ValueError), self._keeping:
             self._events = self._events or Lines(self._directory / EVENTS)
             self._events.add(notice.model_dump_json())
-
-
-def ways_to_name() -> str:
-    """How agents that speak are named, for messages."""
-    return "openai:MODEL, hf:PATH or recorded:RUN"
 
 
 def consequential(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:

@@ -24,7 +24,6 @@ from er_gym.envs.info import Info, LegalActions
 from er_gym.envs.legality import Known
 from er_gym.envs.observations import (
     MAX_REPEATS,
-    OBSERVATIONS,
     Memory,
     Situation,
     goal_row,
@@ -92,6 +91,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     - ``rgb``: the agent's view, ``(height, width, 3)`` uint8.
     - ``state``: ``(D,)`` float32 in [-1, 1], see :data:`er_gym.envs.observations.STATE_LAYOUT`.
     - ``text``: the task, what is seen, held and possible, and feedback, in words.
+    - the name of another package's, or ``package.module:ROW`` (docs/extending.md).
 
     ## Info
     ``reset`` and ``step`` return an :class:`er_gym.envs.info.Info`: what is ``visible``, ``held``,
@@ -201,7 +201,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         if task_type is not None:
             self._task_type = look_up_type(task_type)
         self._obs = parse_obs_mode(obs_mode)
-        self._draws = "rgb" in self._obs
+        self._draws = any(kind.draws for kind in self._obs.values())
         self._instances = instances
         self.render_mode = render_mode
         self._controller_arguments: dict[str, Any] = {
@@ -228,7 +228,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._done: list[AnyAction] = []  # in this episode, so that a copy can do it again
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = spaces.Dict(
-            {name: OBSERVATIONS[name].space(width, height) for name in self._obs}
+            {name: kind.space(width, height) for name, kind in self._obs.items()}
         )
 
     # -- Gymnasium's interface -------------------------------------------------------------------
@@ -573,7 +573,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             steps=self._steps,
             max_steps=self._limit,
         )
-        return {name: OBSERVATIONS[name].build(situation) for name in self._obs}
+        return {name: kind.build(situation) for name, kind in self._obs.items()}
 
     def _info(
         self, action: Action | None, text: str, success: bool, object_id: str, feedback: str

@@ -22,6 +22,7 @@ from er_gym.envs.actions import Action
 from er_gym.envs.arguments import shown
 from er_gym.envs.legality import Known, Surroundings
 from er_gym.envs.percept import Percept
+from er_gym.plugins import PluginError, Registry, is_dotted
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
 from er_gym.thor.objects import KIND_OF, TYPES
@@ -124,7 +125,8 @@ class Memory:
         objects, visible = percept.objects, percept.visible
         self.seen |= percept.visible_types
         out_of_sight = ~percept.visible_types
-        for remembered, now in ((self.is_open, objects.has["isOpen"]), (self.is_on, objects.has["isToggled"])):
+        is_open, is_on = objects.has["isOpen"], objects.has["isToggled"]
+        for remembered, now in ((self.is_open, is_open), (self.is_on, is_on)):
             remembered &= out_of_sight
             remembered[objects.kinds[visible & now]] = True
         if at is not None:
@@ -285,37 +287,63 @@ def _text(situation: Situation) -> str:
 
 @dataclass(frozen=True)
 class Observation:
-    """A kind of observation: its space, given the frame's width and height, and how it is made."""
+    """A kind of observation.
+
+    Attributes:
+        space: its space, given the width and height of frames, pixels.
+        build: makes it.
+        draws: whether ``situation.percept`` must have a picture.
+    """
 
     space: Callable[[int, int], spaces.Space[Any]]
     build: Callable[[Situation], Any]
+    draws: bool = False
 
 
-OBSERVATIONS: Mapping[str, Observation] = {
-    "rgb": Observation(
-        lambda width, height: spaces.Box(0, 255, (height, width, 3), np.uint8),
-        # A copy: after an illegal action the percept, and its frame, are those of the step before.
-        lambda situation: np.array(situation.percept.picture),
-    ),
-    "state": Observation(
-        lambda width, height: spaces.Box(-1.0, 1.0, (len(STATE_LAYOUT),), np.float32), _state
-    ),
-    "text": Observation(
-        lambda width, height: spaces.Text(_TEXT_LENGTH, min_length=1, charset=_CHARACTERS), _text
-    ),
-}
+OBSERVATIONS: Registry[Observation] = Registry(
+    kind="observation",
+    group="er_gym.observations",
+    own={
+        "rgb": Observation(
+            lambda width, height: spaces.Box(0, 255, (height, width, 3), np.uint8),
+            # A copy: after an illegal action the percept is that of the step before.
+            lambda situation: np.array(situation.percept.picture),
+            draws=True,
+        ),
+        "state": Observation(
+            lambda width, height: spaces.Box(-1.0, 1.0, (len(STATE_LAYOUT),), np.float32), _state
+        ),
+        "text": Observation(
+            lambda width, height: spaces.Text(_TEXT_LENGTH, min_length=1, charset=_CHARACTERS),
+            _text,
+        ),
+    },
+    expected=f"a {__name__}.Observation",
+    fits=lambda row: isinstance(row, Observation),
+)
+"""By name, which is also the key in the dictionary that the environment returns."""
 
 
-def parse_obs_mode(obs_mode: str) -> tuple[str, ...]:
-    """The kinds of observation that a mode such as ``"rgb+text"`` asks for.
+def parse_obs_mode(obs_mode: str) -> dict[str, Observation]:
+    """The kinds of observation that a mode such as ``"rgb+text"`` asks for, by name.
 
     Raises:
         ValueError: it names something that is no kind of observation, or nothing, or one twice.
     """
-    kinds = tuple(obs_mode.split("+")) if isinstance(obs_mode, str) else ("",)
-    if len(set(kinds)) < len(kinds) or not set(kinds) <= OBSERVATIONS.keys():
-        raise ValueError(
-            f"unknown obs_mode {shown(obs_mode)}; join any of {', '.join(OBSERVATIONS)} with '+', "
-            "such as 'rgb+text'"
-        )
-    return kinds
+    names = obs_mode.split("+") if isinstance(obs_mode, str) else [""]
+    try:
+        rows = {name: OBSERVATIONS.get(name) for name in names}
+    except PluginError as error:
+        if any(is_dotted(name) for name in names):
+            raise
+        raise ValueError(_unknown_mode(obs_mode)) from error
+    if len(rows) < len(names):
+        raise ValueError(_unknown_mode(obs_mode))
+    return rows
+
+
+def _unknown_mode(obs_mode: object) -> str:
+    return (
+        f"unknown obs_mode {shown(obs_mode)}; join any of {', '.join(OBSERVATIONS.names())} and "
+        "package.module:ROW with '+', such as 'rgb+text'"
+    )

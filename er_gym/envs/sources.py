@@ -14,7 +14,7 @@ import numpy as np
 from er_gym.envs.arguments import shown
 from er_gym.tasks.errors import TaskFileError, in_short, told_once
 from er_gym.tasks.resolve import resolve_tasks
-from er_gym.tasks.suites import load_suite, suite_file, suite_from_file
+from er_gym.tasks.suites import load_suite, suite_file, suite_from_file, suite_names
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TaskType
 
@@ -124,8 +124,10 @@ def make_source(source: Source) -> EpisodeSource:
     if isinstance(source, str | Path):
         name = str(source)
         is_file = "/" in name or name.endswith((".json", ".jsonl", ".jsonl.gz"))
-        path = Path(name).resolve() if is_file else suite_file(name)
-        changed = path.stat().st_mtime_ns if path.exists() else 0
+        path = Path(name).resolve()
+        if name in suite_names():
+            path = suite_file(name)
+        changed = path.stat().st_mtime_ns if path.is_file() else 0
         found, remarks = _read(str(path) if is_file else name, is_file, changed)
         if remarks:
             warnings.warn(remarks, stacklevel=3)

@@ -12,12 +12,12 @@ import os
 import re
 import zlib
 from collections.abc import Callable, Collection, Iterator, Sequence
-from importlib import import_module
 from pathlib import Path
-from typing import TypeAlias, cast
+from typing import TypeAlias
 
 from pydantic import BaseModel, ConfigDict
 
+from er_gym.plugins import Registry
 from er_gym.tasks.files import validated
 from er_gym.thor import OBJECT_TYPES
 
@@ -155,30 +155,23 @@ def choose(variants: Sequence[str], task_id: str) -> str:
     return variants[zlib.crc32(task_id.encode()) % len(variants)]
 
 
+PARAPHRASERS: Registry[Ask] = Registry(
+    kind="paraphraser",
+    group="er_gym.paraphrasers",
+    own={},
+    expected="a function from a prompt to a reply",
+    fits=callable,
+)
+"""The language models of other packages, by name; er-gym brings none."""
+
+
 def load_ask(spec: str) -> Ask:
-    """The function that a spec such as ``my_package.models:ask`` names.
+    """The function that a name such as ``my_package.models:ask`` stands for.
 
     Raises:
-        ValueError: it is no such spec, its module cannot be imported, or has no such function.
+        ValueError: the name stands for no function.
     """
-    wanted = "expected package.module:function, a function from a prompt to a reply"
-    module_name, colon, name = spec.partition(":")
-    parts = module_name.split(".")
-    if not colon or not name.isidentifier() or not all(map(str.isidentifier, parts)):
-        raise ValueError(f"cannot use {spec!r} as a language model: {wanted}")
-    try:
-        module = import_module(module_name)
-    except Exception as error:  # a module may raise anything
-        reason = (str(error).strip().splitlines() or [""])[0]
-        raise ValueError(
-            f"cannot import {module_name!r} of {spec!r} ({type(error).__name__}: {reason}): "
-            f"{wanted}, with the module's folder on PYTHONPATH"
-        ) from error
-    function = getattr(module, name, None)
-    if not callable(function):
-        lack = "is not callable" if hasattr(module, name) else "is not there"
-        raise ValueError(f"{name!r} of {spec!r} {lack} in {module_name}: {wanted}")
-    return cast(Ask, function)
+    return PARAPHRASERS.get(spec)
 
 
 def _read(cache: Path) -> dict[str, str]:

@@ -8,14 +8,16 @@ Any task file is a suite of its own: :func:`suite_from_file`.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import yaml
 from pydantic import BaseModel, ConfigDict
 
+from er_gym.plugins import PluginError, Registry, reason
 from er_gym.tasks import jsonl_format, paper_format
 from er_gym.tasks.errors import SetAside, TaskFileError, in_short
 from er_gym.tasks.files import read_text, validated
@@ -77,17 +79,44 @@ class SuiteConfig(BaseModel):
 
 
 def suite_names() -> tuple[str, ...]:
-    """The names of the suites, in alphabetical order."""
+    """The names of er-gym's own suites, in alphabetical order."""
     return tuple(sorted(file.stem for file in config_directory("suites").glob("*.yaml")))
 
 
+def suite_registry() -> Registry[Suite | Callable[[], Suite]]:
+    """All suites by name: er-gym's own, then those of other packages."""
+    return Registry(
+        kind="suite",
+        group="er_gym.suites",
+        own={name: partial(_own_suite, name) for name in suite_names()},
+        expected=f"a {__name__}.Suite, or a function that makes one",
+        fits=lambda suite: isinstance(suite, Suite) or callable(suite),
+        others="or give a task file",
+    )
+
+
 def load_suite(name: str) -> Suite:
-    """Load a suite by its name.
+    """Load a suite: er-gym's own or another package's by its name, or ``package.module:function``.
 
     Raises:
         ValueError: there is no such suite; the message lists those there are.
         TaskFileError: one of its files is damaged, or it has not been made yet.
     """
+    found = suite_registry().get(name)
+    if name in suite_names() and not isinstance(found, Suite):
+        return found()
+    try:
+        suite = found if isinstance(found, Suite) else found()
+    except Exception as error:  # another package's code can raise anything
+        raise PluginError(
+            f"suite {name!r} cannot be made ({reason(error)}); it is called without arguments"
+        ) from error
+    if not isinstance(suite, Suite):
+        raise PluginError(f"suite {name!r} makes {type(suite).__name__}; give a {__name__}.Suite")
+    return suite
+
+
+def _own_suite(name: str) -> Suite:
     config, file = suite_config(name), suite_file(name)
     if not file.exists():
         raise TaskFileError(
@@ -106,10 +135,7 @@ def suite_config(name: str) -> SuiteConfig:
         TaskFileError: the file is damaged.
     """
     if name not in suite_names():
-        raise ValueError(
-            f"unknown suite {name[:_LONGEST_QUOTE]!r}; choose one of: {', '.join(suite_names())}; "
-            "or give a task file"
-        )
+        raise PluginError(suite_registry().unknown(name[:_LONGEST_QUOTE]))
     file = config_directory("suites") / f"{name}.yaml"
     return validated(SuiteConfig, yaml.safe_load(read_text(file)), f"{file}: the suite")
 

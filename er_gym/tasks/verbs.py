@@ -326,7 +326,7 @@ def _merged(known: Mapping[str, Verb], verbs: list[Verb]) -> dict[str, Verb]:
 def _problem(verb: Verb, taken: Mapping[str, str]) -> str:
     """What is wrong with a row, "" if nothing."""
     said = {f"words[{language!r}].said": words.said for language, words in verb.words.items()}
-    tuples = {"aliases": verb.aliases, "object_types": verb.object_types, **said}
+    tuples: Mapping[str, object] = {"aliases": verb.aliases, "object_types": verb.object_types, **said}
     if strings := [name for name, value in tuples.items() if isinstance(value, str)]:
         return f"{strings[0]} is a string; give a tuple of strings, ({tuples[strings[0]]!r},)"
     for phrase in verb.said:

@@ -171,8 +171,7 @@ class Generator:
         handled = [
             action.object_type
             for action in plan.key_actions
-            if action.verb in verbs.INTERACTIONS
-            and action.verb not in (verbs.OPEN, verbs.CLOSE)
+            if action.verb in verbs.INTERACTIONS and action.verb not in (verbs.OPEN, verbs.CLOSE)
         ] or [thing.type for thing in plan.subjects]
         places = [f"from_{self.room.place_of(thing).type}" for thing in named]
         return "-".join((self.start.layout or self.scene, row.slug or row.type, *handled, *places))

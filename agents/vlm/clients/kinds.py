@@ -1,0 +1,131 @@
+"""The clients that give a model's replies, by the name that an agent's begins with.
+
+An agent ``openai:MODEL`` is the VLM agent with the client ``openai``. A client is a row of
+:data:`CLIENTS`; other packages add rows with an entry point in the group ``er_gym.model_clients``,
+or name one as ``package.module:ROW:MODEL``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from er_gym.plugins import PluginError, Registry, is_dotted
+
+if TYPE_CHECKING:
+    from agents.vlm.clients.budget import Ledger
+    from agents.vlm.clients.kept import Identified
+    from agents.vlm.clients.watch import Watch
+    from agents.vlm.settings import AgentSettings
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelClient:
+    """A way to have a model's replies.
+
+    Attributes:
+        make: makes the client, given what follows the name, the agent's settings, and the run's
+            ledger and watch. A client has ``reply`` and ``close`` (:class:`agents.vlm.chat.Client`)
+            and ``identity``, a text that is the same for clients that reply alike.
+        opens: what follows the name, for messages: ``"MODEL"``.
+        help: what it is, in a few words.
+        install: what to install when a package is missing.
+        priced: whether a reply costs what the settings' ``prices`` state.
+        keeps_ledger: whether the client checks the budget and writes the ledger itself.
+    """
+
+    make: Callable[[str, AgentSettings, Ledger, Watch], Identified]
+    opens: str
+    help: str
+    install: str = "er-gym[vlm]"
+    priced: bool = False
+    keeps_ledger: bool = False
+
+    def open(self, what: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+        """The client, whose replies are written into a run's ledger."""
+        client = self.make(what, settings, ledger, watch)
+        if self.keeps_ledger:
+            return client
+        from agents.vlm.clients.budget import Metered
+
+        return Metered(client, ledger, watch)
+
+
+def _openai(model: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+    from agents.vlm.clients.openai_server import OpenAIClient
+
+    return OpenAIClient(model, settings, ledger, watch)
+
+
+def _local(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+    from agents.vlm.clients.local import LocalClient
+
+    return LocalClient(path, settings, watch)
+
+
+def _recorded(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+    from agents.vlm.clients.scripted import RecordedClient
+
+    return RecordedClient(Path(path))
+
+
+CLIENTS: Registry[ModelClient] = Registry(
+    kind="model client",
+    group="er_gym.model_clients",
+    own={
+        "openai": ModelClient(
+            opens="MODEL",
+            help="a model on an OpenAI-compatible server",
+            make=_openai,
+            priced=True,
+            keeps_ledger=True,
+        ),
+        "hf": ModelClient(
+            opens="PATH",
+            help="a transformers model in this process",
+            make=_local,
+            install="er-gym[local]",
+        ),
+        "recorded": ModelClient(
+            opens="RUN", help="what a model said in an earlier run", make=_recorded
+        ),
+    },
+    expected=f"a {__name__}.ModelClient",
+    fits=lambda row: isinstance(row, ModelClient),
+)
+"""By name."""
+
+
+def _split(name: str) -> tuple[str, str]:
+    """The client's name and what it opens; ("", "") where the name is no client's."""
+    client, colon, opened = name.partition(":")
+    if colon and client not in CLIENTS.names() and is_dotted(client + ":" + opened.split(":")[0]):
+        attribute, colon, opened = opened.partition(":")
+        client = f"{client}:{attribute}"
+        return (client, opened) if colon and opened else ("", "")
+    return (client, opened) if opened and client in CLIENTS.names() else ("", "")
+
+
+def speaks(name: str) -> bool:
+    """Whether an agent of this name gets its replies from a model client: ``openai:MODEL``."""
+    return bool(_split(name)[0])
+
+
+def client_named(name: str) -> tuple[ModelClient, str]:
+    """The client of an agent, and what it is to open.
+
+    Raises:
+        PluginError: the name is no client's, or the client cannot be loaded.
+    """
+    client, opened = _split(name)
+    if not client:
+        raise PluginError(f"{name!r} is no agent of a model; give {ways_to_name()}")
+    return CLIENTS.get(client), opened
+
+
+def ways_to_name() -> str:
+    """How agents of models are named, for messages."""
+    *most, last = (f"{name}:{row.opens}" for name, row in CLIENTS.own.items())
+    return f"{', '.join(most)} or {last}"
