@@ -38,6 +38,13 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
     except click.ClickException as error:
         complain(error.format_message())
         sys.exit(error.exit_code)
+    except ValueError as error:
+        from er_gym.plugins import PluginError  # late: it takes half a second
+
+        if not isinstance(error, PluginError):
+            raise
+        complain(str(error))
+        sys.exit(BadInput.exit_code)
     except (click.Abort, KeyboardInterrupt):
         complain("interrupted")
         sys.exit(INTERRUPTED)

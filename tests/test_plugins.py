@@ -152,7 +152,7 @@ def test_the_command_knows_them_and_so_do_its_workers(tmp_path: Path) -> None:
         ("", "unknown agent ''; choose one of"),
         ("household", "unknown agent 'household'"),
         ("household:", "unknown agent 'household:'"),
-        ("opnai:gpt4", "unknown agent 'opnai:gpt4'.*oracle.*openai:MODEL.*Cannot import 'opnai' .*PYTH"),
+        ("opnai:gpt4", "unknown agent 'opnai:gpt4'.*oracle.*openai:MODEL.*Cannot import 'opnai' "),
         ("household:Impatien", r"has no 'Impatien' \(did you mean Impatient\?\)"),
         ("household:two_tasks", "makes Suite, which has no 'obs_mode'"),
         ("household:OUT", "has no 'OUT'"),
@@ -176,7 +176,7 @@ def test_other_wrong_names() -> None:
         load_suite("household:ECHO")
     with pytest.raises(PluginError, match=r"'household:ask' cannot be made \(TypeError: .*missing"):
         load_suite("household:ask")
-    with pytest.raises(PluginError, match="unknown suite 'er-1'.*er-1k"):
+    with pytest.raises(PluginError, match=r"unknown suite 'er-1'.*er-1k"):
         EmbodiedEnv("er-1")
     with pytest.raises(ValueError, match=r"unknown obs_mode 'rgb\+hand'.*rgb, state, text, hands"):
         EmbodiedEnv(obs_mode="rgb+hand")
@@ -184,7 +184,7 @@ def test_other_wrong_names() -> None:
         EmbodiedEnv(obs_mode="household:ECHO")
     with pytest.raises(PluginError, match="model client 'household:HANDS' is Observation"):
         client_named("household:HANDS:x")
-    with pytest.raises(PluginError, match="unknown paraphraser 'me'.*counter; package"):
+    with pytest.raises(PluginError, match=r"unknown paraphraser 'me'.*counter; package"):
         load_ask("me")
     assert suite_registry().names()[-1] == "two-tasks"
     assert CLIENTS.names() == ("openai", "hf", "recorded", "echo")

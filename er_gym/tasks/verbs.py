@@ -325,8 +325,8 @@ def _merged(known: Mapping[str, Verb], verbs: list[Verb]) -> dict[str, Verb]:
 
 def _problem(verb: Verb, taken: Mapping[str, str]) -> str:
     """What is wrong with a row, "" if nothing."""
-    said = {f"words[{language!r}].said": words.said for language, words in verb.words.items()}
-    tuples: Mapping[str, object] = {"aliases": verb.aliases, "object_types": verb.object_types, **said}
+    tuples: dict[str, object] = {"aliases": verb.aliases, "object_types": verb.object_types}
+    tuples |= {f"words[{code!r}].said": words.said for code, words in verb.words.items()}
     if strings := [name for name, value in tuples.items() if isinstance(value, str)]:
         return f"{strings[0]} is a string; give a tuple of strings, ({tuples[strings[0]]!r},)"
     for phrase in verb.said:
@@ -349,7 +349,7 @@ def _problem_of_object(verb: Verb) -> str:
     if verb.object_property not in ("", *properties):
         return (
             f"no object has the property {verb.object_property!r}; "
-            f"choose one of: {', '.join(properties)}"
+            f"choose one of: {', '.join(properties)}; or give object_types"
         )
     if verb.object_state is not None and verb.object_state[0] not in PROPERTY_OF_STATE:
         return (

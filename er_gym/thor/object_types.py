@@ -28,7 +28,7 @@ class ObjectType:
 def _load() -> dict[str, ObjectType]:
     text = files("er_gym.sim.data").joinpath("object_types.json").read_text()
     recorded = {name: frozenset(has) for name, has in json.loads(text).items()}
-    used_up = {name: frozenset({"canBeUsedUp"}) for name in USED_UP}  # the record leaves it out
+    used_up = {name: frozenset({"canBeUsedUp"}) for name in USED_UP}  # not recorded
     return {
         name: ObjectType(name, has | used_up.get(name, frozenset()))
         for name, has in recorded.items()

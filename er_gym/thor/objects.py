@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.lazy import LazyMetadata
+from er_gym.sim.recorded import USED_UP
 from er_gym.sim.scene import PROPERTIES, STATES, Scene
 from er_gym.sim.space.doors import boxes
 from er_gym.sim.space.visibility import visible
@@ -33,10 +34,10 @@ PROPERTY_OF_STATE: Mapping[str, str] = {
     "isCooked": "cookable",
     "isDirty": "dirtyable",
     "isFilledWithLiquid": "canFillWithLiquid",
-    "isUsedUp": "canBeUsedUp",
 }
-"""AI2-THOR's states, and the property of the objects that can have each."""
-_FLAGS = (*PROPERTIES, *STATES)
+"""AI2-THOR's states, and the property of the objects that can have each. ``isUsedUp`` is left out:
+AI2-THOR's metadata says it of no object."""
+_STATES = tuple(PROPERTY_OF_STATE)
 ENTRY_KEYS = frozenset(
     {"objectId", "objectType", "isPickedUp", "parentReceptacles", "isOpen", "isToggled"}
 )
@@ -54,8 +55,9 @@ class ObjectTable:
     Attributes:
         ids: ``objectId`` of each. row: the row of each id.
         kinds: (N,) index of each one's type in :data:`TYPES`.
-        has: (N,) bool for each of AI2-THOR's properties and states, by its name in the metadata:
-            ``"pickupable"``, ``"isOpen"``.
+        has: (N,) bool for each of AI2-THOR's properties and of :data:`PROPERTY_OF_STATE`, by its
+            name in the metadata: ``"pickupable"``, ``"isOpen"``. ``canBeUsedUp`` is told by the
+            type, since the metadata says it of no object.
         centre, size: (N, 3) of each one's axis-aligned box, world frame, metres.
         parents: rows of the receptacles that each lies in, innermost first.
         contents: rows of what lies in each.
@@ -131,6 +133,7 @@ def is_there(entry: Mapping[str, Any]) -> bool:
     return not (entry.get("isBroken") and entry["objectType"] == "Egg")
 
 
+_STATE_COLUMNS = [STATES.index(name) for name in _STATES]
 _Seen = tuple[ObjectTable, NDArray[np.bool_], NDArray[np.bool_]]
 
 
@@ -160,7 +163,11 @@ def _of_entries(metadata: Mapping[str, Any]) -> _Seen:
         boxes = [entry["axisAlignedBoundingBox"][name] for entry in entries]
         return np.array([(b["x"], b["y"], b["z"]) for b in boxes]).reshape(-1, 3)
 
-    has = {name: np.array([bool(e[name]) for e in entries], dtype=bool) for name in _FLAGS}
+    has = {
+        name: np.array([bool(e.get(name)) for e in entries], dtype=bool)
+        for name in (*PROPERTIES, *_STATES)
+    }
+    has["canBeUsedUp"] = np.array([e["objectType"] in USED_UP for e in entries], dtype=bool)
     held = metadata["inventoryObjects"]
     table = ObjectTable(
         ids=ids,
@@ -226,12 +233,12 @@ def _of_world(world: World) -> ObjectTable:
 def _table(world: World) -> ObjectTable:
     names = _names(world)
     low, high = boxes(world)
-    flags = np.concatenate([world.properties, world.states], axis=1).T.copy()
+    flags = np.concatenate([world.properties, world.states[:, _STATE_COLUMNS]], axis=1).T.copy()
     return ObjectTable(
         ids=names.ids,
         row=names.row,
         kinds=names.kinds,
-        has=dict(zip(_FLAGS, flags, strict=True)),
+        has=dict(zip((*PROPERTIES, *_STATES), flags, strict=True)),
         centre=(low + high) / 2,
         size=high - low,
         parents=tuple(world.parents),
