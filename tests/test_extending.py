@@ -1,0 +1,74 @@
+"""The walk-throughs of docs/extending.md do what they say."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+RUN_EACH = """
+import runpy
+runpy.run_module("household.play")
+
+from agents import make_agent
+from agents.vlm.settings import AgentSettings
+from agents.vlm.speaker import Speaker
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.tasks import load_suite
+from er_gym.tasks.paraphrase import load_ask
+
+observations = "household.observations:HAND+text"
+env = EmbodiedEnv("household.suites:searches", obs_mode=observations)
+parrot = Speaker("household.clients:PARROT:observe", AgentSettings(sees="text")).agent(0)
+for agent in (make_agent("household.agents:Tidy"), parrot):
+    obs, info = env.reset(seed=0)
+    assert obs in env.observation_space and info["task"].type.search
+    agent.reset(info["task"], obs, info)
+    print(agent.act(obs, info).action)
+assert load_ask("household.models:ask")("?") == ""
+"""
+
+
+@pytest.fixture(scope="module")
+def page(repository: Path) -> str:
+    return (repository / "docs" / "extending.md").read_text()
+
+
+def test_the_files_of_the_walk_throughs_work(page: str, repository: Path, tmp_path: Path) -> None:
+    (tmp_path / "household").mkdir()
+    blocks = re.findall(r"```python\n# (household/\w+\.py)\n(.*?)```", page, re.S)
+    assert len(blocks) == page.count("```python")
+    for name, text in blocks:
+        (tmp_path / name).write_text(text)
+    done = subprocess.run(
+        [sys.executable, "-c", RUN_EACH],
+        env={
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join((str(repository), str(tmp_path))),
+            "ER_GYM_VERBS": "household.verbs:CLEAN",
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    feedback, tidy, parrot = done.stdout.splitlines()
+    assert feedback in " ".join(page.split())
+    assert (tidy, parrot) == ("end", "observe")
+
+
+def test_the_groups_are_those_that_are_looked_into(page: str) -> None:
+    from agents import AGENTS
+    from agents.vlm.clients.kinds import CLIENTS
+    from er_gym.envs.observations import OBSERVATIONS
+    from er_gym.tasks import verbs
+    from er_gym.tasks.paraphrase import PARAPHRASERS
+    from er_gym.tasks.suites import suite_registry
+
+    registries = (AGENTS, CLIENTS, OBSERVATIONS, PARAPHRASERS, suite_registry())
+    groups = {verbs.GROUP, *(registry.group for registry in registries)}
+    assert groups == set(re.findall(r"\| `(er_gym\.\w+)` \|", page))
