@@ -62,11 +62,14 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
             f"agent {name!r} cannot be made ({reason(error)}); it is called with seed= if it takes "
             "that, else without arguments"
         ) from error
-    lacking = [part for part in ("obs_mode", "reset", "act") if not hasattr(agent, part)]
+    parts = {"obs_mode": str, "reset": Callable, "act": Callable}
+    lacking = [
+        part for part, kind in parts.items() if not isinstance(getattr(agent, part, None), kind)
+    ]
     if lacking:
         raise PluginError(
             f"agent {name!r} makes {type(agent).__name__}, which has no {lacking[0]!r}; "
-            "an agent has obs_mode, reset and act (agents.base.Agent)"
+            "an agent has a text obs_mode, and reset and act (agents.base.Agent)"
         )
     return agent
 
@@ -74,7 +77,7 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
 def _called(make: Callable[..., Agent], seed: int) -> Agent:
     try:
         takes_seed = "seed" in signature(make).parameters
-    except ValueError:  # built in, without a signature
+    except (TypeError, ValueError):  # built in, without a signature
         takes_seed = False
     return make(seed=seed) if takes_seed else make()
 

@@ -318,7 +318,7 @@ OBSERVATIONS: Registry[Observation] = Registry(
             _text,
         ),
     },
-    expected=f"a {__name__}.Observation",
+    expected=f"an {__name__}.Observation",
     fits=lambda row: isinstance(row, Observation),
 )
 """By name, which is also the key in the dictionary that the environment returns."""

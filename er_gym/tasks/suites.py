@@ -89,7 +89,7 @@ def suite_registry() -> Registry[Suite | Callable[[], Suite]]:
         kind="suite",
         group="er_gym.suites",
         own={name: partial(_own_suite, name) for name in suite_names()},
-        expected=f"a {__name__}.Suite, or a function that makes one",
+        expected=f"an {__name__}.Suite, or a function that makes one",
         fits=lambda suite: isinstance(suite, Suite) or callable(suite),
         others="or give a task file",
     )
@@ -112,7 +112,7 @@ def load_suite(name: str) -> Suite:
             f"suite {name!r} cannot be made ({reason(error)}); it is called without arguments"
         ) from error
     if not isinstance(suite, Suite):
-        raise PluginError(f"suite {name!r} makes {type(suite).__name__}; give a {__name__}.Suite")
+        raise PluginError(f"suite {name!r} makes {type(suite).__name__}; give an {__name__}.Suite")
     return suite
 
 

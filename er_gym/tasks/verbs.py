@@ -292,7 +292,7 @@ def table() -> tuple[Verb, ...]:
         PluginError: a verb cannot be loaded or used.
     """
     named = [name.strip() for name in os.environ.get(VARIABLE, "").split(",") if name.strip()]
-    expected = f"a {__name__}.Verb"
+    expected = f"an {__name__}.Verb"
     given = [
         *((verb, "register()") for verb in _registered),
         *((load_dotted(name, "verb", expected), f"{name} in ${VARIABLE}") for name in named),

@@ -92,7 +92,7 @@ CLIENTS: Registry[ModelClient] = Registry(
             opens="RUN", help="what a model said in an earlier run", make=_recorded
         ),
     },
-    expected=f"a {__name__}.ModelClient",
+    expected=f"an {__name__}.ModelClient",
     fits=lambda row: isinstance(row, ModelClient),
 )
 """By name."""
