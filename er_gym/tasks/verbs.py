@@ -21,11 +21,13 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
 from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
+
+from pydantic import TypeAdapter, ValidationError
 
 from er_gym.plugins import PluginError, entry_points, load_dotted, load_entry_point
 from er_gym.thor.object_types import OBJECT_TYPES
@@ -264,8 +266,8 @@ OWN: tuple[Verb, ...] = (
 
 _registered: list[Verb] = []
 _ABOUT_OBJECTS = ("object_property", "object_types", "object_state", "in_hand", "makes")
+_TYPES = TypeAdapter(Verb)
 _PHRASE = re.compile(r"[^\W_]+(?: [^\W_]+)*")
-_SLOT = re.compile(r"\{(\w*)\}")
 _SLOTS = frozenset({"it", "the", "held", "inside", "reason"})
 
 
@@ -312,7 +314,7 @@ def table() -> tuple[Verb, ...]:
 def _merged(known: Mapping[str, Verb], verbs: list[Verb]) -> dict[str, Verb]:
     """The known verbs and others by name; one that is added twice counts once."""
     found = dict(known)
-    for verb in verbs:
+    for verb in map(_typed, verbs):
         if verb == found.get(verb.name):
             continue
         taken = {phrase: other.name for other in found.values() for phrase in other.said}
@@ -323,12 +325,20 @@ def _merged(known: Mapping[str, Verb], verbs: list[Verb]) -> dict[str, Verb]:
     return found
 
 
+def _typed(verb: Verb) -> Verb:
+    """The same row, once its fields are known to be of their types."""
+    try:
+        return _TYPES.validate_python(asdict(verb))
+    except ValidationError as error:
+        first = error.errors()[0]
+        field_name = ".".join(map(str, first["loc"]))
+        raise PluginError(
+            f"verb {verb.name!r}: {field_name} is {first['input']!r}: {first['msg']}"
+        ) from None
+
+
 def _problem(verb: Verb, taken: Mapping[str, str]) -> str:
     """What is wrong with a row, "" if nothing."""
-    tuples: dict[str, object] = {"aliases": verb.aliases, "object_types": verb.object_types}
-    tuples |= {f"words[{code!r}].said": words.said for code, words in verb.words.items()}
-    if strings := [name for name, value in tuples.items() if isinstance(value, str)]:
-        return f"{strings[0]} is a string; give a tuple of strings, ({tuples[strings[0]]!r},)"
     for phrase in verb.said:
         if not _PHRASE.fullmatch(phrase) or phrase != phrase.lower():
             return f"{phrase!r} is no phrase; write lower-case words with single spaces"
@@ -336,8 +346,12 @@ def _problem(verb: Verb, taken: Mapping[str, str]) -> str:
             return f"{phrase!r} is a way to say {taken.get(phrase, INIT)!r} already; choose another"
     if not verb.thor_action:
         return "it has no thor_action; give the AI2-THOR action that does it"
-    if strange := {*_SLOT.findall(verb.in_plan)} - _SLOTS:
-        return f"plan has {{{min(strange)}}}; it can have {{it}}"
+    if taken_over := {"action", "objectId"} & verb.parameters.keys():
+        return f"parameters has {min(taken_over)!r}, which er-gym gives itself; leave it out"
+    try:
+        verb.in_plan.format_map(dict.fromkeys(_SLOTS, ""))
+    except (KeyError, ValueError, AttributeError, IndexError):
+        return f"plan is {verb.plan!r}; write words and {{it}}, and no other braces"
     return _problem_of_object(verb) or _problem_of_hand(verb)
 
 
@@ -359,7 +373,7 @@ def _problem_of_object(verb: Verb) -> str:
 
 
 def _problem_of_hand(verb: Verb) -> str:
-    if not isinstance(verb.hand, str):
+    if verb.hand and not isinstance(verb.hand, str):
         return _unknown_type(verb.hand)
     if verb.hand in (ANY, EMPTY, FULL):
         return ""
