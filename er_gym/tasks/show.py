@@ -135,8 +135,10 @@ def _step(action: KeyAction, names: _Names, held: str, before: str) -> str:
     name = _name(action)
     reasons = [other for other in action.related_objects if other != action.object_id]
     # {it} is the name unless the action before named the thing.
-    template = "begin" if action.verb == verbs.INIT else verbs.verb_named(action.verb).in_plan
+    plans = {verb.name: verb.in_plan for verb in verbs.table()} | {verbs.INIT: "begin"}
+    template = plans.get(action.verb, "{verb} {the}")
     words = {
+        "verb": action.verb,
         "the": names.the(name),
         "it": it(type_of_id(name)) if name and name == before else names.the(name),
         "inside": names.inside(name),
