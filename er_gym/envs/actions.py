@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from er_gym.envs.arguments import shown
 from er_gym.tasks import verbs
-from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.thor import OBJECT_TYPES
 
 

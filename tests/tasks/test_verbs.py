@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from er_gym.envs.actions import ACTIONS, STANDS_FOR
+from er_gym.envs.actions import ACTIONS
 from er_gym.plugins import PluginError
 from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.tasks.verbs import CLOSE, OPEN, PUT, Verb, Words
 
 OUTSIDE = Path(__file__).parents[1] / "outside"
@@ -44,7 +45,7 @@ def test_the_numbers_of_actions_that_policies_were_trained_with() -> None:
 
 
 def test_what_stands_for_a_part_of_it_can_be_filled() -> None:
-    assert set(verbs.verb_named(PUT).object_types) == set(STANDS_FOR)
+    assert set(verbs.verb_named(PUT).object_types) == set(BASIN_OF)
 
 
 def test_canonical_verb() -> None:
