@@ -28,17 +28,19 @@ from agents import make_agent
 from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig, load_config
 from agents.rl.saved import FOREIGN, MODEL
-from benchmarks.cli_options import trust_option
+from benchmarks.cli_errors import bad_input
+from benchmarks.cli_options import force_option, trust_option
 from benchmarks.curves import draw_curves
 from benchmarks.metrics import Score, score_episode, wilson
 from benchmarks.progress import Progress
 from benchmarks.runner import finished, run
 from benchmarks.scorers import CORRECTED
-from benchmarks.store import Manifest, RunStore, file_stem
+from benchmarks.store import Manifest, RunStore, claimed
 from er_gym import __version__
 from er_gym.tasks import jsonl_format, load_suite
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import GROUPS
+from er_gym.writing import MARKDOWN_MARK, check_output, file_stem, write_output
 
 UNSEEN = "er-1k"
 _EACH = 91
@@ -123,7 +125,10 @@ class Player:
             seed=_SEED,
             er_gym=__version__,
         )
-        store = RunStore.create(self._work / f"{file_stem(name)}-{where}", manifest)
+        with claimed(self._work / f"{file_stem(name)}-{where}", manifest) as store:
+            return self._play(store, tasks, where, name)
+
+    def _play(self, store: RunStore, tasks: Sequence[Task], where: str, name: str) -> list[Score]:
         before = finished(store, tasks)
         progress = Progress(self._console, f"{where}, {name}", len(tasks), len(before), 0)
         with progress:
@@ -200,15 +205,24 @@ def machine() -> str:
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True)
 @click.option("--each", type=click.IntRange(min=1), default=_EACH, help="Tasks of a type.")
 @click.option("--out", type=click.Path(path_type=Path), default=_DOCS / "baselines.md")
+@force_option
 @trust_option
 def main(
-    runs: tuple[Path, ...], work: Path, workers: int, each: int, out: Path, trust: bool
+    runs: tuple[Path, ...],
+    work: Path,
+    workers: int,
+    each: int,
+    out: Path,
+    force: bool,
+    trust: bool,
 ) -> None:
     """Write docs/baselines.md and its pictures."""
     families: defaultdict[str, list[Trained]] = defaultdict(list)
     for path in runs:
         trained = Trained.load(path)
         families[trained.name].append(trained)
+    with bad_input():
+        check_output(out, force=force)
     player = Player(work, workers, trust)
     unseen = load_suite(UNSEEN).tasks
     parts = []
@@ -231,10 +245,12 @@ def main(
             }
             for where, of in tasks.items()
         }
-        (work / f"{name}.json").write_text(json.dumps(results))
+        told = {"format": "er-gym/baselines/1", "results": results}
+        write_output(work / f"{name}.json", json.dumps(told))
         parts.append(_section(name, members, results))
-    pictures = draw_curves(families, out.parent / "images")
-    out.write_text(_page(parts, pictures))
+    with bad_input():
+        pictures = draw_curves(families, out.parent / "images", force=force)
+        write_output(out, MARKDOWN_MARK + _page(parts, pictures), force=force)
     click.echo(f"{out}, {', '.join(str(picture) for picture in pictures)}")
 
 

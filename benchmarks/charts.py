@@ -14,6 +14,7 @@ from er_gym.tasks.difficulty import length
 from er_gym.tasks.rooms import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, GROUPS
+from er_gym.writing import check_output, make_folder, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,12 +33,14 @@ _OBJECTS, _RECEPTACLES = "#2a8c82", "#b5762a"
 _HEAT = ("#f7f5fa", "#54278f")
 
 
-def draw_charts(tasks: Sequence[Task], out: Path, title: str) -> list[Path]:
+def draw_charts(tasks: Sequence[Task], out: Path, title: str, *, force: bool = True) -> list[Path]:
     """Draw how tasks are distributed over types, objects, receptacles, lengths and rooms.
 
     Args:
-        out: the folder to draw into; made where it is missing, files of the same name replaced.
+        out: the folder to draw into; made where it is missing.
         title: what the tasks are, such as the suite's name; every chart's title begins with it.
+        force: whether to replace also files of the same names that er-gym did not write; without
+            it, and where there is one, none is drawn.
 
     Returns:
         The files, ``types.png`` first.
@@ -45,6 +48,7 @@ def draw_charts(tasks: Sequence[Task], out: Path, title: str) -> list[Path]:
     Raises:
         ImportError: matplotlib is not installed.
         ValueError: there are no tasks.
+        NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     try:
         import matplotlib.figure  # noqa: F401
@@ -62,13 +66,14 @@ def draw_charts(tasks: Sequence[Task], out: Path, title: str) -> list[Path]:
         "lengths": _lengths(tasks, summary, title),
         "rooms": _rooms(tasks, summary, title),
     }
-    out.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for name, figure in figures.items():
-        paths.append(out / f"{name}.png")
+    make_folder(out)
+    files = {out / f"{name}.png": figure for name, figure in figures.items()}
+    for path in files:
+        check_output(path, force=force)
+    for path, figure in files.items():
         # "tight" grows the page to whatever sticks out of it: no label is cut.
-        figure.savefig(paths[-1], format="png", dpi=_DPI, bbox_inches="tight", pad_inches=0.15)
-    return paths
+        write_figure(path, figure, force=force, dpi=_DPI, bbox_inches="tight", pad_inches=0.15)
+    return list(files)
 
 
 def _types(summary: Summary, title: str) -> Figure:

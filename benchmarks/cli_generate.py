@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli_errors import BadInput, bad_input
-from benchmarks.cli_options import Span, split, workers_option
+from benchmarks.cli_options import Span, force_option, split, workers_option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -47,8 +47,9 @@ _INTERRUPTED = 130
     metavar="MODULE:FUNCTION",
     help="A function from a prompt to a language model's reply; its wordings join the templates'.",
 )
+@force_option
 @workers_option
-def generate(workers: int, paraphraser: str | None, **given: Any) -> int:
+def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -> int:
     """Generate tasks, play each of them, and write those that can be done.
 
     What has been made when it is interrupted is kept: the same command goes on. The same seed gives
@@ -60,12 +61,15 @@ def generate(workers: int, paraphraser: str | None, **given: Any) -> int:
     from benchmarks.making import parts_of, remove_parts
     from benchmarks.pool import WorkerSetupError
     from er_gym.tasks import jsonl_format
+    from er_gym.writing import check_output, make_folder
 
     console = Console(stderr=True)
     with bad_input():
         order = _order(paraphraser=paraphraser, **given)
         paraphrase = _paraphraser(paraphraser, order) if paraphraser else None
-        order.out.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(order.out.parent)
+        for file in (order.out, order.card):
+            check_output(file, force=force)
     parts = parts_of(order.out, order.making, order.seed)
     try:
         made, verified = _make(order, parts, workers, console)
@@ -74,9 +78,11 @@ def generate(workers: int, paraphraser: str | None, **given: Any) -> int:
             raise click.ClickException(f"no task could be made: {_reasons(made)}")
         if paraphrase:
             chosen = tuple(_paraphrased(task, paraphrase) for task in chosen)
-        card = _write(order, chosen)
-    except (WorkerSetupError, RuntimeError, OSError) as error:
+        _write(order, chosen, force)
+    except (WorkerSetupError, RuntimeError) as error:
         raise click.ClickException(f"{error}; what is done is in {parts}") from error
+    except (ValueError, OSError) as error:  # the disk is full, another file is there by now
+        raise BadInput(f"{error}; what is done is in {parts}") from error
     except KeyboardInterrupt:
         done = len(list(parts.glob("*.jsonl")))
         click.echo(
@@ -88,7 +94,7 @@ def generate(workers: int, paraphraser: str | None, **given: Any) -> int:
     remove_parts(parts)
     print_counts(chosen, made.dropped)
     click.echo(f"{len(chosen)} tasks of {verified} verified: {order.out}")
-    click.echo(f"sha256 of the tasks {jsonl_format.digest(chosen)}; card: {card}")
+    click.echo(f"sha256 of the tasks {jsonl_format.digest(chosen)}; card: {order.card}")
     if len(chosen) < order.making.total:
         console.print(f"{order.making.total} were asked for; more layouts or rooms give more")
     return 0
@@ -110,6 +116,11 @@ class _Order:
     out: Path
     command: str
     paraphraser: str | None
+
+    @property
+    def card(self) -> Path:
+        """Where the card goes: beside the task file."""
+        return self.out.with_name(f"{self.out.name.partition('.jsonl')[0]}.md")
 
 
 def _order(
@@ -190,11 +201,12 @@ def _reasons(made: Made) -> str:
     return "; ".join(f"{reason} ({count})" for reason, count in common) or "the rooms have none"
 
 
-def _write(order: _Order, chosen: tuple[Task, ...]) -> Path:
-    """Write the task file and its card; returns where the card is."""
+def _write(order: _Order, chosen: tuple[Task, ...], force: bool) -> None:
+    """Write the task file and its card."""
     from er_gym import __version__
     from er_gym.tasks import jsonl_format
     from er_gym.tasks.card import card
+    from er_gym.writing import check_output, write_output
 
     how = {
         "suite": order.name,
@@ -203,11 +215,10 @@ def _write(order: _Order, chosen: tuple[Task, ...]) -> Path:
         **order.making.model_dump(mode="json", exclude_defaults=True),
         **({"paraphraser": order.paraphraser} if order.paraphraser else {}),
     }
-    jsonl_format.write_tasks(order.out, chosen, **how)
-    file = order.out.with_name(f"{order.out.name.partition('.jsonl')[0]}.md")
+    check_output(order.card, force=force)  # before one of the two is written
+    jsonl_format.write_tasks(order.out, chosen, force=force, **how)
     text = card(order.name, order.description, chosen, how, order.command)
-    file.write_text(text, encoding="utf-8")
-    return file
+    write_output(order.card, text, force=force)
 
 
 def _paraphraser(spec: str, order: _Order) -> Any:

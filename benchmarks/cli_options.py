@@ -41,6 +41,10 @@ workers_option = click.option(
     help="How many processes.  [default: one for each processor]",
 )
 
+force_option = click.option(
+    "--force", is_flag=True, help="Replace also files that er-gym did not write."
+)
+
 agent_config_option = click.option(
     "--agent-config", metavar="FILE", help="An agent's settings, in YAML, or their name."
 )

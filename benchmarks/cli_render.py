@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli_errors import BadInput, bad_input
+from benchmarks.cli_options import force_option
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,9 +33,10 @@ _ABOVE = 60.0
     "--out", default=Path("room.png"), show_default=True,
     type=click.Path(dir_okay=False, path_type=Path),
 )  # fmt: skip
+@force_option
 def render(
     scene: str, pose: str | None, what: str, width: int, height: int, fov: float, annotate: bool,
-    out: Path,
+    out: Path, force: bool,
 ) -> None:  # fmt: skip
     """Write a picture of a room.
 
@@ -44,7 +46,11 @@ def render(
     from PIL import Image
 
     from er_gym.thor import SCENE_NAMES, UnknownSceneError, make_controller
+    from er_gym.writing import check_output, picture_format, write_picture
 
+    with bad_input():
+        picture_format(out)
+        check_output(out, force=force)
     if scene not in SCENE_NAMES:
         raise BadInput(str(UnknownSceneError(scene)))
     controller = make_controller(
@@ -72,7 +78,8 @@ def render(
         from er_gym.envs.annotate import annotated
 
         frame = annotated(frame, event.instance_detections2D)
-    Image.fromarray(frame).save(out)
+    with bad_input():
+        write_picture(out, Image.fromarray(frame), force=force)
     agent = event.metadata["agent"]
     at = agent["position"]
     click.echo(
@@ -124,14 +131,16 @@ def _from_above(controller: Any) -> Any:
     "--frames", default=Path("frames"), show_default=True,
     type=click.Path(file_okay=False, path_type=Path), help="Where each step's picture goes.",
 )  # fmt: skip
+@force_option
 @click.option("--window/--no-window", default=None, help="Show it in a window.  [default: if any]")
 def play(
     suite: str, task_id: str | None, scene: str | None, seed: int, frames: Path,
-    window: bool | None,
+    force: bool, window: bool | None,
 ) -> None:  # fmt: skip
     """Play a task oneself, in words; each step's picture is written, and shown if it can be."""
     from er_gym.envs.embodied_env import EmbodiedEnv
     from er_gym.tasks.suites import load_suite
+    from er_gym.writing import check_output, make_folder
 
     with bad_input():
         tasks = [t for t in load_suite(suite).tasks if scene is None or t.scene == scene]
@@ -139,13 +148,16 @@ def play(
         tasks = [task for task in tasks if task.id == task_id]
     if not tasks:
         raise BadInput(f"the suite {suite} has no such task; `er-gym suites` lists the suites")
-    frames.mkdir(parents=True, exist_ok=True)
+    with bad_input():
+        make_folder(frames)
+        for file in frames.glob("[0-9][0-9][0-9].png"):
+            check_output(file, force=force)
     show = _window(window)
     env = EmbodiedEnv(tasks, obs_mode="rgb+text", max_steps=None)
     obs, _ = env.reset(seed=seed)
     step = 0
     while True:
-        _keep(obs["rgb"], frames / f"{step:03d}.png", show)
+        _keep(obs["rgb"], frames / f"{step:03d}.png", show, force)
         click.echo(f"\n{obs['text']}")
         try:
             said = click.prompt("What do you do", default="quit", show_default=True)
@@ -158,7 +170,7 @@ def play(
         if reward:
             click.echo(f"reward {reward:g}")
         if terminated or truncated:
-            _keep(obs["rgb"], frames / f"{step:03d}.png", show)
+            _keep(obs["rgb"], frames / f"{step:03d}.png", show, force)
             outcome = "solved" if info["success"] else f"not solved ({info['end_reason']})"
             click.echo(f"\n{obs['text']}\n{outcome} after {info['steps']} steps")
             break
@@ -166,11 +178,14 @@ def play(
     click.echo(f"pictures in {frames}")
 
 
-def _keep(frame: NDArray[np.uint8], file: Path, show: Any) -> None:
+def _keep(frame: NDArray[np.uint8], file: Path, show: Any, force: bool) -> None:
     from PIL import Image
 
+    from er_gym.writing import write_picture
+
     picture = Image.fromarray(frame)
-    picture.save(file)
+    with bad_input():
+        write_picture(file, picture, force=force)
     if show is not None:
         show(picture)
 

@@ -10,7 +10,7 @@ import click
 
 from benchmarks.cli_errors import BadInput, bad_input, tell_left_out
 from benchmarks.cli_generate import generate
-from benchmarks.cli_options import split, workers_option
+from benchmarks.cli_options import force_option, split, workers_option
 
 if TYPE_CHECKING:
     from er_gym.tasks.suites import Suite
@@ -134,7 +134,8 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
     type=click.Path(file_okay=False, path_type=Path),
     help=("Draw the charts into this folder, as PNG."),
 )
-def stats(suite: str, out: Path | None) -> None:
+@force_option
+def stats(suite: str, out: Path | None, force: bool) -> None:
     """Count a suite's tasks by type, room, scene and split, and draw the distributions."""
     from benchmarks.counts import print_counts
 
@@ -145,18 +146,20 @@ def stats(suite: str, out: Path | None) -> None:
         if out is not None:
             from benchmarks.charts import draw_charts
 
-            for file in draw_charts(found.tasks, out, found.name):
+            for file in draw_charts(found.tasks, out, found.name, force=force):
                 click.echo(file)
 
 
 @tasks.command()
 @click.argument("suite", metavar="SUITE|FILE|FOLDER")
 @click.argument("out", metavar="FILE|FOLDER", type=click.Path(path_type=Path))
-def convert(suite: str, out: Path) -> None:
+@force_option
+def convert(suite: str, out: Path, force: bool) -> None:
     """Write tasks in another format, without loss; one that cannot be read is left out and named.
 
     FILE.json is the paper's test file, FILE.jsonl or FILE.jsonl.gz our own; a folder holds the
-    paper's generator files, one for each scene and type, and is read and written as a whole.
+    paper's generator files, one for each scene and type, and is read and written as a whole. The
+    paper's files do not say who wrote them: another one is replaced with --force only.
     """
     from er_gym.tasks import jsonl_format, paper_format
     from er_gym.tasks.errors import in_short
@@ -169,13 +172,13 @@ def convert(suite: str, out: Path) -> None:
             raise BadInput(f"{suite}: no task can be read: {in_short(aside)}")
         tell_left_out(suite, aside)
         if out.name.endswith((".jsonl", ".jsonl.gz")):
-            jsonl_format.write_tasks(out, found)
+            jsonl_format.write_tasks(out, found, force=force)
         elif out.suffix == ".json":
-            paper_format.write_tasks(out, found)
+            paper_format.write_tasks(out, found, force=force)
         elif out.suffix:
             raise BadInput(f"{out}: give FILE.json, FILE.jsonl, FILE.jsonl.gz or a folder")
         else:
-            write_generator_tasks(out, found)
+            write_generator_tasks(out, found, force=force)
     click.echo(f"{len(found)} tasks: {out}")
 
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from er_gym.writing import make_folder, write_figure
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -28,7 +30,9 @@ class Curved(Protocol):
         """Lines with ``steps`` and what was logged."""
 
 
-def draw_curves(families: Mapping[str, Sequence[Curved]], out: Path) -> list[Path]:
+def draw_curves(
+    families: Mapping[str, Sequence[Curved]], out: Path, *, force: bool = True
+) -> list[Path]:
     """Draw success over steps and over minutes, a line a family: mean, least and most of its seeds.
 
     Returns:
@@ -41,7 +45,7 @@ def draw_curves(families: Mapping[str, Sequence[Curved]], out: Path) -> list[Pat
         from matplotlib.figure import Figure
     except ImportError as error:
         raise ImportError("pictures need matplotlib: pip install 'er-gym[charts]'") from error
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     made = []
     for over, scale, label in (("steps", 1e-3, "thousand steps"), ("seconds", 1 / 60, "minutes")):
         figure = Figure((11, 4.2), facecolor="white", layout="constrained")
@@ -54,7 +58,7 @@ def draw_curves(families: Mapping[str, Sequence[Curved]], out: Path) -> list[Pat
         figure.axes[0].set_ylabel("success, %", color=_MUTED)
         figure.axes[1].legend(frameon=False, labelcolor=_INK, loc="lower right")
         file = out / f"learning_{over}.png"
-        figure.savefig(file, dpi=100)
+        write_figure(file, figure, force=force, dpi=100)
         made.append(file)
     return made
 

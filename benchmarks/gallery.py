@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from rich.progress import track
 
+from benchmarks.cli_errors import bad_input
+from benchmarks.cli_options import force_option
 from er_gym.sim.actions import perform
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.look import Look
@@ -28,6 +30,13 @@ from er_gym.sim.render.shapes import SHAPES, build
 from er_gym.sim.render.stage import stage
 from er_gym.sim.scene import SCENE_NAMES, SCENE_NUMBERS, load_scene
 from er_gym.sim.world import Agent, Settings, World
+from er_gym.writing import (
+    MARKDOWN_MARK,
+    check_output,
+    picture_format,
+    write_output,
+    write_picture,
+)
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 _SIDE, _LABEL, _COLUMNS = 150, 15, 10
@@ -149,12 +158,12 @@ def room_views(scene_name: str) -> list[NDArray[np.uint8]]:
 
 
 def make_gallery() -> None:
-    """Write docs/gallery.md and its pictures."""
+    """Write docs/gallery.md and its pictures, which are the repository's own."""
     images = DOCS / "images"
     things = [
         (kind, portrait(looks(kind)[0])) for kind in track(sorted(SHAPES), "things", transient=True)
     ]
-    sheet(things, _COLUMNS).save(images / "gallery-things.png", optimize=True)
+    write_picture(images / "gallery-things.png", sheet(things, _COLUMNS), force=True, optimize=True)
     lines = [
         "# Gallery",
         "",
@@ -176,7 +185,7 @@ def make_gallery() -> None:
         for k, view in enumerate(views):
             page.paste(Image.fromarray(view), (k % 2 * _ROOM[0], k // 2 * _ROOM[1]))
         name = kind.replace("_", "-")
-        page.save(images / f"gallery-{name}.jpg", quality=85)
+        write_picture(images / f"gallery-{name}.jpg", page, force=True, quality=85)
         title = kind.replace("_", " ").capitalize()
         lines += [
             f"## {title}: {' and '.join(scenes)}",
@@ -184,8 +193,9 @@ def make_gallery() -> None:
             f"![{title}](images/gallery-{name}.jpg)",
             "",
         ]
-    front.resize((1000, 625), Image.Resampling.LANCZOS).save(images / "rooms.jpg", quality=88)
-    (DOCS / "gallery.md").write_text("\n".join(lines))
+    small = front.resize((1000, 625), Image.Resampling.LANCZOS)
+    write_picture(images / "rooms.jpg", small, force=True, quality=88)
+    write_output(DOCS / "gallery.md", MARKDOWN_MARK + "\n".join(lines), force=True)
 
 
 @click.command()
@@ -195,7 +205,10 @@ def make_gallery() -> None:
 @click.option("--columns", default=8, show_default=True)
 @click.option("--yaw", default=30.0, show_default=True, help="Degrees from the front.")
 @click.option("--out", default="contact.png", show_default=True, type=click.Path(path_type=Path))
-def main(kinds: str, with_states: bool, count: int, columns: int, yaw: float, out: Path) -> None:
+@force_option
+def main(
+    kinds: str, with_states: bool, count: int, columns: int, yaw: float, out: Path, force: bool
+) -> None:
     """Make the gallery, or one contact sheet."""
     wanted = [kind.strip() for kind in kinds.split(",") if kind.strip()]
     if not wanted:
@@ -206,12 +219,16 @@ def main(kinds: str, with_states: bool, count: int, columns: int, yaw: float, ou
         raise click.BadParameter(
             f"no shape for {', '.join(unknown)}; there are: {', '.join(sorted(SHAPES))}"
         )
+    with bad_input():
+        picture_format(out)
+        check_output(out, force=force)
     pictures = []
     for kind in wanted:
         for look in looks(kind, count):
             for name, shown in states(look) if with_states else [("", look)]:
                 pictures.append((f"{kind} {name}".strip(), portrait(shown, yaw=yaw)))
-    sheet(pictures, columns).save(out)
+    with bad_input():
+        write_picture(out, sheet(pictures, columns), force=force)
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from er_gym.tasks.start import Start
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TASK_TYPES
 from er_gym.thor import make_controller
+from er_gym.writing import make_folder
 
 _TRIES = 3
 """How many tasks of a type and arrangement are played for each that is wanted."""
@@ -119,7 +120,7 @@ def make_suite(
     Raises:
         RuntimeError: a room's worker died again and again.
     """
-    parts.mkdir(parents=True, exist_ok=True)
+    make_folder(parts)
     done = {scene: part for scene in making.rooms if (part := _read(_file(parts, scene)))}
     for scene, part in done.items():
         on_room(scene, part)
@@ -169,7 +170,9 @@ def _write(path: Path, made: Made) -> None:
 
 
 def _read(path: Path) -> Made | None:
-    if not path.exists():
+    """What a room gave; None where that is not known, or its file is damaged."""
+    try:
+        header = json.loads(path.read_text(encoding="utf-8").partition("\n")[0])
+        return Made(tuple(jsonl_format.read_tasks(path)), Counter(header["dropped"]))
+    except (OSError, ValueError, TypeError, KeyError):
         return None
-    header = json.loads(path.read_text(encoding="utf-8").partition("\n")[0])
-    return Made(tuple(jsonl_format.read_tasks(path)), Counter(header["dropped"]))

@@ -15,7 +15,6 @@ of the poses some doors and drawers open. At each pose two shares are counted, a
 
 from __future__ import annotations
 
-import json
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -29,6 +28,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from benchmarks.perf.output import Output, write_figures
 from er_gym.thor import SCENE_NAMES, make_controller
 
 SIZES = ((300, 300), (800, 450))
@@ -201,7 +201,7 @@ def by_type(found: Iterable[Sighting]) -> dict[str, Shares]:
 @click.option("--poses", default=300, show_default=True, type=click.IntRange(1))
 @click.option("--seed", default=0, show_default=True)
 @click.option("--opened", default=0.3, show_default=True, type=click.FloatRange(0, 1))
-@click.option("--json", "file", type=click.Path(dir_okay=False, path_type=Path))
+@click.option("--json", "file", type=Output())
 def main(poses: int, seed: int, opened: float, file: Path | None) -> None:
     """Compare, and print the shares, and the types that disagree most."""
     found = list(sightings(poses, seed, opened, Console(stderr=True)))
@@ -216,7 +216,7 @@ def main(poses: int, seed: int, opened: float, file: Path | None) -> None:
             }
             for size in SIZES
         }
-        file.write_text(json.dumps(told, indent=1) + "\n")
+        write_figures(file, told)
 
 
 if __name__ == "__main__":

@@ -34,6 +34,7 @@ from benchmarks.perf.comparisons.reachable import (
 )
 from benchmarks.perf.comparisons.room import WITHIN, held_out, rooms
 from benchmarks.perf.comparisons.visibility import visible_objects
+from benchmarks.perf.output import Output, write_figures
 from er_gym.sim.space.standing import Rules
 
 CAPTURES = "unity_captures_dev.json"
@@ -139,7 +140,7 @@ def _share(name: str, part: int, whole: int, bound: float | None = None) -> Row:
 
 @click.command()
 @click.option("--shared", type=click.Path(file_okay=False, path_type=Path), default=SHARED)
-@click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), default=None)
+@click.option("--json", "json_file", type=Output())
 def main(shared: Path, json_file: Path | None) -> None:
     """Compare, and print the table; takes about a minute."""
     rows = list(recorded_rows())
@@ -157,7 +158,7 @@ def main(shared: Path, json_file: Path | None) -> None:
     if not (shared / POSITIONS).exists():
         click.echo(f"No positions of AI2-THOR 5 at {shared / POSITIONS}: not compared.")
     if json_file is not None:
-        json_file.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
+        write_figures(json_file, [asdict(row) for row in rows])
 
 
 if __name__ == "__main__":

@@ -39,6 +39,7 @@ from rich.progress import track
 from rich.table import Table
 
 from benchmarks.perf.jobs import choose_scenes
+from benchmarks.perf.output import Output, write_figures
 from benchmarks.perf.soak import free_play
 from benchmarks.perf.steps import Walker
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -355,7 +356,7 @@ def show(figures: list[Figure], memory: list[Memory], console: Console) -> None:
 @click.option("--seconds", default=3.0, show_default=True, type=click.FloatRange(0.1))
 @click.option("--rounds", default=3, show_default=True, type=click.IntRange(1))
 @click.option("--soak", "soaked", is_flag=True, help="Look for memory that grows, too.")
-@click.option("--json", "file", type=click.Path(dir_okay=False, path_type=Path))
+@click.option("--json", "file", type=Output())
 def main(seconds: float, rounds: int, soaked: bool, file: Path | None) -> None:
     """Measure, and print two tables."""
     log = Console(stderr=True)
@@ -366,7 +367,7 @@ def main(seconds: float, rounds: int, soaked: bool, file: Path | None) -> None:
     show(figures, memory, Console(width=None if sys.stdout.isatty() else 110))
     if file is not None:
         told = {"rates": list(map(asdict, figures)), "memory": list(map(asdict, memory))}
-        file.write_text(json.dumps(told, indent=1) + "\n")
+        write_figures(file, told)
 
 
 if __name__ == "__main__":

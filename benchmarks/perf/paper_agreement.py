@@ -43,6 +43,7 @@ from rich.progress import track
 from agents.base import Decision
 from benchmarks.episode import EpisodeRecord, StepRecord
 from benchmarks.metrics import score_episode
+from benchmarks.perf.output import Output, write_figures
 from benchmarks.play import play_episode
 from benchmarks.scorers import PAPER
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -313,7 +314,7 @@ _file = click.Path(exists=True, dir_okay=False, path_type=Path)
 @click.option("--poses", required=True, type=_file)
 @click.option("--episodes", default=300, show_default=True, type=click.IntRange(1))
 @click.option("--seed", default=0, show_default=True)
-@click.option("--json", "file", type=click.Path(dir_okay=False, path_type=Path))
+@click.option("--json", "file", type=Output())
 def main(
     theirs: Path, tasks_file: Path, poses: Path, episodes: int, seed: int, file: Path | None
 ) -> None:
@@ -333,7 +334,7 @@ def main(
     for kind, count in found.differences.most_common():
         print(f"  {count:4} {kind}")
     if file is not None:
-        file.write_text(json.dumps(vars(found), indent=1) + "\n", encoding="utf-8")
+        write_figures(file, vars(found))
 
 
 if __name__ == "__main__":

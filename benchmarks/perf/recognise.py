@@ -12,7 +12,6 @@ sees them. Half of the poses are anywhere, half look at a thing from 0.5 to 2.5 
 from __future__ import annotations
 
 import importlib.util
-import json
 import sys
 import time
 from collections import Counter
@@ -25,14 +24,17 @@ import click
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 from rich.console import Console
 from rich.progress import track
 from rich.table import Column, Table
 
+from benchmarks.perf.output import Output, write_figures
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.stage import stage
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.world import Settings, World
+from er_gym.writing import write_picture
 
 TYPES, EVERY = 40, 4
 """How many types there are to tell apart, and which share of the scenes is held out: one in so
@@ -298,7 +300,7 @@ def draw_sheet(verdict: Verdict, images: NDArray[np.uint8], file: Path) -> None:
                 text = verdict.types[name]
                 cv2.putText(row, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (0, 0, 0))
         rows.extend([row] if chosen else [])
-    cv2.imwrite(str(file), cv2.cvtColor(np.concatenate(rows), cv2.COLOR_RGB2BGR))
+    write_picture(file, Image.fromarray(np.concatenate(rows)))
 
 
 @click.command()
@@ -308,8 +310,8 @@ def draw_sheet(verdict: Verdict, images: NDArray[np.uint8], file: Path) -> None:
     "--crops-per-scene", "most", default=8, show_default=True, type=click.IntRange(1),
     help="At most so many of a type.",
 )  # fmt: skip
-@click.option("--json", "file", type=click.Path(dir_okay=False, path_type=Path))
-@click.option("--sheet", type=click.Path(dir_okay=False, path_type=Path), help="Wrong crops.")
+@click.option("--json", "file", type=Output())
+@click.option("--sheet", type=Output(), help="Wrong crops.")
 def main(seed: int, epochs: int, most: int, file: Path | None, sheet: Path | None) -> None:
     """Draw crops, train the network, and print what it cannot tell apart."""
     if importlib.util.find_spec("torch") is None:
@@ -342,7 +344,7 @@ def main(seed: int, epochs: int, most: int, file: Path | None, sheet: Path | Non
                 "top-1": verdict.right(kind),
                 "taken for": dict(verdict.taken_for(kind)),
             }
-        file.write_text(json.dumps(told, indent=1) + "\n")
+        write_figures(file, told)
 
 
 if __name__ == "__main__":

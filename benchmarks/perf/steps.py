@@ -9,7 +9,6 @@ after round, and the median of the rounds is printed: a busy machine then slows 
 from __future__ import annotations
 
 import importlib.util
-import json
 import os
 import statistics
 import subprocess
@@ -29,6 +28,7 @@ from rich.progress import track
 from rich.table import Table
 
 import er_gym  # noqa: F401  (registers the environments)
+from benchmarks.perf.output import Output, write_figures
 from er_gym.tasks.types import TASK_TYPES
 from er_gym.thor import make_controller
 
@@ -233,7 +233,7 @@ def show(figures: list[Figure], console: Console) -> None:
 @click.command()
 @click.option("--seconds", default=4.0, show_default=True, type=click.FloatRange(0.01))
 @click.option("--rounds", default=3, show_default=True, type=click.IntRange(1))
-@click.option("--json", "file", type=click.Path(dir_okay=False, path_type=Path))
+@click.option("--json", "file", type=Output())
 def main(seconds: float, rounds: int, file: Path | None) -> None:
     """Measure, and print one table."""
     console = Console(width=None if sys.stdout.isatty() else 140)
@@ -254,7 +254,7 @@ def main(seconds: float, rounds: int, file: Path | None) -> None:
             style="yellow",
         )
     if file is not None:
-        file.write_text(json.dumps([asdict(figure) for figure in figures], indent=1) + "\n")
+        write_figures(file, [asdict(figure) for figure in figures])
 
 
 if __name__ == "__main__":

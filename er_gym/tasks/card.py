@@ -14,6 +14,7 @@ from er_gym.tasks.rooms import ROOM_KINDS, room_kind
 from er_gym.tasks.task import Task, type_of_id
 from er_gym.tasks.types import BY_NAME, GROUPS
 from er_gym.thor import OBJECT_TYPES
+from er_gym.writing import MARKDOWN_MARK
 
 _WIDTH = 100
 _TIED = "\u00a0"
@@ -137,7 +138,7 @@ def card(
         f"`{jsonl_format.digest(tasks)}`",
         *(_counts(summary) if tasks else ()),
     ]
-    return "\n\n".join(part for part in parts if part) + "\n"
+    return MARKDOWN_MARK + "\n\n".join(part for part in parts if part) + "\n"
 
 
 def _size(summary: Summary) -> str:

@@ -44,6 +44,21 @@ def read_text(path: Path) -> str:
         raise TaskFileError(f"{path}: {error.strerror}") from None
 
 
+def as_utf8(text: str, path: Path) -> bytes:
+    """A text as it is written.
+
+    Raises:
+        TaskFileError: it holds half a character (a lone surrogate), which UTF-8 cannot.
+    """
+    try:
+        return text.encode()
+    except UnicodeEncodeError as error:
+        half = error.object[error.start]
+        raise TaskFileError(
+            f"{path}: cannot be written: a text holds half a character, {half!r}"
+        ) from None
+
+
 def parse_json(text: str, path: Path, first_line: int = 1) -> object:
     """Parse JSON that starts at line ``first_line`` of a file.
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 import gzip
 import hashlib
 import json
-import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, astuple, replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import (
     Entry,
     TaskFile,
+    as_utf8,
     known_scene,
     known_type,
     known_verb,
@@ -35,6 +35,7 @@ from er_gym.tasks.files import (
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.start import ObjectPose, Start
 from er_gym.tasks.task import AgentPose, KeyAction, Task, type_of_id
+from er_gym.writing import write_output
 
 FORMAT = "er-gym/tasks/1"
 
@@ -143,7 +144,8 @@ def read_file(path: str | Path) -> TaskFile:
         TaskFileError: the file as a whole cannot be used.
     """
     path = Path(path)
-    lines = read_text(path).splitlines()
+    # Not splitlines: an instruction may hold what is an end of line to Unicode and none to JSON.
+    lines = read_text(path).split("\n")
     header = _header(lines, path)
     entries = list(_entries(lines[1:], path))
     if len(entries) != header.tasks:
@@ -154,19 +156,27 @@ def read_file(path: str | Path) -> TaskFile:
     return read_entries(entries)
 
 
-def write_tasks(path: str | Path, tasks: Iterable[Task], **made: object) -> None:
-    """Write a task file, whole or not at all; ``made`` (generator, seed, …) goes into its header.
+def write_tasks(
+    path: str | Path, tasks: Iterable[Task], *, force: bool = True, **made: object
+) -> None:
+    """Write a task file, whole or not at all.
+
+    Args:
+        path: the file; compressed if its name ends in ``.gz``.
+        tasks: what to write.
+        force: whether to replace also a file that er-gym did not write.
+        made: for the header: generator, seed, …
 
     Raises:
-        ValueError: two tasks name different arrangements alike.
+        ValueError: two tasks name different arrangements alike, or a text is none that UTF-8 can
+            hold.
+        NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     path, tasks = Path(path), list(tasks)
     header = json.dumps({"format": FORMAT, "tasks": len(tasks), **made}, ensure_ascii=False)
-    text = "\n".join([header, *_lines(tasks)]) + "\n"
-    data = text.encode()
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    unfinished.write_bytes(gzip.compress(data, mtime=0) if path.suffix == ".gz" else data)
-    unfinished.replace(path)
+    data = as_utf8("\n".join([header, *_lines(tasks)]) + "\n", path)
+    packed = gzip.compress(data, mtime=0) if path.suffix == ".gz" else data
+    write_output(path, packed, force=force)
 
 
 def digest(tasks: Iterable[Task]) -> str:
@@ -196,7 +206,7 @@ def _lines(tasks: Iterable[Task]) -> Iterator[str]:
 
 def _header(lines: list[str], path: Path) -> Header:
     where = f"{path}: the header"
-    if not lines:
+    if not any(lines):
         raise TaskFileError(f'{path}: empty; its first line should be {{"format": "{FORMAT}", …}}')
     header = validated(Header, parse_json(lines[0], path), where)
     if header.format != FORMAT:

@@ -34,6 +34,7 @@ from er_gym.tasks.files import (
 )
 from er_gym.tasks.paper_records import (
     PaperTask,
+    as_json,
     json_kind,
     key_actions,
     metadata_record,
@@ -42,9 +43,9 @@ from er_gym.tasks.paper_records import (
     unspoken,
     with_own_fields,
     without,
-    write_json,
 )
 from er_gym.tasks.task import AgentPose, Task
+from er_gym.writing import write_output
 
 
 class _Vector(BaseModel):
@@ -120,21 +121,27 @@ def _entry(data: object, number: int) -> Entry:
     return Entry(where, f"paper-{identity}" if stated else "", lambda: _read_task(data, where))
 
 
-def write_tasks(path: str | Path, tasks: Iterable[Task]) -> None:
+def write_tasks(path: str | Path, tasks: Iterable[Task], *, force: bool = True) -> None:
     """Write tasks as the paper's test files do; ``Task.poses`` go into a file of their own.
 
     A task that came from elsewhere and so has no identity gets its place in the file, from 1, or,
     where another task has that identity, the next number that is as far into the file again.
 
+    Args:
+        path: the file.
+        tasks: what to write.
+        force: whether to replace another file; one of the paper's says nothing of who wrote it.
+
     Raises:
         TaskFileError: a task could not be read again, for what its ``extra`` says.
+        NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     path, tasks = Path(path), list(tasks)
     records = [
         _task_record(task, identity, path, number)
         for number, (task, identity) in enumerate(_with_identities(tasks), 1)
     ]
-    write_json(path, records)
+    write_output(path, as_json(path, records), force=force)
 
 
 def read_poses(path: str | Path) -> dict[str, dict[str, AgentPose]]:
@@ -180,7 +187,7 @@ def write_poses(path: str | Path, tasks: Iterable[Task]) -> None:
         for task, identity in _with_identities(list(tasks))
         if task.poses
     }
-    write_json(Path(path), entries)
+    write_output(path, as_json(Path(path), entries), force=True)
 
 
 def with_poses(

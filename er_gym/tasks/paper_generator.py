@@ -29,6 +29,7 @@ from er_gym.tasks.files import (
 )
 from er_gym.tasks.paper_records import (
     PaperGenerated,
+    as_json,
     json_kind,
     key_actions,
     metadata_record,
@@ -36,11 +37,11 @@ from er_gym.tasks.paper_records import (
     unknown,
     unspoken,
     with_own_fields,
-    write_json,
 )
 from er_gym.tasks.rooms import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TASK_TYPES, TaskType
+from er_gym.writing import check_output, make_folder, write_output
 
 _ENDING = "_task_metadata.json"
 _SCENE = re.compile(r"FloorPlan(\d+)\w*")
@@ -78,29 +79,41 @@ def read_generated(path: str | Path) -> TaskFile:
     return read_entries(entry for file in files for entry in _entries(file, path))
 
 
-def write_generator_tasks(folder: str | Path, tasks: Iterable[Task]) -> list[Path]:
+def write_generator_tasks(
+    folder: str | Path, tasks: Iterable[Task], *, force: bool = True
+) -> list[Path]:
     """Write tasks as the paper's generator does, one file for each scene and type among them.
 
-    Files of the same names are overwritten, others in the folder stay.
+    Files of other names in the folder stay.
+
+    Args:
+        folder: where to; it is made where it is not there.
+        tasks: what to write.
+        force: whether to replace files of the same names; without it, and where one of them says
+            something else, nothing is written.
 
     Returns:
         The files, in the order in which they are read again.
 
     Raises:
         TaskFileError: a task could not be read again, for what its ``extra`` says.
+        NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     groups: dict[Path, list[Task]] = {}
     for task in tasks:
         file = Path(folder, _room(task.scene), task.scene, _slug(task.type) + _ENDING)
         groups.setdefault(file, []).append(task)
-    records = {
-        file: [_record(task, file, number) for number, task in enumerate(group, 1)]
+    content = {
+        file: as_json(file, [_record(task, file, number) for number, task in enumerate(group, 1)])
         for file, group in sorted(groups.items(), key=lambda item: _order(item[0]))
     }
-    for file, content in records.items():
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write_json(file, content)
-    return list(records)
+    for file, data in content.items():
+        if file.exists():
+            check_output(file, data, force=force)
+    for file, data in content.items():
+        make_folder(file.parent)
+        write_output(file, data, force=force)
+    return list(content)
 
 
 def _entries(path: Path, top: Path) -> list[Entry]:

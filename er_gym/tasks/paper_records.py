@@ -20,7 +20,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.tasks import verbs
-from er_gym.tasks.files import known_scene, known_type, known_verb
+from er_gym.tasks.files import as_utf8, known_scene, known_type, known_verb
 from er_gym.tasks.jsonl_format import ConditionRecord, PoseRecord
 from er_gym.tasks.start import ObjectPose, Start
 from er_gym.tasks.task import AgentPose, KeyAction, Task
@@ -208,10 +208,13 @@ def json_kind(data: object) -> str:
     return kinds.get(type(data), "a number or a truth value")
 
 
-def write_json(path: Path, data: object) -> None:
-    """Write a file as the paper's are laid out."""
-    text = json.dumps(data, indent=4, ensure_ascii=False)
-    path.write_text(text + "\n", encoding="utf-8")
+def as_json(path: Path, data: object) -> bytes:
+    """The content of a file as the paper's are laid out.
+
+    Raises:
+        TaskFileError: it holds half a character.
+    """
+    return as_utf8(json.dumps(data, indent=4, ensure_ascii=False) + "\n", path)
 
 
 def odd_spellings(task: Task) -> list[str]:

@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict
 from er_gym.plugins import Registry
 from er_gym.tasks.files import validated
 from er_gym.thor import OBJECT_TYPES
+from er_gym.writing import CannotWrite, make_folder
 
 Ask: TypeAlias = Callable[[str], str]
 """A language model: a prompt to its reply."""
@@ -51,6 +52,10 @@ _SENTENCES = re.compile(r"[A-Z][^\x00-\x1f\x7f{}]*[a-z][^\x00-\x1f\x7f{}]*[.?!]"
 _WORD = re.compile(r"\w+")
 
 
+_BEGINS = b'{"key": "'
+"""How every line of the file of replies does."""
+
+
 class _Entry(BaseModel):
     """A line of the file of replies."""
 
@@ -77,7 +82,7 @@ class Paraphraser:
             count: how many paraphrases to ask for, and to return at most.
 
         Raises:
-            ValueError: ``count`` is below 1, or ``cache`` has JSON lines of another kind.
+            ValueError: ``count`` is below 1, or ``cache`` has lines of another kind.
         """
         if count < 1:
             raise ValueError(f"count is {count}; ask for at least 1 paraphrase")
@@ -177,28 +182,29 @@ def load_ask(spec: str) -> Ask:
 def _read(cache: Path) -> dict[str, str]:
     """Key to reply; a line that is not whole, since its writer was killed, is passed over."""
     replies: dict[str, str] = {}
-    for number, data in _json_lines(cache):
-        entry = validated(_Entry, data, f"{cache}: the reply in line {number}")
+    try:
+        lines = cache.read_bytes().split(b"\n")
+    except FileNotFoundError:
+        return replies
+    for number, line in enumerate(lines, 1):
+        where = f"{cache}: the reply in line {number}"
+        try:
+            data = json.loads(line)
+        except ValueError:  # not JSON, or not even text
+            if line[: len(_BEGINS)] != _BEGINS[: len(line)]:
+                raise ValueError(
+                    f"{where} is none, and no beginning of one: er-gym did not write this file; "
+                    "move it, or choose another --out"
+                ) from None
+            continue
+        entry = validated(_Entry, data, where)
         replies.setdefault(entry.key, entry.reply)
     return replies
 
 
-def _json_lines(path: Path) -> Iterator[tuple[int, object]]:
-    try:
-        lines = path.read_bytes().split(b"\n")
-    except FileNotFoundError:
-        return
-    for number, line in enumerate(lines, 1):
-        try:
-            data = json.loads(line)
-        except ValueError:  # not JSON, or not even text
-            continue
-        yield number, data
-
-
 def _append(cache: Path, entry: _Entry) -> None:
     """Add a line in one write, so that it is there whole or, if we are killed, at most torn."""
-    cache.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(cache.parent)
     line = json.dumps(entry.model_dump()).encode() + b"\n"
     with open(cache, "ab+", buffering=0) as file:  # O_APPEND: other writers' lines stay whole
         end = file.seek(0, os.SEEK_END)
@@ -206,7 +212,8 @@ def _append(cache: Path, entry: _Entry) -> None:
             file.seek(end - 1)
             if file.read(1) != b"\n":  # a torn line is not to spoil this one
                 line = b"\n" + line
-        file.write(line)
+        if file.write(line) != len(line):
+            raise CannotWrite(f"{cache}: cannot be written: the disk is full")
 
 
 def _bare(line: str) -> str:

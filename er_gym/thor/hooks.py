@@ -11,11 +11,13 @@ from importlib.metadata import version
 from pathlib import Path
 
 from er_gym.thor import client_hook
-from er_gym.thor.launcher import write_whole
 from er_gym.thor.places import PlayerError, client_home
+from er_gym.writing import write_whole
 
 _HOOK = "er_gym_player_hook"
 """What the module is called where it is copied to."""
+_FOR_ALL = 0o644
+"""A hook that a user of this Python may not read would be complained of whenever Python starts."""
 _ASK_PYTHON = """
 import json, site, sysconfig
 from ai2thor._builds import COMMIT_ID
@@ -61,9 +63,9 @@ def write_hook(folders: Sequence[Path]) -> Path | None:
             if os.access(folder, os.W_OK):
                 # First it is written down, so that uninstall finds what a kill leaves behind.
                 hooks = sorted({*_hooks(), str(folder)})
-                write_whole(_record(), json.dumps({"hooks": hooks}) + "\n")
+                write_whole(_record(), json.dumps({"hooks": hooks}) + "\n", mode=_FOR_ALL)
                 for name, text in _hook_files().items():
-                    write_whole(folder / name, text)
+                    write_whole(folder / name, text, mode=_FOR_ALL)
                 return folder / f"{_HOOK}.pth"
     return None
 

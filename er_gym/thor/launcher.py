@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-import tempfile
 from hashlib import sha256
 from pathlib import Path
+
+from er_gym.writing import write_whole
 
 EXECUTABLE = 0o755
 _START = Path(__file__).with_name("start_player.py")
@@ -27,7 +28,7 @@ def thor_executable() -> str:
     try:
         if not (os.access(path, os.X_OK) and path.read_text() == text):
             cache.mkdir(parents=True, exist_ok=True)
-            write_whole(path, text, EXECUTABLE)
+            write_whole(path, text, mode=EXECUTABLE)
     except OSError:
         return shlex.join(_command())
     return shlex.quote(str(path))
@@ -46,12 +47,3 @@ def launcher() -> str:
         "# er-gym's player, which AI2-THOR's client starts in place of Unity's.\n"
         f'exec {shlex.join(_command())} -parent "$PPID" "$@"\n'
     )
-
-
-def write_whole(path: Path, text: str, mode: int = 0o644) -> None:
-    """Write a file so that nobody ever finds half of it there."""
-    file, draft = tempfile.mkstemp(dir=path.parent, prefix=path.name)
-    with os.fdopen(file, "w", encoding="utf-8") as stream:
-        stream.write(text)
-    os.chmod(draft, mode)
-    os.replace(draft, path)

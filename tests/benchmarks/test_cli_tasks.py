@@ -7,6 +7,7 @@ import io
 import json
 import os
 import re
+import resource
 import subprocess
 import sys
 from collections.abc import Callable
@@ -108,7 +109,7 @@ def test_a_file_and_a_card_is_all_that_is_left(made: Path) -> None:
     suite = suite_from_file(made)
     assert len(suite.tasks) == 6
     card = made.with_name("six.md").read_text(encoding="utf-8")
-    assert card.startswith("# six\n")
+    assert card.startswith("<!-- Written by er-gym -->\n# six\n")
     assert suite.digest in card
     assert '| scenes | ["FloorPlan5", "FloorPlan301"] |' in card
 
@@ -171,7 +172,7 @@ def test_a_suite_that_is_made_is_found_afterwards(er_gym: Command, tmp_path: Pat
     }
     assert suite.env == load_suite("er-1k").env
     card = file.with_name("train.md").read_text(encoding="utf-8")
-    assert card.startswith("# train\n\nGenerated tasks.")  # not what the suite says
+    assert "\n# train\n\nGenerated tasks." in card  # not what the suite says
     (command,) = [line for line in card.splitlines() if line.startswith("er-gym tasks generate")]
     for option in ("--suite train", "--total 4", "--scenes FloorPlan5", "--layouts 0", "--seed 0"):
         assert option in command
@@ -373,6 +374,61 @@ def test_tasks_are_converted_without_loss(er_gym: Command, tmp_path: Path) -> No
     assert read_tasks("2.jsonl.gz") == tasks
     by_id = {task.id: task for task in tasks}
     assert {task.id: task for task in read_tasks("3.jsonl")} == by_id
+
+
+def test_files_of_others_are_replaced_with_force_only(er_gym: Command, tmp_path: Path) -> None:
+    """Also those that nobody named, such as the card beside the task file."""
+    mine = tmp_path / "notes.md"
+    mine.write_text("# er-gym notes\n")
+    for name in ("t.json", "t.jsonl", "t.jsonl.gz", "charts/rooms.png"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(b"mine")
+    folder = tmp_path / "folder" / "kitchens" / "FloorPlan1" / "single_pickup_task_metadata.json"
+    folder.parent.mkdir(parents=True)
+    folder.write_bytes(b"mine")
+    task = next(t for t in load_suite("mini").tasks if t.type.name == "single_pickup")
+    write_tasks(tmp_path / "one.jsonl", [replace(task, scene="FloorPlan1")])
+    before = {name: (tmp_path / name).read_bytes() for name in files_in(tmp_path)}
+    generate = ("generate", "--out", "notes.jsonl", "--scenes", "FloorPlan410", "--types")
+    commands = [
+        (*generate, "single_toggle", "--per-layout", "1", "--workers", "1"),
+        ("convert", "one.jsonl", "t.json"),
+        ("convert", "one.jsonl", "t.jsonl"),
+        ("convert", "one.jsonl", "t.jsonl.gz"),
+        ("convert", "one.jsonl", "folder"),
+        ("stats", "one.jsonl", "--out", "charts"),
+    ]
+    for command in commands:
+        code, _, err = er_gym("tasks", *command)
+        assert (code, err.count("\n")) == (2, 1), command
+        assert "er-gym did not write it" in err
+        assert {name: (tmp_path / name).read_bytes() for name in files_in(tmp_path)} == before
+    for command in commands:
+        code, _, err = er_gym("tasks", *command, "--force")
+        assert code == 0, err
+    after = {name: (tmp_path / name).read_bytes() for name in files_in(tmp_path)}
+    assert [name for name in before if after[name] == before[name]] == ["one.jsonl"]
+    for command in commands:  # and now they are er-gym's, or the same as before
+        code, _, err = er_gym("tasks", *command)
+        assert code == 0, err
+
+
+@pytest.mark.parametrize(
+    "out", ["good.jsonl", "good.json", "no/such/good.jsonl", "/dev/full.jsonl"]
+)
+def test_a_full_disk_harms_no_file(out: str, er_gym: Command, tmp_path: Path) -> None:
+    write_tasks(tmp_path / "good.jsonl", load_suite("mini").tasks[:1])
+    (tmp_path / "good.json").write_text("[]")
+    before = {name: (tmp_path / name).read_bytes() for name in files_in(tmp_path)}
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, limits[1]))
+    try:
+        code, shown, err = er_gym("tasks", "convert", "mini", out, "--force")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert (code, shown, err.count("\n")) == (2, "", 1)
+    assert f"{out}: cannot be written: " in err
+    assert {name: (tmp_path / name).read_bytes() for name in files_in(tmp_path)} == before
 
 
 # -- bad input -------------------------------------------------------------------------------------

@@ -119,7 +119,7 @@ def test_the_card_of_a_small_example() -> None:
         "small", "Four tasks.", TASKS, {"seed": 3, "by": "hand | eye", "of": [1]}, "make it"
     )
     assert text.startswith(
-        "# small\n\nFour tasks.\n\n"
+        "<!-- Written by er-gym -->\n# small\n\nFour tasks.\n\n"
         "4 tasks in 3 scenes. Rearranged at the start: 2 of them, in 1 layout.\n\n"
         "Licence: Apache-2.0."
     )

@@ -211,3 +211,31 @@ def test_mini_has_all_types_and_all_kinds_of_room() -> None:
     assert set(per_type) == set(GENERATED_TYPES)
     assert max(per_type.values()) <= 2 * min(per_type.values())
     assert {room_kind(task.scene) for task in tasks} == set(ROOM_KINDS)
+
+
+ENDS_OF_LINES = [chr(code) for code in range(0x110000) if len(f"a{chr(code)}b".splitlines()) > 1]
+"""All that Python, or Unicode, takes for an end of line."""
+
+
+@pytest.mark.parametrize("end", [*ENDS_OF_LINES, "\r\n", "\ufeff", "\0"], ids=ascii)
+@pytest.mark.parametrize("name", ["tasks.jsonl", "tasks.jsonl.gz", "tasks.json"])
+def test_what_is_written_is_read(end: str, name: str, tmp_path: Path) -> None:
+    text = f"{end}Bring{end}the Cup{end * 2}to the Plate.{end}"
+    extra = {"identity": 3, "note": text, text: [text]}
+    odd = replace(TASK, instruction=text, name=text, target_objects=(text,), extra=extra)
+    tasks = [replace(odd, poses={}), replace(TASK, id="FloorPlan1-b", poses={})]
+    writer = write_paper_tasks if name.endswith(".json") else write_tasks
+    writer(tmp_path / name, tasks)
+    assert [each.instruction for each in suite_from_file(tmp_path / name).tasks] == [
+        text,
+        TASK.instruction,
+    ]
+    if name != "tasks.json":
+        assert read_tasks(tmp_path / name) == tasks
+
+
+def test_lines_may_end_as_on_windows(tmp_path: Path) -> None:
+    path = tmp_path / "tasks.jsonl"
+    write_tasks(path, [TASK])
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    assert read_tasks(path) == [TASK]

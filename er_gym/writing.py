@@ -1,0 +1,281 @@
+"""Files that are written whole or not at all, and only over what er-gym wrote.
+
+Every file goes through :func:`write_whole`: it is written beside its place and moved there, so that
+neither a full disk nor a kill leaves half a file or harms the old one. A file that the user named,
+or that is derived from such a name, goes through :func:`write_output`, which replaces nothing that
+er-gym did not write unless it is told to.
+
+How er-gym knows its own files (:func:`is_ours`): each says so at its beginning.
+
+========================  ======================================================================
+JSON, JSON lines (.gz)    the first key is ``"format"``, its value begins with ``er-gym/``
+Markdown                  begins with ``<!-- Written by er-gym``
+YAML                      begins with ``# Written by er-gym``
+PNG                       the text chunk ``Software`` is ``er-gym``
+JPEG                      the comment begins with ``Written by er-gym``
+========================  ======================================================================
+
+The paper's task files have no place for such a mark, nor have other kinds of pictures. An empty
+file holds nothing that could be lost, and counts as er-gym's.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import os
+import re
+import secrets
+import stat
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from PIL.Image import Image
+
+MARKDOWN_MARK = "<!-- Written by er-gym -->\n"
+"""The first line of a Markdown file of er-gym's; readers do not see it."""
+YAML_MARK = "# Written by er-gym\n"
+"""The first line of a YAML file of er-gym's."""
+PICTURE_MARK: Mapping[str, str] = {"Software": "er-gym"}
+"""What a PNG file of er-gym's says of itself."""
+
+_LONGEST_NAME = 200
+"""Bytes that a draft's name takes from the file's; file systems allow 255, the rest included."""
+_LONGEST_STEM = 120
+_HEAD = 4096
+"""So many bytes of a file are looked at for a mark."""
+_COMMENT = b"Written by er-gym"
+_OURS = re.compile(rb'\s*\{\s*"format"\s*:\s*"er-gym/|(<!--|#) Written by er-gym\b')
+_PNG, _JPEG, _GZIP = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\x1f\x8b"
+
+
+class CannotWrite(OSError):
+    """A file cannot be written; the message is one line that names it. The old one is whole."""
+
+
+class NotOurs(ValueError):
+    """er-gym did not write what is there, so it does not replace it; nothing is changed."""
+
+
+def file_stem(name: str) -> str:
+    """A file's name for what has a name, less an ending: its name, or, where that is not fit, a
+    readable unique one of at most 129 characters."""
+    stem = re.sub(r"[^A-Za-z0-9._-]", "_", name)[:_LONGEST_STEM]
+    if stem == name and not stem.startswith("."):
+        return stem
+    return f"{stem.lstrip('.')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+
+
+def write_whole(path: Path, data: str | bytes, *, mode: int | None = None) -> None:
+    """Write a file so that it is found whole or not at all, power cuts included.
+
+    Args:
+        path: the file; its folder must be there. What is there is replaced, a link too.
+        data: text is encoded as UTF-8; ends of lines stay as they are.
+        mode: permissions; by default those of the file that is replaced, or the user's usual ones.
+
+    Raises:
+        CannotWrite: the disk is full, the folder is not there or may not be written to, a folder
+            stands in the file's place.
+    """
+    content = data.encode() if isinstance(data, str) else data
+    # What a kill leaves behind tells by its name of which file it is.
+    name = os.fsdecode(os.fsencode(path.name)[:_LONGEST_NAME])
+    draft = path.with_name(f"{name}.{secrets.token_hex(8)}.tmp")
+    try:
+        if mode is None:
+            with contextlib.suppress(OSError):
+                mode = stat.S_IMODE(os.stat(path).st_mode)
+        handle = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+        try:
+            with open(handle, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            if mode is not None:
+                os.chmod(draft, mode)
+            os.replace(draft, path)
+        except BaseException:  # Ctrl-C too
+            with contextlib.suppress(OSError):
+                os.unlink(draft)
+            raise
+    except OSError as error:
+        raise CannotWrite(f"{path}: cannot be written: {_reason(error, path)}") from error
+
+
+def write_output(path: str | Path, data: str | bytes, *, force: bool = False) -> None:
+    """Write a file that the user asked for.
+
+    Where the same content is there already, nothing is done. A link is followed.
+
+    Args:
+        path: the file; its folder must be there.
+        data: text is encoded as UTF-8.
+        force: whether to replace also what er-gym did not write.
+
+    Raises:
+        NotOurs: it did not write what is there.
+        CannotWrite: as :func:`write_whole`; or a device or a pipe is there, or a file that may not
+            be written to.
+    """
+    path = Path(path)
+    content = data.encode() if isinstance(data, str) else data
+    if not _holds(path, content):
+        check_output(path, force=force)
+        write_whole(Path(os.path.realpath(path)), content)
+
+
+def check_output(path: str | Path, data: bytes | None = None, *, force: bool = False) -> None:
+    """Raise what :func:`write_output` would, as far as can be known beforehand.
+
+    Args:
+        path: the file.
+        data: its content, if that is known already.
+        force: as in :func:`write_output`.
+    """
+    path = Path(path)
+    if data is not None and _holds(path, data):
+        return
+    folder = Path(os.path.realpath(path)).parent
+    try:
+        kind = os.stat(path).st_mode
+    except FileNotFoundError:
+        if not folder.is_dir():
+            why = f"there is no folder {folder}; make it first"
+            raise CannotWrite(f"{path}: cannot be written: {why}") from None
+    except OSError as error:
+        raise CannotWrite(f"{path}: cannot be written: {_reason(error, path)}") from error
+    else:
+        if not stat.S_ISREG(kind):
+            what = "a folder" if stat.S_ISDIR(kind) else "a device or a pipe"
+            raise CannotWrite(f"{path}: cannot be written: {what} is there; name a file")
+        if not os.access(path, os.W_OK):
+            raise CannotWrite(f"{path}: cannot be written: the file is read-only")
+        if not (force or is_ours(path)):
+            raise NotOurs(
+                f"{path} is there already, and er-gym did not write it; choose another name or "
+                "move it away (commands that have --force then replace it)"
+            )
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise CannotWrite(f"{path}: cannot be written: the folder {folder} is read-only")
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it, where they are not there.
+
+    Raises:
+        CannotWrite: it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = "a file is there" if isinstance(error, FileExistsError) else error.strerror
+        raise CannotWrite(f"{path}: the folder cannot be made: {reason}") from error
+
+
+def is_ours(path: Path) -> bool:
+    """Whether er-gym wrote a file, by what the file says of itself; an empty one counts as such."""
+    try:
+        with open(path, "rb") as file:
+            head = file.read(_HEAD)
+    except OSError:
+        return False
+    if not head:
+        return True
+    if head.startswith(_GZIP):
+        try:
+            head = zlib.decompressobj(wbits=31).decompress(head, _HEAD)
+        except zlib.error:
+            return False
+    if head.startswith(_PNG):
+        return b"tEXtSoftware\x00er-gym" in head
+    if head.startswith(_JPEG):
+        return _COMMENT in head
+    return _OURS.match(head) is not None
+
+
+def picture_format(path: Path) -> str:
+    """The kind of picture that a name's ending asks for, as Pillow calls it.
+
+    Raises:
+        ValueError: there is none of that ending.
+    """
+    from PIL.Image import SAVE, registered_extensions
+
+    kind = registered_extensions().get(path.suffix.lower(), "")
+    if kind not in SAVE:
+        raise ValueError(f"{path}: {path.suffix!r} is no kind of picture; give .png or .jpg")
+    return kind
+
+
+def write_picture(path: Path, picture: Image, *, force: bool = False, **options: Any) -> None:
+    """Write a picture that the user asked for, of the kind that its name ends in.
+
+    Args:
+        path: the file.
+        picture: what to write.
+        force: as in :func:`write_output`.
+        options: of Pillow's writer.
+
+    Raises:
+        NotOurs, CannotWrite: as :func:`write_output`.
+        ValueError: there is no such kind of picture, or it cannot hold this one.
+    """
+    from PIL.PngImagePlugin import PngInfo
+
+    kind = picture_format(path)
+    if kind == "PNG":
+        options["pnginfo"] = PngInfo()
+        for name, text in PICTURE_MARK.items():
+            options["pnginfo"].add_text(name, text)
+    elif kind == "JPEG":
+        options["comment"] = _COMMENT
+    buffer = io.BytesIO()
+    try:
+        picture.save(buffer, format=kind, **options)
+    except (OSError, ValueError, KeyError) as error:
+        raise ValueError(f"{path}: a {kind} file cannot hold this picture: {error}") from error
+    write_output(path, buffer.getvalue(), force=force)
+
+
+def write_figure(path: Path, figure: Figure, *, force: bool = False, **options: Any) -> None:
+    """Write a figure of matplotlib's as PNG.
+
+    Args:
+        path: the file.
+        figure: what to write.
+        force: as in :func:`write_output`.
+        options: of ``savefig``.
+
+    Raises:
+        NotOurs, CannotWrite: as :func:`write_output`.
+    """
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", metadata=dict(PICTURE_MARK), **options)
+    write_output(path, buffer.getvalue(), force=force)
+
+
+def _holds(path: Path, content: bytes) -> bool:
+    """Whether a file's content is this."""
+    try:
+        state = os.stat(path)
+        same_size = stat.S_ISREG(state.st_mode) and state.st_size == len(content)
+        return same_size and path.read_bytes() == content
+    except OSError:
+        return False
+
+
+def _reason(error: OSError, path: Path) -> str:
+    """Why, in words; what the system says of the draft is said of the file's folder."""
+    if isinstance(error, (FileNotFoundError, NotADirectoryError)):
+        return f"there is no folder {path.parent}; make it first"
+    if isinstance(error, IsADirectoryError):
+        return "a folder is there; name a file"
+    if isinstance(error, PermissionError):
+        return f"the folder {path.parent} may not be written to"
+    return error.strerror or type(error).__name__
