@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from benchmarks.episode import EpisodeRecord
     from benchmarks.runner import Outcome
     from benchmarks.spoken import Voice
-    from benchmarks.store import RunStore
+    from benchmarks.store import Manifest, RunStore
     from er_gym.tasks.suites import Suite
     from er_gym.tasks.task import Task
 
@@ -146,12 +146,13 @@ def bench(
     from benchmarks.report import load_run
     from benchmarks.runner import Shard, finished, select
     from benchmarks.scorers import CORRECTED, SCORERS
-    from benchmarks.store import Manifest, RunStore, file_stem
+    from benchmarks.store import Manifest
     from benchmarks.tables import print_tables, tables
     from er_gym import __version__
     from er_gym.tasks.errors import in_short
     from er_gym.tasks.resolve import resolve_tasks
     from er_gym.thor import BackendError
+    from er_gym.writing import file_stem
 
     terminal = Console(stderr=True)
     with bad_input(BackendError):
@@ -183,33 +184,34 @@ def bench(
             set_aside=aside,
             taken=fitted.taken,
         )
-        store = RunStore.create(out, manifest)
     tell_left_out(asked.name, aside, fitted.taken)
     for note in fitted.notes:
         terminal.print(note, style="dim", markup=False, highlight=False, soft_wrap=True)
 
     judge = SCORERS.get(scorer, CORRECTED)
-    before = finished(store, chosen)
-    succeeded = sum(score_episode(episode, judge).success for episode in before)
     try:
-        with _player(store, chosen, workers, voice, trust) as (play, spent):
-            progress = Progress(
-                terminal, f"{asked.name}, {agent}", len(chosen), len(before), succeeded, spent
-            )
-            with progress:
-                outcome = play(
-                    lambda episode: progress.episode(score_episode(episode, judge).success),
-                    progress.say,
+        with _claimed(out, manifest) as store:
+            for line in store.move_aside(task.id for task in chosen):
+                complain(line)
+            before = finished(store, chosen)
+            succeeded = sum(score_episode(episode, judge).success for episode in before)
+            with _player(store, chosen, workers, voice, trust) as (play, spent):
+                progress = Progress(
+                    terminal, f"{asked.name}, {agent}", len(chosen), len(before), succeeded, spent
                 )
-            bill = spent()
-    except (WorkerSetupError, OSError) as error:  # OSError: the disk is full, the share is gone
-        raise click.ClickException(f"{error}; the episodes done are in {out}") from error
+                with progress:
+                    outcome = play(
+                        lambda episode: progress.episode(score_episode(episode, judge).success),
+                        progress.say,
+                    )
+                bill = spent()
+    except WorkerSetupError as error:
+        raise click.ClickException(f"{error}; {_left_in(out, chosen)}") from error
+    except OSError as error:  # the disk is full, the share is gone
+        raise BadInput(f"{error}; {_left_in(out, chosen)}") from error
     except (KeyboardInterrupt, CannotGoOn) as error:
         why = str(error) if isinstance(error, CannotGoOn) else "interrupted"
-        complain(
-            f"{why}: {len(finished(store, chosen))} of {len(chosen)} episodes are in {out}; "
-            "the same command continues"
-        )
+        complain(f"{why}: {_left_in(out, chosen)}")
         return STOPPED if isinstance(error, CannotGoOn) else INTERRUPTED
     print_tables(tables([load_run(out)], scorer=scorer), stdout())
     if bill:
@@ -222,6 +224,28 @@ def bench(
         )
         return CRASHED
     return 0
+
+
+@contextmanager
+def _claimed(out: Path, manifest: Manifest) -> Iterator[RunStore]:
+    """The run directory; what keeps it from being used is the user's to mend."""
+    from benchmarks.store import claimed
+
+    with ExitStack() as stack:
+        with bad_input():
+            store = stack.enter_context(claimed(out, manifest))
+        yield store
+
+
+def _left_in(out: Path, chosen: Sequence[Task]) -> str:
+    """What a run that ended early has left, in words."""
+    from benchmarks.runner import finished
+    from benchmarks.store import MANIFEST, RunStore
+
+    if not (out / MANIFEST).exists():
+        return f"no episode was played, and nothing is left in {out}"
+    done = len(finished(RunStore.open(out), chosen))
+    return f"{done} of {len(chosen)} episodes are in {out}; the same command continues"
 
 
 @contextmanager

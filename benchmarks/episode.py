@@ -94,6 +94,8 @@ class EpisodeRecord(_Record):
         total_reward: the sum over the steps.
         seconds: wall-clock time.
         error: what it crashed with, in one line; ``""`` if it did not.
+        run: in a run directory, the digest of the manifest of its run; ``""`` elsewhere, and in
+            what was written before episodes told.
     """
 
     format: Literal["er-gym/episode/1"] = "er-gym/episode/1"
@@ -114,6 +116,7 @@ class EpisodeRecord(_Record):
     total_reward: float
     seconds: float
     error: str = ""
+    run: str = ""
 
     @property
     def predicted(self) -> list[StepRecord]:

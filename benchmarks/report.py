@@ -51,6 +51,7 @@ class RunReport:
         path: the directory.
         manifest: what was played.
         episodes: in the order of their file names.
+        unusable: what else is among their files, in words; it is not counted.
         scores: for each scorer's name, one score per episode, in the same order.
     """
 
@@ -58,6 +59,7 @@ class RunReport:
     manifest: Manifest
     episodes: tuple[EpisodeRecord, ...]
     scores: dict[str, tuple[Score, ...]]
+    unusable: tuple[str, ...] = ()
 
     @property
     def differ(self) -> tuple[str, ...]:
@@ -85,6 +87,7 @@ class RunReport:
             *aside,
             *(f"set aside: {one}" for one in self.manifest.set_aside),
             *told_once(self.manifest.taken),
+            *(f"not counted: {one}" for one in self.unusable),
         )
 
     @property
@@ -113,12 +116,13 @@ def load_run(path: Path) -> RunReport:
         RunDirectoryError: there is no run.
     """
     store = RunStore.open(path)
-    episodes = tuple(store.episodes())
+    found = store.read()
     scores = {
-        name: tuple(score_episode(episode, scorer) for episode in episodes)
+        name: tuple(score_episode(episode, scorer) for episode in found.episodes)
         for name, scorer in SCORERS.items()
     }
-    return RunReport(path, store.manifest, episodes, scores)
+    unusable = tuple(map(str, found.unusable))
+    return RunReport(path, store.manifest, found.episodes, scores, unusable)
 
 
 def _miss(episode: EpisodeRecord, scored: Score) -> Miss:
@@ -167,6 +171,7 @@ def _run(run: RunReport) -> dict[str, Any]:
         "manifest": run.manifest.model_dump(),
         "episodes": len(run.episodes),
         "crashed": run.crashed,
+        "not_counted": run.unusable,
         "scorers_differ": run.differ,
         "scorers": {
             name: {
@@ -191,7 +196,7 @@ def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = Fal
     """One line per run, scorer and slice (overall and groups; task types if asked for).
 
     Rates are fractions; a missing interval is empty. A task that was set aside, or an object that
-    stands for one that a scene lacks, has a line without figures.
+    stands for one that a scene lacks, has a line without figures; so has a file that is no episode.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -210,6 +215,7 @@ def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = Fal
         for level, lines in (
             ("set aside", map(str, run.manifest.set_aside)),
             ("taken", told_once(run.manifest.taken)),
+            ("not counted", run.unusable),
         ):
             for line in lines:
                 writer.writerow([*head, "", level, line, 0, *[""] * len(columns)])

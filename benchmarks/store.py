@@ -9,34 +9,40 @@
 
 Files are written beside their place and moved there, so that whatever is found under its name is
 whole; what a killed run left half-written has another name and is never read. Running again
-continues: :meth:`RunStore.episodes` tells what is there.
+continues: :meth:`RunStore.read` tells what is there. Who plays has the directory to himself:
+:func:`claimed`.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
-import re
+import json
 import shutil
-import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from agents.base import CannotGoOn
 from agents.vlm.record import ConversationRecord
+from agents.vlm.speaker import EVENTS, REPLIES, SPENDING
 from benchmarks.episode import EpisodeRecord
+from benchmarks.play import episode_seed
 from er_gym.envs.protocol import DEFAULT
+from er_gym.locking import sole_user
 from er_gym.tasks.errors import SetAside, Taken
+from er_gym.writing import file_stem, make_folder, write_whole
 
 MANIFEST = "run.json"
 EPISODES = "episodes"
 CONVERSATIONS = "conversations"
 PICTURES = "pictures"
 
-_LONGEST_NAME = 120  # characters; file systems take 255 bytes, the temporary name among them
+_KEPT = (EPISODES, CONVERSATIONS, PICTURES, SPENDING, EVENTS, REPLIES)
+"""What a run directory holds beside its manifest."""
 
 
 class RunDirectoryError(ValueError):
@@ -79,6 +85,43 @@ class Manifest(BaseModel):
         """By which rules episodes are played, see :mod:`er_gym.envs.protocol`."""
         return str(self.env.get("protocol", DEFAULT.name))
 
+    @property
+    def digest(self) -> str:
+        """What the run's episodes know it by: 16 hex digits of a sha256. Fields that it does not
+        state, later ones too, do not change it."""
+        told = self.model_dump(mode="json", exclude_defaults=True)
+        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Unusable:
+    """A file among a run's episodes that is none of them.
+
+    Attributes:
+        path: of the file.
+        reason: what is wrong with it.
+    """
+
+    path: Path
+    reason: str
+
+    def __str__(self) -> str:
+        line = f"{EPISODES}/{self.path.name}: {self.reason}"
+        return "".join(char if char.isprintable() else "?" for char in line)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What is in a run directory.
+
+    Attributes:
+        episodes: by file name.
+        unusable: the other files among them.
+    """
+
+    episodes: tuple[EpisodeRecord, ...]
+    unusable: tuple[Unusable, ...]
+
 
 class RunStore:
     """A run directory, opened with :meth:`create` to play or :meth:`open` to read.
@@ -116,14 +159,14 @@ class RunStore:
                         f"{path} holds another run: its {name} is {there!r}, this one's {here!r}; "
                         "choose another --out, or start that run again as it was"
                     )
-        elif any((path / EPISODES).glob("*.json")):
+        elif there := [name for name in _KEPT if _holds_something(path / name)]:
             raise RunDirectoryError(
-                f"{path} holds episodes but no {MANIFEST} that tells of which run; "
+                f"{path} holds {there[0]} but no {MANIFEST} that tells of which run; "
                 "choose another --out"
             )
         else:
-            (path / EPISODES).mkdir(parents=True, exist_ok=True)
-            _write_whole(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
+            make_folder(path / EPISODES)
+            write_whole(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
         return cls(path, manifest)
 
     @classmethod
@@ -143,17 +186,16 @@ class RunStore:
         try:
             return cls(path, Manifest.model_validate_json(text))
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"])) or "the file"
             raise RunDirectoryError(
-                f"{path / MANIFEST} is no run manifest: {where}: {first['msg']}"
+                f"{path / MANIFEST} is no run manifest: {_first_problem(error)}"
             ) from error
 
     def write(self, episode: EpisodeRecord) -> Path:
         """Keep an episode, in place of an earlier one of the same task."""
-        path = self.path / EPISODES / f"{file_stem(episode.task_id)}.json"
-        path.parent.mkdir(exist_ok=True)
-        _write_whole(path, episode.model_dump_json(indent=1) + "\n")
+        path = self._file(episode.task_id)
+        make_folder(path.parent)
+        told = episode.model_copy(update={"run": self.manifest.digest})
+        write_whole(path, told.model_dump_json(indent=1) + "\n")
         return path
 
     def write_conversation(
@@ -169,17 +211,111 @@ class RunStore:
         shutil.rmtree(self.path / picture_folder(task_id), ignore_errors=True)
         for name, data in pictures.items():
             path = self.path / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
+            make_folder(path.parent)
+            write_whole(path, data)
         place = self.path / CONVERSATIONS / f"{file_stem(task_id)}.json"
-        place.parent.mkdir(exist_ok=True)
-        _write_whole(place, conversation.model_dump_json(indent=1) + "\n")
+        make_folder(place.parent)
+        write_whole(place, conversation.model_dump_json(indent=1) + "\n")
+
+    def read(self) -> Found:
+        """Every episode there is, and what else is among them: broken, copied and foreign files."""
+        episodes, unusable = [], []
+        for path in sorted((self.path / EPISODES).glob("*.json")):
+            try:
+                episodes.append(self._episode(path))
+            except ValueError as error:
+                unusable.append(Unusable(path, str(error)))
+        return Found(tuple(episodes), tuple(unusable))
 
     def episodes(self) -> Iterator[EpisodeRecord]:
-        """Every episode there is, by file name; files that hold none are passed over."""
-        for path in sorted((self.path / EPISODES).glob("*.json")):
-            with contextlib.suppress(ValidationError, OSError):
-                yield EpisodeRecord.model_validate_json(path.read_bytes())
+        """Every episode there is, by file name; files that hold none of this run's are left out."""
+        yield from self.read().episodes
+
+    def move_aside(self, task_ids: Iterable[str]) -> list[str]:
+        """Move what is none of this run's episodes out of the way of those of some tasks.
+
+        Returns:
+            In a line each, what was moved and why, and what else is no episode of this run's.
+        """
+        ways = {self._file(task_id) for task_id in task_ids}
+        told = []
+        for one in self.read().unusable:
+            then = "it is not counted"
+            if one.path in ways:
+                aside = _free_name(one.path)
+                one.path.rename(aside)
+                then = f"it is now {aside.name}, and the task is played anew"
+            told.append(f"{self.path / str(one)}; {then}")
+        return told
+
+    def _withdraw(self) -> None:
+        """Remove the run; first what it keeps, so that a kill leaves a run, not a riddle."""
+        for name in _KEPT:
+            path = self.path / name
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+        (self.path / MANIFEST).unlink()
+
+    def _file(self, task_id: str) -> Path:
+        return self.path / EPISODES / f"{file_stem(task_id)}.json"
+
+    def _episode(self, path: Path) -> EpisodeRecord:
+        """The episode in a file; a ValueError says in one line why there is none of this run's."""
+        if not path.is_file():  # a pipe would be waited for
+            raise ValueError("no file")
+        try:
+            episode = EpisodeRecord.model_validate_json(path.read_bytes())
+        except ValidationError as error:
+            raise ValueError(f"broken: {_first_problem(error)}") from None
+        except OSError as error:
+            raise ValueError(f"it cannot be read: {error.strerror}") from None
+        name = self._file(episode.task_id).name
+        if name != path.name:
+            raise ValueError(f"a copy: it holds the episode of {episode.task_id!r:.80}, as {name}")
+        manifest = self.manifest
+        if episode.run:
+            told = [("run", episode.run, manifest.digest)]
+        else:  # written before episodes told of their run
+            seed = episode_seed(manifest.seed, episode.task_id)
+            told = [("agent", episode.agent, manifest.agent), ("seed", episode.seed, seed)]
+        for what, its, ours in told:
+            if its != ours:
+                raise ValueError(f"of another run: its {what} is {its!r:.80}, not {ours!r:.80}")
+        return episode.model_copy(update={"run": ""})
+
+
+@contextlib.contextmanager
+def claimed(path: Path, manifest: Manifest) -> Iterator[RunStore]:
+    """A run directory to play in, which nobody else plays in meanwhile.
+
+    Where it ends with an exception before anything is there that could be lost (an episode that did
+    not crash, a reply that was paid for), a run that was begun here is removed, so that a
+    mistyped command leaves nothing in the way of the right one. A run that was killed so early
+    gives way, too.
+
+    Raises:
+        Locked: another process plays in it.
+        RunDirectoryError: another run's results are there; nothing is changed.
+        OSError: the directory cannot be made or written to.
+    """
+    with sole_user(path):
+        if (path / MANIFEST).exists():
+            begun = RunStore.open(path)
+            if not any(_holds_something(path / name) for name in (EPISODES, SPENDING, REPLIES)):
+                begun._withdraw()
+        new = not (path / MANIFEST).exists()
+        store = RunStore.create(path, manifest)
+        try:
+            yield store
+        except BaseException as error:  # Ctrl-C too
+            paid = _holds_something(path / SPENDING)
+            # What crashed since nobody answered says no more than the error does.
+            refused = isinstance(error, CannotGoOn)
+            if new and not paid and all(one.error and refused for one in store.episodes()):
+                store._withdraw()
+            raise
 
 
 def picture_folder(task_id: str) -> str:
@@ -187,25 +323,23 @@ def picture_folder(task_id: str) -> str:
     return f"{PICTURES}/{file_stem(task_id)}"
 
 
-def file_stem(task_id: str) -> str:
-    """A file name for a task: its id, or, where that is no fit name, a readable unique one."""
-    stem = re.sub(r"[^A-Za-z0-9._-]", "_", task_id)[:_LONGEST_NAME]
-    if stem == task_id and not stem.startswith("."):
-        return stem
-    return f"{stem.lstrip('.')}-{hashlib.sha256(task_id.encode()).hexdigest()[:8]}"
+def _first_problem(error: ValidationError) -> str:
+    """Pydantic's first complaint, in one line."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    where = ".".join(map(str, first["loc"])) or "the file"
+    return f"{where}: {first['msg']}"
 
 
-def _write_whole(path: Path, text: str) -> None:
-    """Write a file so that it is seen whole or not at all, power cuts included."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=".tmp")
-    try:
-        with open(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o644)  # mkstemp's 0600 would keep the results from one's colleagues
-        os.replace(temporary, path)
-    except BaseException:  # Ctrl-C too
-        with contextlib.suppress(OSError):
-            os.unlink(temporary)
-        raise
+def _holds_something(path: Path) -> bool:
+    """Whether a file has content, or a folder files."""
+    if path.is_dir():
+        return any(path.iterdir())
+    return path.exists() and path.stat().st_size > 0
+
+
+def _free_name(path: Path) -> Path:
+    """A name beside a file that is not taken, and that no reader takes for an episode's."""
+    number = 1
+    while (aside := path.with_name(f"{path.name}.aside-{number}")).exists():
+        number += 1
+    return aside

@@ -8,14 +8,17 @@ from pathlib import Path
 
 import pytest
 
-_TASKS = {"er_gym.thor", "er_gym.tasks", "er_gym.plugins"}
+_BASE = {"er_gym.writing", "er_gym.locking", "er_gym.plugins"}
+_TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
 _AGENTS = {*_ENVS, "er_gym", "agents"}
 _BENCHMARKS = {*_AGENTS, "benchmarks"}
 ALLOWED = {
     "er_gym.plugins": {"er_gym.plugins"},
-    "er_gym.sim": {"er_gym.sim"},
-    "er_gym.thor": {"er_gym.sim", "er_gym.thor"},
+    "er_gym.writing": set(),
+    "er_gym.locking": _BASE,
+    "er_gym.sim": {*_BASE, "er_gym.sim"},
+    "er_gym.thor": {*_BASE, "er_gym.sim", "er_gym.thor"},
     "er_gym.tasks": _TASKS,
     "er_gym.envs": _ENVS,
     "er_gym": _ENVS,

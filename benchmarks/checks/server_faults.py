@@ -180,7 +180,7 @@ def _wrong_ledger(directory: Path, server: FaultyServer, replies: int) -> Iterat
 
 
 def _lines(file: Path) -> list[str]:
-    return file.read_text().splitlines() if file.exists() else []
+    return [line for line in file.read_text().split("\n") if line] if file.exists() else []
 
 
 # -- runs ------------------------------------------------------------------------------------------

@@ -131,7 +131,7 @@ def test_a_key_that_is_refused_stops_the_run(tmp_path: Path, monkeypatch: Any) -
     with naughty.NaughtyServer(script=["401"] * 50) as server:
         result = bench(server.url, tmp_path, "--limit", "6")
     assert result.return_value == 3
-    assert list(RunStore.open(tmp_path).episodes()) == []
+    assert "nothing is left in" in result.output
     everything = b"".join(file.read_bytes() for file in tmp_path.rglob("*") if file.is_file())
     assert b"very-secret" not in everything
     assert "very-secret" not in result.output
@@ -211,7 +211,7 @@ def test_a_server_that_hangs_is_told_of_and_left_in_time(tmp_path: Path) -> None
         assert over.return_value == 3
         assert "the 0.01 minutes are over" in over.output
         assert time.monotonic() - began < 30
-    assert list(RunStore.open(tmp_path).episodes()) == []
+    assert list(tmp_path.glob("run.*")) == []
 
 
 def test_how_long_a_server_may_ask_to_wait(tmp_path: Path) -> None:

@@ -6,9 +6,10 @@ import os
 import pytest
 from pydantic import ValidationError
 
-import benchmarks.store
 from benchmarks.episode import EpisodeRecord
-from benchmarks.store import RunDirectoryError, RunStore, file_stem
+from benchmarks.store import RunDirectoryError, RunStore, claimed
+from er_gym.locking import Locked
+from er_gym.writing import file_stem
 
 GOLDEN = """
 {"format": "er-gym/episode/1", "task_id": "t", "task_type": "single_search", "scene": "FloorPlan1",
@@ -24,7 +25,7 @@ GOLDEN = """
             "reward": -0.5, "thought": "hm", "text": "dance", "appended": false}],
  "success": false, "goal_unmet": ["Mug is held"], "search_targets": ["Mug"],
  "end_reason": "no known action", "total_reward": -0.5, "seconds": 1.25,
- "error": ""}
+ "error": "", "run": ""}
 """
 
 
@@ -46,7 +47,7 @@ def test_other_formats_are_not_misread(change):
 
 def test_what_was_written_before_goals_and_search_targets_is_read_still() -> None:
     old = json.loads(GOLDEN)
-    del old["goal_unmet"], old["search_targets"], old["key_actions"][0]["exact"]
+    del old["goal_unmet"], old["search_targets"], old["run"], old["key_actions"][0]["exact"]
     read = EpisodeRecord.model_validate(old)
     assert (read.goal_unmet, read.search_targets) == ([], None)
     assert not read.key_actions[0].exact
@@ -84,7 +85,7 @@ def test_a_write_that_fails_leaves_the_old_file(store, episode, monkeypatch):
     def full(handle):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(benchmarks.store.os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space"):
         store.write(episode(("end",), ()))
     assert path.read_bytes() == before
@@ -158,3 +159,119 @@ def test_file_names_stay_apart_and_short():
     ids = ["a/b", "a_b", "a b", "x" * 400, "x" * 401, "..", "."]
     assert len({file_stem(each) for each in ids}) == len(ids)
     assert max(len(file_stem(each)) for each in ids) < 140
+
+
+# -- what is none of the run's ---------------------------------------------------------------------
+
+
+@pytest.fixture
+def odd_files(store, manifest, episode, tmp_path):
+    """A run with one good episode, task-1, and files that are none; what is said of each."""
+    good = store.write(episode(("end",), ("end",)))
+    folder, whole = good.parent, good.read_text()
+    (folder / "task-1 (copy).json").write_text(whole)
+    (folder / "task-2.json").write_text(whole)
+    (folder / "task-3.json").write_text(whole[: len(whole) // 2])
+    (folder / "task-4.json").write_bytes(b"\xff\xfe\x00")
+    (folder / "task-5.json").write_text("[]")
+    (folder / "task-6.json").mkdir()
+    (folder / "task-7.json").write_text(whole.replace('"steps": [', '"steps": [4, '))
+    other = RunStore.create(tmp_path / "other", manifest.model_copy(update={"seed": 1}))
+    other.write(episode(("end",), (), task_id="task-8")).rename(folder / "task-8.json")
+    old = episode(("end",), (), task_id="task-9").model_copy(update={"agent": "random"})
+    (folder / "task-9.json").write_text(old.model_dump_json())
+    (folder / "a\nb.json").touch()
+    return {
+        "a?b.json": "broken: the file: Invalid JSON",
+        "task-1 (copy).json": "a copy: it holds the episode of 'task-1', as task-1.json",
+        "task-2.json": "a copy: it holds the episode of 'task-1', as task-1.json",
+        "task-3.json": "broken: the file: Invalid JSON: EOF while parsing",
+        "task-4.json": "broken: the file: Invalid JSON",
+        "task-5.json": "broken: the file: Input should be an object",
+        "task-6.json": "no file",
+        "task-7.json": "broken: steps.0: Input should be an object",
+        "task-8.json": "of another run: its run is ",
+        "task-9.json": "of another run: its agent is 'random', not 'oracle'",
+    }
+
+
+def test_what_is_no_episode_of_the_run_is_named(store, odd_files):
+    found = store.read()
+    assert [each.task_id for each in found.episodes] == ["task-1"]
+    said = dict(str(each).removeprefix("episodes/").split(": ", 1) for each in found.unusable)
+    assert said.keys() == odd_files.keys()
+    for name, words in odd_files.items():
+        assert said[name].startswith(words)
+        assert said[name].isprintable()
+
+
+def test_it_is_moved_out_of_the_way_and_not_lost(store, odd_files, episode):
+    kept = {path.name: path.read_bytes() for path in (store.path / "episodes").glob("task-[23]*")}
+    told = store.move_aside(["task-1", "task-2", "task-3"])
+    assert len(told) == len(odd_files)
+    assert sum("and the task is played anew" in line for line in told) == 2
+    for name, content in kept.items():
+        assert (store.path / "episodes" / f"{name}.aside-1").read_bytes() == content
+    store.write(episode(("end",), (), task_id="task-3"))
+    assert [each.task_id for each in store.episodes()] == ["task-1", "task-3"]
+    assert len(store.move_aside(["task-1", "task-2", "task-3"])) == len(odd_files) - 2
+
+
+# -- who plays has the directory -------------------------------------------------------------------
+
+
+def test_a_start_that_is_refused_claims_nothing(tmp_path, manifest):
+    with pytest.raises(ValueError, match="no such model"), claimed(tmp_path / "a" / "x", manifest):
+        raise ValueError("no such model")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_was_there_before_stays(tmp_path, store, manifest, episode):
+    (tmp_path / "run" / "notes.md").write_text("mine")
+    with pytest.raises(KeyboardInterrupt), claimed(store.path, manifest):
+        raise KeyboardInterrupt
+    assert [path.name for path in store.path.iterdir()] == ["notes.md"]
+    for error in ("", "ValueError: no"):
+        with claimed(store.path, manifest) as mine:
+            mine.write(episode(("end",), (), error=error))
+        with pytest.raises(KeyboardInterrupt), claimed(store.path, manifest):
+            raise KeyboardInterrupt
+        assert len(list(RunStore.open(store.path).episodes())) == 1
+
+
+def test_a_run_killed_before_it_had_anything_gives_way(store, manifest):
+    other = manifest.model_copy(update={"agent": "random"})
+    with claimed(store.path, other):
+        pass
+    assert RunStore.open(store.path).manifest == other
+
+
+def test_what_was_paid_for_stays(store, manifest):
+    (store.path / "spending.jsonl").write_text("{}\n")
+    with (
+        pytest.raises(RunDirectoryError, match="its agent is"),
+        claimed(store.path, manifest.model_copy(update={"agent": "random"})),
+    ):
+        pass
+    with pytest.raises(KeyboardInterrupt), claimed(store.path, manifest):
+        raise KeyboardInterrupt
+    assert (store.path / "run.json").exists()
+
+
+@pytest.mark.parametrize("name", ["spending.jsonl", "conversations/x.json", "replies/cache.db"])
+def test_files_of_unknown_origin_are_refused(tmp_path, manifest, name):
+    path = tmp_path / "x" / name
+    path.parent.mkdir(parents=True)
+    path.write_text("mine")
+    with pytest.raises(RunDirectoryError, match=rf"holds {name.split('/')[0]} but no run\.json"):
+        RunStore.create(tmp_path / "x", manifest)
+    assert path.read_text() == "mine"
+
+
+def test_two_do_not_play_in_one_directory(store, manifest):
+    with (
+        claimed(store.path, manifest),
+        pytest.raises(Locked, match=f"in use by process {os.getpid()};"),
+        claimed(store.path, manifest),
+    ):
+        pass

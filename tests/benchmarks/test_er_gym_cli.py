@@ -379,5 +379,6 @@ def test_a_full_disk_is_told_in_one_line(tasks_file, tmp_path, er_gym, monkeypat
     code, shown, err = er_gym(
         *("bench", "--tasks-file", tasks_file, "--agent", "oracle", "--out", out)
     )
-    assert (code, shown) == (1, "")
-    assert "No space left on device; the episodes done are in" in one_line(err)
+    assert (code, shown) == (2, "")
+    assert "No space left on device; no episode was played, and nothing is left" in one_line(err)
+    assert not out.exists()

@@ -45,7 +45,9 @@ class Lines:
         """Write a line; OSError if it cannot be written, or the file is closed."""
         # One write of a whole line to the end of the file: lines of processes do not mix.
         with self._lock:
-            os.write(self._file, line.encode() + b"\n")
+            data = line.encode() + b"\n"
+            if os.write(self._file, data) != len(data):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
 
     def new(self) -> list[bytes]:
         """The lines that have been added since the last call, whoever added them."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -11,6 +13,9 @@ from pydantic import ValidationError
 
 from agents.vlm.chat import LEFT_OUT, Message, ModelError, Picture, Reply
 from agents.vlm.record import ConversationRecord, PictureRecord
+from er_gym.writing import file_stem
+
+_log = logging.getLogger(__name__)
 
 
 class ScriptedClient:
@@ -44,7 +49,8 @@ class RecordedClient:
         run: the run directory; or a single conversation's file.
 
     Raises:
-        ValueError: there are no conversations in it, or one cannot be read.
+        ValueError: there are no conversations in it, or none that can be read. Files that are none
+            of the run's (broken, copied, of another agent) are left out, with a warning each.
     """
 
     def __init__(self, run: Path) -> None:
@@ -56,8 +62,16 @@ class RecordedClient:
             )
         self._run = run
         self._replies: dict[str, Reply] = {}
+        wrong = []
         for file in files:
-            self._replies |= _replies(_read(file))
+            try:
+                self._replies |= _replies(_read(file, None if run.is_file() else _agent_of(run)))
+            except ValueError as error:
+                wrong.append(str(error))
+        if len(wrong) == len(files):
+            raise ValueError(wrong[0])
+        for each in wrong:
+            _log.warning("%s; it is left out", each)
         everything = "".join(sorted(self._replies))
         self.identity = f'{{"recorded":"{hashlib.sha256(everything.encode()).hexdigest()}"}}'
 
@@ -102,13 +116,36 @@ def _key(turns: Iterable[_Turn]) -> str:
     return hashlib.sha256("\x1e".join(said).encode()).hexdigest()
 
 
-def _read(file: Path) -> ConversationRecord:
+def _agent_of(run: Path) -> str:
+    """The agent of a run directory, "" where it does not tell."""
     try:
-        return ConversationRecord.model_validate_json(file.read_bytes())
+        told = json.loads((run / "run.json").read_bytes())
+    except (OSError, ValueError):
+        return ""
+    agent = told.get("agent") if isinstance(told, dict) else None
+    return agent if isinstance(agent, str) else ""
+
+
+def _read(file: Path, agent: str | None) -> ConversationRecord:
+    """A conversation of a run of that agent's; None where it was named by itself."""
+    try:
+        kept = ConversationRecord.model_validate_json(file.read_bytes())
     except (OSError, ValidationError) as error:
-        raise ValueError(
-            f"{file} cannot be read as a conversation: {str(error).splitlines()[0]}"
-        ) from None
+        problem = error.strerror if isinstance(error, OSError) else _first_problem(error)
+        raise ValueError(f"{file} cannot be read as a conversation: {problem}") from None
+    name = f"{file_stem(kept.task_id)}.json"
+    if agent is not None and file.name != name:
+        raise ValueError(f"{file} is a copy: it holds the conversation of {name}")
+    if agent and kept.agent != agent:
+        raise ValueError(f"{file} is of another run: its agent is {kept.agent!r}, not {agent!r}")
+    return kept
+
+
+def _first_problem(error: ValidationError) -> str:
+    """Pydantic's first complaint, in one line."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    where = ".".join(map(str, first["loc"])) or "the file"
+    return f"{where}: {first['msg']}"
 
 
 def _replies(kept: ConversationRecord) -> Mapping[str, Reply]:

@@ -1,0 +1,212 @@
+"""Files are written whole or not at all, and over nothing that er-gym did not write."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from er_gym.locking import LOCK, Locked, sole_user
+from er_gym.writing import (
+    MARKDOWN_MARK,
+    YAML_MARK,
+    CannotWrite,
+    NotOurs,
+    check_output,
+    is_ours,
+    write_output,
+    write_picture,
+    write_whole,
+)
+
+ROOT = Path(__file__).resolve().parents[1]
+TASKS = b'{"format": "er-gym/tasks/1", "tasks": 0}\n'
+
+
+@contextmanager
+def a_full_disk(room: int) -> Iterator[None]:
+    """Files can grow to so many bytes and no further."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+OURS = {
+    "tasks": TASKS,
+    "packed tasks": gzip.compress(TASKS),
+    "a report": json.dumps({"format": "er-gym/report/1"}, indent=2).encode(),
+    "a card": MARKDOWN_MARK.encode() + b"# six\n",
+    "a configuration": YAML_MARK.encode() + b"seed: 0\n",
+    "nothing": b"",
+}
+THEIRS = {
+    "notes": b"# er-gym\n\nWritten by er-gym's users\n",
+    "JSON": b'{"tasks": 3, "format": "er-gym/tasks/1"}\n',
+    "another format": b'{"format": "er-gymnastics/1"}',
+    "packed notes": gzip.compress(b"notes"),
+    "a torn packed file": gzip.compress(TASKS)[:4],
+    "bytes": b"\xff\xfe\x00",
+    "a blank": b"\n",
+}
+
+
+@pytest.mark.parametrize("content", OURS.values(), ids=OURS)
+def test_what_is_ours_is_replaced(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(content)
+    write_output(path, "new")
+    assert path.read_text() == "new"
+
+
+@pytest.mark.parametrize("content", THEIRS.values(), ids=THEIRS)
+def test_what_is_theirs_is_replaced_with_force_only(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(content)
+    with pytest.raises(NotOurs, match=r"file is there already.*--force"):
+        write_output(path, "new")
+    assert path.read_bytes() == content
+    write_output(path, content)  # what is there already
+    write_output(path, "new", force=True)
+    assert path.read_text() == "new"
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.jpg", "a.JPEG"])
+def test_pictures_say_whose_they_are(tmp_path: Path, name: str) -> None:
+    path, picture = tmp_path / name, Image.new("RGB", (9, 9), "red")
+    picture.save(path)
+    assert not is_ours(path)
+    with pytest.raises(NotOurs):
+        write_picture(path, picture.rotate(1))
+    write_picture(path, picture, force=True)
+    assert is_ours(path)
+    write_picture(path, Image.new("RGB", (5, 5)))
+    assert Image.open(path).size == (5, 5)
+
+
+def test_a_picture_that_its_kind_cannot_hold_is_a_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.jpg"
+    with pytest.raises(ValueError, match=r"a\.jpg: a JPEG file cannot hold this picture"):
+        write_picture(path, Image.new("I;16", (9, 9)))
+    with pytest.raises(ValueError, match=r"'\.mug' is no kind of picture"):
+        write_picture(tmp_path / "a.mug", Image.new("RGB", (9, 9)))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("old", [None, TASKS])
+def test_a_full_disk_harms_nothing(tmp_path: Path, old: bytes | None) -> None:
+    path = tmp_path / "tasks.jsonl"
+    if old is not None:
+        path.write_bytes(old)
+    with a_full_disk(1000), pytest.raises(CannotWrite, match=r"tasks\.jsonl: cannot be written"):
+        write_output(path, TASKS * 100)
+    assert [each.read_bytes() for each in tmp_path.iterdir()] == [old] * (old is not None)
+
+
+def test_places_that_cannot_be_written_to(tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("x")
+    os.mkfifo(tmp_path / "pipe")
+    for path, words in (
+        (tmp_path / "folder", "a folder is there"),
+        (tmp_path / "pipe", "a device or a pipe is there"),
+        (Path("/dev/null"), "a device or a pipe is there"),
+        (tmp_path / "no" / "x", f"no folder {tmp_path / 'no'}; make it first"),
+        (tmp_path / "file" / "x", f"no folder {tmp_path / 'file'}; make it first"),
+        (tmp_path / ("x" * 300), "name too long"),
+    ):
+        for attempt in (check_output, lambda path: write_output(path, b"new", force=True)):
+            with pytest.raises(CannotWrite) as caught:
+                attempt(path)
+            assert words in str(caught.value)
+            assert "\n" not in str(caught.value)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder", "pipe"]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write to read-only files")
+def test_read_only_files_and_folders(tmp_path: Path) -> None:
+    path = tmp_path / "folder" / "tasks.jsonl"
+    path.parent.mkdir()
+    path.write_bytes(TASKS)
+    for read_only in (path, path.parent):
+        mode = read_only.stat().st_mode
+        read_only.chmod(mode & 0o555)
+        with pytest.raises(CannotWrite, match="read-only"):
+            write_output(path, b"new")
+        read_only.chmod(mode)
+        assert path.read_bytes() == TASKS
+
+
+def test_links_are_followed_and_permissions_kept(tmp_path: Path) -> None:
+    path, link = tmp_path / "tasks.jsonl", tmp_path / "link.jsonl"
+    path.write_bytes(TASKS)
+    path.chmod(0o640)
+    link.symlink_to(path.name)
+    write_output(link, "new")
+    assert link.is_symlink()
+    assert path.read_text() == "new"
+    assert path.stat().st_mode & 0o777 == 0o640
+
+
+def test_the_longest_name_there_may_be(tmp_path: Path) -> None:
+    path = tmp_path / ("ü" * 127)
+    write_whole(path, "x")
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
+
+
+# -- a folder has one user -------------------------------------------------------------------------
+
+_HOLD = """
+import sys, time
+from pathlib import Path
+from er_gym.locking import sole_user
+with sole_user(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_another_process_is_refused_until_it_is_dead(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "run"
+    process = subprocess.Popen(
+        [sys.executable, "-c", _HOLD, str(folder)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "held\n"
+        with pytest.raises(Locked, match=rf"run is in use by process {process.pid};.*--out"):
+            sole_user(folder).__enter__()
+    finally:
+        process.kill()
+        process.communicate()
+    assert (folder / LOCK).exists()
+    with sole_user(folder):
+        (folder / "kept").touch()
+    assert [path.name for path in folder.iterdir()] == ["kept"]
+
+
+def test_nothing_is_left_of_a_folder_that_was_made_for_nothing(tmp_path: Path) -> None:
+    with sole_user(tmp_path / "a" / "b"), pytest.raises(Locked, match="in use by process"):
+        sole_user(tmp_path / "a" / "b").__enter__()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_lock_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / LOCK).write_text("my own lock\n")
+    with pytest.raises(NotOurs, match=r"run\.lock is there"):
+        sole_user(tmp_path).__enter__()
+    assert (tmp_path / LOCK).read_text() == "my own lock\n"
