@@ -53,7 +53,9 @@ def train_rl(
     except (RuntimeError, EOFError) as error:
         raise click.ClickException(f"{error}; what has been learnt is in {run}") from error
     except KeyboardInterrupt:
-        complain(f"interrupted; what has been learnt is in {run}, the same command continues")
+        kept = run.exists()
+        left = f"what has been learnt is in {run}, the same command continues" if kept else ""
+        complain(f"interrupted; {left or 'nothing had been learnt, and nothing is left behind'}")
         return INTERRUPTED
     _say_result(run, model)
     return 0

@@ -63,9 +63,7 @@ class Curve(KVWriter):
     def __init__(self, run: Path, steps: int) -> None:
         self._file = run / CURVE
         kept = [line for line in read_curve(run) if line["steps"] <= steps]
-        beside = self._file.with_suffix(".tmp")
-        beside.write_text("".join(json.dumps(line) + "\n" for line in kept))
-        beside.replace(self._file)
+        write_whole(self._file, "".join(json.dumps(line) + "\n" for line in kept))
         self._before = kept[-1]["seconds"] if kept else 0.0
         self._began = time.monotonic()
 
@@ -90,10 +88,10 @@ def read_curve(run: Path) -> list[dict[str, float]]:
     """The lines of a run's curve so far; a half-written line is left out."""
     file = run / CURVE
     lines = []
-    for text in file.read_text().splitlines() if file.exists() else ():
+    for text in file.read_bytes().split(b"\n") if file.exists() else ():
         try:
             line = json.loads(text)
-        except json.JSONDecodeError:
+        except ValueError:  # not JSON, or not even text
             continue
         if isinstance(line, dict) and "steps" in line and "seconds" in line:
             lines.append(line)

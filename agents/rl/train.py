@@ -9,6 +9,7 @@ it does nothing.
 from __future__ import annotations
 
 import json
+import shutil
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -28,6 +29,7 @@ from torch.distributions import Distribution
 from agents.configs import dump
 from agents.rl import dqn, ppo
 from agents.rl.callbacks import (
+    CURVE,
     ByType,
     Checkpoints,
     Curriculum,
@@ -42,8 +44,13 @@ from agents.rl.perception import Perception
 from agents.rl.saved import FOREIGN, MODEL, nothing, restore, save, untrusted
 from agents.rl.vec import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS
+from er_gym.locking import sole_user
+from er_gym.writing import YAML_MARK, is_ours, make_folder, write_whole
 
 CONFIG = "config.yaml"
+WARM_START = "warm_start.json"
+TENSORBOARD = "tensorboard"
+_OF_A_RUN = (MODEL, FOREIGN, CURVE, WARM_START, TENSORBOARD)
 _EVALUATION_SEED = 10_000
 """Every evaluation of every run begins with the same episodes."""
 
@@ -88,9 +95,26 @@ def train(
     Raises:
         RunConflict: the directory holds a run of another configuration.
         UntrustedModel: its checkpoint can run code, and ``trust`` does not allow that.
+        Locked: another process trains in it.
         KeyboardInterrupt: Ctrl-C; what has been learnt is saved.
     """
-    prepare(config, run)
+    with sole_user(run):
+        new = prepare(config, run)
+        try:
+            return _train(config, run, show_progress, trust, more)
+        except BaseException:  # Ctrl-C too
+            if new and not (run / MODEL).exists():
+                _withdraw(run)
+            raise
+
+
+def _train(
+    config: TrainConfig,
+    run: Path,
+    show_progress: bool,
+    trust: bool,
+    more: tuple[BaseCallback, ...],
+) -> BaseAlgorithm:
     model = load_last(run, trust)
     if model is not None and not (run / MODEL).exists():
         save(model, run)  # from now on it needs no trust
@@ -168,7 +192,7 @@ def _warm(model: BaseAlgorithm, config: TrainConfig, how: WarmStart, run: Path, 
         "unread": seen.unread,
         "agreement": agreement,
     }
-    (run / "warm_start.json").write_text(json.dumps(told))
+    write_whole(run / WARM_START, json.dumps(told))
     if seen.refused or seen.unread:
         warnings.warn(
             f"cloning {how.teacher}: of its {len(seen) + seen.refused + seen.unread:,} steps "
@@ -183,16 +207,27 @@ def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOut:
     return HeldOut(env, asked.every, asked.count, _EVALUATION_SEED)
 
 
-def prepare(config: TrainConfig, run: Path) -> None:
-    """Make the run directory, or see that it is this run's.
+def prepare(config: TrainConfig, run: Path) -> bool:
+    """Make the run directory, or see that it is this run's; returns whether the run is new.
 
-    More steps may be asked for than before; anything else has to be the same.
+    More steps may be asked for than before; anything else has to be the same. A run that was killed
+    before its first checkpoint has nothing that could be lost: it is begun anew.
 
     Raises:
-        RunConflict: it is not.
+        RunConflict: it is another run's, or holds files that er-gym did not write.
     """
     file = run / CONFIG
-    if file.exists():
+    new = not any((run / name).exists() for name in (MODEL, FOREIGN))
+    if file.exists() and new and not is_ours(file):
+        raise RunConflict(f"{file} is there, and er-gym did not write it; give another --out")
+    if not file.exists():
+        there = [name for name in _OF_A_RUN if (run / name).exists()]
+        if there:
+            raise RunConflict(
+                f"{run} holds {there[0]} but no {CONFIG} that tells of which run; "
+                "give another --out"
+            )
+    elif not new:
         before = load_config(file)
         if before.model_copy(update={"total_steps": config.total_steps}) != config:
             differ = _differences(before.model_dump(), config.model_dump())
@@ -200,10 +235,16 @@ def prepare(config: TrainConfig, run: Path) -> None:
                 f"{run} holds a run of another configuration ({differ}); give another --out, "
                 "or the configuration that it was begun with"
             )
-    run.mkdir(parents=True, exist_ok=True)
-    beside = file.with_suffix(".tmp")
-    beside.write_text(dump(config))
-    beside.replace(file)
+    make_folder(run)
+    write_whole(file, YAML_MARK + dump(config))
+    return new
+
+
+def _withdraw(run: Path) -> None:
+    """Remove what a run has left that had learnt nothing yet, so that another may be begun."""
+    shutil.rmtree(run / TENSORBOARD, ignore_errors=True)
+    for name in (CURVE, WARM_START, CONFIG):
+        (run / name).unlink(missing_ok=True)
 
 
 def _differences(one: dict[str, Any], other: dict[str, Any], path: str = "") -> str:
@@ -270,7 +311,7 @@ def vectorised(config: TrainConfig, options: Episodes, seed: int) -> VecEnv:
 def _logger(config: TrainConfig, run: Path, steps: int) -> Logger:
     writers: list[KVWriter] = [Curve(run, steps)]
     if config.tensorboard:
-        writers.append(TensorBoardOutputFormat(str(run / "tensorboard")))
+        writers.append(TensorBoardOutputFormat(str(run / TENSORBOARD)))
     if config.wandb:
         _start_wandb(config, run)
     return Logger(str(run), writers)
