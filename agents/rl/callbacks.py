@@ -16,6 +16,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from agents.rl.config import Phase
 from agents.rl.saved import save
+from er_gym.writing import write_whole
 
 CURVE = "curve.jsonl"
 

@@ -11,8 +11,8 @@ Reading one runs whatever code its maker put there, so that takes an explicit ``
 
 from __future__ import annotations
 
+import io
 import json
-import os
 import zipfile
 from collections import deque
 from collections.abc import Mapping
@@ -27,6 +27,8 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
+
+from er_gym.writing import write_whole
 
 MODEL = "model.npz"
 FOREIGN = "model.zip"
@@ -60,13 +62,10 @@ def untrusted(file: Path) -> UntrustedModel:
 
 def save(model: BaseAlgorithm, run: Path) -> None:
     """Write the model so that whatever is found under its name is whole."""
-    beside = run / f".{MODEL}.{os.getpid()}.tmp"
     about = np.frombuffer(json.dumps(_about(model)).encode(), np.uint8)
-    with beside.open("wb") as file:
-        np.savez(file, **{_ABOUT: about}, **_arrays(model))
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(run / MODEL)
+    archive = io.BytesIO()
+    np.savez(archive, **{_ABOUT: about}, **_arrays(model))
+    write_whole(run / MODEL, archive.getvalue())
 
 
 def _arrays(model: BaseAlgorithm) -> Arrays:
