@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel
 
-from er_gym.tasks.files import read_text, validated
+from er_gym.tasks.files import validated
+from er_gym.tasks.reading import parse_yaml, read_yaml
 from er_gym.tasks.suites import config_directory
 
 Settings = TypeVar("Settings", bound=BaseModel)
@@ -64,23 +65,16 @@ def load(
         path, equals, value = text.partition("=")
         if not (equals and path):
             raise ValueError(f"{text!r} is no override; give NAME=VALUE")
-        _put(data, path.split("."), _parsed(value, text), text)
+        _put(data, path.split("."), parse_yaml(value, f"--set {text:.60}"), text)
     where = f"{file}: the {what}" if file else f"the {what}"
     return validated(model, {**data, **(more or {})}, where)
 
 
 def _read(file: Path, what: str) -> dict[str, Any]:
-    data = _parsed(read_text(file), str(file))
+    data = read_yaml(file)
     if not isinstance(data, dict):
         raise ValueError(f"{file}: a {what} is a table of settings, not {data!r:.60}")
     return data
-
-
-def _parsed(text: str, where: str) -> Any:
-    try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise ValueError(f"{where}: not YAML: {' '.join(str(error).split())}") from None
 
 
 def _put(data: dict[str, Any], path: Sequence[str], value: Any, text: str) -> None:

@@ -33,7 +33,8 @@ from benchmarks.episode import EpisodeRecord
 from benchmarks.play import episode_seed
 from er_gym.envs.protocol import DEFAULT
 from er_gym.locking import sole_user
-from er_gym.tasks.errors import SetAside, Taken
+from er_gym.tasks.errors import SetAside, Taken, TaskFileError
+from er_gym.tasks.reading import read_bytes, read_text
 from er_gym.writing import file_stem, make_folder, write_whole
 
 MANIFEST = "run.json"
@@ -177,11 +178,11 @@ class RunStore:
             RunDirectoryError: there is no run.
         """
         try:
-            text = (path / MANIFEST).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
+            text = read_text(path / MANIFEST)
+        except TaskFileError as error:
             raise RunDirectoryError(
-                f"{path} is no run directory: {MANIFEST} cannot be read "
-                f"({type(error).__name__}); give the directory that was er-gym bench's --out"
+                f"{path} is no run directory: {error}; give the directory that was "
+                "er-gym bench's --out"
             ) from error
         try:
             return cls(path, Manifest.model_validate_json(text))
@@ -266,11 +267,11 @@ class RunStore:
         if not path.is_file():  # a pipe would be waited for
             raise ValueError("no file")
         try:
-            episode = EpisodeRecord.model_validate_json(path.read_bytes())
+            episode = EpisodeRecord.model_validate_json(read_bytes(path))
         except ValidationError as error:
             raise ValueError(f"broken: {_first_problem(error)}") from None
-        except OSError as error:
-            raise ValueError(f"it cannot be read: {error.strerror}") from None
+        except TaskFileError as error:
+            raise ValueError(f"it cannot be read: {error}") from None
         name = self._file(episode.task_id).name
         if name != path.name:
             raise ValueError(f"a copy: it holds the episode of {episode.task_id!r:.80}, as {name}")

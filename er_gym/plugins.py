@@ -115,7 +115,7 @@ def load_entry_point(entry: metadata.EntryPoint, kind: str) -> Any:
     """
     try:
         return entry.load()
-    except Exception as error:  # a module can raise anything
+    except (Exception, SystemExit) as error:  # a module can raise anything
         raise PluginError(
             f"{kind} {entry.name!r} of the package {_package(entry)} cannot be loaded from "
             f"{entry.value} ({reason(error)}); mend or uninstall that package"
@@ -142,7 +142,7 @@ def load_dotted(name: str, kind: str, expected: str) -> Any:
     module_name, _, attributes = name.partition(":")
     try:
         found: Any = _imported(module_name)
-    except Exception as error:  # a module can raise anything
+    except (Exception, SystemExit) as error:  # a module can raise anything
         raise PluginError(
             f"Cannot import {module_name!r} of {kind} {name!r} ({reason(error)}); give {expected}, "
             "in an installed package, the working directory or a folder on PYTHONPATH"

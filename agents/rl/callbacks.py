@@ -16,6 +16,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from agents.rl.config import Phase
 from agents.rl.saved import save
+from er_gym.tasks.reading import read_bytes
 from er_gym.writing import write_whole
 
 CURVE = "curve.jsonl"
@@ -89,7 +90,7 @@ def read_curve(run: Path) -> list[dict[str, float]]:
     """The lines of a run's curve so far; a half-written line is left out."""
     file = run / CURVE
     lines = []
-    for text in file.read_bytes().split(b"\n") if file.exists() else ():
+    for text in read_bytes(file).split(b"\n") if file.exists() else ():
         try:
             line = json.loads(text)
         except ValueError:  # not JSON, or not even text

@@ -15,6 +15,7 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
 from typing import TextIO
@@ -22,6 +23,7 @@ from typing import TextIO
 from agents.vlm.prompt_set import IMAGE, MARK, Decide, Did, Now, PromptSet, Sees
 from er_gym.envs.actions import parse
 from er_gym.tasks import verbs
+from er_gym.tasks.reading import open_file
 
 ENOUGH = 500
 """So many conversations show what all of them have in common."""
@@ -58,6 +60,7 @@ _ENDED = re.compile(r"([^.!?。！？\n]*)[.!?。！？\n]")
 """A sentence that is begun at the end of a text, or ended at the beginning."""
 _BETWEEN = re.compile(r"[\s\[\],]*")
 _CHUNK = 1 << 20  # characters
+_LARGEST_ITEM = 1 << 24  # characters of a conversation; its pictures are files
 _VERBS_LONGEST_FIRST = sorted(
     {*verbs.BARE_VERBS, *verbs.OBJECT_VERBS, *verbs.ALIASES}, key=len, reverse=True
 )  # so that "put in" is tried before "put"
@@ -139,11 +142,13 @@ def read_prompts(path: Path, fallback: PromptSet) -> DerivedPrompts:
     """
     found: list[_Sample | None] = []
     try:
-        with path.open(encoding="utf-8-sig") as file:
+        with open_file(path) as raw, TextIOWrapper(raw, encoding="utf-8-sig") as file:
             for item in islice(_items(file), ENOUGH):
                 found.append(_sample(item))
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from None
+    except RecursionError:
+        raise ValueError(f"{path}: nested too deeply after {len(found)} whole items") from None
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: not UTF-8 text (byte {error.start})") from None
     except json.JSONDecodeError as error:
@@ -197,6 +202,8 @@ def _items(file: TextIO) -> Iterator[object]:
         try:
             value, place = decoder.raw_decode(text, place)
         except json.JSONDecodeError:
+            if len(text) - place > _LARGEST_ITEM:
+                raise
             more = file.read(size)
             if more:
                 text, place, size = text[place:] + more, 0, 2 * size

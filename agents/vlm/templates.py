@@ -13,19 +13,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-import yaml
-
 from agents.vlm.prompt_set import IMAGE, MARK, THOUGHTS, Decide, Did, Now, Sees, unmarked
 from er_gym.tasks import verbs
-from er_gym.tasks.files import read_text
+from er_gym.tasks.reading import parse_yaml, read_text
 from er_gym.tasks.suites import config_directory
 from er_gym.tasks.verbs import Verb
 
 if TYPE_CHECKING:
-    from jinja2.sandbox import SandboxedEnvironment
+    from agents.vlm.sandbox import BoundedEnvironment
 
 _TEMPLATES = ("system.jinja", "first.jinja", "next.jinja", "feedback.jinja")
 _ACTIONS = "actions.yaml"
+_LARGEST = 1 << 16
+"""Bytes of a template."""
+_LONGEST = 200_000
+"""Characters of a turn."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class Templates:
     files: Mapping[str, Path] = field(repr=False)
     actions: tuple[ActionRow, ...] = field(repr=False)
     after_observe: int | None = field(default=None, init=False)
-    environment: SandboxedEnvironment = field(repr=False, compare=False)
+    environment: BoundedEnvironment = field(repr=False, compare=False)
 
     def system(self, *, decide: Decide, sees: Sees) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
@@ -74,6 +76,7 @@ class Templates:
             name: unmarked(value) if isinstance(value, str) else value
             for name, value in variables.items()
         }
+        self.environment.begin()
         try:
             text = self.environment.get_template(template).render(
                 **given, pictures=pictures, actions=self.actions, thoughts=THOUGHTS
@@ -84,6 +87,11 @@ class Templates:
                 f"{' '.join(str(error).split())}"
             ) from None
         text = text.strip()
+        if len(text) > _LONGEST:
+            raise ValueError(
+                f"{self.files[template]}: makes a turn of {len(text):,} characters; "
+                f"{_LONGEST:,} are allowed"
+            )
         if text.count(MARK) != pictures:
             raise ValueError(
                 f"{self.files[template]}: {IMAGE} comes {text.count(MARK)} times, but the "
@@ -128,7 +136,7 @@ def load_templates(directory: Path) -> Templates:
     if missing:
         raise ValueError(f"{directory} lacks {min(missing)}; copy it from another set of prompts")
     listed = directory / _ACTIONS
-    sources = {file.name: read_text(file) for file in (*files.values(), listed)}
+    sources = {file.name: read_text(file, _LARGEST) for file in (*files.values(), listed)}
     actions = _rows(sources[_ACTIONS], listed, directory.name)
     digest = hashlib.sha256(repr(sorted(sources.items())).encode())
     if verbs.ADDED:
@@ -145,11 +153,12 @@ def load_templates(directory: Path) -> Templates:
     return templates
 
 
-def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> SandboxedEnvironment:
+def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> BoundedEnvironment:
     """Of templates that were read once: what is rendered is what the digest is of."""
     try:
         from jinja2 import FunctionLoader, StrictUndefined, TemplateSyntaxError
-        from jinja2.sandbox import SandboxedEnvironment
+
+        from agents.vlm.sandbox import BoundedEnvironment
     except ImportError as error:
         raise ValueError(
             f"prompts need {error.name}, which is not installed: pip install 'er-gym[vlm]'"
@@ -160,7 +169,7 @@ def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> Sandb
             return None
         return unmarked(sources[name]).replace(IMAGE, MARK), str(files[name]), None
 
-    environment = SandboxedEnvironment(
+    environment = BoundedEnvironment(
         loader=FunctionLoader(source),
         undefined=StrictUndefined,
         autoescape=False,
@@ -168,21 +177,22 @@ def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> Sandb
         lstrip_blocks=True,
     )
     for name, file in files.items():
+        environment.begin()
         try:
             environment.get_template(name)
         except TemplateSyntaxError as error:
             problem = " ".join((error.message or "").split())
             raise ValueError(f"{file}:{error.lineno}: no template: {problem}") from None
+        except Exception as error:  # RecursionError, SyntaxError, OverflowError: of its nesting
+            problem = " ".join(str(error).split())[:200]
+            raise ValueError(f"{file}: no template: {type(error).__name__}: {problem}") from None
     return environment
 
 
 def _rows(text: str, file: Path, language: str) -> tuple[ActionRow, ...]:
     """The actions and what they mean, in the file's order; then the verbs of other packages that
     the file does not explain, in their own words."""
-    try:
-        meanings = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise ValueError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
+    meanings = parse_yaml(text, str(file))
     own = [verb.name for verb in verbs.OWN]
     added = {verb.name: _meaning(verb, language) for verb in verbs.ADDED}
     if not isinstance(meanings, dict) or not {*own} <= {*meanings} <= {*own, *added}:

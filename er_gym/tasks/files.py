@@ -1,11 +1,8 @@
-"""What every task file format shares: reading, checking, and saying in one line what is wrong."""
+"""What every task file format shares: checking, and saying in one line what is wrong."""
 
 from __future__ import annotations
 
-import gzip
-import json
 import re
-import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,25 +20,8 @@ Model = TypeVar("Model", bound=BaseModel)
 
 _FILE_NAME_SAFE = re.compile(r"[\w+=.-]+")
 _LONGEST_QUOTE = 60
-
-
-def read_text(path: Path) -> str:
-    """The text of a file, unpacked if its name ends in ``.gz``.
-
-    Raises:
-        TaskFileError: it is not there, is a folder, may not be read, or is not UTF-8 or gzip.
-    """
-    try:
-        data = path.read_bytes()
-        return (gzip.decompress(data) if path.suffix == ".gz" else data).decode()
-    except FileNotFoundError:
-        raise TaskFileError(f"{path}: no such file") from None
-    except UnicodeDecodeError as error:
-        raise TaskFileError(f"{path}: not UTF-8 text (byte {error.start})") from None
-    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-        raise TaskFileError(f"{path}: not a whole gzip file: {error}") from None
-    except OSError as error:
-        raise TaskFileError(f"{path}: {error.strerror}") from None
+MOST_TASKS = 50_000
+"""Tasks in a file; the suite ``train`` has 10,000."""
 
 
 def as_utf8(text: str, path: Path) -> bytes:
@@ -56,21 +36,6 @@ def as_utf8(text: str, path: Path) -> bytes:
         half = error.object[error.start]
         raise TaskFileError(
             f"{path}: cannot be written: a text holds half a character, {half!r}"
-        ) from None
-
-
-def parse_json(text: str, path: Path, first_line: int = 1) -> object:
-    """Parse JSON that starts at line ``first_line`` of a file.
-
-    Raises:
-        TaskFileError: it is not JSON; the message gives line and column.
-    """
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError as error:
-        line = error.lineno + first_line - 1
-        raise TaskFileError(
-            f"{path}: not JSON: {error.msg} (line {line}, column {error.colno})"
         ) from None
 
 
@@ -159,12 +124,17 @@ def read_entries(entries: Iterable[Entry]) -> TaskFile:
     """Read one task after another; what is wrong with one does not keep the others from use.
 
     Of several tasks with one id the first is used.
+
+    Raises:
+        TaskFileError: there are more than :data:`MOST_TASKS`.
     """
     tasks: dict[str, Task] = {}
     places: list[int] = []
     set_aside: list[SetAside] = []
     first: dict[str, str] = {}
     for place, entry in enumerate(entries, 1):
+        if place > MOST_TASKS:
+            raise TaskFileError(f"more than {MOST_TASKS:,} tasks; give them in several files")
         try:
             task = entry.read()
         except TaskFileError as error:

@@ -27,12 +27,11 @@ from er_gym.tasks.files import (
     known_scene,
     known_type,
     known_verb,
-    parse_json,
     read_entries,
-    read_text,
     validated,
 )
 from er_gym.tasks.goal import Condition
+from er_gym.tasks.reading import read_json_lines
 from er_gym.tasks.start import ObjectPose, Start
 from er_gym.tasks.task import AgentPose, KeyAction, Task, type_of_id
 from er_gym.writing import write_output
@@ -144,10 +143,9 @@ def read_file(path: str | Path) -> TaskFile:
         TaskFileError: the file as a whole cannot be used.
     """
     path = Path(path)
-    # Not splitlines: an instruction may hold what is an end of line to Unicode and none to JSON.
-    lines = read_text(path).split("\n")
+    lines = read_json_lines(path)
     header = _header(lines, path)
-    entries = list(_entries(lines[1:], path))
+    entries = list(_entries(lines, path))
     if len(entries) != header.tasks:
         raise TaskFileError(
             f"{path}: cut short or edited: its header says {header.tasks} tasks, "
@@ -204,22 +202,20 @@ def _lines(tasks: Iterable[Task]) -> Iterator[str]:
         yield _line(_record(task))
 
 
-def _header(lines: list[str], path: Path) -> Header:
+def _header(lines: Iterator[tuple[int, object]], path: Path) -> Header:
     where = f"{path}: the header"
-    if not any(lines):
+    _, data = next(lines, (0, None))
+    if data is None:
         raise TaskFileError(f'{path}: empty; its first line should be {{"format": "{FORMAT}", …}}')
-    header = validated(Header, parse_json(lines[0], path), where)
+    header = validated(Header, data, where)
     if header.format != FORMAT:
         raise TaskFileError(f"{where} says format {header.format!r}; this er-gym reads {FORMAT!r}")
     return header
 
 
-def _entries(lines: list[str], path: Path) -> Iterator[Entry]:
+def _entries(lines: Iterable[tuple[int, object]], path: Path) -> Iterator[Entry]:
     layouts: dict[str, dict[str, ObjectPose]] = {}
-    for number, line in enumerate(lines, 2):
-        if not line.strip():
-            continue
-        data = parse_json(line, path, number)
+    for number, data in lines:
         if isinstance(data, dict) and "layout" in data and "id" not in data:
             layout = validated(LayoutRecord, data, f"{path}: the layout in line {number}")
             layouts[layout.layout] = {

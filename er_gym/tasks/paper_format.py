@@ -27,9 +27,7 @@ from er_gym.tasks.files import (
     TaskFile,
     known_scene,
     known_type,
-    parse_json,
     read_entries,
-    read_text,
     validated,
 )
 from er_gym.tasks.paper_records import (
@@ -44,6 +42,7 @@ from er_gym.tasks.paper_records import (
     with_own_fields,
     without,
 )
+from er_gym.tasks.reading import parse_json, read_text
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.writing import write_output
 

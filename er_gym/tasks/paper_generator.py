@@ -22,9 +22,7 @@ from er_gym.tasks.files import (
     TaskFile,
     known_scene,
     known_type,
-    parse_json,
     read_entries,
-    read_text,
     validated,
 )
 from er_gym.tasks.paper_records import (
@@ -38,6 +36,7 @@ from er_gym.tasks.paper_records import (
     unspoken,
     with_own_fields,
 )
+from er_gym.tasks.reading import parse_json, read_text
 from er_gym.tasks.rooms import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TASK_TYPES, TaskType

@@ -7,6 +7,7 @@ so that it is asked once; what is kept is checked anew each time it is used.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import re
@@ -18,7 +19,9 @@ from typing import TypeAlias
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.plugins import Registry
+from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import validated
+from er_gym.tasks.reading import parse_json, read_bytes
 from er_gym.thor import OBJECT_TYPES
 from er_gym.writing import CannotWrite, make_folder
 
@@ -99,7 +102,8 @@ class Paraphraser:
             names: what each paraphrase must have, spelled so: object types, perhaps "off".
 
         Raises:
-            ValueError: the instruction itself lacks one of the names.
+            ValueError: the instruction itself lacks one of the names, or the model's reply is no
+                text.
         """
         if lacking := sorted(name for name in set(names) if not _has(instruction, name)):
             raise ValueError(
@@ -109,7 +113,13 @@ class Paraphraser:
         prompt = make_prompt(instruction, names, self._count)
         key = hashlib.sha256(f"{PROMPT_VERSION}\n{prompt}".encode()).hexdigest()
         if key not in self._replies:
-            entry = _Entry(key=key, instruction=instruction, reply=self._ask(prompt))
+            reply = self._ask(prompt)
+            if not isinstance(reply, str):
+                raise ValueError(
+                    f"the language model returned {type(reply).__name__}, not a text; let it "
+                    "return its reply, as str"
+                )
+            entry = _Entry(key=key, instruction=instruction, reply=reply)
             if self._cache is not None:
                 _append(self._cache, entry)
             self._replies[key] = entry.reply
@@ -134,6 +144,7 @@ def usable(reply: str, instruction: str, names: Collection[str]) -> tuple[str, .
     for line in map(_bare, reply.splitlines()):
         if (
             len(line) <= LONGEST
+            and line.isprintable()
             and _SENTENCES.fullmatch(line)
             and all(_has(line, name) for name in names)
             and _types(line) <= own_types
@@ -182,14 +193,12 @@ def load_ask(spec: str) -> Ask:
 def _read(cache: Path) -> dict[str, str]:
     """Key to reply; a line that is not whole, since its writer was killed, is passed over."""
     replies: dict[str, str] = {}
-    try:
-        lines = cache.read_bytes().split(b"\n")
-    except FileNotFoundError:
+    if not cache.exists():
         return replies
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(read_bytes(cache).split(b"\n"), 1):
         where = f"{cache}: the reply in line {number}"
         try:
-            data = json.loads(line)
+            data = parse_json(line.decode(), cache, number)
         except ValueError:  # not JSON, or not even text
             if line[: len(_BEGINS)] != _BEGINS[: len(line)]:
                 raise ValueError(

@@ -14,14 +14,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.plugins import PluginError, Registry, reason
 from er_gym.tasks import jsonl_format, paper_format
 from er_gym.tasks.errors import SetAside, TaskFileError, in_short
-from er_gym.tasks.files import read_text, validated
+from er_gym.tasks.files import validated
 from er_gym.tasks.making import Making
+from er_gym.tasks.reading import read_yaml
 from er_gym.tasks.task import Task
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -137,7 +137,7 @@ def suite_config(name: str) -> SuiteConfig:
     if name not in suite_names():
         raise PluginError(suite_registry().unknown(name[:_LONGEST_QUOTE]))
     file = config_directory("suites") / f"{name}.yaml"
-    return validated(SuiteConfig, yaml.safe_load(read_text(file)), f"{file}: the suite")
+    return validated(SuiteConfig, read_yaml(file), f"{file}: the suite")
 
 
 def suite_file(name: str) -> Path:

@@ -13,6 +13,8 @@ from pydantic import ValidationError
 
 from agents.vlm.chat import LEFT_OUT, Message, ModelError, Picture, Reply
 from agents.vlm.record import ConversationRecord, PictureRecord
+from er_gym.tasks.errors import TaskFileError
+from er_gym.tasks.reading import read_bytes
 from er_gym.writing import file_stem
 
 _log = logging.getLogger(__name__)
@@ -119,8 +121,8 @@ def _key(turns: Iterable[_Turn]) -> str:
 def _agent_of(run: Path) -> str:
     """The agent of a run directory, "" where it does not tell."""
     try:
-        told = json.loads((run / "run.json").read_bytes())
-    except (OSError, ValueError):
+        told = json.loads(read_bytes(run / "run.json"))
+    except (TaskFileError, ValueError):
         return ""
     agent = told.get("agent") if isinstance(told, dict) else None
     return agent if isinstance(agent, str) else ""
@@ -129,9 +131,9 @@ def _agent_of(run: Path) -> str:
 def _read(file: Path, agent: str | None) -> ConversationRecord:
     """A conversation of a run of that agent's; None where it was named by itself."""
     try:
-        kept = ConversationRecord.model_validate_json(file.read_bytes())
-    except (OSError, ValidationError) as error:
-        problem = error.strerror if isinstance(error, OSError) else _first_problem(error)
+        kept = ConversationRecord.model_validate_json(read_bytes(file))
+    except (TaskFileError, ValidationError) as error:
+        problem = str(error) if isinstance(error, TaskFileError) else _first_problem(error)
         raise ValueError(f"{file} cannot be read as a conversation: {problem}") from None
     name = f"{file_stem(kept.task_id)}.json"
     if agent is not None and file.name != name:

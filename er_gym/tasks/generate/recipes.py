@@ -12,17 +12,17 @@ from inspect import signature
 from itertools import permutations
 from pathlib import Path
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field
 
 from er_gym.tasks import verbs
 from er_gym.tasks.errors import TaskFileError
-from er_gym.tasks.files import read_text, validated
+from er_gym.tasks.files import validated
 from er_gym.tasks.generate.plan import Plan, Row, plan_of
 from er_gym.tasks.generate.room import Room, Thing, largest, may_fill
 from er_gym.tasks.generate.script import Impossible, Script
 from er_gym.tasks.generate.templates import STYLES, in_order
 from er_gym.tasks.generate.words import in_the
+from er_gym.tasks.reading import read_yaml
 from er_gym.tasks.verbs import Verb
 from er_gym.thor import OBJECT_TYPES
 
@@ -329,10 +329,7 @@ def read_recipes(path: Path) -> tuple[Recipe, ...]:
     Raises:
         TaskFileError: the file cannot be used; one line says where and why.
     """
-    try:
-        data = yaml.safe_load(read_text(path))
-    except yaml.YAMLError as error:
-        raise TaskFileError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    data = read_yaml(path)
     if not isinstance(data, list):
         raise TaskFileError(f"{path}: not a list of recipes")
     recipes = tuple(

@@ -1,0 +1,169 @@
+"""A Jinja environment whose templates reach nothing, and do only so much.
+
+Jinja's own sandbox keeps templates from Python's insides. It does not keep them from
+``{% for a in range(99999) %}{% for b in range(99999) %}`` or ``{{ "x" * 10 ** 10 }}``. Here every
+loop, call, filter and operator is paid for out of a budget, before it is done.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from functools import wraps
+from math import prod
+from typing import Any
+
+from jinja2 import nodes
+from jinja2.sandbox import SandboxedEnvironment, SecurityError
+from jinja2.visitor import NodeTransformer
+
+BUDGET = 10_000_000
+"""Characters that a template may handle each time it is rendered; a prompt has some thousands."""
+STEP = 5_000
+"""What a round of a loop, a call or an include costs: there may be 2,000 of them."""
+_EACH = "_each"
+_STRINGS = (str, bytes)
+_CONTAINERS = (*_STRINGS, list, tuple, dict, set)
+
+
+class BoundedEnvironment(SandboxedEnvironment):
+    """A sandboxed environment whose templates stop when they have done :data:`BUDGET`.
+
+    A template may be rendered in several threads; :meth:`begin` is called in each before.
+
+    Raises:
+        SecurityError: while rendering, a template does too much, or formats with widths.
+        TemplateSyntaxError: while compiling, it is no template; ValueError: it has a recursive
+            loop.
+    """
+
+    intercepted_binops = frozenset({"+", "*", "**", "%"})
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options, finalize=self._shown)
+        self._bill = threading.local()
+        self.filters = {name: self._paid(filter) for name, filter in self.filters.items()}
+        self.filters[_EACH] = self._each
+        self.filters["format"] = _no_format
+
+    def begin(self) -> None:
+        """Fill up this thread's budget."""
+        self._bill.left = BUDGET
+
+    def pay(self, amount: int) -> None:
+        """Take from this thread's budget, or raise SecurityError."""
+        self._bill.left = getattr(self._bill, "left", BUDGET) - amount
+        if self._bill.left < 0:
+            raise SecurityError("a template that does too much; make its loops and texts smaller")
+
+    # -- Jinja's hooks ---------------------------------------------------------------------------
+
+    def call(self, context: Any, function: Any, *args: Any, **kwargs: Any) -> Any:
+        """Call something, once it is paid for."""
+        if getattr(function, "__name__", "") in ("format", "format_map"):
+            _no_format()
+        self.pay(STEP + _product([getattr(function, "__self__", None)], args, kwargs.values()))
+        return super().call(context, function, *args, **kwargs)
+
+    def call_binop(self, context: Any, operator: str, left: Any, right: Any) -> Any:
+        """Work out ``left operator right``, once it is paid for."""
+        if operator == "%" and isinstance(left, _STRINGS):
+            _no_format()
+        if operator == "**":
+            self.pay(_bits(left) * max(1, int(abs(right))))
+        elif operator == "*":
+            self.pay(_bits(left) * _bits(right) if _numbers(left, right) else _product(left, right))
+        elif operator == "+":
+            self.pay(_length(left) + _length(right))
+        return super().call_binop(context, operator, left, right)
+
+    def _load_template(self, name: Any, globals: Any) -> Any:
+        self.pay(STEP)
+        return super()._load_template(name, globals)
+
+    def _parse(self, source: str, name: str | None, filename: str | None) -> nodes.Template:
+        return _Priced().visit(super()._parse(source, name, filename))  # type: ignore[no-any-return]
+
+    # -- prices ----------------------------------------------------------------------------------
+
+    def _paid(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """A filter that is paid for; what Jinja notes on filters stays with it."""
+
+        @wraps(function)
+        def paid(*args: Any, **kwargs: Any) -> Any:
+            self.pay(_product(args, kwargs.values()))
+            return function(*args, **kwargs)
+
+        return paid
+
+    def _each(self, values: Iterable[Any]) -> Iterator[Any]:
+        for value in values:
+            self.pay(STEP)
+            yield value
+
+    def _shown(self, value: Any) -> Any:
+        self.pay(len(str(value)))
+        return value
+
+
+class _Priced(NodeTransformer):
+    """Leads loops and joined texts to where they are paid for."""
+
+    def visit_For(self, node: nodes.For) -> nodes.Node:
+        self.generic_visit(node)
+        if node.recursive:
+            raise ValueError(f"line {node.lineno}: no template: loops may not be recursive here")
+        node.iter = _filtered(node.iter, _EACH)
+        return node
+
+    def visit_Concat(self, node: nodes.Concat) -> nodes.Node:
+        self.generic_visit(node)
+        first, *others = (_filtered(part, "string") for part in node.nodes)
+        joined: nodes.Expr = first
+        for other in others:
+            joined = nodes.Add(joined, other, lineno=node.lineno)
+        return joined
+
+
+def _filtered(node: nodes.Expr, name: str) -> nodes.Filter:
+    return nodes.Filter(node, name, [], [], None, None, lineno=node.lineno)
+
+
+def _product(*groups: Any) -> int:
+    """How much work values can make of one another: the product of their sizes."""
+    values = [value for group in groups for value in _values(group)]
+    return prod(max(1, _size(value)) for value in values)
+
+
+def _values(group: Any) -> Iterable[Any]:
+    return (group,) if isinstance(group, (*_STRINGS, int, float)) else group
+
+
+def _size(value: Any) -> int:
+    """The length of a text or a list, whole texts in it counted; a number as what it is."""
+    if isinstance(value, bool) or value is None:
+        return 1
+    if isinstance(value, (int, float)):
+        return int(min(abs(value), BUDGET + 1)) if value == value else 1
+    return _length(value)
+
+
+def _length(value: Any) -> int:
+    if isinstance(value, _STRINGS):
+        return len(value)
+    if isinstance(value, _CONTAINERS):
+        parts = [*value, *value.values()] if isinstance(value, dict) else value
+        return sum(len(part) if isinstance(part, _STRINGS) else 1 for part in parts)
+    return 1
+
+
+def _bits(value: Any) -> int:
+    return value.bit_length() if isinstance(value, int) else 64
+
+
+def _numbers(*values: Any) -> bool:
+    return all(isinstance(value, (int, float)) for value in values)
+
+
+def _no_format(*_: Any, **__: Any) -> Any:
+    raise SecurityError("templates may not format texts with % or format; join them with ~")

@@ -1,0 +1,327 @@
+"""Reads the files that users give, so that none of them can hang er-gym or fill the memory.
+
+Every file that a user may have written comes through here: task files, configurations, prompts, run
+directories. What is read is a regular file, never a device or a pipe; it is of bounded size, also
+once it is unpacked; what is parsed is of bounded size and depth, aliases counted as what they stand
+for.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import math
+import os
+import re
+import stat
+import zlib
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+from typing import Any, BinaryIO, NoReturn
+
+import yaml
+
+from er_gym.tasks.errors import TaskFileError
+
+LARGEST = 64 << 20
+"""Bytes of a file, unpacked. The suite ``train``, 10,000 tasks, has 14 MB."""
+LARGEST_TEXT = 32 << 20
+"""Bytes of a file that is one text; as characters it takes up to four times as much memory."""
+LONGEST_LINE = 4 << 20
+"""Bytes of a line of JSON Lines; those of ``train`` have up to 4,600."""
+LARGEST_YAML = 1 << 16
+"""Characters; PyYAML takes up to two seconds for so many."""
+MOST_VALUES = 2_000_000
+"""Values in a file of JSON, the separators among them counted; ``train`` has 0.6 million."""
+MOST_IN_YAML = 100_000
+"""Nodes of a YAML document, those that an alias stands for counted each time."""
+DEEPEST = 64
+"""How deeply lists and objects may be nested in one another."""
+LONGEST_INTEGER = 20
+"""Characters: more than 64 bits need."""
+
+_KINDS = (
+    (stat.S_ISDIR, "a directory"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)
+_MOST_BRACKETS = 500
+_BRACKET = re.compile(r"[\[\]{}]")
+_INTEGER = "tag:yaml.org,2002:int"
+_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
+"""Escapes of JSON that stand for a character only in pairs."""
+
+
+def open_file(path: Path) -> BinaryIO:
+    """Open a regular file to read its bytes.
+
+    Raises:
+        TaskFileError: it is not there, is no regular file, or may not be read.
+    """
+    try:
+        _must_be_regular(os.stat(path).st_mode, path)  # to open a device may have consequences
+        # Nobody is waited for if a pipe has taken the file's place meanwhile.
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        file = open(handle, "rb")  # noqa: SIM115  # the caller's to close
+    except TaskFileError:
+        raise
+    except FileNotFoundError:
+        raise TaskFileError(f"{path}: no such file") from None
+    except OSError as error:
+        raise TaskFileError(f"{path}: {error.strerror}") from None
+    except ValueError as error:  # a path with a zero byte
+        raise TaskFileError(f"{str(path)!r}: no path: {error}") from None
+    try:
+        _must_be_regular(os.fstat(handle).st_mode, path)
+    except TaskFileError:
+        file.close()
+        raise
+    return file
+
+
+def read_bytes(path: Path, most: int = LARGEST) -> bytes:
+    """The bytes of a file, unpacked if its name ends in ``.gz``.
+
+    Args:
+        path: of a regular file.
+        most: bytes that it may have, packed and unpacked.
+
+    Raises:
+        TaskFileError: it cannot be read, is larger, or is not gzip.
+    """
+    with open_file(path) as file:
+        try:
+            data = file.read(most + 1)
+            if path.suffix.lower() == ".gz" and len(data) <= most:
+                with gzip.GzipFile(fileobj=io.BytesIO(data)) as packed:
+                    data = packed.read(most + 1)
+        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+            raise TaskFileError(f"{path}: not a whole gzip file: {error}") from None
+        except OSError as error:
+            raise TaskFileError(f"{path}: {error.strerror}") from None
+    if len(data) > most:
+        raise TaskFileError(
+            f"{path}: larger than er-gym reads; such a file has at most {_size(most)}, unpacked"
+        )
+    return data
+
+
+def read_text(path: Path, most: int = LARGEST_TEXT) -> str:
+    """The text of a file, unpacked if its name ends in ``.gz``; a byte order mark is left out.
+
+    Raises:
+        TaskFileError: it cannot be read, is larger than ``most`` bytes, or is not UTF-8 or gzip.
+    """
+    return _decoded(read_bytes(path, most), path)
+
+
+def parse_json(text: str, path: Path, first_line: int = 1) -> object:
+    """Parse JSON that starts at line ``first_line`` of a file.
+
+    Raises:
+        TaskFileError: it is not JSON, or holds what er-gym does not read: too many values, nested
+            too deeply, NaN, numbers beyond 64 bits, half a character. The message says where.
+    """
+    opened = text.count("[") + text.count("{")
+    if opened + text.count(",") > MOST_VALUES:
+        _too_many(path)
+    try:
+        data = _DECODER.decode(text)
+    except json.JSONDecodeError as error:
+        line = error.lineno + first_line - 1
+        raise TaskFileError(
+            f"{path}: not JSON: {error.msg} (line {line}, column {error.colno})"
+        ) from None
+    except RecursionError:
+        _too_deep(f"{path}: line {first_line}")
+    except ValueError as error:  # of the decoder's parts below
+        raise TaskFileError(f"{path}: {_place(text, first_line)}: {error}") from None
+    if opened > DEEPEST and _is_deeper(data):
+        _too_deep(f"{path}: {_place(text, first_line)}")
+    if _SURROGATE.search(text):
+        try:
+            json.dumps(data, ensure_ascii=False).encode()
+        except UnicodeEncodeError:
+            raise TaskFileError(
+                f"{path}: {_place(text, first_line)}: half a character (a lone surrogate); "
+                "write the whole one"
+            ) from None
+    return data
+
+
+def read_json_lines(path: Path) -> Iterator[tuple[int, object]]:
+    """The number of each line, from 1, and the JSON in it; empty lines are passed over.
+
+    Lines end with a newline and nothing else: U+2028 and its like are characters of a text.
+
+    Raises:
+        TaskFileError: as :func:`read_bytes` and :func:`parse_json`.
+    """
+    data = read_bytes(path)
+    values = data.count(b"\n")
+    for number, line in enumerate(io.BytesIO(data), 1):
+        if len(line) > LONGEST_LINE:
+            raise TaskFileError(f"{path}: line {number} is longer than {_size(LONGEST_LINE)}")
+        values += line.count(b",") + line.count(b"[") + line.count(b"{")
+        if values > MOST_VALUES:
+            _too_many(path)
+        text = _decoded(line, path, number)
+        if text.strip():
+            yield number, parse_json(text, path, number)
+
+
+def read_yaml(path: Path) -> Any:
+    """What a YAML file says; see :func:`parse_yaml`."""
+    return parse_yaml(read_text(path, LARGEST_YAML), str(path))
+
+
+def parse_yaml(text: str, where: str) -> Any:
+    """What YAML says.
+
+    Args:
+        text: one document.
+        where: its place, for messages.
+
+    Raises:
+        TaskFileError: it is not YAML, is too large or nested too deeply, or its aliases make too
+            much of little.
+    """
+    if len(text) > LARGEST_YAML:
+        raise TaskFileError(f"{where}: too long; YAML may have {LARGEST_YAML:,} characters")
+    if _brackets(text) > _MOST_BRACKETS:  # PyYAML's time goes with the square of them
+        _too_deep(where)
+    loader = None
+    try:
+        loader = yaml.SafeLoader(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        size, height = _measured(node, {})
+        if height > DEEPEST:
+            _too_deep(where)
+        if size > MOST_IN_YAML:
+            raise TaskFileError(
+                f"{where}: too many values; YAML may have {MOST_IN_YAML:,}, what an alias stands "
+                "for counted each time"
+            )
+        return loader.construct_document(node)
+    except TaskFileError:
+        raise
+    except UnicodeEncodeError:
+        raise TaskFileError(f"{where}: not YAML: half a character (a lone surrogate)") from None
+    except yaml.YAMLError as error:
+        raise TaskFileError(f"{where}: not YAML: {' '.join(str(error).split())}") from None
+    except RecursionError:
+        _too_deep(where)
+    except Exception as error:  # PyYAML takes "!!int" and 2001-99-99 for what they say they are
+        raise TaskFileError(
+            f"{where}: not YAML: a value that is not of its kind ({type(error).__name__}: "
+            f"{' '.join(str(error).split())})"
+        ) from None
+    finally:
+        if loader is not None:
+            loader.dispose()
+
+
+# -- parts ----------------------------------------------------------------------------------------
+
+
+def _integer(text: str) -> int:
+    if len(text) > LONGEST_INTEGER:
+        raise ValueError(f"a whole number of {len(text)} digits; er-gym reads those of 64 bits")
+    return int(text)
+
+
+def _decimal(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"the number {text[:LONGEST_INTEGER]} is too large; give a finite one")
+    return number
+
+
+def _constant(text: str) -> NoReturn:
+    raise ValueError(f"{text} is no number of JSON; give a finite one, or null")
+
+
+_DECODER = json.JSONDecoder(parse_int=_integer, parse_float=_decimal, parse_constant=_constant)
+
+
+def _must_be_regular(mode: int, path: Path) -> None:
+    if not stat.S_ISREG(mode):
+        kind = next((name for is_one, name in _KINDS if is_one(mode)), "something else")
+        raise TaskFileError(f"{path}: {kind}, not a file; give the path of a file")
+
+
+def _decoded(data: bytes, path: Path, line: int | None = None) -> str:
+    try:
+        return data.decode("utf-8-sig" if line in (None, 1) else "utf-8")
+    except UnicodeDecodeError as error:
+        at = f"byte {error.start}" if line is None else f"line {line}, byte {error.start}"
+        raise TaskFileError(f"{path}: not UTF-8 text ({at})") from None
+
+
+def _place(text: str, first_line: int) -> str:
+    """Where JSON stands: its line, or its lines."""
+    last = first_line + text.rstrip().count("\n")
+    return f"line {first_line}" if last == first_line else f"lines {first_line} to {last}"
+
+
+def _is_deeper(data: object) -> bool:
+    """Whether JSON is nested more deeply than :data:`DEEPEST`."""
+    level: list[Any] = [data]
+    for _ in range(DEEPEST + 1):
+        inner = (each.values() if isinstance(each, dict) else each for each in level)
+        level = [part for each in inner for part in each if isinstance(part, (dict, list))]
+        if not level:
+            return False
+    return True
+
+
+def _brackets(text: str) -> int:
+    """How deeply YAML's brackets are nested at most; those in its texts count too."""
+    depth = deepest = 0
+    for bracket in _BRACKET.findall(text):
+        depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
+        deepest = max(deepest, depth)
+    return deepest
+
+
+def _measured(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:
+    """How many nodes a YAML node stands for, aliases followed, and how deeply it is nested.
+
+    Args:
+        known: what was found so far, by the node's id; None while a node is being looked at.
+    """
+    if isinstance(node, yaml.ScalarNode):
+        node.value.encode()
+        if node.tag == _INTEGER and len(node.value) > LONGEST_INTEGER:
+            raise yaml.YAMLError(f"a whole number of {len(node.value)} digits; 64 bits are allowed")
+        return 1, 0
+    if id(node) in known:
+        found = known[id(node)]
+        if found is None:
+            raise yaml.YAMLError("a value that has itself for a part")
+        return found
+    known[id(node)] = None
+    is_map = isinstance(node, yaml.MappingNode)
+    parts = chain.from_iterable(node.value) if is_map else node.value
+    sizes = [_measured(part, known) for part in parts]
+    total = 1 + sum(size for size, _ in sizes), 1 + max((height for _, height in sizes), default=0)
+    known[id(node)] = total
+    return total
+
+
+def _too_deep(where: str) -> NoReturn:
+    raise TaskFileError(f"{where}: nested too deeply; er-gym reads {DEEPEST} levels") from None
+
+
+def _too_many(path: Path) -> NoReturn:
+    raise TaskFileError(f"{path}: too many values; er-gym reads files of {MOST_VALUES:,}")
+
+
+def _size(count: int) -> str:
+    return f"{count >> 20} MiB" if count >= 1 << 20 else f"{count >> 10} KiB"
