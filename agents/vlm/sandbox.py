@@ -8,22 +8,25 @@ loop, call, filter and operator is paid for out of a budget, before it is done.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from functools import wraps
-from math import prod
+from itertools import chain
 from typing import Any
 
 from jinja2 import nodes
 from jinja2.sandbox import SandboxedEnvironment, SecurityError
+from jinja2.utils import Namespace
 from jinja2.visitor import NodeTransformer
 
-BUDGET = 10_000_000
+BUDGET = 2_000_000
 """Characters that a template may handle each time it is rendered; a prompt has some thousands."""
-STEP = 5_000
+STEP = 1_000
 """What a round of a loop, a call or an include costs: there may be 2,000 of them."""
-_EACH = "_each"
+_DEEPEST = 4
+"""How deeply lists may be nested: what shares its parts can be as long as it likes."""
+_EACH, _MADE = "_each", "_made"
 _STRINGS = (str, bytes)
-_CONTAINERS = (*_STRINGS, list, tuple, dict, set)
+_CONTAINERS = (list, tuple, dict, set)
 
 
 class BoundedEnvironment(SandboxedEnvironment):
@@ -44,6 +47,8 @@ class BoundedEnvironment(SandboxedEnvironment):
         self._bill = threading.local()
         self.filters = {name: self._paid(filter) for name, filter in self.filters.items()}
         self.filters[_EACH] = self._each
+        self.filters[_MADE] = self._made
+        self.tests = {name: self._paid(test) for name, test in self.tests.items()}
         self.filters["format"] = _no_format
 
     def begin(self) -> None:
@@ -87,12 +92,13 @@ class BoundedEnvironment(SandboxedEnvironment):
     # -- prices ----------------------------------------------------------------------------------
 
     def _paid(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """A filter that is paid for; what Jinja notes on filters stays with it."""
+        """A filter or a test that is paid for; what Jinja notes on filters stays with it."""
 
         @wraps(function)
         def paid(*args: Any, **kwargs: Any) -> Any:
             self.pay(_product(args, kwargs.values()))
-            return function(*args, **kwargs)
+            result = function(*args, **kwargs)
+            return [*self._counted(result)] if isinstance(result, Generator) else result
 
         return paid
 
@@ -101,8 +107,17 @@ class BoundedEnvironment(SandboxedEnvironment):
             self.pay(STEP)
             yield value
 
+    def _counted(self, values: Iterable[Any]) -> Iterator[Any]:
+        for value in values:
+            self.pay(1)
+            yield value
+
+    def _made(self, value: Any) -> Any:
+        self.pay(_length(value))
+        return value
+
     def _shown(self, value: Any) -> Any:
-        self.pay(len(str(value)))
+        self.pay(_length(value))
         return value
 
 
@@ -115,6 +130,16 @@ class _Priced(NodeTransformer):
             raise ValueError(f"line {node.lineno}: no template: loops may not be recursive here")
         node.iter = _filtered(node.iter, _EACH)
         return node
+
+    def visit_Tuple(self, node: nodes.Tuple) -> nodes.Node:
+        self.generic_visit(node)
+        return _filtered(node, _MADE) if node.ctx == "load" else node
+
+    def visit_List(self, node: nodes.List | nodes.Dict) -> nodes.Node:
+        self.generic_visit(node)
+        return _filtered(node, _MADE)
+
+    visit_Dict = visit_List
 
     def visit_Concat(self, node: nodes.Concat) -> nodes.Node:
         self.generic_visit(node)
@@ -131,12 +156,16 @@ def _filtered(node: nodes.Expr, name: str) -> nodes.Filter:
 
 def _product(*groups: Any) -> int:
     """How much work values can make of one another: the product of their sizes."""
-    values = [value for group in groups for value in _values(group)]
-    return prod(max(1, _size(value)) for value in values)
+    total = 1
+    for value in chain.from_iterable(map(_values, groups)):
+        total *= max(1, _size(value))
+        if total > BUDGET:
+            break
+    return total
 
 
 def _values(group: Any) -> Iterable[Any]:
-    return (group,) if isinstance(group, (*_STRINGS, int, float)) else group
+    return (group,) if isinstance(group, (*_STRINGS, range, int, float)) else group
 
 
 def _size(value: Any) -> int:
@@ -148,13 +177,19 @@ def _size(value: Any) -> int:
     return _length(value)
 
 
-def _length(value: Any) -> int:
-    if isinstance(value, _STRINGS):
+def _length(value: Any, depth: int = 0) -> int:
+    if isinstance(value, (*_STRINGS, range)):
         return len(value)
+    if isinstance(value, Namespace) or (isinstance(value, _CONTAINERS) and depth == _DEEPEST):
+        return BUDGET + 1
+    total = 1
     if isinstance(value, _CONTAINERS):
-        parts = [*value, *value.values()] if isinstance(value, dict) else value
-        return sum(len(part) if isinstance(part, _STRINGS) else 1 for part in parts)
-    return 1
+        parts = chain(value, value.values()) if isinstance(value, dict) else value
+        for part in parts:
+            total += _length(part, depth + 1)
+            if total > BUDGET:
+                break
+    return total
 
 
 def _bits(value: Any) -> int:
