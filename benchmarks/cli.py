@@ -16,12 +16,13 @@ import click
 from benchmarks.cli_bench import bench
 from benchmarks.cli_errors import INTERRUPTED, BadInput, bad_input, complain
 from benchmarks.cli_inspect import inspect
-from benchmarks.cli_options import scorer_option, stdout
+from benchmarks.cli_options import scorer_option
 from benchmarks.cli_player import doctor, player
 from benchmarks.cli_render import play, render
 from benchmarks.cli_serve import match_server, serve
 from benchmarks.cli_tasks import tasks
 from benchmarks.cli_train import train_rl
+from benchmarks.terminal import echo, stdout, use_any_encoding
 
 FORMATS = ("table", "md", "csv", "json")
 _directory = click.Path(file_okay=False, path_type=Path)
@@ -29,6 +30,7 @@ _directory = click.Path(file_okay=False, path_type=Path)
 
 def main(args: Sequence[str] | None = None) -> NoReturn:
     """Run the command and exit: 0; 2 for bad input; others as in ``benchmarks.cli_errors``."""
+    use_any_encoding()
     try:
         code = cli.main(args=args, prog_name="er-gym", standalone_mode=False)
     except click.UsageError as error:
@@ -48,6 +50,9 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
     except (click.Abort, KeyboardInterrupt):
         complain("interrupted")
         sys.exit(INTERRUPTED)
+    except MemoryError as error:
+        complain(f"the memory does not suffice: {error}".rstrip(": "))
+        sys.exit(1)
     sys.exit(code if isinstance(code, int) else 0)
 
 
@@ -59,10 +64,10 @@ def cli(context: click.Context, version: bool) -> None:
     if version:
         from er_gym import __version__
 
-        click.echo(f"er-gym {__version__}")
+        echo(f"er-gym {__version__}")
         context.exit()
     if context.invoked_subcommand is None:
-        click.echo(context.get_help())
+        echo(context.get_help())
 
 
 cli.add_command(bench)
@@ -99,13 +104,13 @@ def report(runs: tuple[Path, ...], layout: str, scorer: str, by_type: bool, miss
     with bad_input():
         loaded = [reports.load_run(path) for path in runs]
     if layout == "json":
-        click.echo(reports.as_json(loaded))
+        echo(reports.as_json(loaded))
     elif layout == "csv":
-        click.echo(reports.as_csv(loaded, scorer, by_type), nl=False)
+        echo(reports.as_csv(loaded, scorer, by_type), nl=False)
     else:
         found = tables(loaded, scorer=scorer, with_types=by_type, with_misses=misses)
         if layout == "md":
-            click.echo(as_markdown(found), nl=False)
+            echo(as_markdown(found), nl=False)
         else:
             print_tables(found, stdout())
 
@@ -126,7 +131,7 @@ def suites() -> None:
 
     for name in suite_registry().names():
         if name in suite_names() and not suite_file(name).exists():
-            click.echo(
+            echo(
                 f"{name}: not made yet (er-gym tasks generate --suite {name}); "
                 f"{suite_config(name).description}"
             )
@@ -135,7 +140,7 @@ def suites() -> None:
             tasks = load_suite(name).tasks
         counts = Counter(task.type.group for task in tasks)
         groups = ", ".join(f"{group} {counts[group]}" for group in GROUPS if counts[group])
-        click.echo(f"{name}: {len(tasks)} tasks ({groups})")
+        echo(f"{name}: {len(tasks)} tasks ({groups})")
 
 
 @cli.command()
@@ -145,7 +150,7 @@ def envs() -> None:
 
     widest = max(len(kind.env_id) for kind in TASK_TYPES)
     for kind in TASK_TYPES:
-        click.echo(f"{kind.env_id:{widest}}  {kind.group}: {kind.title}, {kind.max_steps} steps")
+        echo(f"{kind.env_id:{widest}}  {kind.group}: {kind.title}, {kind.max_steps} steps")
 
 
 if __name__ == "__main__":

@@ -21,14 +21,17 @@ from benchmarks.cli_errors import (
     tell_left_out,
 )
 from benchmarks.cli_options import (
+    Finite,
     agent_config_option,
     overrides_option,
     protocol_option,
     scorer_option,
+    seed_option,
     split,
-    stdout,
     trust_option,
+    workers_type,
 )
+from benchmarks.terminal import stdout, terminal
 
 if TYPE_CHECKING:
     from benchmarks.episode import EpisodeRecord
@@ -71,12 +74,12 @@ _SPOKEN_OPTIONS = (
     ),
     click.option(
         "--concurrency",
-        type=click.IntRange(min=1),
+        type=click.IntRange(1, 1000),
         help="How many conversations at once.  [default: 8]",
     ),
-    click.option("--max-usd", type=float, help="Stop when so much is spent."),
+    click.option("--max-usd", type=Finite(), help="Stop when so much is spent."),
     click.option("--max-tokens", type=int, help="Stop at so many tokens."),
-    click.option("--max-minutes", type=float, help="Stop after so long, requests included."),
+    click.option("--max-minutes", type=Finite(), help="Stop after so long, requests included."),
 )
 """For agents that speak; the budgets are of the run, however often it is continued, and the minutes
 of this command."""
@@ -101,11 +104,11 @@ def _spoken_options(command: Callable[..., Any]) -> Callable[..., Any]:
     "--agent", required=True, help="Who plays: oracle, random, searcher, rl:RUN, openai:MODEL …"
 )
 @click.option("--out", type=_directory, help="The run directory.  [default: runs/SUITE-AGENT]")
-@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True)
+@click.option("--workers", type=workers_type, default=1, show_default=True)
 @click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
 @click.option("--task-ids", multiple=True, metavar="ID,…", help="Play these; may be repeated.")
 @click.option("--shard", metavar="I/N", help="Play the I-th of N parts, such as 2/8.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@seed_option
 @click.option("--backend", help="The engine: embedded or unity.  [default: the suite's]")
 @trust_option
 @click.option("--instances", help="What a type name stands for.  [default: the suite's]")
@@ -136,8 +139,6 @@ def bench(
     cannot be played is set aside and named; the others are played. The options from
     --agent-config on are for agents that speak, such as openai:MODEL.
     """
-    from rich.console import Console
-
     from agents import RL
     from agents.base import CannotGoOn
     from benchmarks.metrics import score_episode
@@ -154,7 +155,7 @@ def bench(
     from er_gym.thor import BackendError
     from er_gym.writing import file_stem
 
-    terminal = Console(stderr=True)
+    console = terminal(stderr=True)
     with bad_input(BackendError):
         part = Shard.parse(shard) if shard else None
         asked = _load_suite(suite, tasks_file, poses, protocol)
@@ -186,7 +187,7 @@ def bench(
         )
     tell_left_out(asked.name, aside, fitted.taken)
     for note in fitted.notes:
-        terminal.print(note, style="dim", markup=False, highlight=False, soft_wrap=True)
+        console.print(note, style="dim", soft_wrap=True)
 
     judge = SCORERS.get(scorer, CORRECTED)
     try:
@@ -197,7 +198,7 @@ def bench(
             succeeded = sum(score_episode(episode, judge).success for episode in before)
             with _player(store, chosen, workers, voice, trust) as (play, spent):
                 progress = Progress(
-                    terminal, f"{asked.name}, {agent}", len(chosen), len(before), succeeded, spent
+                    console, f"{asked.name}, {agent}", len(chosen), len(before), succeeded, spent
                 )
                 with progress:
                     outcome = play(
@@ -215,7 +216,7 @@ def bench(
         return STOPPED if isinstance(error, CannotGoOn) else INTERRUPTED
     print_tables(tables([load_run(out)], scorer=scorer), stdout())
     if bill:
-        terminal.print(bill, highlight=False, markup=False)
+        console.print(bill)
     if outcome.crashed:
         first = outcome.crashed[0]
         complain(

@@ -8,6 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from benchmarks.terminal import echo
+
+_LONGEST = 2_000  # characters of a complaint
+
 if TYPE_CHECKING:
     from er_gym.tasks.errors import SetAside, Taken
 
@@ -34,7 +38,10 @@ def bad_input(*more: type[Exception]) -> Iterator[None]:
 
 def complain(message: str) -> None:
     """Say something in one line on stderr."""
-    click.echo(f"er-gym: {' '.join(message.split())}", err=True)
+    text = " ".join(message.split())
+    if len(text) > _LONGEST:
+        text = f"{text[:_LONGEST]}… ({len(text) - _LONGEST:,} characters more)"
+    echo(f"er-gym: {text}", err=True)
 
 
 def tell_left_out(suite: str, set_aside: Iterable[SetAside], taken: Iterable[Taken] = ()) -> None:

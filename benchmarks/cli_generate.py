@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli_errors import BadInput, bad_input
-from benchmarks.cli_options import Span, force_option, split, workers_option
+from benchmarks.cli_options import MOST_SEED, Span, force_option, split, workers_option
+from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -36,12 +37,12 @@ _INTERRUPTED = 130
 )
 @click.option("--scenes", metavar="NAMES", help="all, training, evaluation, or rooms with commas.")
 @click.option("--types", metavar="NAMES", help="Types of tasks, with commas.  [default: all]")
-@click.option("--layouts", type=click.IntRange(min=0), help="Rearrangements of each room.")
+@click.option("--layouts", type=click.IntRange(0, 10_000), help="Rearrangements of each room.")
 @click.option("--per-layout", type=click.IntRange(min=1), help="Tasks of a type in each of them.")
 @click.option("--hidden-depth", type=Span(), help="How many containers must be opened.")
 @click.option("--distractors", type=Span(), help="How many other objects of the types named.")
 @click.option("--distance", type=Span(), help="How far it is, metres.")
-@click.option("--seed", type=click.IntRange(min=0), help="[default: the suite's, or 0]")
+@click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the suite's, or 0]")
 @click.option(
     "--paraphraser",
     metavar="MODULE:FUNCTION",
@@ -55,15 +56,13 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
     What has been made when it is interrupted is kept: the same command goes on. The same seed gives
     the same file. Beside the file comes a card, in Markdown.
     """
-    from rich.console import Console
-
     from benchmarks.counts import print_counts
     from benchmarks.making import parts_of, remove_parts
     from benchmarks.pool import WorkerSetupError
     from er_gym.tasks import jsonl_format
     from er_gym.writing import check_output, make_folder
 
-    console = Console(stderr=True)
+    console = terminal(stderr=True)
     with bad_input():
         order = _order(paraphraser=paraphraser, **given)
         paraphrase = _paraphraser(paraphraser, order) if paraphraser else None
@@ -85,7 +84,7 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
         raise BadInput(f"{error}; what is done is in {parts}") from error
     except KeyboardInterrupt:
         done = len(list(parts.glob("*.jsonl")))
-        click.echo(
+        echo(
             f"er-gym: interrupted: {done} of {len(order.making.rooms)} rooms are in {parts}; "
             "the same command goes on",
             err=True,
@@ -93,8 +92,8 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
         return _INTERRUPTED
     remove_parts(parts)
     print_counts(chosen, made.dropped)
-    click.echo(f"{len(chosen)} tasks of {verified} verified: {order.out}")
-    click.echo(f"sha256 of the tasks {jsonl_format.digest(chosen)}; card: {order.card}")
+    echo(f"{len(chosen)} tasks of {verified} verified: {order.out}")
+    echo(f"sha256 of the tasks {jsonl_format.digest(chosen)}; card: {order.card}")
     if len(chosen) < order.making.total:
         console.print(f"{order.making.total} were asked for; more layouts or rooms give more")
     return 0
@@ -228,9 +227,15 @@ def _paraphraser(spec: str, order: _Order) -> Any:
 
     def asked(prompt: str) -> str:
         try:
-            return ask(prompt)
-        except Exception as error:  # it is the user's, and may raise anything
+            reply = ask(prompt)
+        except (Exception, SystemExit) as error:  # it is the user's, and may raise anything
             raise RuntimeError(f"{spec} raised {type(error).__name__}: {error}") from error
+        if not isinstance(reply, str):
+            raise RuntimeError(
+                f"{spec} returned {type(reply).__name__}, not a text; let it return its reply, "
+                "as str"
+            )
+        return reply
 
     return Paraphraser(asked, order.out.with_name(f"{order.name}.paraphrases.jsonl"))
 

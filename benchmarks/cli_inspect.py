@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli_errors import CRASHED, BadInput, bad_input, complain
-from benchmarks.cli_options import agent_config_option, overrides_option
+from benchmarks.cli_options import agent_config_option, overrides_option, seed_option
+from benchmarks.terminal import echo
 
 if TYPE_CHECKING:
     from inspect_ai.log import EvalLog
@@ -22,10 +23,10 @@ if TYPE_CHECKING:
 @agent_config_option
 @overrides_option("sees=text")
 @click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@seed_option
 @click.option(
     "--concurrency",
-    type=click.IntRange(min=1),
+    type=click.IntRange(1, 256),
     default=4,
     show_default=True,
     help="How many conversations at once, each with an engine in a process of its own.",
@@ -80,8 +81,8 @@ def _say(log: EvalLog) -> int:
     for metric in results:
         mean = metric.metrics.get("mean")
         if mean is not None:
-            click.echo(f"{metric.name}: {mean.value:.3f}")
-    click.echo(log.location)
+            echo(f"{metric.name}: {mean.value:.3f}")
+    echo(log.location)
     if log.status == "success":
         return 0
     why = log.error.message if log.error else "cancelled"

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
-import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 SCORER_CHOICES = ("both", "paper", "corrected")
 """As in ``benchmarks.report``, which is too heavy to import for ``--help``; a test compares."""
@@ -34,9 +31,20 @@ protocol_option = click.option(
     "that stand beside its table.",
 )
 
+_MOST_WORKERS = 256
+"""Each takes a hundred megabytes and more."""
+MOST_SEED = 2**32 - 1
+"""NumPy's and PyTorch's generators take no larger one."""
+
+seed_option = click.option(
+    "--seed", type=click.IntRange(0, MOST_SEED), default=0, show_default=True
+)
+
+workers_type = click.IntRange(1, _MOST_WORKERS)
+
 workers_option = click.option(
     "--workers",
-    type=click.IntRange(min=1),
+    type=workers_type,
     default=os.cpu_count() or 1,
     help="How many processes.  [default: one for each processor]",
 )
@@ -72,6 +80,16 @@ def split(*lists: str | None) -> list[str]:
     return [word.strip() for text in lists for word in (text or "").split(",") if word.strip()]
 
 
+class Finite(click.FloatRange):
+    """A number in a range, or any, but neither NaN nor infinite."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is no finite number", param, ctx)
+        return float(number)
+
+
 class Span(click.ParamType):
     """``3``, ``2-5`` or ``4-``: from and to, both included."""
 
@@ -84,10 +102,3 @@ class Span(click.ParamType):
             return start, (float(high) if high else None) if dash else start
         except ValueError:
             self.fail(f"{value!r} is no range; give a number, A-B, or A- for no end", param, ctx)
-
-
-def stdout() -> Console:
-    """Tables are as wide as the terminal, and as wide as they need to be in a file."""
-    from rich.console import Console
-
-    return Console(width=None if sys.stdout.isatty() else 240)

@@ -7,6 +7,7 @@ import sys
 import click
 
 from benchmarks.cli_errors import bad_input
+from benchmarks.terminal import echo
 
 
 @click.group()
@@ -19,7 +20,7 @@ def path() -> None:
     """Print what Controller(local_executable_path=…, x_display=":0") is to launch."""
     from er_gym.thor import thor_executable
 
-    click.echo(thor_executable())
+    echo(thor_executable())
 
 
 @player.command()
@@ -43,17 +44,17 @@ def install(force: bool, python: str | None) -> None:
     with bad_input(players.PlayerError):
         installed = players.install(force=force, python=python or sys.executable)
     for release in installed.releases:
-        click.echo(f"{release.platform}: {release.path}")
-    click.echo(f"for {version_of_client()}; programs on another version of it are not served")
+        echo(f"{release.platform}: {release.path}")
+    echo(f"for {version_of_client()}; programs on another version of it are not served")
     if installed.hook is not None:
-        click.echo(f"hook: {installed.hook}")
+        echo(f"hook: {installed.hook}")
     else:
-        click.echo(
+        echo(
             "no hook, for the site-packages of Python cannot be written: AI2-THOR's client "
             "still asks for an X server or a Vulkan library; er-gym doctor says what to do"
         )
     for build in installed.pruned:
-        click.echo(f"AI2-THOR's client keeps three builds: at its next start it deletes {build}")
+        echo(f"AI2-THOR's client keeps three builds: at its next start it deletes {build}")
 
 
 @player.command()
@@ -64,11 +65,11 @@ def uninstall() -> None:
 
     with bad_input(players.PlayerError):
         unity = players.uninstall()
-    click.echo(f"removed from {client_home()}")
+    echo(f"removed from {client_home()}")
     for release in unity:
-        click.echo(f"Unity's build is there again: {release.path}")
+        echo(f"Unity's build is there again: {release.path}")
     for path in players.still_aside():
-        click.echo(f"left where it is, for its place is taken: {path}")
+        echo(f"left where it is, for its place is taken: {path}")
 
 
 @click.command()
@@ -81,5 +82,5 @@ def doctor() -> int:
     for finding in findings:
         mark = "ok" if finding.works else "--"
         mend = f"; {finding.mend}" if finding.mend else ""
-        click.echo(f"{mark}  {finding.what:{widest}}  {finding.says}{mend}")
+        echo(f"{mark}  {finding.what:{widest}}  {finding.says}{mend}")
     return 0 if all(finding.works for finding in findings if finding.needed) else 1

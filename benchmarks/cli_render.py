@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from benchmarks.cli_errors import BadInput, bad_input
-from benchmarks.cli_options import force_option
+from benchmarks.cli_options import Finite, force_option, seed_option
+from benchmarks.terminal import echo
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
 WHAT = ("rgb", "depth", "ids", "map")
+_ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+_ENDINGS_OF_DEPTH = (".png", ".tif", ".tiff")
+"""Those that hold 16 bits."""
 _DEPTH_UNIT = 1000.0
 """Depth pictures are 16 bit, so many steps a metre."""
 _ABOVE = 60.0
@@ -27,7 +32,7 @@ _ABOVE = 60.0
 @click.option("--what", type=click.Choice(WHAT), default="rgb", show_default=True)
 @click.option("--width", type=click.IntRange(64, 1920), default=800, show_default=True)
 @click.option("--height", type=click.IntRange(64, 1280), default=450, show_default=True)
-@click.option("--fov", type=click.FloatRange(30, 150), default=90, show_default=True)
+@click.option("--fov", type=Finite(30, 150), default=90, show_default=True)
 @click.option("--annotate", is_flag=True, help="Write the types of things into the picture.")
 @click.option(
     "--out", default=Path("room.png"), show_default=True,
@@ -46,13 +51,16 @@ def render(
     from PIL import Image
 
     from er_gym.thor import SCENE_NAMES, UnknownSceneError, make_controller
-    from er_gym.writing import check_output, picture_format, write_picture
+    from er_gym.writing import check_output, write_picture
 
-    with bad_input():
-        picture_format(out)
-        check_output(out, force=force)
     if scene not in SCENE_NAMES:
         raise BadInput(str(UnknownSceneError(scene)))
+    endings = _ENDINGS_OF_DEPTH if what == "depth" else _ENDINGS
+    if out.suffix.lower() not in endings:
+        raise BadInput(f"--out {out}: such a picture's name ends in one of: {', '.join(endings)}")
+    with bad_input():
+        check_output(out, force=force)
+    stand = None if pose is None else _pose(pose)
     controller = make_controller(
         scene=scene,
         width=width,
@@ -62,8 +70,8 @@ def render(
         renderInstanceSegmentation=what == "ids" or annotate,
         snapToGrid=False,
     )
-    if pose is not None:
-        _stand(controller, pose)
+    if stand is not None:
+        _stand(controller, stand)
     event = controller.last_event
     if what == "map":
         event = _from_above(controller)
@@ -82,21 +90,31 @@ def render(
         write_picture(out, Image.fromarray(frame), force=force)
     agent = event.metadata["agent"]
     at = agent["position"]
-    click.echo(
+    echo(
         f"{out}: {what} of {scene} from ({at['x']:.2f}, {at['z']:.2f}), rotation "
         f"{agent['rotation']['y']:g}, horizon {agent['cameraHorizon']:g}"
     )
 
 
-def _stand(controller: Any, pose: str) -> None:
-    """Put the agent at a pose given in words."""
+def _pose(text: str) -> tuple[float, float, float, float]:
+    """X, z, rotation and horizon of a pose given in words; metres and degrees."""
+    found: tuple[float, ...]
     try:
-        x, z, rotation, *horizon = (float(number) for number in pose.split(","))
-        (tilt,) = horizon or (0.0,)
+        found = tuple(float(number) for number in text.split(","))
     except ValueError:
+        found = ()
+    if len(found) not in (3, 4) or not all(map(math.isfinite, found)):
         raise BadInput(
-            f"{pose!r} is no pose; say X,Z,ROTATION or X,Z,ROTATION,HORIZON, such as 1.0,-0.5,90"
-        ) from None
+            f"{text!r:.80} is no pose; say X,Z,ROTATION or X,Z,ROTATION,HORIZON, such as "
+            "1.0,-0.5,90"
+        )
+    x, z, rotation, tilt = (*found, 0.0)[:4]
+    return x, z, rotation, tilt
+
+
+def _stand(controller: Any, pose: tuple[float, float, float, float]) -> None:
+    """Put the agent at a pose."""
+    x, z, rotation, tilt = pose
     agent = controller.last_event.metadata["agent"]["position"]
     event = controller.step(
         action="TeleportFull", position={"x": x, "y": agent["y"], "z": z},
@@ -126,7 +144,7 @@ def _from_above(controller: Any) -> Any:
 @click.option("--suite", default="mini", show_default=True, help="Where the task is from.")
 @click.option("--task", "task_id", help="Its id.  [default: one by chance]")
 @click.option("--scene", help="A task by chance in this scene.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@seed_option
 @click.option(
     "--frames", default=Path("frames"), show_default=True,
     type=click.Path(file_okay=False, path_type=Path), help="Where each step's picture goes.",
@@ -158,7 +176,7 @@ def play(
     step = 0
     while True:
         _keep(obs["rgb"], frames / f"{step:03d}.png", show, force)
-        click.echo(f"\n{obs['text']}")
+        echo(f"\n{obs['text']}")
         try:
             said = click.prompt("What do you do", default="quit", show_default=True)
         except click.Abort:
@@ -168,14 +186,14 @@ def play(
         obs, reward, terminated, truncated, info = env.step(said)
         step += 1
         if reward:
-            click.echo(f"reward {reward:g}")
+            echo(f"reward {reward:g}")
         if terminated or truncated:
             _keep(obs["rgb"], frames / f"{step:03d}.png", show, force)
             outcome = "solved" if info["success"] else f"not solved ({info['end_reason']})"
-            click.echo(f"\n{obs['text']}\n{outcome} after {info['steps']} steps")
+            echo(f"\n{obs['text']}\n{outcome} after {info['steps']} steps")
             break
     env.close()
-    click.echo(f"pictures in {frames}")
+    echo(f"pictures in {frames}")
 
 
 def _keep(frame: NDArray[np.uint8], file: Path, show: Any, force: bool) -> None:

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli_errors import INTERRUPTED, BadInput, bad_input, complain
-from benchmarks.cli_options import agent_config_option, overrides_option
+from benchmarks.cli_options import Finite, agent_config_option, overrides_option
+from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from agents.vlm.serving import Command
@@ -53,7 +54,7 @@ _TERMINATED = 143
 )
 @click.option(
     "--patience",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Finite(min=0, min_open=True),
     default=1200.0,
     show_default=True,
     metavar="SECONDS",
@@ -96,7 +97,7 @@ def serve(
     with bad_input():
         command = command_for(model, wanted, look_around(python))
     if dry_run:
-        click.echo(_as_shell(command))
+        echo(_as_shell(command))
         return 0
     return run_server(command, patience=patience, verbose=verbose)
 
@@ -145,14 +146,14 @@ def run_server(command: Command, *, patience: float, verbose: bool = False) -> i
     from benchmarks.server_process import ServerError, ServerProcess
 
     before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
-    show = partial(click.echo, err=True)
+    show = partial(echo, err=True)
     listeners = [show] if verbose else []
     try:
         with ServerProcess(command.argv, command.environment, *listeners) as server:
             try:
                 seconds = _wait(server, command, patience, verbose)
-                click.echo(f"ready after {seconds:.0f} s: {command.base_url}")
-                click.echo(_how_to_play(command))
+                echo(f"ready after {seconds:.0f} s: {command.base_url}")
+                echo(_how_to_play(command))
                 server.wait()
             except ServerError as error:
                 server.stop()
@@ -168,19 +169,18 @@ def run_server(command: Command, *, patience: float, verbose: bool = False) -> i
 
 def _wait(server: ServerProcess, command: Command, patience: float, verbose: bool) -> float:
     """Wait with a line that tells how it goes, where there is a terminal to show it on."""
-    from rich.console import Console
     from rich.text import Text
 
-    terminal = Console(stderr=True)
-    if verbose or not terminal.is_terminal:
-        click.echo(f"starting {command.engine} for {command.name}", err=True)
+    console = terminal(stderr=True)
+    if verbose or not console.is_terminal:
+        echo(f"starting {command.engine} for {command.name}", err=True)
         return server.wait_until_ready(command.ready_url, patience)
-    with terminal.status(f"starting {command.engine}") as line:
+    with console.status(f"starting {command.engine}") as line:
         return server.wait_until_ready(
             command.ready_url,
             patience,
             lambda since, last: line.update(
-                Text(f"{command.engine}, {since:.0f} s: {last}"[: terminal.width - 4])
+                Text(f"{command.engine}, {since:.0f} s: {last}"[: console.width - 4])
             ),
         )
 

@@ -11,6 +11,7 @@ import click
 from benchmarks.cli_errors import BadInput, bad_input, tell_left_out
 from benchmarks.cli_generate import generate
 from benchmarks.cli_options import force_option, split, workers_option
+from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from er_gym.tasks.suites import Suite
@@ -36,15 +37,13 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
     """
     from contextlib import closing
 
-    from rich.console import Console
-
     from benchmarks.pool import Lost, do_jobs
     from benchmarks.progress import Progress
     from er_gym.envs.verify import Verifier
     from er_gym.tasks.errors import in_short
     from er_gym.tasks.resolve import resolve_tasks
 
-    console = Console(stderr=True)
+    console = terminal(stderr=True)
     failed = 0
     for name in suites:
         with bad_input():
@@ -55,7 +54,7 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
                 raise BadInput(f"{suite.name}: no task can be played: {in_short(aside)}")
         tell_left_out(suite.name, (), fitted.taken)
         for one in aside:
-            click.echo(f"{suite.name}: set aside: {one}")
+            echo(f"{suite.name}: set aside: {one}")
         solved = 0
         with (
             Progress(console, suite.name, len(todo)) as progress,
@@ -67,11 +66,11 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
                 progress.episode(not problem)
                 if problem:
                     detail = "" if isinstance(verdict, Lost) else f": {verdict.detail}"
-                    click.echo(f"{suite.name}: {task.id}: {problem}{detail}")
+                    echo(f"{suite.name}: {task.id}: {problem}{detail}")
         every = len(todo) + len(aside)
         failed += every - solved
         told = f"; {len(aside)} set aside" if aside else ""
-        click.echo(f"{suite.name}: {solved} of {every} tasks can be done{told}")
+        echo(f"{suite.name}: {solved} of {every} tasks can be done{told}")
     return 1 if failed else 0
 
 
@@ -121,10 +120,12 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
     pages = []
     for task in fitted.tasks:
         told = task.extra.get("difficulty")  # whoever wrote the file may mean something else by it
-        known = isinstance(told, Mapping) and all(name in told for name in names)
+        known = isinstance(told, Mapping) and all(
+            type(told.get(name)) in (int, float) for name in names
+        )
         figures = Difficulty(**{name: told[name] for name in names}) if known else None
         pages.append(describe(task, figures))
-    click.echo("\n\n".join(pages))
+    echo("\n\n".join(pages))
 
 
 @tasks.command()
@@ -147,7 +148,7 @@ def stats(suite: str, out: Path | None, force: bool) -> None:
             from benchmarks.charts import draw_charts
 
             for file in draw_charts(found.tasks, out, found.name, force=force):
-                click.echo(file)
+                echo(file)
 
 
 @tasks.command()
@@ -179,7 +180,7 @@ def convert(suite: str, out: Path, force: bool) -> None:
             raise BadInput(f"{out}: give FILE.json, FILE.jsonl, FILE.jsonl.gz or a folder")
         else:
             write_generator_tasks(out, found, force=force)
-    click.echo(f"{len(found)} tasks: {out}")
+    echo(f"{len(found)} tasks: {out}")
 
 
 # -- parts ----------------------------------------------------------------------------------------

@@ -8,7 +8,8 @@ from typing import Any
 import click
 
 from benchmarks.cli_errors import INTERRUPTED, BadInput, bad_input, complain
-from benchmarks.cli_options import overrides_option, trust_option
+from benchmarks.cli_options import MOST_SEED, overrides_option, trust_option
+from benchmarks.terminal import echo
 
 
 @click.command(name="train-rl")
@@ -19,7 +20,7 @@ from benchmarks.cli_options import overrides_option, trust_option
     help="A training run in YAML, or the name of one that comes with er-gym.",
 )
 @overrides_option("total_steps=20000 or env.types=[single_search]")
-@click.option("--seed", type=click.IntRange(min=0), help="[default: the configuration's]")
+@click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the configuration's]")
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
@@ -50,7 +51,7 @@ def train_rl(
     try:
         with bad_input():
             model = training.train(wanted, run, show_progress=True, trust=trust)
-    except (RuntimeError, EOFError) as error:
+    except (RuntimeError, EOFError, MemoryError) as error:
         raise click.ClickException(f"{error}; what has been learnt is in {run}") from error
     except KeyboardInterrupt:
         kept = run.exists()
@@ -64,9 +65,9 @@ def train_rl(
 def _say_result(run: Path, model: Any) -> None:
     from agents.rl.callbacks import read_curve
 
-    click.echo(f"{model.num_timesteps:,} steps: {run}")
+    echo(f"{model.num_timesteps:,} steps: {run}")
     looked = [line for line in read_curve(run) if "eval/success_rate" in line]
     if looked:
         rate = looked[-1]["eval/success_rate"]
-        click.echo(f"success on the episodes of evaluation: {100 * rate:.1f} %")
-    click.echo(f"er-gym bench --suite mini --instances explore --agent rl:{run}")
+        echo(f"success on the episodes of evaluation: {100 * rate:.1f} %")
+    echo(f"er-gym bench --suite mini --instances explore --agent rl:{run}")

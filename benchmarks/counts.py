@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from rich.console import Console
-
 from benchmarks.tables import Table, print_tables
+from benchmarks.terminal import stdout
 from er_gym.tasks.rooms import ROOM_KINDS, room_kind
 from er_gym.tasks.splits import split
 from er_gym.tasks.task import Task
@@ -40,7 +38,7 @@ def print_counts(
         found += [_scene_table(chosen), _count_table("Splits", Counter(map(split, chosen)))]
     if dropped:
         found.append(_count_table("Dropped", dropped))
-    print_tables(found, _stdout())
+    print_tables(found, stdout())
 
 
 def _scene_table(chosen: Sequence[Task]) -> Table:
@@ -63,7 +61,3 @@ def _count_table(title: str, counts: Mapping[str, int]) -> Table:
 
     rows = tuple((name, str(n)) for name, n in sorted(counts.items(), key=lambda item: -item[1]))
     return Table(title, (title, "Tasks"), rows, 1)
-
-
-def _stdout() -> Console:
-    return Console(width=None if sys.stdout.isatty() else 240)

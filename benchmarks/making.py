@@ -25,7 +25,6 @@ from er_gym.envs.verify import Verifier, unwanted, with_difficulty
 from er_gym.tasks import jsonl_format
 from er_gym.tasks.generate import Generator, arranged, select_balanced
 from er_gym.tasks.making import Making
-from er_gym.tasks.reading import read_json_lines
 from er_gym.tasks.start import Start
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TASK_TYPES

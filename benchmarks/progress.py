@@ -31,7 +31,7 @@ class Progress:
     """A context manager; call :meth:`episode` for each that is over.
 
     Args:
-        console: where to.
+        console: where to, a :func:`~benchmarks.terminal.terminal`.
         title: what is played.
         total: how many episodes there are.
         done: how many of them were there before.
@@ -80,17 +80,12 @@ class Progress:
         if not self._console.is_terminal and lines > (self._done - 1) * _LINES // self._total:
             self._console.print(
                 f"{self._title}: {self._done}/{self._total} episodes, {self._status()}",
-                markup=False,
-                emoji=False,
-                highlight=False,
                 soft_wrap=True,
             )
 
     def say(self, what: object) -> None:
         """Print a line, above the bar where there is one; from any thread."""
-        self._console.print(
-            str(what), style="dim", markup=False, emoji=False, highlight=False, soft_wrap=True
-        )
+        self._console.print(str(what), style="dim", soft_wrap=True)
 
     def _status(self) -> str:
         if not self._done:

@@ -58,9 +58,9 @@ class Episodes(_Model):
     types: tuple[str, ...] = ()
     obs_mode: Literal["state", "rgb+state"] = "state"
     instruction: str = ""
-    width: Positive = 128
-    height: Positive = 72
-    frames: Positive = 1
+    width: Annotated[int, Field(gt=0, le=2048)] = 128
+    height: Annotated[int, Field(gt=0, le=2048)] = 72
+    frames: Annotated[int, Field(gt=0, le=64)] = 1
     instances: Literal["explore", "target"] = EXPLORE  # type: ignore[assignment]
     step_penalty: float = Field(0.01, ge=0)
     illegal_penalty: float = Field(0.0, ge=0)
@@ -74,8 +74,8 @@ class Episodes(_Model):
 class Vectorised(_Model):
     """How many environments, in how many processes."""
 
-    envs: Positive = 128
-    workers: Positive = 2
+    envs: Annotated[int, Field(gt=0, le=4096)] = 128
+    workers: Annotated[int, Field(gt=0, le=256)] = 2
 
 
 class Evaluation(_Model):
@@ -122,8 +122,8 @@ class WarmStart(_Model):
 class Network(_Model):
     """The network: ``width`` of its layers, and length ``kind`` of a type's learnt vector."""
 
-    width: Positive = 64
-    kind: Positive = 16
+    width: Annotated[int, Field(gt=0, le=8192)] = 64
+    kind: Annotated[int, Field(gt=0, le=8192)] = 16
 
 
 class PPO(_Model):
@@ -150,7 +150,7 @@ class DQN(_Model):
 
     name: Literal["dqn", "qrdqn"]
     learning_rate: Rate = 1e-3
-    buffer_size: Positive = 50_000
+    buffer_size: Annotated[int, Field(gt=0, le=10_000_000)] = 50_000
     learning_starts: int = Field(5_000, ge=0)
     batch_size: Positive = 128
     gamma: Fraction = 0.97
@@ -160,7 +160,7 @@ class DQN(_Model):
     exploration_fraction: Fraction = 0.1
     exploration_final_eps: Fraction = 0.05
     max_grad_norm: Rate = 10.0
-    quantiles: Positive = 10
+    quantiles: Annotated[int, Field(gt=0, le=1000)] = 10
 
 
 Algorithm = Annotated[PPO | DQN, Field(discriminator="name")]
@@ -186,7 +186,7 @@ class TrainConfig(_Model):
 
     algorithm: Algorithm = PPO()
     total_steps: Positive
-    seed: int = Field(0, ge=0)
+    seed: int = Field(0, ge=0, lt=2**32)
     env: Episodes = Episodes()
     vec: Vectorised = Vectorised()
     evaluation: Evaluation | None = Evaluation()
@@ -194,7 +194,7 @@ class TrainConfig(_Model):
     warm_start: WarmStart | None = None
     network: Network = Network()
     checkpoint_every: Positive = 50_000
-    threads: Positive = 1
+    threads: Annotated[int, Field(gt=0, le=256)] = 1
     tensorboard: bool = True
     wandb: str = ""
 

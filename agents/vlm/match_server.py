@@ -13,6 +13,7 @@ one line, and a status of 4xx or 5xx.
 
 from __future__ import annotations
 
+import socket
 from dataclasses import asdict
 from typing import Annotated
 
@@ -91,10 +92,20 @@ def serve(matcher: Matcher, port: int) -> None:
         port: of this machine; any free one for 0.
 
     Raises:
-        ValueError: the matcher's model cannot be loaded.
-        SystemExit: the port cannot be had; the reason has been printed.
+        ValueError: the matcher's model cannot be loaded, or the port cannot be had.
     """
     matcher.prepare()
-    server = make_server(HOST, port, make_app(matcher), threaded=True)
+    app = make_app(matcher)
+    with socket.socket() as listening:  # ours, for werkzeug ends the process if it cannot have it
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listening.bind((HOST, port))
+            listening.listen()
+        except OSError as error:
+            raise ValueError(
+                f"port {port} of {HOST} cannot be had ({error.strerror}); choose another --port, "
+                "or 0 for a free one"
+            ) from error
+        server = make_server(HOST, port, app, threaded=True, fd=listening.fileno())
     print(f"http://{HOST}:{server.server_port}", flush=True)
     server.serve_forever()

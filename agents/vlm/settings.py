@@ -18,6 +18,7 @@ def _no_bool(value: object) -> object:
 
 
 Positive = Annotated[int, BeforeValidator(_no_bool), Field(gt=0)]
+Pixels = Annotated[int, BeforeValidator(_no_bool), Field(gt=0, le=8192)]
 Seconds = Annotated[float, BeforeValidator(_no_bool), Field(gt=0, le=86_400)]
 Dollars = Annotated[float, BeforeValidator(_no_bool), Field(ge=0, le=1_000_000)]
 
@@ -46,8 +47,8 @@ class Pictures(_Settings):
     max_pixels: Positive = 351_232
     keep: int | None = Field(None, ge=0)
     views: bool = True
-    width: Positive | None = None
-    height: Positive | None = None
+    width: Pixels | None = None
+    height: Pixels | None = None
 
     @model_validator(mode="after")
     def _bounds_in_order(self) -> Pictures:

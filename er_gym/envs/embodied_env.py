@@ -39,7 +39,7 @@ from er_gym.tasks.start import begin
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import TaskType
 from er_gym.tasks.types import task_type as look_up_type
-from er_gym.thor import BACKENDS, RENDER_DEVICES, make_controller
+from er_gym.thor import BACKENDS, RENDER_DEVICES, check_size, make_controller
 from er_gym.thor.objects import ENTRY_KEYS
 
 MAX_UNKNOWN = 3
@@ -132,8 +132,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
       :class:`~er_gym.envs.sources.EpisodeSource`.
     - ``task_type``: draw tasks of this type only.
     - ``backend``: ``"embedded"`` or ``"unity"`` (:func:`er_gym.thor.make_controller`).
-    - ``width``, ``height`` pixels; ``field_of_view`` degrees, vertical; ``grid_size`` and
-      ``visibility_distance`` metres.
+    - ``width``, ``height`` pixels, such as 4096 by 4096 at most; ``field_of_view`` degrees,
+      vertical; ``grid_size`` and ``visibility_distance`` metres.
     - ``instances``: ``"target"``: a type name stands for the task's object of that type first, as
       in the paper; ``"explore"``: for the nearest not yet visited (navigation) or the nearest
       (interaction), whatever the task.
@@ -191,6 +191,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             one_of("render_mode", render_mode, self.metadata["render_modes"])
         width = whole("width", width, 1, _LARGEST_SIDE)
         height = whole("height", height, 1, _LARGEST_SIDE)
+        check_size(width, height)
         annotate = flag("annotate", annotate)
         self._backend = one_of("backend", backend, BACKENDS)
         self._grid_size = number("grid_size", grid_size, _SMALLEST_GRID, _LARGEST_GRID)

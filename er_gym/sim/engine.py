@@ -13,6 +13,7 @@ from er_gym.sim.lazy import LazyMetadata
 from er_gym.sim.metadata import metadata
 from er_gym.sim.render.view import View, draw, with_flags
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError, load_scene
+from er_gym.sim.size import check_size
 from er_gym.sim.world import Settings, World
 
 
@@ -22,6 +23,9 @@ class Engine:
     Args:
         width, height: size of frames, pixels.
         metadata_kind: the class of the metadata that :meth:`step` returns.
+
+    Raises:
+        ValueError: no frame is of that size, see :func:`~er_gym.sim.size.check_size`.
     """
 
     def __init__(
@@ -30,6 +34,7 @@ class Engine:
         height: int = 300,
         metadata_kind: type[LazyMetadata] = LazyMetadata,
     ) -> None:
+        check_size(width, height)
         self._kind = metadata_kind
         self._last: ReferenceType[LazyMetadata] | None = None
         self.world = World.load(load_scene(SCENE_NAMES[0]), Settings(width=width, height=height))

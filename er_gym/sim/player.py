@@ -22,6 +22,7 @@ from typing import Any
 from er_gym.sim.engine import Engine
 from er_gym.sim.protocol import Field, images
 from er_gym.sim.render.view import View
+from er_gym.sim.size import check_size
 from er_gym.sim.transports import TRANSPORTS, Message, Transport
 
 NOT_BY_THE_CLIENT = 2
@@ -100,6 +101,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = dict(pairwise(words))  # Unity's come as `-name value`, and so does ours
     _end_with(int(given.get("-parent", os.getppid())))
     width, height = (int(given.get(f"-screen-{side}", 300)) for side in ("width", "height"))
+    try:
+        check_size(width, height)
+    except ValueError as error:
+        print(f"er-gym's player: {error}", file=sys.stderr)
+        return NOT_BY_THE_CLIENT
     try:
         client = transport(os.environ)
         player = Player(width, height, client)

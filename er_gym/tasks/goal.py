@@ -11,6 +11,18 @@ from er_gym.thor.objects import is_there
 
 _CUT_UP = frozenset({"isSliced", "isBroken"})
 
+STATES: Mapping[str, tuple[bool | str, ...]] = {
+    **dict.fromkeys(
+        (
+            "isToggled", "isOpen", "isSliced", "isCooked", "isBroken", "isDirty",
+            "isFilledWithLiquid", "isUsedUp", "isPickedUp", "isMoving",
+        ),
+        (True, False),
+    ),
+    "temperature": ("Hot", "Cold", "RoomTemp"),
+}  # fmt: skip
+"""What a goal may ask of an object's metadata, and the values that each has."""
+
 State = tuple[tuple[str, bool | str], ...]
 """Fields of AI2-THOR's object metadata, such as ``isToggled``, with the values they must have."""
 
@@ -26,7 +38,10 @@ class Condition:
         in_reach: the agent must be where an object of that type can be seen and handled.
         inside: the type of a receptacle that it must lie in or on, ``""`` for anywhere. What lies
             in a SinkBasin is in the Sink, too; what lies on the rim of a Sink is not in its basin.
-        state: what its metadata must say.
+        state: what its metadata must say, of :data:`STATES`.
+
+    Raises:
+        ValueError: the metadata have no such state, or not with that value.
     """
 
     object_type: str
@@ -35,6 +50,16 @@ class Condition:
     in_reach: bool = False
     inside: str = ""
     state: State = ()
+
+    def __post_init__(self) -> None:
+        for name, value in self.state:
+            allowed = STATES.get(name)
+            if allowed is None:
+                raise ValueError(f"unknown state {name!r}; choose one of: {', '.join(STATES)}")
+            if (type(value), value) not in [(type(one), one) for one in allowed]:
+                raise ValueError(
+                    f"state {name} is one of {', '.join(map(str, allowed))}, not {value!r}"
+                )
 
     def __str__(self) -> str:
         """In words: "Potato is in Plate, isCooked"."""

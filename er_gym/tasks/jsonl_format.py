@@ -17,7 +17,7 @@ from dataclasses import asdict, astuple, replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, field_validator
 
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import (
@@ -75,6 +75,12 @@ class ConditionRecord(_Strict):
     in_reach: bool = False
     inside: str = ""
     state: dict[str, bool | str] = {}
+
+    @field_validator("state")
+    @classmethod
+    def _known(cls, state: dict[str, bool | str]) -> dict[str, bool | str]:
+        Condition("", state=tuple(state.items()))
+        return state
 
     @classmethod
     def of(cls, condition: Condition) -> ConditionRecord:

@@ -35,7 +35,7 @@ class Making(BaseModel):
     total: int = Field(gt=0)
     scenes: str | tuple[str, ...] = "all"
     types: tuple[str, ...] = ()
-    layouts: int = Field(0, ge=0)
+    layouts: int = Field(0, ge=0, le=10_000)
     per_layout: int = Field(3, gt=0)
     unseen_objects: bool = True
     hidden_depth: Span = (0, None)

@@ -7,7 +7,6 @@ so that it is asked once; what is kept is checked anew each time it is used.
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import os
 import re
@@ -19,7 +18,6 @@ from typing import TypeAlias
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.plugins import Registry
-from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import parse_json, read_bytes
 from er_gym.thor import OBJECT_TYPES

@@ -2,6 +2,7 @@
 
 from er_gym.sim.compatibility import accepts, placement_table
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError
+from er_gym.sim.size import check_size
 from er_gym.thor.backends import BACKENDS, RENDER_DEVICES, BackendError, make_controller
 from er_gym.thor.launcher import thor_executable
 from er_gym.thor.object_types import OBJECT_TYPES, ObjectType
@@ -17,6 +18,7 @@ __all__ = [
     "ObjectType",
     "UnknownSceneError",
     "accepts",
+    "check_size",
     "make_controller",
     "objects_of",
     "placement_table",

@@ -8,6 +8,7 @@ from er_gym.sim.actions.checks import field_of_view, within
 from er_gym.sim.actions.move import snap_to_grid
 from er_gym.sim.actions.registry import action, quoted
 from er_gym.sim.errors import ActionFailed
+from er_gym.sim.size import LARGEST_SIDE, check_size
 from er_gym.sim.space.visibility import NEAR_PLANE
 from er_gym.sim.world import World
 
@@ -89,8 +90,12 @@ def initialize(
 @action("ChangeResolution")
 def change_resolution(world: World, *, x: int, y: int) -> None:
     """Set the width and height of frames in pixels."""
-    within("x", x, 1, 8192)
-    within("y", y, 1, 8192)
+    within("x", x, 1, LARGEST_SIDE)
+    within("y", y, 1, LARGEST_SIDE)
+    try:
+        check_size(x, y)
+    except ValueError as error:
+        raise ActionFailed(f"{error}.") from None
     world.configure(width=x, height=y)
 
 
