@@ -107,5 +107,5 @@ def serve(matcher: Matcher, port: int) -> None:
                 "or 0 for a free one"
             ) from error
         server = make_server(HOST, port, app, threaded=True, fd=listening.fileno())
-    print(f"http://{HOST}:{server.server_port}", flush=True)
-    server.serve_forever()
+        print(f"http://{HOST}:{listening.getsockname()[1]}", flush=True)
+        server.serve_forever()

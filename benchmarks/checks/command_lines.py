@@ -1,0 +1,232 @@
+"""Tries ``er-gym`` with command lines that are wrong in hundreds of ways.
+
+    python -m benchmarks.checks.command_lines [WORD …]
+
+Each line of :mod:`benchmarks.checks.bad_commands` that holds the given words is run in an empty
+folder of its own. What must hold for all: the exit code is right; a few lines on stderr say why,
+and none of them is a traceback; nothing that a terminal would obey is printed; it ends in time, with
+less than 500 MB of memory; and nothing is left behind or changed. Most lines are run by the
+command's own entry point in a fork of this process, which has imported the command already; every
+tenth is run as a process from its start. Prints what falls short; the exit code says whether
+anything does.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import resource
+import shutil
+import signal
+import socket
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+import benchmarks.report
+import benchmarks.runner
+import benchmarks.spoken  # noqa: F401  # imported once, not in each fork
+from benchmarks import cli
+from benchmarks.checks.bad_commands import Line, lines
+from benchmarks.checks.bad_files import make
+
+_AT_ONCE = 2
+_REAL_EVERY = 10
+_SECONDS, _CPU_SECONDS = 120.0, 20.0
+"""That a line may take on a busy machine, and of a processor; most take a tenth of one."""
+_MEGABYTES = 500
+_LINES, _CHARACTERS = 3, 2_500
+"""That stderr may have."""
+_RAW = re.compile(b"[\x00-\x08\x0b-\x1f\x7f]|\xc2[\x80-\x9f]|\xe2\x80[\xa8-\xae]")
+"""What a terminal obeys, in UTF-8, but for tab and newline."""
+_ROOT = Path(__file__).resolve().parents[2]
+
+
+def main(words: Sequence[str]) -> int:
+    """Try all, and print what falls short."""
+    chosen = [line for line in lines() if all(word in str(line) for word in words)]
+    began, short = time.monotonic(), 0
+    with tempfile.TemporaryDirectory() as directory, _taken_port() as port:
+        top = Path(directory)
+        make(top / "files")
+        before = _state(top / "files")
+        for ended in _ends(chosen, top, port):
+            problems = [*_problems(ended)]
+            now = _state(top / "files")
+            if now != before:
+                problems.append(f"changed files: {sorted(now ^ before)[:3]}")
+                before = now
+            for problem in problems:
+                short += 1
+                print(f"er-gym {str(ended.line)!r}: {problem}", flush=True)
+            shutil.rmtree(ended.folder, ignore_errors=True)
+    seconds = time.monotonic() - began
+    print(f"{len(chosen)} command lines in {seconds:.0f} s: {short} fall short")
+    return int(short > 0)
+
+
+@dataclass(frozen=True)
+class _Ended:
+    """A line that has been run.
+
+    Attributes:
+        line: which.
+        folder: with ``work``, where it was run, its home, ``out`` and ``err``.
+        code: of its end; below 0 the signal that ended it.
+        seconds, cpu_seconds, megabytes: that it took.
+        left: whether processes of it had to be ended.
+    """
+
+    line: Line
+    folder: Path
+    code: int
+    seconds: float
+    cpu_seconds: float
+    megabytes: int
+    left: bool
+
+
+@contextlib.contextmanager
+def _taken_port() -> Iterator[int]:
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+        yield listening.getsockname()[1]
+
+
+def _ends(chosen: Sequence[Line], top: Path, port: int) -> Iterator[_Ended]:
+    """Run all, a few at once."""
+    waiting = list(enumerate(chosen))[::-1]
+    running: dict[int, tuple[Line, Path, float]] = {}
+    while waiting or running:
+        while waiting and len(running) < _AT_ONCE:
+            number, line = waiting.pop()
+            folder = top / str(number)
+            for name in ("work", "home", "tmp"):
+                (folder / name).mkdir(parents=True)
+            for name in line.holds:
+                shutil.copy(top / "files" / name, folder / "work" / name)
+            # work/../files is where lines look for files
+            (folder / "files").symlink_to(top / "files")
+            pid = os.fork()
+            if pid == 0:
+                _run(line, folder, port, real=number % _REAL_EVERY == 0)
+            running[pid] = line, folder, time.monotonic()
+        time.sleep(0.005)
+        for pid, (line, folder, start) in list(running.items()):
+            seconds = time.monotonic() - start
+            if seconds > _SECONDS:
+                os.kill(pid, signal.SIGKILL)
+            done, status, used = os.wait4(pid, 0 if seconds > _SECONDS else os.WNOHANG)
+            if done:
+                del running[pid]
+                code = os.waitstatus_to_exitcode(status)
+                left = False
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(pid, signal.SIGKILL)
+                    left = True
+                cpu = used.ru_utime + used.ru_stime
+                yield _Ended(line, folder, code, seconds, cpu, used.ru_maxrss >> 10, left)
+
+
+def _run(line: Line, folder: Path, port: int, real: bool) -> NoReturn:
+    """Run a line in this process, a fork, and end it."""
+    code = 70
+    try:
+        os.setsid()
+        (folder / "in").write_text(line.says)
+        for number, (name, flags) in enumerate(
+            (
+                ("in", os.O_RDONLY),
+                ("out", os.O_CREAT | os.O_WRONLY),
+                ("err", os.O_CREAT | os.O_WRONLY),
+            )
+        ):
+            os.dup2(os.open(folder / name, flags, 0o644), number)
+        os.chdir(folder / "work")
+        os.environ |= {
+            "HOME": str(folder / "home"),
+            "TMPDIR": str(folder / "tmp"),
+            "PYTHONPATH": f"{_ROOT}:{folder / 'files'}",
+            "COLUMNS": "200",
+        }
+        for name in ("OPENAI_API_KEY", "ER_GYM_HOME", "XDG_DATA_HOME"):
+            os.environ.pop(name, None)
+        tempfile.tempdir = None
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 28, 1 << 28))
+        words = [word.replace("{port}", str(port)) for word in line.words]
+        if real:
+            os.execv(sys.executable, [sys.executable, "-m", "benchmarks.cli", *words])
+        sys.path.insert(0, str(folder / "files"))
+        try:
+            cli.main(words)
+        except SystemExit as ended:
+            code = ended.code if isinstance(ended.code, int) else 1
+    except BaseException:  # as a process of its own would end
+        traceback.print_exc()
+        code = 1
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def _problems(ended: _Ended) -> Iterator[str]:
+    out, err = ((ended.folder / name).read_bytes() for name in ("out", "err"))
+    said = err.decode(errors="replace")
+    if ended.seconds > _SECONDS:
+        yield f"did not end in {_SECONDS:.0f} s"
+    elif ended.code not in ended.line.codes:
+        yield f"ended with {ended.code}, not {sorted(ended.line.codes)}: {said[-300:]!r}"
+    if ended.code and not said.startswith("er-gym: ") and ended.seconds <= _SECONDS:
+        yield f"does not say why: {said[:200]!r}"
+    if b"Traceback" in out + err:
+        yield f"a traceback: {said[-300:]!r}"
+    if len(said.splitlines()) > _LINES or len(said) > _CHARACTERS:
+        yield f"{len(said.splitlines())} lines, {len(said)} characters: {said[:300]!r}"
+    for name, data in (("stdout", out), ("stderr", err)):
+        if raw := _RAW.search(data):
+            yield f"{name} has {raw[0]!r}, which a terminal obeys"
+    if ended.cpu_seconds > _CPU_SECONDS:
+        yield f"took {ended.cpu_seconds:.0f} s of a processor"
+    if ended.megabytes > _MEGABYTES:
+        yield f"took {ended.megabytes} MB"
+    if ended.left:
+        yield "left processes behind"
+    if ended.code:
+        yield from _leavings(ended)
+
+
+def _leavings(ended: _Ended) -> Iterator[str]:
+    """What a refused command left or changed."""
+    work = ended.folder / "work"
+    files = ended.folder / "files"
+    found = {str(path.relative_to(work)) for path in work.rglob("*")}
+    if more := found - {*ended.line.holds}:
+        yield f"left {sorted(more)[:3]}"
+    for name in ended.line.holds:
+        if (work / name).read_bytes() != (files / name).read_bytes():
+            yield f"overwrote {name}"
+    for name in ("home", "tmp"):
+        if more := [path.name for path in (ended.folder / name).rglob("*") if path.is_file()]:
+            yield f"left {sorted(more)[:3]} in its {name} folder"
+
+
+def _state(folder: Path) -> set[tuple[str, int, int]]:
+    """Name, size and time of all that is in a folder."""
+    found = set()
+    for place, names, files in os.walk(folder):
+        for name in (*names, *files):
+            state = os.lstat(os.path.join(place, name))
+            found.add((os.path.join(place, name), state.st_size, state.st_mtime_ns))
+    return {each for each in found if "__pycache__" not in each[0]}
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
