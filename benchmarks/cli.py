@@ -50,6 +50,9 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
     except (click.Abort, KeyboardInterrupt):
         complain("interrupted")
         sys.exit(INTERRUPTED)
+    except OSError as error:  # a full disk, a directory that has gone
+        complain(str(error))
+        sys.exit(1)
     except MemoryError as error:
         complain(f"the memory does not suffice: {error}".rstrip(": "))
         sys.exit(1)

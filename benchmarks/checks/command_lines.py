@@ -4,8 +4,8 @@
 
 Each line of :mod:`benchmarks.checks.bad_commands` that holds the given words is run in an empty
 folder of its own. What must hold for all: the exit code is right; a few lines on stderr say why,
-and none of them is a traceback; nothing that a terminal would obey is printed; it ends in time, with
-less than 500 MB of memory; and nothing is left behind or changed. Most lines are run by the
+and none of them is a traceback; nothing that a terminal would obey is printed; it ends in time,
+with less than 500 MB of memory; and nothing is left behind or changed. Most lines are run by the
 command's own entry point in a fork of this process, which has imported the command already; every
 tenth is run as a process from its start. Prints what falls short; the exit code says whether
 anything does.

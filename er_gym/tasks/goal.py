@@ -20,6 +20,7 @@ STATES: Mapping[str, tuple[bool | str, ...]] = {
         (True, False),
     ),
     "temperature": ("Hot", "Cold", "RoomTemp"),
+    "fillLiquid": ("water", "coffee", "wine"),
 }  # fmt: skip
 """What a goal may ask of an object's metadata, and the values that each has."""
 
