@@ -157,7 +157,7 @@ def bench(
 
     console = terminal(stderr=True)
     with bad_input(BackendError):
-        part = Shard.parse(shard) if shard else None
+        part = Shard.parse(shard) if shard is not None else None
         asked = _load_suite(suite, tasks_file, poses, protocol)
         voice = _voice(agent, spoken)
         if trust and not agent.startswith(RL):

@@ -133,7 +133,7 @@ def _order(
     from er_gym.tasks.types import task_type
 
     told = {name: value for name, value in given.items() if value is not None}
-    config = suite_config(suite) if suite else None
+    config = None if suite is None else suite_config(suite)
     base = config.generate.model_dump() if config and config.generate else {"total": _DEFAULT_TOTAL}
     if out is None:
         if suite is None:

@@ -162,7 +162,7 @@ def _runs(folder: Path) -> None:
 PROMPTS = {
     "loops": "{% for a in range(99999) %}{% for b in range(99999) %}{% endfor %}{% endfor %}",
     "times": "{{ 'x' * 10 ** 10 }}",
-    "power": "{{ 9 ** 9 ** 9 ** 9 }}",
+    "power": "{{ 9 ** (9 ** 9) }}",
     "width": "{{ '%9999999999d' % 1 }}",
     "center": "{{ 'x' | center(9999999999) }}",
     "doubles": "{% set a = namespace(x='abc') %}{% for i in range(99) %}"

@@ -273,7 +273,7 @@ def _place(text: str, first_line: int) -> str:
 def _is_deeper(data: object) -> bool:
     """Whether JSON is nested more deeply than :data:`DEEPEST`."""
     level: list[Any] = [data]
-    for _ in range(DEEPEST + 1):
+    for _ in range(DEEPEST):
         inner = (each.values() if isinstance(each, dict) else each for each in level)
         level = [part for each in inner for part in each if isinstance(part, (dict, list))]
         if not level:

@@ -29,7 +29,9 @@ OWN = Task(
     target_objects=(SINK,),
     related_objects=(MUG,),
     goal=(
-        Condition("Mug", MUG, inside="SinkBasin", state=(("isDirty", False), ("fill", "water"))),
+        Condition(
+            "Mug", MUG, inside="SinkBasin", state=(("isDirty", False), ("fillLiquid", "water"))
+        ),
         Condition("Plate", held=True),
         Condition("Faucet", in_reach=True, state=(("isToggled", True),)),
     ),
@@ -206,7 +208,7 @@ def test_what_the_papers_format_has_no_field_for_lies_under_one_key(tmp_path: Pa
                 "object_type": "Mug",
                 "object_id": MUG,
                 "inside": "SinkBasin",
-                "state": {"isDirty": False, "fill": "water"},
+                "state": {"isDirty": False, "fillLiquid": "water"},
             },
             {"object_type": "Plate", "held": True},
             {"object_type": "Faucet", "in_reach": True, "state": {"isToggled": True}},

@@ -1,0 +1,50 @@
+"""What the command prints is text, whoever wrote it."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+
+from benchmarks import cli
+from benchmarks.checks.bad_files import HOSTILE
+from benchmarks.progress import Progress
+from benchmarks.tables import Table, print_tables
+from benchmarks.terminal import plain, terminal
+
+
+def test_what_a_terminal_obeys_is_shown_as_an_escape():
+    assert plain("a\x1b[31m\x07\x9b\u202e\ud800\r") == r"a\x1b[31m\x07\x9b\u202e\ud800\r"
+    assert plain("kept: ä 中 😀\t\n") == "kept: ä 中 😀\t\n"
+
+
+@pytest.mark.parametrize("name", ["openai:x:", "[red]x[/]", "[/]", ":smile:", HOSTILE])
+def test_names_stand_in_tables_and_lines_as_they_are(name):
+    console = terminal(width=200)
+    console.file = io.StringIO()
+    print_tables([Table(name, ("Agent",), ((name,),), 1, notes=(name,))], console)
+    with Progress(console, name, 1) as progress:
+        progress.episode(True)
+        progress.say(name)
+    said = console.file.getvalue()
+    shown = plain(name.replace("\x07", ""))  # Rich leaves it out by itself
+    assert said.count(shown) == 5
+    assert "\x1b" not in said
+
+
+def test_errors_are_one_line_that_no_terminal_obeys(capsys):
+    with pytest.raises(SystemExit) as left:
+        cli.main(["render", "--scene", f"{HOSTILE}{'x' * 9000}"])
+    err = capsys.readouterr().err
+    assert left.value.code == 2
+    assert err.count("\n") == 1
+    assert "\x1b" not in err
+    assert len(err) < 2_200
+
+
+def test_the_command_prints_through_one_function_alone():
+    for file in Path(cli.__file__).parent.glob("cli*.py"):
+        text = file.read_text()
+        assert "click.echo" not in text, file
+        assert "Console(" not in text, file
