@@ -13,6 +13,7 @@ from rich.text import Text
 
 from benchmarks.metrics import METRICS, Estimate, Score, Summary
 from benchmarks.report import BOTH, RunReport, by_group, by_type, slices
+from benchmarks.terminal import plain
 from er_gym.envs.protocol import DEFAULT
 from er_gym.tasks.types import BY_NAME, GROUPS
 
@@ -223,7 +224,7 @@ def _markdown(table: Table) -> str:
 def print_tables(found: Sequence[Table], console: Console) -> None:
     """Print the tables as the terminal's width allows: a table that may be turned is turned where
     that makes it fit, words are folded, figures never."""
-    for table in found:
+    for table in map(_plain, found):
         if table.may_turn and _width(table) > console.width > _width(_turned(table)):
             table = _turned(table)
         console.print(Text(f"\n{table.title}", style="bold"), soft_wrap=True)
@@ -231,6 +232,12 @@ def print_tables(found: Sequence[Table], console: Console) -> None:
             console.print(_rich(table, console.width), crop=False)
         for note in table.notes:
             console.print(Text(note, style="dim"), soft_wrap=True)
+
+
+def _plain(table: Table) -> Table:
+    """The table as it is shown, so that columns are as wide as their words."""
+    rows = tuple(tuple(map(plain, row)) for row in table.rows)
+    return replace(table, head=tuple(map(plain, table.head)), rows=rows)
 
 
 def _turned(table: Table) -> Table:
