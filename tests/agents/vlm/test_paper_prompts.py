@@ -578,8 +578,8 @@ def test_files_that_do_not_serve(read: Reader, text: str, message: str) -> None:
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "latin").write_bytes(b'[{"messages": "\xe9"}]')
     for name, problem in (
-        ("nowhere", "No such file"),
-        ("", "Is a directory"),
+        ("nowhere", "no such file"),
+        ("", "a directory"),
         ("latin", "not UTF-8"),
     ):
         with pytest.raises(ValueError, match=problem):
