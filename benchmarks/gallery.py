@@ -21,6 +21,7 @@ from rich.progress import track
 from benchmarks.cli_errors import bad_input
 from benchmarks.cli_options import force_option
 from er_gym.sim.actions import perform
+from er_gym.sim.agent import Agent
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.look import Look
 from er_gym.sim.render.panda import core, geometry, rasteriser
@@ -29,7 +30,8 @@ from er_gym.sim.render.shade import shaded
 from er_gym.sim.render.shapes import SHAPES, build
 from er_gym.sim.render.stage import stage
 from er_gym.sim.scene import SCENE_NAMES, SCENE_NUMBERS, load_scene
-from er_gym.sim.world import Agent, Settings, World
+from er_gym.sim.settings import Settings
+from er_gym.sim.world import World
 from er_gym.writing import (
     MARKDOWN_MARK,
     check_output,

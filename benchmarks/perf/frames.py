@@ -46,7 +46,8 @@ from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.stage import stage
 from er_gym.sim.scene import SCENE_NAMES, load_scene
-from er_gym.sim.world import Settings, World
+from er_gym.sim.settings import Settings
+from er_gym.sim.world import World
 
 SIZES = ((224, 224), (300, 300), (800, 450))
 SCENES = 10

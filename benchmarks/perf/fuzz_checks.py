@@ -22,8 +22,9 @@ from benchmarks.perf.invariants import (
 )
 from er_gym.sim.object_metadata import objects as objects_of
 from er_gym.sim.scene import load_scene
+from er_gym.sim.settings import Settings
 from er_gym.sim.space.standing import standing_places
-from er_gym.sim.world import Settings, World
+from er_gym.sim.world import World
 
 Pictures = Sequence[NDArray[Any]]
 
@@ -133,9 +134,7 @@ def is_worked_out_anew(world: World, metadata: Metadata) -> Iterator[str]:
     """What the engine keeps of the world is what it would work out without."""
     untouched = world.untouched
     world.untouched = False  # an untouched world's entries are those of its scene
-    for kept in (world.entries, world.derived, world._shapes, world._samples):
-        kept.clear()
-    world._nesting = None
+    world.forget()
     anew = objects_of(world)
     world.untouched = untouched
     for old, new in zip(metadata["objects"], anew, strict=True):

@@ -16,7 +16,7 @@ from typing import Any, get_args, get_origin
 
 from er_gym.sim.actions.registry import ACTIONS, EXEMPT, REFUSED, Parameter, parameters_of
 from er_gym.sim.actions.state_change import LIQUIDS
-from er_gym.sim.recorded import USED_UP
+from er_gym.sim.initial_state import USED_UP
 
 Request = dict[str, Any]
 

@@ -33,7 +33,8 @@ from benchmarks.perf.output import Output, write_figures
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.stage import stage
 from er_gym.sim.scene import SCENE_NAMES, load_scene
-from er_gym.sim.world import Settings, World
+from er_gym.sim.settings import Settings
+from er_gym.sim.world import World
 from er_gym.writing import write_picture
 
 TYPES, EVERY = 40, 4

@@ -13,8 +13,9 @@ from er_gym.sim.lazy import LazyMetadata
 from er_gym.sim.metadata import metadata
 from er_gym.sim.render.view import View, draw, with_flags
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError, load_scene
+from er_gym.sim.settings import Settings
 from er_gym.sim.size import check_size
-from er_gym.sim.world import Settings, World
+from er_gym.sim.world import World
 
 
 class Engine:

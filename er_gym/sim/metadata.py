@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from er_gym.sim.agent import HAND_OFFSET
 from er_gym.sim.lazy import LazyMetadata
 from er_gym.sim.object_metadata import box, objects, vector
 from er_gym.sim.space.room import room_box
-from er_gym.sim.world import HAND_OFFSET, World
+from er_gym.sim.world import World
 
 
 def scene_bounds(world: World) -> dict[str, Any]:

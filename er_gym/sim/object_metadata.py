@@ -1,7 +1,7 @@
 """The objects of the world as AI2-THOR 5 metadata.
 
 All but ``visible``, ``isInteractable`` and ``distance`` says nothing of the agent; it is made for
-many objects at once and kept in ``World.entries`` until the object changes. What is kept is shared:
+many objects at once and kept in the world's cache until the object changes. What is kept is shared:
 :func:`objects` is for what packs it or reads it, :func:`own_objects` for whoever may write into it.
 """
 
@@ -22,6 +22,7 @@ from er_gym.sim.space.doors import boxes
 from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
+from er_gym.sim.world_cache import ObjectCacheKey
 
 Entry = dict[str, Any]
 Parts = tuple[Entry, Entry, Entry]
@@ -34,6 +35,7 @@ _OBB_CORNERS = np.array(
     dtype=float,
 )
 """Corners of an oriented box in AI2-THOR's order, in edges from corner 0."""
+_ENTRIES: ObjectCacheKey[Parts] = ObjectCacheKey("metadata")
 _SCENES_KEPT = 128
 _RECEPTACLE = PROPERTIES.index("receptacle")
 _NEVER = {"canBeUsedUp": False, "isUsedUp": False}
@@ -76,7 +78,7 @@ def own_objects(world: World) -> list[Entry]:
 
 def _parts(world: World) -> Iterator[tuple[Parts, bool, float]]:
     """What is said of every object, whether the agent sees it, and how far from it it is."""
-    entries = world.entries
+    entries = world.cache.of_objects(_ENTRIES)
     rows = _listed(world)
     stale = [i for i in rows if i not in entries]
     if world.untouched and len(stale) == len(world):

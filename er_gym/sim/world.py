@@ -9,33 +9,25 @@ next asked for.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim import recorded
-from er_gym.sim.errors import ActionFailed
-from er_gym.sim.nesting import Nesting
-from er_gym.sim.scene import PROPERTIES, STATES, Scene
+from er_gym.sim import initial_state
+from er_gym.sim.agent import HAND_OFFSET, Agent
+from er_gym.sim.scene import Scene
+from er_gym.sim.scene_objects import PROPERTY_COLUMN, STATE_COLUMN, SceneObjects
+from er_gym.sim.settings import Settings, ThirdPartyCamera
 from er_gym.sim.space.rotation import unity_rotation
-from er_gym.sim.space.shapes import Shape, shape_of
-from er_gym.sim.space.shapes.seen import points_to_see
-from er_gym.sim.start import start_pose
+from er_gym.sim.start_pose import start_pose
+from er_gym.sim.world_cache import WorldCache
 
-AGENT_HEIGHT = 0.900999128818512
-"""Height of the agent's centre above the top of the scene's Floor, metres, as AI2-THOR has it."""
-CAMERA_STANDING, CAMERA_CROUCHING = 0.675, 0.0
-"""Height of the camera above the agent's centre, metres."""
-HAND_OFFSET = np.array([0.0, -0.16, 0.38])
-"""Where the hand is in the camera's frame (right, up, forward), metres."""
 _STEP = 2.0**-40
 """Metres, a picometre: recorded coordinates, and whole steps beside them, add without rounding."""
-_PROPERTY = {name: column for column, name in enumerate(PROPERTIES)}
-_STATE = {name: column for column, name in enumerate(STATES)}
 
 
 def settled(rotation: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
@@ -53,119 +45,26 @@ def whole_steps(offset: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.round(offset / _STEP) * _STEP)
 
 
-@dataclass(frozen=True)
-class Agent:
-    """The agent's pose: position (3,) of its centre in metres, degrees, AI2-THOR's frame."""
-
-    position: NDArray[np.float64]
-    rotation: float = 0.0
-    horizon: float = 0.0
-    standing: bool = True
-
-    @property
-    def camera(self) -> NDArray[np.float64]:
-        """Position (3,) of the camera, metres."""
-        lift = CAMERA_STANDING if self.standing else CAMERA_CROUCHING
-        return np.asarray(self.position + np.array([0.0, lift, 0.0]))
+_KEPT_APART = frozenset({"scene", "settings", "agent", "cameras", "cache", "base", "listed"})
+"""Fields that a snapshot of the objects does not copy."""
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What ``Initialize`` sets; lengths in metres, angles in degrees."""
+@dataclass(kw_only=True)
+class World(SceneObjects):
+    """A scene's objects, the agent in it and the settings; made by :meth:`World.load`.
 
-    grid_size: float = 0.25
-    snap_to_grid: bool = True
-    visibility_distance: float = 1.5
-    field_of_view: float = 90.0
-    rotate_step: float = 90.0
-    width: int = 300
-    height: int = 300
-    render_depth: bool = False
-    render_instances: bool = False
-    render_classes: bool = False
-
-    @property
-    def draws_colors(self) -> bool:
-        """Whether objects are drawn in colours of their own."""
-        return self.render_instances or self.render_classes
-
-
-@dataclass(frozen=True)
-class ThirdPartyCamera:
-    """A camera that nobody carries: (3,) metres, (3,) Unity angles and vertical degrees."""
-
-    position: tuple[float, float, float]
-    rotation: tuple[float, float, float]
-    field_of_view: float
-
-
-_Entry = tuple[dict[str, Any], dict[str, Any], dict[str, Any]]
-_NOT_OBJECTS = frozenset(
-    {"scene", "settings", "agent", "cameras", "derived", "arrangement", "looks", "base", "listed"}
-)
-"""What a snapshot of the objects has no copy of."""
-
-
-@dataclass
-class World:
-    """A scene being lived in. Made by :meth:`World.load`.
-
-    Attributes mirror AI2-THOR's object metadata, one row an object: ``position``, ``rotation``,
-    ``low`` and ``high`` (corners of the axis-aligned box) are (N, 3), metres and degrees;
-    ``properties`` and ``states`` are (N, P) and (N, S) bool, see :meth:`has` and :meth:`state`.
-    ``untouched`` is True until something has been changed. ``base`` is how the room was arranged
-    before, by ``SetObjectPoses``, if it was; it is not to be changed.
-    ``remains`` are the rows of wholes that were cut up; ``disabled`` those of objects that
-    ``EnableObject`` may bring back, with what lay in them. ``listed`` are the only objects that the
-    metadata list, None for all.
-    ``parents[i]`` are the receptacles that object i is in, innermost first as recorded.
-    ``entries`` is where :mod:`er_gym.sim.metadata` keeps what it said of objects that have not
-    changed since, ``looks`` where the renderer does; ``touched`` are the objects that something has
-    happened to since the scene was loaded. ``derived`` holds what is worked out from the whole
-    state, until it changes, and ``arrangement`` what is from where things are and whether they are
-    open.
+    Attributes:
+        settings: what ``Initialize`` set.
+        agent: the agent's pose.
+        cameras: the third-party cameras.
+        base: a snapshot of the arrangement that ``SetObjectPoses`` made last, None if it made
+            none. It must not be changed.
     """
 
-    scene: Scene
     settings: Settings
     agent: Agent
-    object_ids: list[str]
-    names: list[str]
-    types: list[str]
-    asset_ids: list[str]
-    position: NDArray[np.float64]
-    rotation: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    obb: NDArray[np.float64]
-    properties: NDArray[np.bool_]
-    states: NDArray[np.bool_]
-    openness: NDArray[np.float64]
-    mass: NDArray[np.float64]
-    exists: NDArray[np.bool_]
-    temperature: list[str]
-    fill_liquid: list[str | None]
-    parents: list[tuple[int, ...]]
-    controlled: list[tuple[int, ...] | None]
-    salient_materials: list[tuple[str, ...] | None]
-    held: int = -1
-    remains: set[int] = field(default_factory=set)
-    disabled: dict[int, tuple[int, ...]] = field(default_factory=dict)
-    listed: frozenset[int] | None = None
-    untouched: bool = True
     base: World | None = None
     cameras: tuple[ThirdPartyCamera, ...] = ()
-    index: dict[str, int] = field(default_factory=dict)
-    derived: dict[str, object] = field(default_factory=dict)
-    arrangement: dict[str, object] = field(default_factory=dict)
-    _displaced: set[int] = field(default_factory=set)
-    _shapes: dict[int, Shape] = field(default_factory=dict)
-    _samples: dict[int, NDArray[np.float64]] = field(default_factory=dict)
-    entries: dict[int, _Entry] = field(default_factory=dict)
-    looks: dict[int, object] = field(default_factory=dict)
-    touched: set[int] = field(default_factory=set)
-    _nesting: Nesting | None = None
-    _by_type: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     @staticmethod
     def load(scene: Scene, settings: Settings) -> World:
@@ -184,20 +83,20 @@ class World:
             low=scene.aabb_center - half,
             high=scene.aabb_center + half,
             obb=scene.obb.copy(),
-            properties=recorded.properties(scene),
+            properties=initial_state.properties(scene),
             states=scene.states.copy(),
             openness=scene.openness.copy(),
             mass=scene.mass.copy(),
             exists=np.ones(len(scene.object_ids), dtype=bool),
             temperature=list(scene.temperature),
             fill_liquid=[None] * len(scene.object_ids),
-            parents=list(recorded.parents(scene)),
+            parents=list(initial_state.parents(scene)),
             controlled=list(scene.controlled),
             salient_materials=list(scene.salient_materials),
         )
         world.index = {object_id: i for i, object_id in enumerate(world.object_ids)}
-        world._nesting = recorded.nesting(scene)
-        world._by_type = recorded.rows_by_type(scene)
+        world._nesting = initial_state.nesting(scene)
+        world._by_type = initial_state.rows_by_type(scene)
         start = start_pose(scene.name)
         position = np.array([start.x, world.standing_height, start.z])
         world.agent = Agent(position, start.rotation)
@@ -219,142 +118,6 @@ class World:
             setattr(self, name, value)
         self.base = kept
 
-    # -- reading ---------------------------------------------------------------------------------
-
-    def __len__(self) -> int:
-        return len(self.object_ids)
-
-    def has(self, i: int, prop: str) -> bool:
-        """Whether object i has a property of :data:`er_gym.sim.scene.PROPERTIES`."""
-        return bool(self.properties[i, _PROPERTY[prop]])
-
-    def state(self, i: int, name: str) -> bool:
-        """Whether object i is in a state of :data:`er_gym.sim.scene.STATES`."""
-        return bool(self.states[i, _STATE[name]])
-
-    def of_type(self, *types: str) -> Iterator[int]:
-        """The existing objects of some types, in scene order."""
-        rows = sorted(i for name in types for i in self._by_type.get(name, ()))
-        return (i for i in rows if self.exists[i])
-
-    def find(self, object_id: str | None) -> int:
-        """The row of an object.
-
-        Raises:
-            ActionFailed: there is none of that id, or it has been cut up.
-        """
-        i = None if object_id is None else self.index.get(object_id)
-        if i is not None and i in self.remains:
-            how = "sliced" if self.state(i, "isSliced") else "broken"
-            raise ActionFailed(f"{object_id} is {how}: only its parts are there.")
-        if i is None or not self.exists[i]:
-            raise ActionFailed(f"No object with ID {object_id!r:.200} is in {self.scene.name}.")
-        return i
-
-    @property
-    def ground(self) -> float:
-        """Height of the floor, metres."""
-        floor = self.scene.types.index("Floor")
-        return float(self.scene.aabb_center[floor, 1] + self.scene.aabb_size[floor, 1] / 2)
-
-    @property
-    def standing_height(self) -> float:
-        """Height of the agent's centre where it stands on the floor, metres."""
-        return self.ground + AGENT_HEIGHT + start_pose(self.scene.name).lift
-
-    @property
-    def nesting(self) -> Nesting:
-        """What lies in what."""
-        if self._nesting is None:
-            self._nesting = Nesting.of(self.parents, self.exists)
-        return self._nesting
-
-    @property
-    def contents(self) -> list[list[int]]:
-        """For each object, the rows of what lies in or on it."""
-        return self.nesting.contents
-
-    def ancestors(self, i: int) -> set[int]:
-        """Every receptacle that object i is in, directly or through others."""
-        return set(np.flatnonzero(self.nesting.within[i]).tolist())
-
-    def inside(self, i: int) -> list[int]:
-        """Everything in or on object i, directly or through others, nearest first."""
-        found: list[int] = []
-        todo = list(self.contents[i])
-        while todo:
-            child = todo.pop(0)
-            if child not in found and child != i:
-                found.append(child)
-                todo.extend(self.contents[child])
-        return found
-
-    def is_shut(self, i: int) -> bool:
-        """Whether i is a receptacle that opens and is closed now.
-
-        A toilet never is: things stand on its cistern, not under its lid.
-        """
-        return (
-            self.has(i, "receptacle")
-            and self.has(i, "openable")
-            and not self.state(i, "isOpen")
-            and self.types[i] != "Toilet"
-        )
-
-    @property
-    def hidden(self) -> NDArray[np.bool_]:
-        """(N,) which objects lie in something shut, or are no more."""
-        found = self.arrangement.get("hidden")
-        if not isinstance(found, np.ndarray):
-            shut = (
-                self.properties[:, _PROPERTY["receptacle"]]
-                & self.properties[:, _PROPERTY["openable"]]
-            )
-            shut &= ~self.states[:, _STATE["isOpen"]]
-            shut[list(self._by_type.get("Toilet", ()))] = False
-            found = ~self.exists | self.nesting.within[:, shut].any(axis=1)
-            self.arrangement["hidden"] = found
-        return found
-
-    @property
-    def in_hand(self) -> list[int]:
-        """The held object and all that lies in it; empty when the hand is."""
-        return [] if self.held < 0 else [self.held, *self.inside(self.held)]
-
-    def displaced(self) -> list[int]:
-        """Objects that may be elsewhere, or in something else, than when the scene was loaded."""
-        return sorted(self._displaced)
-
-    def _as_recorded(self, i: int) -> bool:
-        return i < len(self.scene) and i not in self._displaced
-
-    def shape(self, i: int) -> Shape:
-        """What object i is made of, where it is now."""
-        kept = recorded.shapes(self.scene) if self._as_recorded(i) else self._shapes
-        found = kept.get(i)
-        if found is None:
-            found = kept[i] = shape_of(self, i)
-        return found
-
-    def obb_corners(self, i: int) -> NDArray[np.float64] | None:
-        """(8, 3) corners of object i's oriented box in AI2-THOR's order, None where none is."""
-        if np.isnan(self.obb[i, 0, 0]):
-            return None
-        turn = unity_rotation(self.rotation[i])
-        corner, right, up, forward = self.obb[i] @ turn.T
-        corner = corner + self.position[i]
-        bottom = np.array([corner, corner + right, corner + right + forward, corner + forward])
-        return np.concatenate([bottom, bottom + up])
-
-    def sample_points(self, i: int) -> NDArray[np.float64]:
-        """(P, 3) points of object i that the agent may see; :func:`points_to_see`."""
-        kept = recorded.samples(self.scene) if self._as_recorded(i) else self._samples
-        points = kept.get(i)
-        if points is None:
-            points = points_to_see(self, i)
-            kept[i] = points
-        return points
-
     def _shift(self, rows: list[int], offset: NDArray[np.float64]) -> None:
         offset = whole_steps(offset)
         self.position[rows] += offset
@@ -367,29 +130,31 @@ class World:
         self.untouched = False
         for i in rows:
             self.touched.add(i)
-            self.entries.pop(i, None)
-            self.looks.pop(i, None)
+            self.cache.object_changed(i)
 
     def _displace(self, rows: Iterable[int]) -> None:
         """Forget that too, and what was worked out from where they are and what they lie in."""
         rows = list(rows)
         self._touch(rows)
         self._displaced.update(rows)
-        for i in rows:
-            self._samples.pop(i, None)
-            self._shapes.pop(i, None)
+        self.cache.objects_moved(rows)
+
+    def forget(self) -> None:
+        """Forget what readers have worked out; they work it out again when next asked for it."""
+        self.cache = WorldCache()
+        self._nesting = None
 
     # -- changing --------------------------------------------------------------------------------
 
     def changed(self) -> None:
         """Say that something is elsewhere than it was, or has been opened or shut."""
         self.restated()
-        self.arrangement = {}  # not cleared: other worlds may be arranged like this, see become()
+        self.cache.arrangement_changed()
 
     def restated(self) -> None:
         """Say that something is in another state than it was, where it is."""
         self.untouched = False
-        self.derived.clear()
+        self.cache.state_changed()
 
     def _renested(self) -> None:
         """Say that something lies elsewhere than it did."""
@@ -398,7 +163,7 @@ class World:
 
     def set_state(self, i: int, name: str, value: bool) -> None:
         """Put object i into a state of :data:`er_gym.sim.scene.STATES`, or out of it."""
-        self.states[i, _STATE[name]] = value
+        self.states[i, STATE_COLUMN[name]] = value
         self._touch([i, *(self.controlled[i] or ())])  # a burner glows by its knob
         if name == "isOpen":
             self.changed()
@@ -418,7 +183,7 @@ class World:
 
     def set_property(self, i: int, name: str, value: bool) -> None:
         """Give object i a property, or take it away."""
-        self.properties[i, _PROPERTY[name]] = value
+        self.properties[i, PROPERTY_COLUMN[name]] = value
         self._touch([i])
         self.changed()
 
@@ -571,6 +336,6 @@ def _objects(world: World) -> dict[str, Any]:
     copies = {
         each.name: copy(getattr(world, each.name))
         for each in fields(world)
-        if each.name not in _NOT_OBJECTS
+        if each.name not in _KEPT_APART
     }
-    return {**copies, "derived": {}, "arrangement": world.arrangement, "looks": {}}
+    return {**copies, "cache": world.cache.snapshot()}

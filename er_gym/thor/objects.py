@@ -21,6 +21,7 @@ from er_gym.sim.scene import PROPERTIES, STATES, Scene
 from er_gym.sim.space.doors import boxes
 from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
+from er_gym.sim.world_cache import CacheKey
 from er_gym.thor.object_types import OBJECT_TYPES
 
 TYPES = tuple(OBJECT_TYPES)
@@ -219,11 +220,14 @@ def _names(world: World) -> _Names:
     return recorded if tuple(world.object_ids) == recorded.ids else _Names.of(world)
 
 
+_TABLE: CacheKey[ObjectTable] = CacheKey("object table")
+
+
 def _of_world(world: World) -> ObjectTable:
     """The table of the world as it is; kept until the world changes."""
-    found = world.derived.get("table")
-    if not isinstance(found, ObjectTable):
-        found = world.derived["table"] = _table(world)
+    found = world.cache.state.get(_TABLE)
+    if found is None:
+        found = world.cache.state.put(_TABLE, _table(world))
     elif world.held >= 0:  # what is carried moves with the agent
         low, high = boxes(world)
         found = replace(found, centre=(low + high) / 2)

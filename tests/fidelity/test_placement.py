@@ -8,8 +8,9 @@ import pytest
 from benchmarks.perf.comparisons.placement import Placements, clashes, random_placements
 from er_gym.sim.actions.pick_place import put_down
 from er_gym.sim.scene import load_scene
+from er_gym.sim.settings import Settings
 from er_gym.sim.space.placement import _tight_spots, free_spots
-from er_gym.sim.world import Settings, World
+from er_gym.sim.world import World
 
 
 @pytest.fixture(scope="module")

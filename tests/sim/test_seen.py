@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 from benchmarks.perf.agreement import SIZES, Shares, sightings
+from er_gym.sim.agent import Agent
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.stage import stage
 from er_gym.sim.scene import SCENE_NAMES, load_scene
-from er_gym.sim.space.shapes.built_in import fitted_rows, fronts, hosts
-from er_gym.sim.space.shapes.carcass import carcass
-from er_gym.sim.space.shapes.facing import SIDES, facings
+from er_gym.sim.settings import Settings
+from er_gym.sim.space.solids.built_in import fitted_rows, fronts, hosts
+from er_gym.sim.space.solids.carcass import carcass
+from er_gym.sim.space.solids.facing import SIDES, facings
 from er_gym.sim.space.visibility import visible
-from er_gym.sim.world import Agent, Settings, World
+from er_gym.sim.world import World
 
 COUNTERS = [
     (name, i)

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from er_gym.sim.scene import SCENE_NAMES, load_scene
-from er_gym.sim.space.shapes.counters import _largest_rectangle, rectangles
-from er_gym.sim.space.shapes.facing import facings
-from er_gym.sim.space.shapes.families import parts
-from er_gym.sim.space.shapes.frame import trimmed, turned
+from er_gym.sim.settings import Settings
 from er_gym.sim.space.sights import sights
-from er_gym.sim.world import Settings, World
+from er_gym.sim.space.solids import solid_of
+from er_gym.sim.space.solids.box_transforms import trimmed, turned
+from er_gym.sim.space.solids.counters import _largest_rectangle, rectangles
+from er_gym.sim.space.solids.facing import facings
+from er_gym.sim.space.solids.families import parts
+from er_gym.sim.world import World
 
 # -- parts -----------------------------------------------------------------------------------------
 
@@ -58,7 +60,7 @@ def test_few_boxes_hide_things():
 def test_shapes_are_where_the_things_are(name):
     world = World.load(load_scene(name), Settings())
     for i in range(len(world)):
-        shape = world.shape(i)
+        shape = solid_of(world, i)
         slack = 0.02 if round(shape.yaw) % 90 == 0 else 0.15  # askew, it is a box of equal area
         assert (shape.boxes[:, 0] >= world.low[i] - slack).all(), world.object_ids[i]
         assert (shape.boxes[:, 1] <= world.high[i] + slack).all(), world.object_ids[i]
@@ -67,9 +69,9 @@ def test_shapes_are_where_the_things_are(name):
 def test_a_shape_moves_with_its_thing():
     world = World.load(load_scene("FloorPlan201"), Settings())
     sofa = next(world.of_type("Sofa"))
-    before = world.shape(sofa).boxes
+    before = solid_of(world, sofa).boxes
     world.move_by(sofa, np.array([0.5, 0.0, -0.25]))
-    assert np.allclose(world.shape(sofa).boxes - before, [0.5, 0.0, -0.25])
+    assert np.allclose(solid_of(world, sofa).boxes - before, [0.5, 0.0, -0.25])
     fresh = World.load(load_scene("FloorPlan201"), Settings())
     assert np.array_equal(fresh.shape(sofa).boxes, before)
 

@@ -7,10 +7,11 @@ import pytest
 
 from er_gym.sim.controller import EmbeddedController
 from er_gym.sim.scene import load_scene
+from er_gym.sim.settings import Settings
 from er_gym.sim.space.rays import blocked_by
 from er_gym.sim.space.sights import sights, sights_anew
 from er_gym.sim.space.visibility import in_frustum, visible
-from er_gym.sim.world import Settings, World
+from er_gym.sim.world import World
 
 
 def random_changes(controller, random, count):

@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 
 from benchmarks.perf.comparisons.reachable import pieces
+from er_gym.sim.agent import Agent
 from er_gym.sim.scene import SCENE_NAMES, load_scene
+from er_gym.sim.settings import Settings
 from er_gym.sim.space.rays import blocked_by
 from er_gym.sim.space.reach import Outlines
-from er_gym.sim.space.shapes import Shape
+from er_gym.sim.space.solids import Solid
 from er_gym.sim.space.standing import standing_places
 from er_gym.sim.space.visibility import NEAR_PLANE, in_frustum, visible
-from er_gym.sim.world import Agent, Settings, World
+from er_gym.sim.world import World
 
 APPLE = "Apple|-00.47|+01.15|+00.48"
 EGG = "Egg|-02.04|+00.81|+01.24"
@@ -234,7 +236,7 @@ def test_the_edges_of_the_picture(point, camera, expected):
 
 def outline(middle, yaw, *boxes):
     parts = np.array(boxes, dtype=float)
-    return Shape(np.array(middle, dtype=float), yaw, parts, parts, parts)
+    return Solid(np.array(middle, dtype=float), yaw, parts, parts, parts)
 
 
 def test_distance_is_measured_along_the_floor_to_the_nearest_part():

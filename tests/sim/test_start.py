@@ -11,7 +11,7 @@ import pytest
 from er_gym.sim.data.build_start_poses import build, start_pose_of
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.space.standing import floor_of
-from er_gym.sim.start import START_POSES, start_pose
+from er_gym.sim.start_pose import START_POSES, start_pose
 
 MISLABELLED = {"FloorPlan410": "FloorPlan411", "FloorPlan411": "FloorPlan412"}
 """Where a pose was published for, and the room that it belongs to; see docs/fidelity.md."""

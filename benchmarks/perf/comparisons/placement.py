@@ -7,10 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from er_gym.sim.actions.pick_place import put_down
+from er_gym.sim.agent import Agent
 from er_gym.sim.compatibility import accepts
 from er_gym.sim.scene import SCENE_NAMES, load_scene
+from er_gym.sim.settings import Settings
 from er_gym.sim.space.placement import free_spots, is_vessel, surface_height
-from er_gym.sim.world import Agent, Settings, World
+from er_gym.sim.space.solids import solid_of
+from er_gym.sim.world import World
 
 _TOUCH = 0.005
 
@@ -95,7 +98,7 @@ def clashes(world: World, i: int, receptacle: int) -> list[int]:
         if world.has(k, "pickupable"):
             boxes = np.array([[world.low[k], world.high[k]]])
         elif world.has(k, "moveable"):
-            boxes = world.shape(k).boxes
+            boxes = solid_of(world, k).boxes
         else:
             continue
         depth = np.minimum(boxes[:, 1], world.high[i]) - np.maximum(boxes[:, 0], world.low[i])

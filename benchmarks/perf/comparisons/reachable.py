@@ -16,9 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from er_gym.sim.scene import SCENE_NAMES, SCENE_NUMBERS, Scene, load_scene
+from er_gym.sim.settings import Settings
 from er_gym.sim.space.footprints import Footprints
 from er_gym.sim.space.standing import Rules, floor_by, floor_of
-from er_gym.sim.world import Settings, World
+from er_gym.sim.world import World
 from er_gym.thor import make_controller
 
 FINE = 0.1

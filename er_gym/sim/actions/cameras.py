@@ -7,7 +7,8 @@ from pydantic import BaseModel, ConfigDict
 from er_gym.sim.actions.checks import FARTHEST, field_of_view, within
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import ActionFailed
-from er_gym.sim.world import ThirdPartyCamera, World
+from er_gym.sim.settings import ThirdPartyCamera
+from er_gym.sim.world import World
 
 
 class PartialVector(BaseModel):

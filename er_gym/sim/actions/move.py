@@ -10,10 +10,11 @@ import numpy as np
 
 from er_gym.sim.actions.look import LOOK_LIMITS, LOOK_TOLERANCE
 from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.agent import Agent
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.room import room_box
 from er_gym.sim.space.standing import floor_of, standing_places
-from er_gym.sim.world import Agent, World
+from er_gym.sim.world import World
 
 _FARTHEST = 1000.0
 """No scene is larger than this, metres."""

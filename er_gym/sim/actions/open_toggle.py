@@ -8,6 +8,7 @@ from er_gym.sim import consequences
 from er_gym.sim.actions.aim import object_action
 from er_gym.sim.actions.checks import require, target
 from er_gym.sim.errors import ActionFailed
+from er_gym.sim.space.solids import solid_of
 from er_gym.sim.world import World, whole_steps
 
 _ONLY_SHUT = frozenset({"Microwave"})
@@ -18,7 +19,7 @@ def _slide(world: World, i: int, openness: float) -> None:
     """Slide a drawer, with what lies in it, to an openness: by its depth at 1."""
     if world.types[i] != "Drawer":
         return
-    shape = world.shape(i)
+    shape = solid_of(world, i)
     depth = np.ptp(shape.upright[:, :, 2])
     heading = np.radians(shape.yaw)
     ahead = np.array([np.sin(heading), 0.0, np.cos(heading)])

@@ -18,9 +18,9 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from er_gym.sim.agent import AGENT_HEIGHT
 from er_gym.sim.scene import SCENE_NAMES, load_scene
-from er_gym.sim.start import START_POSES, StartPose
-from er_gym.sim.world import AGENT_HEIGHT
+from er_gym.sim.start_pose import START_POSES, StartPose
 
 _OUR_OWN = {
     "FloorPlan30": StartPose(2.25, 0.25, 270.0),  # beside the kitchen island, facing it

@@ -11,8 +11,8 @@ from er_gym.sim.render.palette import palette
 from er_gym.sim.render.shade import shaded
 from er_gym.sim.render.shapes.joinery import carcass_colour, panels
 from er_gym.sim.scene import load_scene
-from er_gym.sim.space.shapes.built_in import Box
-from er_gym.sim.space.shapes.carcass import carcass
+from er_gym.sim.space.solids.built_in import Box
+from er_gym.sim.space.solids.carcass import carcass
 
 
 @lru_cache(maxsize=128)

@@ -23,7 +23,8 @@ from er_gym.sim.render.palette import palette
 from er_gym.sim.render.shade import shaded as in_light
 from er_gym.sim.render.stove_place import LEAN, Box, Ends, Frame, Place, place_of, slope
 from er_gym.sim.scene import load_scene
-from er_gym.sim.world import Settings, World
+from er_gym.sim.settings import Settings
+from er_gym.sim.world import World
 
 _STEEL: Colour = (0.66, 0.68, 0.71)
 _WHITE: Colour = (0.95, 0.95, 0.93)

@@ -8,7 +8,7 @@ from hashlib import blake2b
 import numpy as np
 
 from er_gym.sim.render.mesh import Colour
-from er_gym.sim.space.shapes.built_in import Box
+from er_gym.sim.space.solids.built_in import Box
 
 
 @dataclass(frozen=True)

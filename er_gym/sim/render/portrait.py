@@ -11,10 +11,13 @@ from er_gym.sim.render.look import Look
 from er_gym.sim.render.palette import palette, room_kind
 from er_gym.sim.scene import Scene
 from er_gym.sim.space.rotation import unity_rotation
-from er_gym.sim.space.shapes.built_in import Box, built_in
+from er_gym.sim.space.solids import solid_of
+from er_gym.sim.space.solids.built_in import Box, built_in
 from er_gym.sim.space.surfaces import recorded_surfaces
 from er_gym.sim.world import World
+from er_gym.sim.world_cache import ObjectCacheKey
 
+_LOOKS: ObjectCacheKey[Look] = ObjectCacheKey("looks", in_snapshots=False)
 _ON_THE_FLOOR = 0.1
 _ALWAYS = 0.004
 """Nothing is thinner than this, metres."""
@@ -30,16 +33,17 @@ def _recorded(scene: Scene) -> dict[int, Look]:
 
 def look(world: World, i: int) -> Look:
     """What object i looks like in its present state: worked out once, until it changes."""
-    kept = world.looks if i in world.touched or i >= len(world.scene) else _recorded(world.scene)
+    changed = i in world.touched or i >= len(world.scene)
+    kept = world.cache.of_objects(_LOOKS) if changed else _recorded(world.scene)
     found = kept.get(i)
-    if not isinstance(found, Look):
+    if found is None:
         found = kept[i] = look_of(world, i)
     return found
 
 
 def look_of(world: World, i: int) -> Look:
     """The same, worked out anew."""
-    scene, shape = world.scene.name, world.shape(i)
+    scene, shape = world.scene.name, solid_of(world, i)
     size = np.maximum(np.ptp(shape.upright.reshape(-1, 3), axis=0), _ALWAYS)
     underside = shape.upright[:, 0, 1].min()
     ground = world.high[next(world.of_type("Floor")), 1]

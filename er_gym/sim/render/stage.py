@@ -30,11 +30,13 @@ from er_gym.sim.render.portrait import look
 from er_gym.sim.render.room import room_shell
 from er_gym.sim.render.shade import shaded
 from er_gym.sim.render.shapes import UNSEEN, build
-from er_gym.sim.space.shapes import Shape
+from er_gym.sim.space.solids import Solid, solid_of
 from er_gym.sim.world import World
+from er_gym.sim.world_cache import CacheKey
 
 _SCENES = 64
 """Rooms whose graphs are kept."""
+_STAGED: CacheKey[object] = CacheKey("state that a stage shows")
 _NODES = 2048
 _BEFORE = 8
 """What is no object is drawn before what is: the order of that begins here, below zero."""
@@ -47,7 +49,7 @@ class _Placed:
     """An object in the graph, and what it was placed by."""
 
     look: Look
-    shape: Shape
+    shape: Solid
     order: int
     path: Any
 
@@ -84,7 +86,7 @@ class Stage:
         before, self._state = self._state, None
         if before is None:  # an exception left it half changed
             self._build()
-        elif world.derived.get("staged") is before:
+        elif world.cache.state.get(_STAGED) is before:
             for i in world.in_hand:  # nothing has changed, but where the hand is
                 if i in self._placed:
                     self._place(world, i, self._placed[i].order)
@@ -98,7 +100,7 @@ class Stage:
                 self._lay_floor(i)
             else:
                 self._place(world, i, order[i])
-        self._state = world.derived["staged"] = object()
+        self._state = world.cache.state.put(_STAGED, object())
 
     def _lay_floor(self, i: int) -> None:
         if self._floor_number != i + 1:
@@ -111,7 +113,7 @@ class Stage:
             placed.path.removeNode()
 
     def _place(self, world: World, i: int, order: int) -> None:
-        seen, shape, before = look(world, i), world.shape(i), self._placed.get(i)
+        seen, shape, before = look(world, i), solid_of(world, i), self._placed.get(i)
         same = before is not None and before.look == seen and before.order == order
         if before is not None and same and before.shape is shape:
             return
@@ -139,7 +141,7 @@ def _order(world: World) -> list[int]:
     return [*range(recorded), *(rank[i] for i in range(recorded, len(world)))]
 
 
-def _heading(shape: Shape) -> float:
+def _heading(shape: Solid) -> float:
     return round(shape.yaw / _HEADING) * _HEADING % 360.0
 
 

@@ -17,7 +17,8 @@ from er_gym.sim.render.mesh import rotation
 from er_gym.sim.render.plan import room_plan
 from er_gym.sim.render.portrait import look
 from er_gym.sim.space.rotation import unity_rotation
-from er_gym.sim.space.shapes.carcass import SUNK
+from er_gym.sim.space.solids import solid_of
+from er_gym.sim.space.solids.carcass import SUNK
 from er_gym.sim.world import World
 
 Floats = NDArray[np.float64]
@@ -203,7 +204,9 @@ def _about(world: World, frame: Frame) -> Iterator[Box]:
             seen = look(world, i)
             height = seen.size[1] if seen.surface is None else max(seen.surface, 0.0)
             surface = float(world.low[i, 1]) + min(height, seen.size[1]) - SUNK
-        boxes = world.shape(i).boxes if kind == "CounterTop" else [(world.low[i], world.high[i])]
+        boxes = (
+            solid_of(world, i).boxes if kind == "CounterTop" else [(world.low[i], world.high[i])]
+        )
         for low, high in boxes:
             yield frame.box(low, high, kind, surface)
 

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.agent import Agent
 from er_gym.sim.metadata import instance_color
 from er_gym.sim.render.camera import Camera
-from er_gym.sim.world import Agent, Settings, ThirdPartyCamera, World
+from er_gym.sim.settings import Settings, ThirdPartyCamera
+from er_gym.sim.world import World
+from er_gym.sim.world_cache import CacheKey
 
 if TYPE_CHECKING:
     from er_gym.sim.render.panda import Frames
@@ -57,6 +60,9 @@ class _Kept:
         return same and self.cameras == world.cameras
 
 
+_VIEW: CacheKey[_Kept] = CacheKey("view")
+
+
 def with_flags(settings: Settings, request: Mapping[str, Any]) -> Settings:
     """The settings, with the pictures that one action asks for besides those of ``Initialize``."""
     wanted = {name: True for flag, name in _FLAGS.items() if request.get(flag) is True}
@@ -68,12 +74,12 @@ def draw(world: World) -> View:
 
     What was drawn last is handed out again while nothing has changed.
     """
-    kept = world.derived.get("view")
-    if isinstance(kept, _Kept) and kept.shows(world):
+    kept = world.cache.state.get(_VIEW)
+    if kept is not None and kept.shows(world):
         return kept.view
     first, *others = (_draw(world, camera) for camera in _cameras(world))
     view = replace(first, third_party=tuple(others))
-    world.derived["view"] = _Kept(world.agent, world.settings, world.cameras, view)
+    world.cache.state.put(_VIEW, _Kept(world.agent, world.settings, world.cameras, view))
     return view
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.space.room import room_box
+from er_gym.sim.space.solids import solid_of
 from er_gym.sim.world import World
 
 _SKIN = 0.02
@@ -25,7 +26,7 @@ class Clearance:
     def __init__(self, world: World, i: int, ignored: tuple[int, ...] = ()) -> None:
         aside = {i, *world.inside(i), *world.ancestors(i), *ignored, *world.of_type("Floor")}
         rows = [k for k in np.flatnonzero(world.exists).tolist() if k not in aside]
-        parts = [world.shape(k).boxes for k in rows]
+        parts = [solid_of(world, k).boxes for k in rows]
         self._boxes = np.concatenate([np.empty((0, 2, 3)), *parts])
         self._whose = np.repeat(rows, [len(part) for part in parts]).astype(int)
         self._room = room_box(world.scene.name)

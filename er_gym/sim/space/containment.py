@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from er_gym.sim.scene import PROPERTIES
-from er_gym.sim.space.shapes.families import family
+from er_gym.sim.space.solids import solid_of
+from er_gym.sim.space.solids.families import family
 from er_gym.sim.world import World
 
 _FLOOR = [0, 2]
@@ -77,7 +78,7 @@ def _over(world: World, r: int, i: int) -> bool:
     """Whether the middle of object i is over receptacle r; a counter may bend around it."""
     middle = ((world.low[i] + world.high[i]) / 2)[_FLOOR]
     if world.types[r] == "CounterTop":
-        low, high = world.shape(r).boxes[:, :, _FLOOR].swapaxes(0, 1)
+        low, high = solid_of(world, r).boxes[:, :, _FLOOR].swapaxes(0, 1)
     else:
         low, high = world.low[None, r, _FLOOR], world.high[None, r, _FLOOR]
     return bool(((low - _BESIDE <= middle) & (middle <= high + _BESIDE)).all(axis=1).any())

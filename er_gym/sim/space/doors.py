@@ -11,6 +11,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.space.solids import solid_of
 from er_gym.sim.world import World
 
 _SWINGING = ("Fridge",)
@@ -34,7 +35,7 @@ def boxes(world: World) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def _swept(world: World, i: int) -> NDArray[np.float64]:
     """(4, 3) points around the door of object i, at the height of its middle."""
-    shape = world.shape(i)
+    shape = solid_of(world, i)
     left, right = shape.upright[:, :, 0].min(), shape.upright[:, :, 0].max()
     front = shape.upright[:, :, 2].max()
     edge = front + (right - left) * np.sin(_QUARTER * world.openness[i])

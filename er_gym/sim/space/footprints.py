@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.space.shapes import Shape
+from er_gym.sim.space.solids import Solid, solid_of
 from er_gym.sim.world import World
 
 RADIUS = 0.2
@@ -50,7 +50,7 @@ class Footprints:
             (shape, part)
             for i, kind in enumerate(world.types)
             if kind != "Floor"
-            for shape in (world.shape(i),)
+            for shape in (solid_of(world, i),)
             for part in _solid(kind, shape)
         ]
         boxes = np.array([part for _, part in parts])
@@ -96,7 +96,7 @@ def _reach(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.fl
     return np.where(inside, away, 0.0)
 
 
-def _solid(kind: str, shape: Shape) -> NDArray[np.float64]:
+def _solid(kind: str, shape: Solid) -> NDArray[np.float64]:
     """(K, 2, 3) corners of what is solid of a thing, about its middle, before its turn."""
     if kind in _PANES and np.ptp(shape.upright[..., [0, 2]], axis=(0, 1)).min() > _PANE:
         return shape.upright[:0]

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.agent import Agent
 from er_gym.sim.scene import PROPERTIES
 from er_gym.sim.space.rotation import unity_rotation
-from er_gym.sim.space.shapes.families import family
+from er_gym.sim.space.solids import solid_of
+from er_gym.sim.space.solids.families import family
 from er_gym.sim.space.surfaces import recorded_surfaces
 from er_gym.sim.space.visibility import in_frustum
-from er_gym.sim.world import Agent, World, settled
+from er_gym.sim.world import World, settled
 
 
 @dataclass(frozen=True)
@@ -87,10 +89,10 @@ def _manner(world: World, receptacle: int) -> _Manner:
 def _places(world: World, receptacle: int) -> NDArray[np.float64]:
     """(R, 2, 2) corners x, z of the rectangles in or on a receptacle that things stand in."""
     if world.types[receptacle] == "CounterTop":
-        return world.shape(receptacle).boxes[:, :, [0, 2]]
+        return solid_of(world, receptacle).boxes[:, :, [0, 2]]
     if _stand(world, receptacle) is None:
         return np.array([[world.low[receptacle], world.high[receptacle]]])[:, :, [0, 2]]
-    return world.shape(receptacle).boxes[:1, :, [0, 2]]
+    return solid_of(world, receptacle).boxes[:1, :, [0, 2]]
 
 
 def free_spots(
@@ -264,7 +266,7 @@ def _obstacles(
             hole[0, 1, 1] = max(world.high[k, 1], height + 2 * _SKIN)
             boxes.append(hole)
         elif on_top or world.has(k, "moveable"):
-            parts = world.shape(k).boxes
+            parts = solid_of(world, k).boxes
             rises = _SKIN if world.has(k, "moveable") else _RISES
             boxes.append(parts[parts[:, 1, 1] > height + rises])
     return np.concatenate(boxes), things

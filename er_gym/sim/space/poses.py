@@ -7,10 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.agent import CAMERA_CROUCHING, CAMERA_STANDING, Agent
 from er_gym.sim.space.reach import Outlines
 from er_gym.sim.space.sights import sights
+from er_gym.sim.space.solids import solid_of
+from er_gym.sim.space.solids.sample_points import sample_points
 from er_gym.sim.space.visibility import in_frustum, visible
-from er_gym.sim.world import CAMERA_CROUCHING, CAMERA_STANDING, Agent, World
+from er_gym.sim.world import World
 
 HORIZONS = (-30.0, 0.0, 30.0, 60.0)
 """Camera tilts that AI2-THOR tries when none are asked for, degrees, down positive."""
@@ -132,12 +135,12 @@ def _within_reach(
     away = np.abs(np.array(sights(world).reach)[:, None] - positions).max(axis=0, initial=0.0)
     if i not in world.in_hand and (np.hypot(away[:, 0], away[:, 1]) <= distance).all():
         return positions  # all that there is, is
-    return positions[Outlines.of([world.shape(i)]).gaps(positions)[:, 0] <= distance]
+    return positions[Outlines.of([solid_of(world, i)]).gaps(positions)[:, 0] <= distance]
 
 
 def _lines_to(
     world: World, i: int, eyes: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Object i's sample points (Q, 3), and (E, Q) from which eyes (E, 3) nothing hides which."""
-    points = world.sample_points(i).astype(np.float32)
+    points = sample_points(world, i).astype(np.float32)
     return points, sights(world).clear(eyes, points, i)

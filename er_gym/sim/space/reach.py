@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.space.shapes import Shape
+from er_gym.sim.space.solids import Solid
 
 _FLOOR = [0, 2]
 
@@ -36,7 +36,7 @@ class Outlines:
     first: NDArray[np.int64]
 
     @staticmethod
-    def of(shapes: Sequence[Shape]) -> Outlines:
+    def of(shapes: Sequence[Solid]) -> Outlines:
         """The outlines of some shapes, each of one part or more."""
         counts = [len(shape.upright) for shape in shapes]
         corners = np.concatenate([shape.upright for shape in shapes])[:, :, _FLOOR]

@@ -20,10 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.scene import load_scene
+from er_gym.sim.settings import Settings
 from er_gym.sim.space.rays import Targets, blocked_by, crossings
 from er_gym.sim.space.reach import Outlines
-from er_gym.sim.space.shapes.seen import SLABS, SOLID
-from er_gym.sim.world import Settings, World
+from er_gym.sim.space.solids import solid_of
+from er_gym.sim.space.solids.sample_points import SLABS, SOLID, sample_points
+from er_gym.sim.world import World
+from er_gym.sim.world_cache import CacheKey
 
 _RUN = 26
 """So many points, those of a small box, are held against a box at once before each is by itself."""
@@ -255,7 +258,7 @@ def _kept(
 def _boxes(world: World, rows: Iterable[int]) -> tuple[Floats, Floats, NDArray[np.intp]]:
     """(M, 3) corners of what some objects hide things with, and (M,) whose they are."""
     rows = list(rows)
-    hiding = [np.empty((0, 2, 3)), *(world.shape(i).hiding for i in rows)]
+    hiding = [np.empty((0, 2, 3)), *(solid_of(world, i).hiding for i in rows)]
     boxes = np.concatenate(hiding).astype(np.float32)
     return boxes[:, 0], boxes[:, 1], np.repeat(rows, [len(h) for h in hiding[1:]]).astype(np.intp)
 
@@ -293,14 +296,14 @@ def _both(one: _Rectangle, other: _Rectangle) -> _Rectangle:
 def sights_anew(world: World) -> Sights:
     """The sights of the world as it is now, whatever is known of other arrangements."""
     rows = range(len(world))
-    points = [world.sample_points(i) for i in rows]
+    points = [sample_points(world, i) for i in rows]
     count = np.array([len(p) for p in points])
     of = np.repeat(np.arange(len(world)), count)
     away = world.hidden.copy()
     away[world.in_hand] = True
     low, high, whose = _boxes(world, np.flatnonzero(~away).tolist())
     own = _own(world, whose)
-    outlines = Outlines.of([world.shape(i) for i in rows])
+    outlines = Outlines.of([solid_of(world, i) for i in rows])
     return Sights(
         points=np.concatenate(points).astype(np.float32),
         of=of,
@@ -321,10 +324,13 @@ def sights_anew(world: World) -> Sights:
     )
 
 
+_SIGHTS: CacheKey[Sights] = CacheKey("sights")
+
+
 @lru_cache(maxsize=128)
 def _as_recorded(scene_name: str) -> World:
     world = World.load(load_scene(scene_name), Settings())
-    world.arrangement["sights"] = sights_anew(world)
+    world.cache.arrangement.put(_SIGHTS, sights_anew(world))
     return world
 
 
@@ -408,7 +414,7 @@ def _changed(world: World, before: Sights, difference: _Difference) -> Sights:
     anew, outlines, reach = None, None, before.reach
     if len(elsewhere):
         anew = moved[of]
-        outlines = Outlines.of([world.shape(i) for i in elsewhere.tolist()])
+        outlines = Outlines.of([solid_of(world, i) for i in elsewhere.tolist()])
         reach = _both(reach, _rectangle(outlines))
     return Sights(
         points=points,
@@ -443,10 +449,10 @@ def _with_points(world: World, before: Sights, elsewhere: NDArray[np.intp]) -> _
     points, new = [before.points.copy()], {}
     for i in elsewhere[elsewhere < old].tolist():
         # As many as it had: they are spread over a box of the same size.
-        own = world.sample_points(i).astype(np.float32)
+        own = sample_points(world, i).astype(np.float32)
         points[0][before.first[i] : before.first[i] + before.count[i]] = own
     for i in range(old, len(world)):  # what is shut away too: this may be another's `before`
-        points.append(world.sample_points(i).astype(np.float32))
+        points.append(sample_points(world, i).astype(np.float32))
         new[i] = len(points[-1])
     if len(world) == old:
         return points[0], before.of, before.first, before.count
@@ -462,10 +468,10 @@ _known: OrderedDict[Any, Sights] = OrderedDict()
 
 def sights(world: World) -> Sights:
     """The sights of the world as it is now: those found before, if it was like this before."""
-    found = world.arrangement.get("sights")
+    found = world.cache.arrangement.get(_SIGHTS)
     if found is None:
-        found = world.arrangement["sights"] = _found(world)
-    return found  # type: ignore[return-value]  # the only writer is above
+        found = world.cache.arrangement.put(_SIGHTS, _found(world))
+    return found
 
 
 def _found(world: World) -> Sights:

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.scene import Scene, load_scene
+from er_gym.sim.settings import Settings
 from er_gym.sim.space.footprints import RADIUS, Footprints
 from er_gym.sim.space.walk import RECORDED_STEP, Cells, recorded_cells
-from er_gym.sim.world import Settings, World
+from er_gym.sim.world import World
 
 CELL = 0.025
 """Side of the cells that the floor is cut into, metres."""

@@ -10,8 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.agent import Agent
+from er_gym.sim.settings import Settings
 from er_gym.sim.space.sights import Sights, sights
-from er_gym.sim.world import Agent, Settings, World
+from er_gym.sim.world import World
 
 NEAR_PLANE = 0.1
 """Distance of the camera's near plane, metres."""

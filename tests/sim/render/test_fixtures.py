@@ -13,7 +13,8 @@ from er_gym.sim.render.fixtures import fixtures
 from er_gym.sim.render.panda import geometry
 from er_gym.sim.render.stage import Stage
 from er_gym.sim.scene import SCENE_NAMES, SCENE_NUMBERS, load_scene
-from er_gym.sim.world import Settings, World
+from er_gym.sim.settings import Settings
+from er_gym.sim.world import World
 
 KITCHENS = [f"FloorPlan{number}" for number in SCENE_NUMBERS["kitchens"]]
 EYE = 1.575

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from er_gym.sim.agent import AGENT_HEIGHT, Agent
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.doorway import WIDTH, doorway
 from er_gym.sim.render.mesh import Mesh, Patch
@@ -12,8 +13,10 @@ from er_gym.sim.render.panda import core, geometry, rasteriser
 from er_gym.sim.render.plan import room_plan
 from er_gym.sim.render.room import room_shell
 from er_gym.sim.scene import SCENE_NAMES, load_scene
+from er_gym.sim.settings import Settings
+from er_gym.sim.space.solids import solid_of
 from er_gym.sim.space.visibility import visible
-from er_gym.sim.world import AGENT_HEIGHT, Agent, Settings, World
+from er_gym.sim.world import World
 
 FLOOR = 250
 
@@ -26,7 +29,7 @@ def drawn(root: Any, patches: dict[str, Patch], number: int, name: str) -> Any:
 def boxes(world: World, i: int) -> dict[str, Patch]:
     """An object as the boxes that the engine takes it for."""
     mesh = Mesh()
-    for low, high in world.shape(i).boxes:
+    for low, high in solid_of(world, i).boxes:
         x, y, z = ((low + high) / 2).tolist()
         w, h, d = np.maximum(high - low, 0.004).tolist()
         mesh.box((x, y, z), (w, h, d), (1, 1, 1))

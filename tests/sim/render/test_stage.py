@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from er_gym.sim.actions import perform
+from er_gym.sim.agent import Agent
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.look import Look
 from er_gym.sim.render.panda import FAR
@@ -18,7 +19,8 @@ from er_gym.sim.render.portrait import look_of
 from er_gym.sim.render.shapes import SHAPES, UNSEEN, build, without_shape
 from er_gym.sim.render.stage import stage
 from er_gym.sim.scene import SCENE_NAMES, load_scene
-from er_gym.sim.world import Agent, Settings, World
+from er_gym.sim.settings import Settings
+from er_gym.sim.world import World
 from er_gym.thor import OBJECT_TYPES
 
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from er_gym.sim.render.look import Palette, shaded
 from er_gym.sim.render.mesh import Colour, Mesh, Triple
-from er_gym.sim.space.shapes.built_in import Box
+from er_gym.sim.space.solids.built_in import Box
 
 WALL = 0.02
 """Thickness of boards, metres."""

@@ -17,7 +17,7 @@ from er_gym.sim.render.shapes.joinery import (
     panels,
 )
 from er_gym.sim.render.shapes.table import shape
-from er_gym.sim.space.shapes.carcass import LET_IN, LIP, SLAB, SUNK, TALL, without
+from er_gym.sim.space.solids.carcass import LET_IN, LIP, SLAB, SUNK, TALL, without
 
 _CARD, _TAPE = (0.72, 0.54, 0.34), (0.86, 0.76, 0.52)
 _STEEL, _GUNMETAL, _DIAL = (0.30, 0.33, 0.35), (0.20, 0.24, 0.25), (0.85, 0.85, 0.82)

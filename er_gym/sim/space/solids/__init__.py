@@ -7,6 +7,6 @@ points; :mod:`placed` sets the parts into the world; :mod:`samples` spreads the 
 that are looked for when one asks whether it is visible.
 """
 
-from er_gym.sim.space.shapes.placed import Shape, shape_of
+from er_gym.sim.space.solids.solid import Solid, solid_of
 
-__all__ = ["Shape", "shape_of"]
+__all__ = ["Solid", "solid_of"]

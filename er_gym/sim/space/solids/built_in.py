@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from er_gym.sim.scene import load_scene
-from er_gym.sim.space.shapes.facing import SIDES, facings
+from er_gym.sim.space.solids.facing import SIDES, facings
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Low and high corner, metres."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.scene import load_scene
-from er_gym.sim.space.shapes.built_in import Front, Rectangle, fronts
+from er_gym.sim.space.solids.built_in import Front, Rectangle, fronts
 from er_gym.sim.space.walk import recorded_cells
 
 _CELL = 0.05

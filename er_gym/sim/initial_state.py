@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from er_gym.sim.nesting import Nesting
 from er_gym.sim.scene import PROPERTIES, Scene
-from er_gym.sim.space.shapes import Shape
 
 USED_UP = ("PaperTowelRoll", "SoapBottle", "TissueBox", "ToiletPaper")
 """Types that ProcTHOR's asset database says can be used up."""
@@ -52,15 +51,3 @@ def rows_by_type(scene: Scene) -> Mapping[str, tuple[int, ...]]:
 def nesting(scene: Scene) -> Nesting:
     """What lies in what, as recorded."""
     return Nesting.of(parents(scene), np.ones(len(scene), dtype=bool))
-
-
-@lru_cache(maxsize=128)
-def shapes(scene: Scene) -> dict[int, Shape]:
-    """The shapes of a scene's objects as recorded, filled by ``World.shape``."""
-    return {}
-
-
-@lru_cache(maxsize=128)
-def samples(scene: Scene) -> dict[int, NDArray[np.float64]]:
-    """Their sample points as recorded, filled by ``World.sample_points``."""
-    return {}

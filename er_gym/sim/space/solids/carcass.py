@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.scene import PROPERTIES, Scene, load_scene
-from er_gym.sim.space.shapes.built_in import Front, Rectangle, built_in, fronts
-from er_gym.sim.space.shapes.counters import rectangles
+from er_gym.sim.space.solids.built_in import Front, Rectangle, built_in, fronts
+from er_gym.sim.space.solids.counters import rectangles
 from er_gym.sim.space.surfaces import recorded_surfaces
 
 SLAB = 0.035

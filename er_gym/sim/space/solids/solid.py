@@ -1,30 +1,30 @@
-"""The shape of one object where it is now."""
+"""The solid of one object: the boxes that it is made of, where it is now."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.scene import Scene
+from er_gym.sim.scene_objects import SceneObjects
 from er_gym.sim.space.rotation import unity_rotation
-from er_gym.sim.space.shapes.carcass import carcass
-from er_gym.sim.space.shapes.counters import rectangles
-from er_gym.sim.space.shapes.facing import facings
-from er_gym.sim.space.shapes.families import family, parts
-from er_gym.sim.space.shapes.frame import trimmed, turned
+from er_gym.sim.space.solids.box_transforms import trimmed, turned
+from er_gym.sim.space.solids.carcass import carcass
+from er_gym.sim.space.solids.counters import rectangles
+from er_gym.sim.space.solids.facing import facings
+from er_gym.sim.space.solids.families import family, parts
 from er_gym.sim.space.surfaces import recorded_surfaces
-
-if TYPE_CHECKING:
-    from er_gym.sim.world import World
+from er_gym.sim.world_cache import ObjectCacheKey
 
 _HOB, _UNDER = 0.03, 0.004
 """How much wider than its burners a stove is at least, and from a burner down to it, metres."""
 
 
 @dataclass(frozen=True)
-class Shape:
+class Solid:
     """What an object is made of; metres.
 
     Attributes:
@@ -32,7 +32,7 @@ class Shape:
         yaw: heading of its front, degrees.
         upright: (K, 2, 3) corners of its parts about ``middle``, before the turn by ``yaw``.
         boxes: (K, 2, 3) the same as axis-aligned boxes of the world (see
-            :func:`er_gym.sim.space.shapes.frame.turned`).
+            :func:`er_gym.sim.space.solids.box_transforms.turned`).
         hiding: (H, 2, 3) boxes of the world that hide what is behind them.
     """
 
@@ -43,8 +43,26 @@ class Shape:
     hiding: NDArray[np.float64]
 
 
-def shape_of(world: World, i: int) -> Shape:
-    """The shape of object i as it stands now; :meth:`World.shape` keeps it."""
+_SOLIDS: ObjectCacheKey[Solid] = ObjectCacheKey("solids", until_moved=True)
+
+
+@lru_cache(maxsize=128)
+def _recorded_solids(scene: Scene) -> dict[int, Solid]:
+    """The solids of a scene's objects where they are recorded, filled by :func:`solid_of`."""
+    return {}
+
+
+def solid_of(world: SceneObjects, i: int) -> Solid:
+    """The solid of object i where it is now; kept until the object moves."""
+    recorded = world.is_where_recorded(i)
+    kept = _recorded_solids(world.scene) if recorded else world.cache.of_objects(_SOLIDS)
+    found = kept.get(i)
+    if found is None:
+        found = kept[i] = _make_solid(world, i)
+    return found
+
+
+def _make_solid(world: SceneObjects, i: int) -> Solid:
     if world.types[i] == "CounterTop" and i < len(world.scene):
         return _counter(world, i)
     if world.types[i] == "StoveBurner" and i == next(world.of_type("StoveBurner")):
@@ -52,7 +70,7 @@ def shape_of(world: World, i: int) -> Shape:
     return _of_family(world, i)
 
 
-def _of_family(world: World, i: int) -> Shape:
+def _of_family(world: SceneObjects, i: int) -> Solid:
     middle, size, yaw = upright_box(world, i)
     standing = recorded_surfaces(world.scene.name).get(i)
     made_of, hiding = parts(
@@ -66,10 +84,12 @@ def _of_family(world: World, i: int) -> Shape:
     hides = boxes[len(upright) :]
     if not family(world.types[i], world.has(i, "pickupable")).snug:
         hides = trimmed(hides)
-    return Shape(middle, yaw, upright, boxes[: len(upright)], hides)
+    return Solid(middle, yaw, upright, boxes[: len(upright)], hides)
 
 
-def upright_box(world: World, i: int) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def upright_box(
+    world: SceneObjects, i: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Middle (3,), size (3,) and heading of object i's box before it is turned to that heading."""
     if np.isnan(world.obb[i, 0, 0]):
         fronts = facings(world.scene.name)
@@ -84,7 +104,7 @@ def upright_box(world: World, i: int) -> tuple[NDArray[np.float64], NDArray[np.f
     return middle, np.abs(edges).sum(axis=0), yaw
 
 
-def _with_stove(world: World, i: int) -> Shape:
+def _with_stove(world: SceneObjects, i: int) -> Solid:
     """A burner; the first of a kitchen hides things with the stove under them, which is no object.
 
     What hides: from the floor to just below the burners, over which it is a little wider.
@@ -96,11 +116,11 @@ def _with_stove(world: World, i: int) -> Shape:
     return replace(burner, hiding=stove[None])
 
 
-def _counter(world: World, i: int) -> Shape:
+def _counter(world: SceneObjects, i: int) -> Solid:
     """A counter, less what the agent walks through; its slab and its carcass hide things."""
     middle = (world.low[i] + world.high[i]) / 2
     tops = rectangles(world.scene.name, i)
     boxes = np.empty((len(tops), 2, 3))
     boxes[:, :, [0, 2]] = tops
     boxes[:, 0, 1], boxes[:, 1, 1] = world.low[i, 1], world.high[i, 1]
-    return Shape(middle, 0.0, boxes - middle, boxes, carcass(world.scene.name, i).hiding)
+    return Solid(middle, 0.0, boxes - middle, boxes, carcass(world.scene.name, i).hiding)

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.scene import Scene
+from er_gym.sim.scene_objects import SceneObjects
 from er_gym.sim.space.rotation import unity_rotation
-from er_gym.sim.space.shapes.built_in import hosts
-from er_gym.sim.space.shapes.carcass import carcass
-from er_gym.sim.space.shapes.placed import upright_box
-from er_gym.sim.space.shapes.samples import (
+from er_gym.sim.space.solids.built_in import hosts
+from er_gym.sim.space.solids.carcass import carcass
+from er_gym.sim.space.solids.solid import upright_box
+from er_gym.sim.space.solids.surface_points import (
     INSET,
     ROUND,
     points_on_face,
     points_on_top,
     surface_fractions,
 )
-
-if TYPE_CHECKING:
-    from er_gym.sim.world import World
+from er_gym.sim.world_cache import ObjectCacheKey
 
 SOLID = ("Drawer", "Cabinet", "CounterTop", "StoveBurner")
 """Types that are seen from outside only: their own boxes hide the points on their far sides."""
@@ -58,7 +58,30 @@ _CLOSE = 0.2
 Floats = NDArray[np.float64]
 
 
-def points_to_see(world: World, i: int) -> Floats:
+_SAMPLE_POINTS: ObjectCacheKey[Floats] = ObjectCacheKey("sample points", until_moved=True)
+
+
+@lru_cache(maxsize=128)
+def _recorded_points(scene: Scene) -> dict[int, Floats]:
+    """The points of a scene's objects where they are recorded, filled by :func:`sample_points`."""
+    return {}
+
+
+def sample_points(world: SceneObjects, i: int) -> Floats:
+    """(P, 3) points of object i, world frame, metres; kept until the object moves.
+
+    The object is visible if the agent sees any of them. Their number does not depend on where the
+    object is or in which state.
+    """
+    recorded = world.is_where_recorded(i)
+    kept = _recorded_points(world.scene) if recorded else world.cache.of_objects(_SAMPLE_POINTS)
+    points = kept.get(i)
+    if points is None:
+        points = kept[i] = _make_points(world, i)
+    return points
+
+
+def _make_points(world: SceneObjects, i: int) -> Floats:
     """(P, 3) points of object i, world frame, metres: as many wherever it is and however it is.
 
     Most things are looked for all over their boxes, the oriented ones where recorded; of what is
