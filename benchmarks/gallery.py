@@ -22,13 +22,12 @@ from benchmarks.cli_errors import bad_input
 from benchmarks.cli_options import force_option
 from er_gym.sim.actions import perform
 from er_gym.sim.agent import Agent
+from er_gym.sim.render.appearance import Appearance, compute_appearance
 from er_gym.sim.render.camera import Camera
-from er_gym.sim.render.look import Look
+from er_gym.sim.render.lighting import lit_colours
 from er_gym.sim.render.panda import core, geometry, rasteriser
-from er_gym.sim.render.portrait import look_of
-from er_gym.sim.render.shade import shaded
+from er_gym.sim.render.scene_graph import scene_graph_of
 from er_gym.sim.render.shapes import SHAPES, build
-from er_gym.sim.render.stage import stage
 from er_gym.sim.scene import SCENE_NAMES, SCENE_NUMBERS, load_scene
 from er_gym.sim.settings import Settings
 from er_gym.sim.world import World
@@ -51,13 +50,13 @@ _CUT = {"Sliced": "SliceObject", "Cracked": "BreakObject"}
 """Ends of types that come to be by an action, and the action."""
 
 
-def looks(kind: str, count: int = 1) -> list[Look]:
+def looks(kind: str, count: int = 1) -> list[Appearance]:
     """Some objects of a type, of as many different assets and rooms as there are."""
-    found: dict[tuple[str, ...], Look] = {}
+    found: dict[tuple[str, ...], Appearance] = {}
     for name in SCENE_NAMES:
         world = _world_with(kind, name)
         if world is not None:
-            look = look_of(world, next(world.of_type(kind)))
+            look = compute_appearance(world, next(world.of_type(kind)))
             key = (look.asset,) if look.asset else (look.room, str(len(found) % 3))
             found.setdefault(key, look)
     kept = list(found.values())
@@ -79,7 +78,7 @@ def _world_with(kind: str, scene_name: str) -> World | None:
     return None
 
 
-def states(look: Look) -> Iterator[tuple[str, Look]]:
+def states(look: Appearance) -> Iterator[tuple[str, Appearance]]:
     """The look in each of the states that change its triangles."""
     plain = replace(look, openness=0.0, on=False, filled="", dirty=False, cooked=False)
     yield "", plain
@@ -104,10 +103,10 @@ def states(look: Look) -> Iterator[tuple[str, Look]]:
             yield name, other
 
 
-def portrait(look: Look, side: int = _SIDE, yaw: float = 30.0) -> NDArray[np.uint8]:
+def portrait(look: Appearance, side: int = _SIDE, yaw: float = 30.0) -> NDArray[np.uint8]:
     """(S, S, 3) a thing by itself, seen from its front, ``yaw`` degrees aside, and from above."""
     parts = [
-        (m, p.vertices, shaded(m, p, 0.0, look.size[1], look.height), p.uv, p.triangles)
+        (m, p.vertices, lit_colours(m, p, 0.0, look.size[1], look.height), p.uv, p.triangles)
         for m, p in build(look).items()
     ]
     root = core().NodePath("portrait")
@@ -149,14 +148,14 @@ def room_views(scene_name: str) -> list[NDArray[np.uint8]]:
     for k, (x, z) in enumerate(world.scene.reachable[::4]):
         for yaw in np.arange(0.0, 360.0, 45.0):
             camera = Camera(Agent(np.array([x, y, z])).camera, float(yaw), 15.0, 75.0, 96, 60)
-            ids = stage(scene_name).draw(world, camera).ids
+            ids = scene_graph_of(scene_name).draw(world, camera).ids
             counts = np.bincount(ids.ravel(), minlength=2)[1:]
             found.append((int((counts > 8).sum()), -k, float(yaw), camera))
     found.sort(key=lambda view: view[:3], reverse=True)
     first = found[0]
     second = next(view for view in found if abs((view[2] - first[2] + 180) % 360 - 180) > 80)
     views = [replace(view[3], width=_ROOM[0], height=_ROOM[1]) for view in (first, second)]
-    return [stage(scene_name).draw(world, camera).rgb for camera in views]
+    return [scene_graph_of(scene_name).draw(world, camera).rgb for camera in views]
 
 
 def make_gallery() -> None:

@@ -35,7 +35,7 @@ from benchmarks.perf.comparisons.reachable import (
 from benchmarks.perf.comparisons.room import WITHIN, held_out, rooms
 from benchmarks.perf.comparisons.visibility import visible_objects
 from benchmarks.perf.output import Output, write_figures
-from er_gym.sim.space.standing import Rules
+from er_gym.sim.space.walkable_floor import Rules
 
 CAPTURES = "unity_captures_dev.json"
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"

@@ -44,7 +44,7 @@ from benchmarks.perf.soak import free_play
 from benchmarks.perf.steps import Walker
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.sim.render.camera import Camera
-from er_gym.sim.render.stage import stage
+from er_gym.sim.render.scene_graph import scene_graph_of
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.settings import Settings
 from er_gym.sim.world import World
@@ -146,7 +146,7 @@ class Pictures:
         frames, start = 0, time.perf_counter()
         while time.perf_counter() - start < seconds:
             world, camera = next(self._poses)
-            stage(world.scene.name).draw(world, camera, self._depth)
+            scene_graph_of(world.scene.name).draw(world, camera, self._depth)
             frames += 1
         return frames / (time.perf_counter() - start)
 

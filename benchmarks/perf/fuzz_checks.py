@@ -23,7 +23,7 @@ from benchmarks.perf.invariants import (
 from er_gym.sim.object_metadata import objects as objects_of
 from er_gym.sim.scene import load_scene
 from er_gym.sim.settings import Settings
-from er_gym.sim.space.standing import standing_places
+from er_gym.sim.space.walkable_floor import standing_places
 from er_gym.sim.world import World
 
 Pictures = Sequence[NDArray[Any]]

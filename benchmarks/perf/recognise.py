@@ -31,7 +31,7 @@ from rich.table import Column, Table
 
 from benchmarks.perf.output import Output, write_figures
 from er_gym.sim.render.camera import Camera
-from er_gym.sim.render.stage import stage
+from er_gym.sim.render.scene_graph import scene_graph_of
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.settings import Settings
 from er_gym.sim.world import World
@@ -133,7 +133,7 @@ def crops_of(name: str, types: Sequence[str], most: int, random: np.random.Gener
     label = [number.get(kind, -1) for kind in world.types]
     found: dict[int, list[NDArray[np.uint8]]] = {k: [] for k in set(label) - {-1}}
     for camera in poses(world, types, random):
-        frames = stage(name).draw(world, camera)
+        frames = scene_graph_of(name).draw(world, camera)
         pixels = np.bincount(frames.ids.ravel(), minlength=len(world) + 1)[1:]
         for i in np.flatnonzero(pixels >= LEAST_PIXELS).tolist():
             if label[i] >= 0 and share_inside(camera, world.low[i], world.high[i]) >= LEAST_INSIDE:

@@ -31,7 +31,7 @@ from benchmarks.perf.jobs import choose_scenes, do_all
 from benchmarks.pool import Lost
 from benchmarks.progress import bar
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.sim.space.standing import standing_places
+from er_gym.sim.space.walkable_floor import standing_places
 from er_gym.tasks import verbs
 from er_gym.tasks.task import KeyAction, Task
 from er_gym.tasks.types import TASK_TYPES

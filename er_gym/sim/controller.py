@@ -8,11 +8,11 @@ import ai2thor.controller
 import ai2thor.server
 from numpy.typing import NDArray
 
+from er_gym.sim.copy_on_read import CopyOnReadDict
 from er_gym.sim.engine import Engine
 from er_gym.sim.errors import CLIENT_ERRORS
-from er_gym.sim.lazy import LazyMetadata
-from er_gym.sim.object_metadata import own_objects
-from er_gym.sim.own import OwnDict
+from er_gym.sim.lazy_metadata import LazyMetadata
+from er_gym.sim.object_metadata import writable_objects
 from er_gym.sim.protocol import rgba
 from er_gym.sim.render.view import View
 
@@ -36,12 +36,12 @@ class EventMetadata(LazyMetadata, ai2thor.server.MetadataWrapper):  # type: igno
     What reads them as a whole, such as ``dict`` or ``json``, finds plain dictionaries.
     """
 
-    instead: ClassVar = {"objects": own_objects}
+    instead: ClassVar = {"objects": writable_objects}
 
     def read_whole(self) -> None:
         super().read_whole()
         objects = dict.__getitem__(self, "objects")
-        if objects and type(objects[0]) is OwnDict:
+        if objects and type(objects[0]) is CopyOnReadDict:
             objects[:] = map(dict, objects)
 
 

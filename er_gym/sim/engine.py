@@ -9,7 +9,7 @@ from weakref import ReferenceType, ref
 
 from er_gym.sim.actions import perform
 from er_gym.sim.errors import ActionFailed, WrongCall
-from er_gym.sim.lazy import LazyMetadata
+from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.sim.metadata import metadata
 from er_gym.sim.render.view import View, draw, with_flags
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError, load_scene

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from er_gym.sim.agent import HAND_OFFSET
-from er_gym.sim.lazy import LazyMetadata
+from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.sim.object_metadata import box, objects, vector
-from er_gym.sim.space.room import room_box
+from er_gym.sim.space.room_bounds import room_bounds
 from er_gym.sim.world import World
 
 
 def scene_bounds(world: World) -> dict[str, Any]:
     """The box around the room with its walls and ceiling, metres."""
-    return box(*room_box(world.scene.name))
+    return box(*room_bounds(world.scene.name))
 
 
 def _agent(world: World) -> dict[str, Any]:

@@ -1,8 +1,9 @@
 """The objects of the world as AI2-THOR 5 metadata.
 
-All but ``visible``, ``isInteractable`` and ``distance`` says nothing of the agent; it is made for
-many objects at once and kept in the world's cache until the object changes. What is kept is shared:
-:func:`objects` is for what packs it or reads it, :func:`own_objects` for whoever may write into it.
+Only ``visible``, ``isInteractable`` and ``distance`` depend on the agent. Everything else is made
+for many objects at once and kept in the world's cache until the object changes. The kept values
+are shared: use :func:`objects` to read or pack them and :func:`writable_objects` for a caller that
+may change them.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.own import OwnDict
+from er_gym.sim.copy_on_read import CopyOnReadDict
 from er_gym.sim.scene import PROPERTIES, STATES
-from er_gym.sim.space.doors import boxes
+from er_gym.sim.space.door_boxes import boxes_with_doors
 from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
@@ -66,11 +67,11 @@ def objects(world: World) -> list[Entry]:
     ]
 
 
-def own_objects(world: World) -> list[Entry]:
+def writable_objects(world: World) -> list[Entry]:
     """The same, the caller's to change."""
     found: list[Entry] = []
     for (_, single, nested), seen, away in _parts(world):
-        entry = OwnDict(single, visible=seen, isInteractable=seen, distance=away)
+        entry = CopyOnReadDict(single, visible=seen, isInteractable=seen, distance=away)
         entry.shared = nested
         found.append(entry)
     return found
@@ -116,7 +117,7 @@ def _as_recorded(world: World) -> dict[int, Parts]:
 
 def _entries(world: World, rows: list[int]) -> list[Parts]:
     """What does not change with where the agent is, for some objects."""
-    low, high = (corners[rows] for corners in boxes(world))
+    low, high = (corners[rows] for corners in boxes_with_doors(world))
     turned = world.obb[rows] @ np.swapaxes(unity_rotation(world.rotation[rows]), 1, 2)
     oriented = turned[:, :1] + _OBB_CORNERS @ turned[:, 1:] + world.position[rows, None]
     columns = zip(

@@ -57,6 +57,13 @@ SCENE_NUMBERS: Mapping[str, range] = {
 SCENE_NAMES = tuple(f"FloorPlan{n}" for numbers in SCENE_NUMBERS.values() for n in numbers)
 """The names of the 120 iTHOR scenes, in AI2-THOR's order."""
 
+
+def scene_category(scene_name: str) -> str:
+    """ "kitchens", "living_rooms", "bedrooms" or "bathrooms": a key of :data:`SCENE_NUMBERS`."""
+    number = int(scene_name.removeprefix("FloorPlan"))
+    return next(category for category, numbers in SCENE_NUMBERS.items() if number in numbers)
+
+
 _GRID = 0.25  # metres between the recorded agent positions
 _SCENES = Path(__file__).parent / "data" / "scenes"
 

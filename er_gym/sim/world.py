@@ -1,10 +1,7 @@
 """The mutable state of a scene: what is where, in which state, and where the agent is.
 
-Struct of arrays: row ``i`` of every array is object ``i``. Rows are never removed; an object that
-is no more (a whole apple after slicing) has ``exists[i]`` False, and is in ``remains`` if the
-metadata go on listing it, as AI2-THOR's do of what was cut up. Whoever changes something says so
-(:meth:`World.changed`, :meth:`World.restated`), and what is derived from it is worked out anew when
-next asked for.
+Every method that changes something calls :meth:`World.arrangement_changed` or
+:meth:`World.state_changed`. They empty the caches, so that readers work out their values again.
 """
 
 from __future__ import annotations
@@ -30,13 +27,13 @@ _STEP = 2.0**-40
 """Metres, a picometre: recorded coordinates, and whole steps beside them, add without rounding."""
 
 
-def settled(rotation: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
+def upright_rotation(rotation: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
     """(3,) degrees: a rotation with its tilts rounded to quarter turns, and another heading."""
     x, _, z = np.round(rotation / 90.0) * 90.0 % 360.0
     return np.array([x, yaw % 360.0, z])
 
 
-def whole_steps(offset: NDArray[np.float64]) -> NDArray[np.float64]:
+def reversible_offset(offset: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3,) metres: an offset after which the opposite one leads back to the same place exactly.
 
     The sums of others do not: what is carried about or slid out and in would end up elsewhere by
@@ -103,12 +100,12 @@ class World(SceneObjects):
         return world
 
     def snapshot(self) -> World:
-        """The objects as they are now, to be restored by :meth:`become`; they are its :attr:`base`
+        """The objects as they are now, to be restored by :meth:`restore`; they are its :attr:`base`
         from now on."""
         self.base = replace(self, **_objects(self))
         return self.base
 
-    def become(self, kept: World) -> None:
+    def restore(self, kept: World) -> None:
         """Put every object into the state of a snapshot of the same scene.
 
         The agent stays where it is. What has been worked out from where things are is shared, until
@@ -119,7 +116,7 @@ class World(SceneObjects):
         self.base = kept
 
     def _shift(self, rows: list[int], offset: NDArray[np.float64]) -> None:
-        offset = whole_steps(offset)
+        offset = reversible_offset(offset)
         self.position[rows] += offset
         self.low[rows] += offset
         self.high[rows] += offset
@@ -146,12 +143,12 @@ class World(SceneObjects):
 
     # -- changing --------------------------------------------------------------------------------
 
-    def changed(self) -> None:
+    def arrangement_changed(self) -> None:
         """Say that something is elsewhere than it was, or has been opened or shut."""
-        self.restated()
+        self.state_changed()
         self.cache.arrangement_changed()
 
-    def restated(self) -> None:
+    def state_changed(self) -> None:
         """Say that something is in another state than it was, where it is."""
         self.untouched = False
         self.cache.state_changed()
@@ -159,16 +156,16 @@ class World(SceneObjects):
     def _renested(self) -> None:
         """Say that something lies elsewhere than it did."""
         self._nesting = None
-        self.changed()
+        self.arrangement_changed()
 
     def set_state(self, i: int, name: str, value: bool) -> None:
         """Put object i into a state of :data:`er_gym.sim.scene.STATES`, or out of it."""
         self.states[i, STATE_COLUMN[name]] = value
         self._touch([i, *(self.controlled[i] or ())])  # a burner glows by its knob
         if name == "isOpen":
-            self.changed()
+            self.arrangement_changed()
         else:
-            self.restated()
+            self.state_changed()
 
     def set_temperature(self, i: int, temperature: str) -> None:
         """Make object i "Hot", "Cold" or "RoomTemp"."""
@@ -179,13 +176,13 @@ class World(SceneObjects):
         """Give object i another mass, kilograms."""
         self.mass[i] = mass
         self._touch([i])
-        self.restated()
+        self.state_changed()
 
     def set_property(self, i: int, name: str, value: bool) -> None:
         """Give object i a property, or take it away."""
         self.properties[i, PROPERTY_COLUMN[name]] = value
         self._touch([i])
-        self.changed()
+        self.arrangement_changed()
 
     def relocate(self, i: int, parents: Sequence[int]) -> None:
         """Say in which receptacles object i lies from now on; what lies in it goes along."""
@@ -212,17 +209,17 @@ class World(SceneObjects):
 
         What was leaning is set straight, to the nearest quarter turn: what lay flat lies flat.
         """
-        self.rotation[i] = settled(self.rotation[i], yaw)
+        self.rotation[i] = upright_rotation(self.rotation[i], yaw)
         corners = self.obb_corners(i)
         if corners is not None:
             self.low[i], self.high[i] = corners.min(axis=0), corners.max(axis=0)
         self._displace([i])
-        self.changed()
+        self.arrangement_changed()
 
     def move_by(self, i: int, offset: NDArray[np.float64]) -> None:
         """Shift object i by (3,) metres, and what lies in it with it."""
         self._shift([i, *self.inside(i)], offset)
-        self.changed()
+        self.arrangement_changed()
 
     def set_pose(
         self, i: int, position: NDArray[np.float64], rotation: NDArray[np.float64]
@@ -240,7 +237,7 @@ class World(SceneObjects):
         else:
             self.low[i], self.high[i] = corners.min(axis=0), corners.max(axis=0)
         self._displace([i])
-        self.changed()
+        self.arrangement_changed()
 
     def rename(self, i: int, object_id: str) -> None:
         """Give object i another id, which nothing else has."""
@@ -248,7 +245,7 @@ class World(SceneObjects):
         self.object_ids[i] = object_id
         self.index[object_id] = i
         self._touch([i, *self.parents[i], *self.contents[i]])
-        self.restated()
+        self.state_changed()
 
     def remove(self, i: int) -> None:
         """Take object i out of the scene; what lies in it stays where it is."""

@@ -1,6 +1,6 @@
 """The boundary: everything above speaks the AI2-THOR 5 Controller API and asks for one here."""
 
-from er_gym.sim.compatibility import accepts, placement_table
+from er_gym.sim.placement_restrictions import accepts, placement_table
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError
 from er_gym.sim.size import check_size
 from er_gym.thor.backends import BACKENDS, RENDER_DEVICES, BackendError, make_controller

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from er_gym.sim.lazy import LazyMetadata
-from er_gym.sim.space.standing import standing_places
+from er_gym.sim.lazy_metadata import LazyMetadata
+from er_gym.sim.space.walkable_floor import standing_places
 from er_gym.sim.world import World
 
 

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.lazy import LazyMetadata
-from er_gym.sim.recorded import USED_UP
+from er_gym.sim.initial_state import USED_UP
+from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.sim.scene import PROPERTIES, STATES, Scene
-from er_gym.sim.space.doors import boxes
+from er_gym.sim.space.door_boxes import boxes_with_doors
 from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
 from er_gym.sim.world_cache import CacheKey
@@ -229,14 +229,14 @@ def _of_world(world: World) -> ObjectTable:
     if found is None:
         found = world.cache.state.put(_TABLE, _table(world))
     elif world.held >= 0:  # what is carried moves with the agent
-        low, high = boxes(world)
+        low, high = boxes_with_doors(world)
         found = replace(found, centre=(low + high) / 2)
     return found
 
 
 def _table(world: World) -> ObjectTable:
     names = _names(world)
-    low, high = boxes(world)
+    low, high = boxes_with_doors(world)
     flags = np.concatenate([world.properties, world.states[:, _STATE_COLUMNS]], axis=1).T.copy()
     return ObjectTable(
         ids=names.ids,

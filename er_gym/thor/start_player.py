@@ -15,6 +15,6 @@ _bare.__path__ = [str(_PACKAGE)]
 sys.modules["er_gym"] = _bare
 
 if __name__ == "__main__":
-    from er_gym.sim.player import main
+    from er_gym.sim.player_process import main
 
     sys.exit(main())

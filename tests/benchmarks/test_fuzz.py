@@ -141,12 +141,12 @@ def returns_an_array(world):
 
 def puts_nan_into_the_world(world):
     world._shift([0], np.array([0.0, float("nan"), 0.0]))
-    world.changed()
+    world.arrangement_changed()
 
 
 def changes_what_it_was_asked_about(world):
     world._shift([0], np.array([0.0, 0.1, 0.0]))
-    world.changed()
+    world.arrangement_changed()
 
 
 def changes_settings_and_refuses(world):

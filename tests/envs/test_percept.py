@@ -17,7 +17,7 @@ from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.legality import Known, legal_actions, navigable_within, surroundings
 from er_gym.envs.observations import Memory
 from er_gym.envs.percept import Percept, names, perceive
-from er_gym.sim.lazy import LazyMetadata
+from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import AgentPose
 from er_gym.thor.objects import KIND_OF, TYPES

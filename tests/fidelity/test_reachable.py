@@ -21,7 +21,7 @@ from benchmarks.perf.comparisons.reachable import (
     sample,
 )
 from er_gym.sim.scene import SCENE_NUMBERS
-from er_gym.sim.space.standing import Rules
+from er_gym.sim.space.walkable_floor import Rules
 
 
 @pytest.fixture(scope="module")

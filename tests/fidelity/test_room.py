@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.perf.comparisons.room import WITHIN, Rooms, faces, held_out, rooms
 from er_gym.sim.scene import load_scene
-from er_gym.sim.space.room import room_box
+from er_gym.sim.space.room_bounds import room_bounds
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,9 @@ def test_what_was_captured_as_floorplan410_is_recorded_as_floorplan411(captures)
     capture = captures["FloorPlan410"]
     assert set(capture["visible"]) <= set(load_scene("FloorPlan411").object_ids)
     assert not set(capture["visible"]) & set(load_scene("FloorPlan410").object_ids)
-    assert abs(faces(capture["sceneBounds"]) - np.concatenate(room_box("FloorPlan411"))).max() < 0.2
+    assert (
+        abs(faces(capture["sceneBounds"]) - np.concatenate(room_bounds("FloorPlan411"))).max() < 0.2
+    )
 
 
 def test_missed_bounds_are_those_farther_off_than_a_quarter_of_a_metre() -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.settings import Settings
-from er_gym.sim.space.containment import receptacles_of
+from er_gym.sim.space.receptacles import receptacles_of
 from er_gym.sim.world import World
 
 

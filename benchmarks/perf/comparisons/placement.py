@@ -8,7 +8,7 @@ import numpy as np
 
 from er_gym.sim.actions.pick_place import put_down
 from er_gym.sim.agent import Agent
-from er_gym.sim.compatibility import accepts
+from er_gym.sim.placement_restrictions import accepts
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.settings import Settings
 from er_gym.sim.space.placement import free_spots, is_vessel, surface_height

@@ -7,9 +7,9 @@ import numpy as np
 from er_gym.sim.agent import Agent
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.settings import Settings
-from er_gym.sim.space.poses import interactable_poses
+from er_gym.sim.space.interactable_poses import interactable_poses
+from er_gym.sim.space.recorded_floor import RECORDED_STEP
 from er_gym.sim.space.visibility import visible
-from er_gym.sim.space.walk import RECORDED_STEP
 from er_gym.sim.world import World
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from er_gym.sim.scene import SCENE_NAMES, SCENE_NUMBERS, Scene, load_scene
 from er_gym.sim.settings import Settings
 from er_gym.sim.space.footprints import Footprints
-from er_gym.sim.space.standing import Rules, floor_by, floor_of
+from er_gym.sim.space.walkable_floor import Rules, compute_floor, floor_of
 from er_gym.sim.world import World
 from er_gym.thor import make_controller
 
@@ -164,7 +164,7 @@ def sample(positions_file: Path) -> Sample:
 
 def agreement(name: str, given: np.ndarray, rules: Rules) -> Agreement:
     """Compare one scene under some rules."""
-    ours = floor_by(name, rules).grid(FINE, (0.0, 0.0))
+    ours = compute_floor(name, rules).grid(FINE, (0.0, 0.0))
     found = _nodes(given) & _nodes(ours)
     if len(given) < _DENSE:
         return Agreement(len(given), len(found))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from er_gym.sim.scene import load_scene
-from er_gym.sim.space.room import Slacks, estimate_box
+from er_gym.sim.space.room_bounds import Slacks, estimate_bounds
 from er_gym.thor import make_controller
 
 WITHIN = 0.25
@@ -76,7 +76,7 @@ def held_out(captures: Mapping[str, Any]) -> dict[str, np.ndarray]:
     boxes = np.array([faces(captures[name]["sceneBounds"]) for name in captures])
     scenes = [load_scene(name) for name in captures]
     tried = [Slacks(*map(float, slacks)) for slacks in product(*_TRIED)]
-    off = boxes - [[np.concatenate(estimate_box(s, slacks)) for s in scenes] for slacks in tried]
+    off = boxes - [[np.concatenate(estimate_bounds(s, slacks)) for s in scenes] for slacks in tried]
     # (slacks, scenes): the differences, all together less than one scene's worth, break ties.
     score = (abs(off).max(axis=2) <= WITHIN) - np.minimum(abs(off), 0.6).mean(axis=2) / len(scenes)
     chosen = (score.sum(axis=1, keepdims=True) - score).argmax(axis=0)

@@ -1,19 +1,19 @@
 """AI2-THOR's actions, one small file a family. Importing this package registers them all."""
 
 from er_gym.sim.actions import (  # noqa: F401  (imported for their registrations)
-    accepted,
-    arrange,
+    arrange_objects,
     cameras,
-    look,
+    initialize,
     move,
+    navigation,
+    no_effect,
     open_toggle,
-    paths,
     pick_place,
+    place_at_point,
     presence,
     push,
-    put_at,
     query,
-    setup,
+    rotate_look,
     state_change,
 )
 from er_gym.sim.actions.registry import ACTIONS, perform

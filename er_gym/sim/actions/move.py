@@ -8,12 +8,12 @@ from math import remainder
 
 import numpy as np
 
-from er_gym.sim.actions.look import LOOK_LIMITS, LOOK_TOLERANCE
 from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.actions.rotate_look import LOOK_LIMITS, LOOK_TOLERANCE
 from er_gym.sim.agent import Agent
 from er_gym.sim.errors import ActionFailed
-from er_gym.sim.space.room import room_box
-from er_gym.sim.space.standing import floor_of, standing_places
+from er_gym.sim.space.room_bounds import room_bounds
+from er_gym.sim.space.walkable_floor import floor_of, standing_places
 from er_gym.sim.world import World
 
 _FARTHEST = 1000.0
@@ -169,7 +169,7 @@ def _not_too_far_up_or_down(horizon: float) -> None:
 
 
 def _in_bounds(world: World, there: np.ndarray) -> None:
-    low, high = room_box(world.scene.name)
+    low, high = room_bounds(world.scene.name)
     here = world.agent.position
     inside = (low <= there) & (there <= high)
     # Two rooms were published with a start outside their walls: there one can stay.

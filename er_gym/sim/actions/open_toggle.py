@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from er_gym.sim import consequences
-from er_gym.sim.actions.aim import object_action
 from er_gym.sim.actions.checks import require, target
+from er_gym.sim.actions.object_action import object_action
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.solids import solid_of
-from er_gym.sim.world import World, whole_steps
+from er_gym.sim.world import World, reversible_offset
 
 _ONLY_SHUT = frozenset({"Microwave"})
 """Types that run only when shut, and open only when off."""
@@ -19,11 +19,13 @@ def _slide(world: World, i: int, openness: float) -> None:
     """Slide a drawer, with what lies in it, to an openness: by its depth at 1."""
     if world.types[i] != "Drawer":
         return
-    shape = solid_of(world, i)
-    depth = np.ptp(shape.upright[:, :, 2])
-    heading = np.radians(shape.yaw)
+    solid = solid_of(world, i)
+    depth = np.ptp(solid.upright[:, :, 2])
+    heading = np.radians(solid.yaw)
     ahead = np.array([np.sin(heading), 0.0, np.cos(heading)])
-    before, after = (whole_steps(ahead * depth * share) for share in (world.openness[i], openness))
+    before, after = (
+        reversible_offset(ahead * depth * share) for share in (world.openness[i], openness)
+    )
     world.move_by(i, after - before)
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from er_gym.sim import consequences
-from er_gym.sim.actions.aim import object_action
 from er_gym.sim.actions.checks import require, target, within
+from er_gym.sim.actions.object_action import object_action
 from er_gym.sim.actions.registry import action
-from er_gym.sim.compatibility import accepts
 from er_gym.sim.errors import ActionFailed
+from er_gym.sim.placement_restrictions import accepts
+from er_gym.sim.space.landing import landing
 from er_gym.sim.space.placement import free_spots
-from er_gym.sim.space.resting import landing
 from er_gym.sim.world import World
 
 _NEWTONS_PER_METRE = 100.0
@@ -38,7 +38,7 @@ def pickup_object(
         )
     world.relocate(i, ())
     world.held = i
-    world.changed()
+    world.arrangement_changed()
     world.carry()
 
 

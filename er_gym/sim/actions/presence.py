@@ -6,7 +6,7 @@ import numpy as np
 
 from er_gym.sim.actions.registry import action
 from er_gym.sim.errors import ActionFailed
-from er_gym.sim.space.containment import receptacles_of
+from er_gym.sim.space.receptacles import receptacles_of
 from er_gym.sim.world import World
 
 

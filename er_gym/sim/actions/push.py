@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from er_gym.sim import consequences
-from er_gym.sim.actions.aim import object_action, pointed_at
 from er_gym.sim.actions.checks import target, within
+from er_gym.sim.actions.object_action import object_action, pointed_at
 from er_gym.sim.actions.pick_place import fall, shift
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.clearance import Clearance
-from er_gym.sim.space.containment import receptacles_of
+from er_gym.sim.space.receptacles import receptacles_of
 from er_gym.sim.world import World
 
 _NEWTONS_PER_METRE = 100.0

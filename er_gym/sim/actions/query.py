@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from er_gym.sim.actions.aim import pointed_at, shown_at
 from er_gym.sim.actions.checks import FARTHEST, target
+from er_gym.sim.actions.object_action import pointed_at, shown_at
 from er_gym.sim.actions.registry import Vector, action
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.object_metadata import vector
 from er_gym.sim.scene import SCENE_NAMES
-from er_gym.sim.space.pieces import places_around
-from er_gym.sim.space.poses import HORIZONS, interactable_poses
-from er_gym.sim.space.standing import floor_of, standing_places
+from er_gym.sim.space.interactable_poses import HORIZONS, interactable_poses
+from er_gym.sim.space.reachable_positions import reachable_positions
+from er_gym.sim.space.walkable_floor import floor_of, standing_places
 from er_gym.sim.world import World
 
 _SMALLEST_STEP = 0.01
@@ -57,7 +57,7 @@ def _grid(world: World, step: float | None, ahead: bool = False) -> np.ndarray:
         return here[None]
     if floor_of(world.scene.name).contains(here):
         yaw = world.agent.rotation if ahead else 0.0
-        return places_around(world.scene.name, here, float(size), yaw)
+        return reachable_positions(world.scene.name, here, float(size), yaw)
     offset = (here % size).round(5) % size  # of the grid that the agent stands on
     return standing_places(world.scene.name, float(size), (float(offset[0]), float(offset[1])))
 

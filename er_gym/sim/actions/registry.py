@@ -91,7 +91,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Way:
+class Signature:
     """A way to call an action: a handler and what it takes.
 
     Attributes:
@@ -117,7 +117,9 @@ class Way:
         """How many of the arguments it has parameters for."""
         return sum(name in self.parameters for name in request)
 
-    def arguments(self, request: Mapping[str, Any], ways: tuple[Way, ...]) -> dict[str, Any]:
+    def arguments(
+        self, request: Mapping[str, Any], signatures: tuple[Signature, ...]
+    ) -> dict[str, Any]:
         """The handler's arguments out of a request.
 
         Args:
@@ -131,7 +133,7 @@ class Way:
         known = self.parameters
         unknown = [name for name in request if name not in known and name not in EXEMPT]
         if unknown:
-            raise _unknown_arguments(self, unknown, request, ways)
+            raise _unknown_arguments(self, unknown, request, signatures)
         found = {
             name: self._converted(known[name], value)
             for name, value in request.items()
@@ -177,7 +179,7 @@ class Way:
             raise WrongCall(message, INVALID_ARGUMENT) from None
 
 
-ACTIONS: dict[str, tuple[Way, ...]] = {}
+ACTIONS: dict[str, tuple[Signature, ...]] = {}
 """Every action there is, and the ways to call it, those that require least first."""
 
 
@@ -192,7 +194,7 @@ def action(*names: str, server_action: bool = False) -> Callable[[Run], Run]:
 
     def register(run: Run) -> Run:
         for name in names:
-            add_way(Way(name, run, parameters_of(run), server_action))
+            add_signature(Signature(name, run, parameters_of(run), server_action))
         return run
 
     return register
@@ -208,10 +210,10 @@ def parameters_of(run: Run) -> dict[str, Parameter]:
     }
 
 
-def add_way(way: Way) -> None:
+def add_signature(signature: Signature) -> None:
     """Enter a way to call an action into the table."""
-    ways = sorted((*ACTIONS.get(way.action, ()), way), key=lambda each: each.cost)
-    ACTIONS[way.action] = tuple(ways)
+    signatures = sorted((*ACTIONS.get(signature.action, ()), signature), key=lambda each: each.cost)
+    ACTIONS[signature.action] = tuple(signatures)
 
 
 def perform(world: World, request: Mapping[str, Any]) -> Any:
@@ -222,11 +224,15 @@ def perform(world: World, request: Mapping[str, Any]) -> Any:
         ActionFailed: it cannot be done in this state of the world.
     """
     name = request.get("action")
-    ways = ACTIONS.get(name) if isinstance(name, str) else None
-    if ways is None:
+    signatures = ACTIONS.get(name) if isinstance(name, str) else None
+    if signatures is None:
         raise WrongCall(_unknown(name), INVALID_ACTION)
-    way = ways[0] if len(ways) == 1 else max(ways, key=lambda each: each.knows(request))
-    return way.run(world, **way.arguments(request, ways))
+    signature = (
+        signatures[0]
+        if len(signatures) == 1
+        else max(signatures, key=lambda each: each.knows(request))
+    )
+    return signature.run(world, **signature.arguments(request, signatures))
 
 
 def quoted(value: object) -> str:
@@ -250,15 +256,18 @@ def _unknown(name: object) -> str:
 
 
 def _unknown_arguments(
-    way: Way, unknown: list[str], request: Mapping[str, Any], ways: tuple[Way, ...]
+    signature: Signature,
+    unknown: list[str],
+    request: Mapping[str, Any],
+    signatures: tuple[Signature, ...],
 ) -> WrongCall:
     given = [name for name in request if name not in EXEMPT]
     several = "s" if len(unknown) > 1 else ""
-    expected = ", ".join(map(str, way.parameters.values())) or "none"
+    expected = ", ".join(map(str, signature.parameters.values())) or "none"
     return WrongCall(
-        f'Action: "{way.action}" called with invalid argument{several}: {_names(unknown)}. '
+        f'Action: "{signature.action}" called with invalid argument{several}: {_names(unknown)}. '
         f"Expected arguments: {expected}. Your arguments: {_names(given)}. "
-        f'Valid ways to call "{way.action}" action: {" or ".join(map(str, ways))}.',
+        f'Valid ways to call "{signature.action}" action: {" or ".join(map(str, signatures))}.',
         INVALID_ARGUMENT,
     )
 

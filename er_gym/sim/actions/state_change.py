@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from er_gym.sim import consequences
-from er_gym.sim.actions.aim import object_action
 from er_gym.sim.actions.checks import require, target
+from er_gym.sim.actions.object_action import object_action
 from er_gym.sim.actions.registry import quoted
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.world import World

@@ -6,9 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from er_gym.sim.render.mesh import Mesh, Patch
+from er_gym.sim.render.lighting import lit_colours
+from er_gym.sim.render.mesh import Mesh
 from er_gym.sim.render.palette import palette
-from er_gym.sim.render.shade import shaded
+from er_gym.sim.render.patch import Patch
 from er_gym.sim.render.shapes.joinery import carcass_colour, panels
 from er_gym.sim.scene import load_scene
 from er_gym.sim.space.solids.built_in import Box
@@ -40,6 +41,6 @@ def _lit(material: str, patch: Patch, floor: float, tall: float) -> Patch:
         patch.vertices + np.array([0.0, floor, 0.0], np.float32),
         patch.normals,
         patch.uv,
-        np.clip(shaded(material, patch, 0.0, tall, 0.0), 0.0, 1.0),
+        np.clip(lit_colours(material, patch, 0.0, tall, 0.0), 0.0, 1.0),
         patch.triangles,
     )

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er_gym.sim.render.look import Palette, mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh
-from er_gym.sim.render.plan import Floats, Plan, Wall, room_plan
+from er_gym.sim.render.floor_plan import Floats, FloorPlan, Wall, floor_plan
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import Palette, mixed, shaded
+from er_gym.sim.render.patch import Colour
 from er_gym.sim.scene import Scene, load_scene
 
 WIDTH, HEIGHT = 0.98, 2.1
@@ -37,7 +38,7 @@ class Doorway:
 
 def doorway(scene_name: str) -> Doorway | None:
     """Where the door is: at a free stretch of wall that one can walk to, by a light switch."""
-    scene, plan = load_scene(scene_name), room_plan(scene_name)
+    scene, plan = load_scene(scene_name), floor_plan(scene_name)
     if plan.ceiling - plan.ground < HEIGHT + 0.05:
         return None
     switches = np.array(
@@ -53,7 +54,7 @@ def doorway(scene_name: str) -> Doorway | None:
     return min(choices, key=unlikely, default=None)
 
 
-def _free(scene: Scene, plan: Plan, wall: Wall) -> Iterator[Doorway]:
+def _free(scene: Scene, plan: FloorPlan, wall: Wall) -> Iterator[Doorway]:
     """Places at a wall with nothing before it, where one can stand."""
     axis, side = 2 * wall.axis, 2 - 2 * wall.axis
     low, high = scene.aabb_center - scene.aabb_size / 2, scene.aabb_center + scene.aabb_size / 2

@@ -17,11 +17,19 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import ArrayLike
 
-from er_gym.sim.render.look import mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh, Patch, Triple
-from er_gym.sim.render.palette import palette
-from er_gym.sim.render.shade import shaded as in_light
-from er_gym.sim.render.stove_place import LEAN, Box, Ends, Frame, Place, place_of, slope
+from er_gym.sim.render.lighting import lit_colours
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, palette, shaded
+from er_gym.sim.render.patch import Colour, Patch, Triple
+from er_gym.sim.render.stove_layout import (
+    LEAN,
+    Box,
+    Ends,
+    StoveFrame,
+    StoveLayout,
+    slope,
+    stove_layout,
+)
 from er_gym.sim.scene import load_scene
 from er_gym.sim.settings import Settings
 from er_gym.sim.world import World
@@ -46,20 +54,20 @@ def fixtures(scene_name: str) -> dict[str, Patch]:
     world = World.load(load_scene(scene_name), Settings())
     if not any(world.of_type("StoveBurner")):
         return {}
-    frame = Frame.of(world)
-    place = place_of(world, frame)
+    frame = StoveFrame.of(world)
+    place = stove_layout(world, frame)
     patches = _stove(place, *_finish(scene_name)).patches()
     return {name: _in_world(name, patch, frame, place.top) for name, patch in patches.items()}
 
 
-def _in_world(material: str, patch: Patch, frame: Frame, tall: float) -> Patch:
+def _in_world(material: str, patch: Patch, frame: StoveFrame, tall: float) -> Patch:
     """A patch of a stove in the world's frame and in its light."""
     turn = frame.turn.T
     return Patch(
         np.asarray(patch.vertices @ turn + frame.origin, np.float32),
         np.asarray(patch.normals @ turn, np.float32),
         patch.uv,
-        np.clip(in_light(material, patch, frame.yaw, tall, 0.0), 0.0, 1.0),
+        np.clip(lit_colours(material, patch, frame.yaw, tall, 0.0), 0.0, 1.0),
         patch.triangles,
     )
 
@@ -72,7 +80,7 @@ def _finish(scene_name: str) -> tuple[Colour, Colour]:
     return (steel, _WHITE, steel, _BLACK)[chance % 4], colours.counter
 
 
-def _stove(place: Place, colour: Colour, stone: Colour) -> Mesh:
+def _stove(place: StoveLayout, colour: Colour, stone: Colour) -> Mesh:
     """A cooktop and what bears the knobs, and an oven if there is room for one."""
     mesh, grates = Mesh(), place.fire.high[1] - place.fire.low[1] > 0.015
     hob = colour
@@ -116,7 +124,7 @@ def _flat(mesh: Mesh, points: ArrayLike, out: Triple, colour: Colour) -> None:
     )
 
 
-def _cooktop(mesh: Mesh, place: Place, front: float, colour: Colour) -> None:
+def _cooktop(mesh: Mesh, place: StoveLayout, front: float, colour: Colour) -> None:
     x, z = (place.left, place.right), (place.back, front)
     thick = _PLATE if place.counter is None else 0.008
     around = "xXyzZ" if place.pierced else "xXyYzZ"
@@ -147,7 +155,7 @@ def _ring(mesh: Mesh, hole: Box, top: float, colour: Colour) -> None:
         _flat(mesh, [corner, *arc], _UP, colour)
 
 
-def _fill(mesh: Mesh, place: Place, stone: Colour) -> None:
+def _fill(mesh: Mesh, place: StoveLayout, stone: Colour) -> None:
     """The counter behind a stove that stands across a corner."""
     height, front = place.top - 0.023, place.front - 0.03
     corner, *ends = place.gap
@@ -156,7 +164,7 @@ def _fill(mesh: Mesh, place: Place, stone: Colour) -> None:
     mesh.prism(outline, height - _SLAB, height, stone, "stone")
 
 
-def _leaning(mesh: Mesh, place: Place, colour: Colour) -> tuple[float, float]:
+def _leaning(mesh: Mesh, place: StoveLayout, colour: Colour) -> tuple[float, float]:
     """A panel that leans back; where the cooktop ends before it, and how low it reaches."""
     y, z = slope(place.row)
     low = y - LEAN
@@ -171,7 +179,7 @@ def _leaning(mesh: Mesh, place: Place, colour: Colour) -> tuple[float, float]:
     return start, low - 0.03
 
 
-def _strip(mesh: Mesh, place: Place, colour: Colour) -> None:
+def _strip(mesh: Mesh, place: StoveLayout, colour: Colour) -> None:
     """What lifts knobs to where they are on the cooktop: along its front if they are there."""
     row, top = place.row, float(place.row.low[1]) - 0.003
     if top - place.top < 0.004:
@@ -182,7 +190,7 @@ def _strip(mesh: Mesh, place: Place, colour: Colour) -> None:
     _box(mesh, x, (place.top - 0.001, top), z, shaded(colour, 0.8), "xXYzZ")
 
 
-def _guard(mesh: Mesh, place: Place, colour: Colour) -> None:
+def _guard(mesh: Mesh, place: StoveLayout, colour: Colour) -> None:
     """A panel that stands up behind the cooktop, with a clock where knobs leave room for one."""
     face, high = place.back, float(place.row.high[1]) + 0.035
     x, z = (place.left, place.right), (face - _GUARD, face)
@@ -198,7 +206,9 @@ def _guard(mesh: Mesh, place: Place, colour: Colour) -> None:
         mesh.panel((middle, y, face + 0.008), (min(wide, 0.07) - 0.014, 0.03), (1, 1, 1), "digits")
 
 
-def _case(mesh: Mesh, place: Place, x: Ends, start: float, low: float, colour: Colour) -> None:
+def _case(
+    mesh: Mesh, place: StoveLayout, x: Ends, start: float, low: float, colour: Colour
+) -> None:
     """What a stove stands on: a strip under the edge of the cooktop, and the oven below it."""
     face = place.front - 0.004
     under = place.top - _PLATE + 0.005
@@ -208,7 +218,7 @@ def _case(mesh: Mesh, place: Place, x: Ends, start: float, low: float, colour: C
     _oven(mesh, x, low, (place.back, face), colour)
 
 
-def _let_in(mesh: Mesh, place: Place, counter: Box, colour: Colour) -> None:
+def _let_in(mesh: Mesh, place: StoveLayout, counter: Box, colour: Colour) -> None:
     """An oven under a counter."""
     face, high = float(counter.high[2]) - _BASE + 0.012 + _DOOR, counter.surface - _SLAB - 0.01
     _oven(mesh, (place.left, place.right), high, (face - 0.1, face), colour)

@@ -9,9 +9,8 @@ triangles are turned to where their normals point.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from math import cos, pi, radians, sin
+from collections.abc import Iterable, Mapping
+from math import pi
 from typing import Literal
 
 import numpy as np
@@ -30,61 +29,10 @@ from er_gym.sim.render.box_faces import (
     SQUARE,
     fans,
 )
+from er_gym.sim.render.patch import PLAIN, Axis, Patch, Triple, merged, rotation
 
-Colour = tuple[float, float, float]
-Triple = tuple[float, float, float]
-Axis = Literal["x", "y", "z"]
 _AXES: Mapping[str, tuple[int, int, int]] = {"x": (1, 2, 0), "y": (0, 1, 2), "z": (0, 2, 1)}
 """For a solid of revolution made about y: where each of its axes comes from."""
-PLAIN = "plain"
-
-
-@dataclass(frozen=True, eq=False)
-class Patch:
-    """Triangles of one material.
-
-    Attributes:
-        vertices, normals: (V, 3). uv: (V, 2), in turns of the texture. colours: (V, 3).
-        triangles: (F, 3) indices of vertices.
-    """
-
-    vertices: NDArray[np.float32]
-    normals: NDArray[np.float32]
-    uv: NDArray[np.float32]
-    colours: NDArray[np.float32]
-    triangles: NDArray[np.int32]
-
-
-def finished(patches: Sequence[Patch]) -> Patch:
-    """Several patches as one, with normals of length 1 and triangles turned to where they point."""
-    starts = np.cumsum([0, *(len(p.vertices) for p in patches[:-1])])
-    vertices = np.concatenate([p.vertices for p in patches])
-    normals = np.concatenate([p.normals for p in patches])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    faces = np.concatenate([p.triangles + s for p, s in zip(patches, starts, strict=True)])
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    # The frame is left-handed, so that the cross product points the other way.
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), normals[faces].sum(axis=1)) > 0
-    faces[inward] = faces[inward][:, [0, 2, 1]]
-    return Patch(
-        vertices,
-        normals,
-        np.concatenate([p.uv for p in patches]),
-        np.concatenate([p.colours for p in patches]),
-        faces.astype(np.int32),
-    )
-
-
-def rotation(axis: Axis, degrees: float) -> NDArray[np.float64]:
-    """(3, 3) turn about an axis; about y clockwise seen from above, as headings go."""
-    c, s = cos(radians(degrees)), sin(radians(degrees))
-    return np.array(
-        {
-            "x": [[1, 0, 0], [0, c, -s], [0, s, c]],
-            "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]],
-            "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
-        }[axis]
-    )
 
 
 class Mesh:
@@ -95,7 +43,7 @@ class Mesh:
 
     def patches(self) -> dict[str, Patch]:
         """The triangles of each material."""
-        return {material: finished(parts) for material, parts in self._parts.items()}
+        return {material: merged(parts) for material, parts in self._parts.items()}
 
     def __bool__(self) -> bool:
         return bool(self._parts)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import blake2b
 
 import numpy as np
 
-from er_gym.sim.render.look import Palette
-from er_gym.sim.render.mesh import Colour
-from er_gym.sim.scene import SCENE_NUMBERS
+from er_gym.sim.render.patch import Colour
+from er_gym.sim.scene import scene_category
 
 _WOODS: tuple[Colour, ...] = (
     (0.62, 0.42, 0.25), (0.50, 0.33, 0.19), (0.72, 0.54, 0.35), (0.40, 0.26, 0.16),
@@ -66,10 +66,30 @@ _FLOOR_TURNS = {"tiles": 1.5, "planks": 1.5, "carpet": 1.0}
 """Metres that a turn of the texture takes."""
 
 
-def room_kind(scene: str) -> str:
-    """ "kitchens", "living_rooms", "bedrooms" or "bathrooms"."""
-    number = int(scene.removeprefix("FloorPlan"))
-    return next(kind for kind, numbers in SCENE_NUMBERS.items() if number in numbers)
+@dataclass(frozen=True)
+class Palette:
+    """The colours of a scene, the same for all that is in it."""
+
+    wood: Colour
+    cabinet: Colour
+    counter: Colour
+    fabric: Colour
+    accent: Colour
+    metal: Colour
+    wall: Colour
+    floor: Colour
+
+
+def shaded(colour: Colour, factor: float) -> Colour:
+    """A colour made darker (below 1) or lighter."""
+    r, g, b = (min(1.0, channel * factor) for channel in colour)
+    return r, g, b
+
+
+def mixed(one: Colour, other: Colour, share: float) -> Colour:
+    """A colour between two: ``share`` of the other."""
+    r, g, b = (a + (c - a) * share for a, c in zip(one, other, strict=True))
+    return r, g, b
 
 
 def flooring(scene: str) -> tuple[str, float]:
@@ -79,7 +99,7 @@ def flooring(scene: str) -> tuple[str, float]:
 
 
 def _floor(scene: str) -> tuple[str, Colour]:
-    floors = _FLOORS[room_kind(scene)]
+    floors = _FLOORS[scene_category(scene)]
     return floors[blake2b(f"{scene} floor".encode(), digest_size=8).digest()[0] % len(floors)]
 
 
@@ -87,7 +107,7 @@ def _floor(scene: str) -> tuple[str, Colour]:
 def palette(scene: str) -> Palette:
     """The colours of a recorded scene."""
     seed = int.from_bytes(blake2b(scene.encode(), digest_size=8).digest(), "big")
-    random, kind = np.random.default_rng(seed), room_kind(scene)
+    random, kind = np.random.default_rng(seed), scene_category(scene)
 
     def one(colours: tuple[Colour, ...]) -> Colour:
         return colours[int(random.integers(len(colours)))]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er_gym.sim.render.strokes import (
+from er_gym.sim.render.texture_drawing import (
     SIDE,
     Painter,
     Picture,

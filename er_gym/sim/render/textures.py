@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.render.pictures import PICTURES
-from er_gym.sim.render.strokes import (
+from er_gym.sim.render.texture_drawing import (
     SIDE,
     Painter,
     Picture,

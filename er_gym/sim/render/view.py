@@ -123,9 +123,9 @@ def _draw(world: World, camera: Camera) -> View:
 
 
 def _frames(world: World, camera: Camera, depth: bool = False) -> Frames:
-    from er_gym.sim.render.stage import stage  # late: most worlds are never drawn
+    from er_gym.sim.render.scene_graph import scene_graph_of  # late: most worlds are never drawn
 
-    return stage(world.scene.name).draw(world, camera, depth)
+    return scene_graph_of(world.scene.name).draw(world, camera, depth)
 
 
 def _colored(frames: Frames, names: Sequence[str]) -> NDArray[np.uint8]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.space.room import room_box
+from er_gym.sim.space.room_bounds import room_bounds
 from er_gym.sim.space.solids import solid_of
 from er_gym.sim.world import World
 
@@ -29,7 +29,7 @@ class Clearance:
         parts = [solid_of(world, k).boxes for k in rows]
         self._boxes = np.concatenate([np.empty((0, 2, 3)), *parts])
         self._whose = np.repeat(rows, [len(part) for part in parts]).astype(int)
-        self._room = room_box(world.scene.name)
+        self._room = room_bounds(world.scene.name)
         self._ids = world.object_ids
         self._low, self._high = world.low[i].copy(), world.high[i].copy()
         # What it overlaps already, by the record, is not in its way.

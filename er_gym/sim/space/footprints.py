@@ -47,15 +47,15 @@ class Footprints:
     def of(world: World, slack: float = 0.0) -> Footprints:
         """All parts that the capsule, made ``slack`` metres thinner, meets on the floor."""
         parts = [
-            (shape, part)
+            (solid, part)
             for i, kind in enumerate(world.types)
             if kind != "Floor"
-            for shape in (solid_of(world, i),)
-            for part in _solid(kind, shape)
+            for solid in (solid_of(world, i),)
+            for part in _obstructing_parts(kind, solid)
         ]
         boxes = np.array([part for _, part in parts])
-        centres = np.array([shape.middle for shape, _ in parts])
-        yaw = np.radians([shape.yaw for shape, _ in parts])
+        centres = np.array([solid.middle for solid, _ in parts])
+        yaw = np.radians([solid.yaw for solid, _ in parts])
         cos, sin = np.cos(yaw), np.sin(yaw)
         x, z = ((boxes[:, 0] + boxes[:, 1]) / 2)[:, [0, 2]].T
         middle = centres[:, [0, 2]] + np.stack([x * cos + z * sin, z * cos - x * sin], axis=1)
@@ -96,21 +96,21 @@ def _reach(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.fl
     return np.where(inside, away, 0.0)
 
 
-def _solid(kind: str, shape: Solid) -> NDArray[np.float64]:
+def _obstructing_parts(kind: str, solid: Solid) -> NDArray[np.float64]:
     """(K, 2, 3) corners of what is solid of a thing, about its middle, before its turn."""
-    if kind in _PANES and np.ptp(shape.upright[..., [0, 2]], axis=(0, 1)).min() > _PANE:
-        return shape.upright[:0]
-    if kind == "CounterTop" and len(shape.upright) > 1:
-        return _arms(shape.upright)
+    if kind in _PANES and np.ptp(solid.upright[..., [0, 2]], axis=(0, 1)).min() > _PANE:
+        return solid.upright[:0]
+    if kind == "CounterTop" and len(solid.upright) > 1:
+        return _arms(solid.upright)
     if kind == "Toilet":
-        parts = shape.upright.copy()
+        parts = solid.upright.copy()
         parts[:, :, 0] = np.where(
             parts[:, :, 1].min(axis=1, keepdims=True) <= parts[:, :, 1].min() + 1e-6,
             np.clip(parts[:, :, 0], -_BOWL_WIDTH / 2, _BOWL_WIDTH / 2),
             parts[:, :, 0],
         )
         return parts
-    return shape.upright
+    return solid.upright
 
 
 def _arms(parts: NDArray[np.float64]) -> NDArray[np.float64]:

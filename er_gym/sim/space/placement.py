@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from er_gym.sim.agent import Agent
 from er_gym.sim.scene import PROPERTIES
+from er_gym.sim.space.recorded_surfaces import recorded_surfaces
 from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.solids import solid_of
 from er_gym.sim.space.solids.families import family
-from er_gym.sim.space.surfaces import recorded_surfaces
 from er_gym.sim.space.visibility import in_frustum
-from er_gym.sim.world import World, settled
+from er_gym.sim.world import World, upright_rotation
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ def _in_vessel(
 
 def _headings(world: World, i: int) -> list[tuple[float, NDArray[np.float64]]]:
     """Headings in degrees that align object i's box with the axes, and its (2,) half-size then."""
-    tilt = settled(world.rotation[i], 0.0)
+    tilt = upright_rotation(world.rotation[i], 0.0)
     edges = world.obb[i, 1:] @ unity_rotation(tilt).T
     if np.isnan(edges).any():
         return [(world.rotation[i, 1], (world.high[i] - world.low[i])[[0, 2]] / 2)]
@@ -211,7 +211,7 @@ def _headings(world: World, i: int) -> list[tuple[float, NDArray[np.float64]]]:
 
 def _height(world: World, i: int) -> float:
     """How high object i stands once it is set straight, metres."""
-    edges = world.obb[i, 1:] @ unity_rotation(settled(world.rotation[i], 0.0)).T
+    edges = world.obb[i, 1:] @ unity_rotation(upright_rotation(world.rotation[i], 0.0)).T
     if np.isnan(edges).any():
         return float(world.high[i, 1] - world.low[i, 1])
     return float(np.abs(edges[:, 1]).sum())

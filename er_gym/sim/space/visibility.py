@@ -1,8 +1,8 @@
 """What the agent sees.
 
-An object is visible when it is no farther than the visibility distance from the agent (see
-:mod:`er_gym.sim.space.reach`) and one of its sample points is inside the camera's frustum and on an
-unobstructed line from the camera (see :mod:`er_gym.sim.space.sights`).
+An object is visible when two things hold. It is no farther than the visibility distance from the
+agent (see :mod:`er_gym.sim.space.outlines`). And one of its sample points is inside the camera's
+frustum, with nothing between it and the camera (see :mod:`er_gym.sim.space.line_of_sight`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from er_gym.sim.agent import Agent
 from er_gym.sim.settings import Settings
-from er_gym.sim.space.sights import Sights, sights
+from er_gym.sim.space.line_of_sight import LinesOfSight
+from er_gym.sim.space.line_of_sight_builder import lines_of_sight
 from er_gym.sim.world import World
 
 NEAR_PLANE = 0.1
@@ -54,7 +55,7 @@ def in_frustum(
 def visible(world: World, agent: Agent | None = None) -> NDArray[np.bool_]:
     """(N,) which objects the agent sees, from where it is or from another pose."""
     agent = agent or world.agent
-    known, settings = sights(world), world.settings
+    known, settings = lines_of_sight(world), world.settings
     question = (
         *agent.position.tolist(),
         agent.standing,
@@ -64,24 +65,26 @@ def visible(world: World, agent: Agent | None = None) -> NDArray[np.bool_]:
         settings.width / settings.height,
         settings.visibility_distance,
     )
-    found = known.remembered(question, lambda: _look(known, agent, settings)).copy()
+    found = known.cached(question, lambda: _look(known, agent, settings)).copy()
     held = world.in_hand
     if held:
         found[[i for i in held if not world.hidden[i]]] = True
     return found
 
 
-def _look(known: Sights, agent: Agent, settings: Settings) -> NDArray[np.bool_]:
+def _look(known: LinesOfSight, agent: Agent, settings: Settings) -> NDArray[np.bool_]:
     camera = agent.camera
-    clear = known.viewpoint(camera).clear
+    clear = known.viewpoint(camera).clear_points
     seen = in_frustum(
-        (known.axes.take(clear, axis=1) - camera[:, None]).T,  # four times as fast as indexing
+        (
+            known.coordinates.take(clear, axis=1) - camera[:, None]
+        ).T,  # four times as fast as indexing
         agent.rotation,
         agent.horizon,
         settings.field_of_view,
         settings.width / settings.height,
     )
-    found = np.zeros(len(known.count), dtype=bool)
-    found[known.of[clear[seen]]] = True
-    near = known.within(agent.position, settings.visibility_distance)
+    found = np.zeros(len(known.point_count), dtype=bool)
+    found[known.point_owner[clear[seen]]] = True
+    near = known.within_distance(agent.position, settings.visibility_distance)
     return found if near is None else found & near

@@ -16,9 +16,9 @@ _DRAW = """
 import sys
 import numpy as np
 from er_gym.sim.render.panda import RenderDeviceError, use_device
-from tests.sim.render.test_stage import camera_of, stand, world_of
+from tests.sim.render.test_scene_graph import camera_of, stand, world_of
 use_device(sys.argv[1])
-from er_gym.sim.render.stage import stage
+from er_gym.sim.render.scene_graph import stage
 found = {}
 try:
     for scene, pose in (("FloorPlan1", (-0.5, 1.5, 150.0)), ("FloorPlan403", (-0.75, 1.75, 0.0))):

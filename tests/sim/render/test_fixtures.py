@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.fixtures import fixtures
 from er_gym.sim.render.panda import geometry
-from er_gym.sim.render.stage import Stage
+from er_gym.sim.render.scene_graph import SceneGraph
 from er_gym.sim.scene import SCENE_NAMES, SCENE_NUMBERS, load_scene
 from er_gym.sim.settings import Settings
 from er_gym.sim.world import World
@@ -33,9 +33,9 @@ def triangles(name: str) -> NDArray[np.float32]:
     return np.concatenate([p.vertices[p.triangles] for p in fixtures(name).values()])
 
 
-def attach(stage: Any, name: str) -> None:
+def attach(graph: Any, name: str) -> None:
     parts = [(m, p.vertices, p.colours, p.uv, p.triangles) for m, p in fixtures(name).items()]
-    stage._root.attachNewNode(geometry(parts, 0, "fixtures"))
+    graph._root.attachNewNode(geometry(parts, 0, "fixtures"))
 
 
 def views(world: World) -> list[Camera]:
@@ -102,15 +102,15 @@ def test_nobody_walks_into_a_stove(name: str) -> None:
 
 @pytest.mark.parametrize("name", KITCHENS)
 def test_a_stove_hides_neither_burners_nor_knobs(name: str) -> None:
-    world, stage = world_of(name), Stage(name)
+    world, graph = world_of(name), SceneGraph(name)
     numbers = np.array(list(world.of_type("StoveBurner", "StoveKnob"))) + 1
     cameras = views(world)
 
     def pixels() -> NDArray[np.int64]:
-        seen = [np.bincount(stage.draw(world, c).ids.ravel(), minlength=255) for c in cameras]
+        seen = [np.bincount(graph.draw(world, c).ids.ravel(), minlength=255) for c in cameras]
         most: NDArray[np.int64] = np.max(seen, axis=0)[numbers]
         return most
 
     before = pixels()
-    attach(stage, name)
+    attach(graph, name)
     assert (pixels() >= np.maximum(0.9 * before, 8)).all()

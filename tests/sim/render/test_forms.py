@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from er_gym.sim.render.mesh import Mesh, Triple
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.patch import Triple
 from er_gym.sim.render.shapes.forms import laid, leant
 
 

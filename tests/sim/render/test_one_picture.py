@@ -10,10 +10,10 @@ from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.materials import MATERIALS
 from er_gym.sim.render.mesh import Mesh
 from er_gym.sim.render.panda import core, geometry, rasteriser
-from er_gym.sim.render.stage import stage
+from er_gym.sim.render.scene_graph import scene_graph_of
 from er_gym.sim.scene import SCENE_NAMES
 from er_gym.sim.world import World
-from tests.sim.render.test_stage import camera_of, do, one, stand, world_of
+from tests.sim.render.test_scene_graph import camera_of, do, one, stand, world_of
 
 
 def _panel(number: int, material: str = "plain") -> object:
@@ -44,7 +44,7 @@ def test_of_materials_at_the_same_depth_the_first_in_their_table_is_seen() -> No
 
 def _pictures(world: World) -> list[np.ndarray]:
     """From all around, with ids as names: rows depend on what was made first."""
-    found, drawn = [], stage(world.scene.name)
+    found, drawn = [], scene_graph_of(world.scene.name)
     names = np.array(["", *world.names])
     for yaw in range(0, 360, 90):
         stand(world, *world.scene.reachable[0], float(yaw), 20.0)
@@ -117,8 +117,8 @@ def test_what_lies_in_a_shut_box_is_not_drawn_when_the_hand_moves() -> None:
     assert small in world.in_hand
     assert world.hidden[small]
     camera = camera_of(world)
-    stage(scene).draw(world, camera)
+    scene_graph_of(scene).draw(world, camera)
     world.carry()
-    stage(scene).draw(world, camera)
-    assert small not in stage(scene)._placed
-    assert box in stage(scene)._placed
+    scene_graph_of(scene).draw(world, camera)
+    assert small not in scene_graph_of(scene)._placed
+    assert box in scene_graph_of(scene)._placed

@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from er_gym.sim.render.look import Look
+from er_gym.sim.render.appearance import Appearance
 from er_gym.sim.render.mesh import Mesh
 from er_gym.sim.render.palette import palette
 from er_gym.sim.render.shapes import SHAPES
 from er_gym.sim.render.shapes.hangings import across
 
 
-def _look(kind: str, size: tuple[float, float, float], asset: str = "") -> Look:
+def _look(kind: str, size: tuple[float, float, float], asset: str = "") -> Appearance:
     scene = "FloorPlan401"
-    return Look(kind, asset, scene, "bathrooms", size, 0.0, palette(scene))
+    return Appearance(kind, asset, scene, "bathrooms", size, 0.0, palette(scene))
 
 
-def _points(look: Look) -> np.ndarray:
+def _points(look: Appearance) -> np.ndarray:
     return np.concatenate([p.vertices for p in SHAPES[look.kind](look).patches().values()])
 
 

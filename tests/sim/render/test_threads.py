@@ -13,10 +13,10 @@ import pytest
 
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.sim.engine import Engine
-from er_gym.sim.render import stage as staging
+from er_gym.sim.render import scene_graph as scene_graph
 from er_gym.sim.render.panda import DRAWING
 from er_gym.sim.render.view import View
-from tests.sim.render.test_stage import camera_of, one, world_of
+from tests.sim.render.test_scene_graph import camera_of, one, world_of
 
 _THREADS = 4
 _FLAGS = {"renderInstanceSegmentation": True, "renderSemanticSegmentation": True}
@@ -105,19 +105,19 @@ def test_an_interrupted_picture_spoils_no_other(
     plain, changed = world_of("FloorPlan403"), world_of("FloorPlan403")
     for i in (one(changed, "ToiletPaper"), one(changed, "SoapBottle")):
         changed.move_by(i, np.array([0.2, 0.3, 0.1]))
-    stage = staging.stage("FloorPlan403")
-    pictures = [stage.draw(world, camera_of(world)).rgb for world in (plain, changed)]
+    graph = scene_graph.scene_graph_of("FloorPlan403")
+    pictures = [graph.draw(world, camera_of(world)).rgb for world in (plain, changed)]
     assert (pictures[0] != pictures[1]).any()
 
     for name, count in (("look", 0), ("look", 12), ("rasteriser", 0)):
         with monkeypatch.context() as patch:
-            patch.setattr(staging, name, _interrupted(getattr(staging, name), error, count))
+            patch.setattr(scene_graph, name, _interrupted(getattr(scene_graph, name), error, count))
             with pytest.raises(error):
-                stage.draw(plain, camera_of(plain))
+                graph.draw(plain, camera_of(plain))
         for world, picture in zip((plain, changed), pictures, strict=True):
             found: list[np.ndarray] = []
             _in_a_thread(lambda world=world, found=found: found.append(  # type: ignore[misc]
-                staging.stage("FloorPlan403").draw(world, camera_of(world)).rgb
+                scene_graph.scene_graph_of("FloorPlan403").draw(world, camera_of(world)).rgb
             ))  # fmt: skip
             assert (found[0] == picture).all()
 
@@ -148,7 +148,7 @@ def test_nobody_draws_while_the_lock_is_held() -> None:
     done = threading.Event()
 
     def draw() -> None:
-        staging.stage("FloorPlan403").draw(world, camera_of(world))
+        scene_graph.scene_graph_of("FloorPlan403").draw(world, camera_of(world))
         done.set()
 
     with DRAWING:

@@ -8,21 +8,20 @@ from math import cos, pi, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.render.look import Look, mixed, shaded
-from er_gym.sim.render.mesh import Axis, Colour, Mesh
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour
 from er_gym.sim.render.shapes.hangings import across, cracks, frame, turned
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.shapes.registry import shape
 
 _CERAMIC, _STEEL, _CHROME = (0.96, 0.96, 0.95), (0.78, 0.80, 0.83), (0.88, 0.90, 0.94)
 _SEAT, _DARK, _DRAIN = (0.99, 0.99, 0.98), (0.13, 0.13, 0.14), (0.24, 0.24, 0.26)
 _WATER, _STREAM = (0.45, 0.68, 0.84), (0.62, 0.84, 1.0)
-_PAPER, _CARD = (0.97, 0.97, 0.96), (0.62, 0.46, 0.30)
-_SOAPS = ((0.95, 0.62, 0.68), (0.56, 0.80, 0.62), (0.96, 0.86, 0.55), (0.60, 0.72, 0.92))
 _ROUND, _SQUARE = 2.0, 5.0
 """Exponents of outlines: an ellipse, and a rectangle with round corners."""
 _CORNERS = {"FloorPlan403": (1, -1), "FloorPlan418": (-1, -1), "FloorPlan423": (-1, 1)}
 """At which sides (of x and z) glass goes round a corner, where it is not at the positive ones."""
-AXES: tuple[Axis, ...] = ("x", "y", "z")
 Area = tuple[float, float, float, float]
 """x and z of a middle, width and depth."""
 Ring = tuple[float, float, float]
@@ -41,7 +40,7 @@ def outline(
     return np.stack([at[0] + x, np.full(segments, y), at[1] + z], axis=1)
 
 
-def _vessel(
+def vessel(
     mesh: Mesh,
     rings: Iterable[Ring],
     colour: Colour,
@@ -53,52 +52,52 @@ def _vessel(
     mesh.skin([outline(ring, power, (0.0, z), segments) for ring in rings], colour)
 
 
-def _ceramic(look: Look) -> bool:
-    return look.room == "bathrooms"
+def _ceramic(appearance: Appearance) -> bool:
+    return appearance.room == "bathrooms"
 
 
-def _place(look: Look, most: tuple[float, float]) -> tuple[Area, float] | None:
+def _place(appearance: Appearance, most: tuple[float, float]) -> tuple[Area, float] | None:
     """Where in it the basin is, at most so wide and deep, and its top; None where not known."""
-    for kind, (low, high) in look.built_in:
-        if kind == f"{look.kind}Basin":
+    for kind, (low, high) in appearance.built_in:
+        if kind == f"{appearance.kind}Basin":
             w, d = min(high[0] - low[0], most[0]), min(high[2] - low[2], most[1])
             return ((low[0] + high[0]) / 2, (low[2] + high[2]) / 2, w, d), high[1]
     return None
 
 
 @shape("Sink")
-def sink(look: Look) -> Mesh:
+def sink(appearance: Appearance) -> Mesh:
     """A rim round a hollow, let into a counter or on a pedestal; the bowl is its basin."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     if h > 0.45:
-        return _pedestal(look)
+        return _pedestal(appearance)
     mesh, whole = Mesh(), (0.0, 0.0, w, d)
-    place = _place(look, (w - 0.03, d - 0.03))
+    place = _place(appearance, (w - 0.03, d - 0.03))
     if place is None:
-        _let_in(mesh, look, whole, (0.0, 0.0, 0.88 * w, 0.80 * d), None)
+        _let_in(mesh, appearance, whole, (0.0, 0.0, 0.88 * w, 0.80 * d), None)
         return mesh
     (x, z, wide, deep), top = place
     if max(abs(x) / w, abs(z) / d) < 0.12 or max(wide / w, deep / d) > 0.9:
-        _let_in(mesh, look, whole, place[0], top)
+        _let_in(mesh, appearance, whole, place[0], top)
         return mesh
     for side in (1, -1):  # two bowls, of which one is an object
         known = top if side > 0 else None
         if abs(x) / w > abs(z) / d:
             half = (side * np.sign(x) * w / 4, 0.0, w / 2, d)
-            _let_in(mesh, look, half, (side * x, z, min(wide, w / 2 - 0.03), deep), known)
+            _let_in(mesh, appearance, half, (side * x, z, min(wide, w / 2 - 0.03), deep), known)
         else:
             half = (0.0, side * np.sign(z) * d / 4, w, d / 2)
-            _let_in(mesh, look, half, (x, side * z, wide, min(deep, d / 2 - 0.03)), known)
+            _let_in(mesh, appearance, half, (x, side * z, wide, min(deep, d / 2 - 0.03)), known)
     return mesh
 
 
-def _let_in(mesh: Mesh, look: Look, area: Area, hole: Area, top: float | None) -> None:
+def _let_in(mesh: Mesh, appearance: Appearance, area: Area, hole: Area, top: float | None) -> None:
     """A rim with a hole over a basin with that top, or with its own hollow where None."""
-    h, whole = look.size[1], area[2:] == (look.size[0], look.size[2])
-    colour = _CERAMIC if _ceramic(look) else _STEEL
+    h, whole = appearance.size[1], area[2:] == (appearance.size[0], appearance.size[2])
+    colour = _CERAMIC if _ceramic(appearance) else _STEEL
     rim = min(0.02, 0.15 * h)
-    power = 2.6 if _ceramic(look) else _SQUARE
-    outer = 3.5 if _ceramic(look) else _SQUARE if whole else 40.0
+    power = 2.6 if _ceramic(appearance) else _SQUARE
+    outer = 3.5 if _ceramic(appearance) else _SQUARE if whole else 40.0
 
     def ring(of: Area, y: float, shape_of: float = power, more: float = 0.0) -> NDArray[np.float64]:
         return outline((of[2] + more, of[3] + more, y), shape_of, of[:2])
@@ -115,71 +114,71 @@ def _let_in(mesh: Mesh, look: Look, area: Area, hole: Area, top: float | None) -
     mesh.skin(hollow, shaded(colour, 0.85))
 
 
-def _pedestal(look: Look) -> Mesh:
+def _pedestal(appearance: Appearance) -> Mesh:
     """A wide bowl on a foot."""
-    w, h, d = look.size
-    mesh, low = Mesh(), max(0.0, look.size[1] - 0.28)
-    colour = _CERAMIC if _ceramic(look) else _STEEL
-    power = 3.5 if _ceramic(look) else _SQUARE
+    w, h, d = appearance.size
+    mesh, low = Mesh(), max(0.0, appearance.size[1] - 0.28)
+    colour = _CERAMIC if _ceramic(appearance) else _STEEL
+    power = 3.5 if _ceramic(appearance) else _SQUARE
     foot = [(0.20 * w, 0), (0.14 * w, 0.12 * h), (0.12 * w, 0.6 * low), (0.22 * w, low)]
     mesh.lathe(foot, colour, squash=(1.0, min(1.0, d / w)))
     rings = [(0.4 * w, 0.4 * d, low - 0.02), (0.85 * w, 0.85 * d, h - 0.16),
              (w, d, h - 0.035), (w, d, h), (0.9 * w, 0.88 * d, h)]  # fmt: skip
-    _vessel(mesh, rings, colour, power)
-    place = _place(look, (0.88 * w, 0.84 * d))
+    vessel(mesh, rings, colour, power)
+    place = _place(appearance, (0.88 * w, 0.84 * d))
     (x, z, wide, deep), top = place or ((0.0, 0.0, 0.5 * w, 0.47 * d), h - 0.055)
     y = min(top, h) - 0.005
     slope = [outline(rings[-1], power), outline((0.97 * wide, 0.97 * deep, y), 2.6, (x, z))]
     mesh.skin(slope, shaded(colour, 0.9))
     if place is None:
         hollow = [(0.97 * wide, 0.97 * deep, y), (0.9 * wide, 0.9 * deep, low), (0, 0, low)]
-        _vessel(mesh, hollow, shaded(colour, 0.8), 2.6)
+        vessel(mesh, hollow, shaded(colour, 0.8), 2.6)
     return mesh
 
 
-def _basin(look: Look, colour: Colour, power: float) -> Mesh:
+def _basin(appearance: Appearance, colour: Colour, power: float) -> Mesh:
     """A bowl with a thin lip, a drain, and water when filled."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     mesh = Mesh()
     wall = min(0.02, 0.06 * min(w, d))
     floor = min(0.02, 0.15 * h)
     outer = [(0.84 * w, 0.84 * d, 0.0), (w, d, h), (w - 2 * wall, d - 2 * wall, h)]
-    _vessel(mesh, outer, colour, power)
+    vessel(mesh, outer, colour, power)
     sides = [outer[-1], (0.82 * w, 0.82 * d, floor)]
-    _vessel(mesh, sides, shaded(colour, 0.84), power)
+    vessel(mesh, sides, shaded(colour, 0.84), power)
     bottom = [sides[-1], (0.0, 0.0, floor - 0.004)]
-    _vessel(mesh, bottom, shaded(colour, 0.74), power)
+    vessel(mesh, bottom, shaded(colour, 0.74), power)
     mesh.cylinder((0, floor + 0.003, 0), 0.1 * min(w, d) + 0.005, 0.01, _DRAIN, segments=12)
-    if look.filled:
+    if appearance.filled:
         level = 0.62 * h
         share = 0.84 + 0.1 * 0.62
-        _vessel(mesh, [(share * w, share * d, level), (0.0, 0.0, level)], _WATER, power)
+        vessel(mesh, [(share * w, share * d, level), (0.0, 0.0, level)], _WATER, power)
     return mesh
 
 
 @shape("SinkBasin")
-def sink_basin(look: Look) -> Mesh:
+def sink_basin(appearance: Appearance) -> Mesh:
     """The bowl of a sink, with a dark drain."""
-    ceramic = _ceramic(look)
-    return _basin(look, _CERAMIC if ceramic else _STEEL, 2.6 if ceramic else _SQUARE)
+    ceramic = _ceramic(appearance)
+    return _basin(appearance, _CERAMIC if ceramic else _STEEL, 2.6 if ceramic else _SQUARE)
 
 
 @shape("BathtubBasin")
-def bathtub_basin(look: Look) -> Mesh:
+def bathtub_basin(appearance: Appearance) -> Mesh:
     """The long hollow of a bathtub, with a drain."""
-    return _basin(look, shaded(_CERAMIC, 0.97), 3.5)
+    return _basin(appearance, shaded(_CERAMIC, 0.97), 3.5)
 
 
 @shape("Bathtub")
-def bathtub(look: Look) -> Mesh:
+def bathtub(appearance: Appearance) -> Mesh:
     """A long white tub with a wide round rim that slopes down into its basin."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     mesh, rim = Mesh(), 0.08 * min(w, d)
     outer = [(0.97 * w, 0.97 * d, 0), (0.97 * w, 0.97 * d, h - 0.06), (w, d, h - 0.05),
              (w, d, h - 0.01), (0.985 * w, 0.985 * d, h),
              (w - 2 * rim, d - 2 * rim, h)]  # fmt: skip
-    _vessel(mesh, outer, _CERAMIC, 6.0)
-    place = _place(look, (w - 2.2 * rim, d - 2.2 * rim))
+    vessel(mesh, outer, _CERAMIC, 6.0)
+    place = _place(appearance, (w - 2.2 * rim, d - 2.2 * rim))
     share = (0.80, 0.56) if w > d else (0.56, 0.80)
     (x, z, wide, deep), top = place or ((0.0, 0.0, share[0] * w, share[1] * d), 0.74 * h)
     ledge = (0.99 * wide, 0.99 * deep, min(top, h) - 0.006)
@@ -187,7 +186,7 @@ def bathtub(look: Look) -> Mesh:
     mesh.skin(slope, shaded(_CERAMIC, 0.92))
     if place is None:
         hollow = [ledge, (0.92 * wide, 0.92 * deep, 0.012), (0, 0, 0.008)]
-        _vessel(mesh, hollow, shaded(_CERAMIC, 0.82), 3.5)
+        vessel(mesh, hollow, shaded(_CERAMIC, 0.82), 3.5)
     return mesh
 
 
@@ -199,10 +198,10 @@ def _stream(mesh: Mesh, at: tuple[float, float, float], length: float, radius: f
 
 
 @shape("Faucet")
-def faucet(look: Look) -> Mesh:
+def faucet(appearance: Appearance) -> Mesh:
     """A chrome spout that bends forward and down, with a handle or two."""
-    w, h, d = look.size
-    mesh, metal = Mesh(), mixed(_CHROME, look.palette.metal, 0.25)
+    w, h, d = appearance.size
+    mesh, metal = Mesh(), mixed(_CHROME, appearance.palette.metal, 0.25)
     tube = min(0.02, 0.09 * h + 0.003, 0.3 * w)
     back, tip = -d / 2 + 1.4 * tube, d / 2 - tube
     top = h - tube - (0.14 * h if w < 0.14 else 0.0)
@@ -214,7 +213,7 @@ def faucet(look: Look) -> Mesh:
         mesh.ball(point, (2 * tube,) * 3, metal, segments=7, rings=4)
     mesh.cylinder((0, top - 0.31 * h, tip), 1.2 * tube, 0.06 * h, shaded(metal, 0.7))
     if w < 0.14:
-        lift = 24 if look.on else 0
+        lift = 24 if appearance.on else 0
         lever = Mesh()
         lever.box((0, 0, 0.2 * d), (1.2 * tube, 0.05 * h, 0.4 * d), shaded(metal, 0.85))
         mesh.add(lever, turn=("x", -lift), at=(0, h - 0.03 * h, back))
@@ -222,8 +221,8 @@ def faucet(look: Look) -> Mesh:
         mesh.cylinder((0, (low + high) / 2, back), 1.3 * tube, high - low, metal)
     else:
         for side in (-1, 1):
-            _tap(mesh, (side * (w / 2 - 0.032), 0.0, back), h, look.on, metal, side)
-    if look.on:
+            _tap(mesh, (side * (w / 2 - 0.032), 0.0, back), h, appearance.on, metal, side)
+    if appearance.on:
         _stream(mesh, (0, top - 0.3 * h, tip), 0.18, 0.55 * tube + 0.004)
     return mesh
 
@@ -244,9 +243,9 @@ def _tap(
 
 
 @shape("Toilet")
-def toilet(look: Look) -> Mesh:
+def toilet(appearance: Appearance) -> Mesh:
     """A cistern at the back, an oval bowl on a foot, a seat under a hinged lid."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     mesh = Mesh()
     tank, rim = 0.24 * d, 0.36 * h + 0.05
     wide = min(0.86 * w, 0.5 * d)
@@ -265,28 +264,28 @@ def toilet(look: Look) -> Mesh:
     bowl = [(0.62 * wide, 0.72 * deep, 0), (0.5 * wide, 0.62 * deep, 0.3 * rim),
             (0.62 * wide, 0.74 * deep, 0.5 * rim), (0.96 * wide, 0.98 * deep, 0.88 * rim),
             (0.98 * wide, 0.99 * deep, rim), (0.66 * wide, 0.70 * deep, rim)]  # fmt: skip
-    _vessel(mesh, bowl, _CERAMIC, _ROUND, z)
-    _vessel(mesh, [bowl[-1], (0.5 * wide, 0.5 * deep, 0.66 * rim)], shaded(_CERAMIC, 0.8), 2.0, z)
+    vessel(mesh, bowl, _CERAMIC, _ROUND, z)
+    vessel(mesh, [bowl[-1], (0.5 * wide, 0.5 * deep, 0.66 * rim)], shaded(_CERAMIC, 0.8), 2.0, z)
     pool = [(0.56 * wide, 0.58 * deep, 0.74 * rim), (0.0, 0.0, 0.74 * rim)]
-    _vessel(mesh, pool, _WATER, _ROUND, z)
+    vessel(mesh, pool, _WATER, _ROUND, z)
     seat = [(wide, deep, rim + 0.006), (wide, deep, rim + 0.03),
             (0.62 * wide, 0.64 * deep, rim + 0.03),
             (0.62 * wide, 0.64 * deep, rim + 0.006)]  # fmt: skip
-    _vessel(mesh, seat, _SEAT, _ROUND, z)
+    vessel(mesh, seat, _SEAT, _ROUND, z)
     lid, thick = Mesh(), 0.025
     shell = [(0.0, 0.0, 0), (wide, deep, 0), (wide, deep, thick), (0.9 * wide, 0.9 * deep, 0.04),
              (0.0, 0.0, 0.04)]  # fmt: skip
-    _vessel(lid, shell, shaded(_SEAT, 0.97), _ROUND, z)
+    vessel(lid, shell, shaded(_SEAT, 0.97), _ROUND, z)
     hinge = (0.0, 0.0, -d / 2 + tank + 0.03)
-    mesh.add(lid, at=(0, rim + 0.04, 0), turn=("x", -97 * look.openness), about=hinge)
+    mesh.add(lid, at=(0, rim + 0.04, 0), turn=("x", -97 * appearance.openness), about=hinge)
     for side in (-1, 1):
         mesh.box((side * 0.2 * wide, rim + 0.035, hinge[2]), (0.05, 0.03, 0.03), _CHROME)
     return mesh
 
 
-def _glazed(look: Look, w: float, h: float, d: float) -> Mesh:
+def _glazed(appearance: Appearance, w: float, h: float, d: float) -> Mesh:
     """Glass in a metal frame."""
-    mesh, metal = Mesh(), mixed(_STEEL, look.palette.metal, 0.4)
+    mesh, metal = Mesh(), mixed(_STEEL, appearance.palette.metal, 0.4)
     bar = min(0.045, 0.1 * min(w, h))
     frame(mesh, (w, h, d), bar, metal)
     inside = (w - 2 * bar, h - 2 * bar)
@@ -296,45 +295,47 @@ def _glazed(look: Look, w: float, h: float, d: float) -> Mesh:
         mesh.quad([((x - 0.02) * w, 0.35 * h, 0), ((x + 0.03) * w, 0.35 * h, 0),
                    ((x + 0.16) * w, 0.75 * h, 0), ((x + 0.11) * w, 0.75 * h, 0)],
                   _STREAM, "glass", both=True)  # fmt: skip
-    if look.broken:
+    if appearance.broken:
         cracks(mesh, inside, h / 2, 0.0, 0.004)
     return mesh
 
 
 @shape("ShowerDoor")
-def shower_door(look: Look) -> Mesh:
+def shower_door(appearance: Appearance) -> Mesh:
     """A tall glass door in a metal frame, with a long handle; hinged at a side."""
-    w, h, d, along_z = across(look)
+    w, h, d, along_z = across(appearance)
     thick = min(d, 0.06)
-    leaf, mesh = _glazed(look, w, h, thick), Mesh()
+    leaf, mesh = _glazed(appearance, w, h, thick), Mesh()
     for side in (-1, 1):
         z = side * (thick / 2 + 0.025)
         leaf.tube([(0.36 * w, 0.42 * h, z), (0.36 * w, 0.62 * h, z)], 0.014, _DARK, segments=6)
         for y in (0.44, 0.60):
             leaf.box((0.36 * w, y * h, z / 2), (0.0, 0.0, abs(z)), _DARK)
-    mesh.add(leaf, turn=("y", -85 * look.openness), about=(-w / 2, 0, 0))
+    mesh.add(leaf, turn=("y", -85 * appearance.openness), about=(-w / 2, 0, 0))
     return turned(mesh, along_z)
 
 
 @shape("ShowerGlass")
-def shower_glass(look: Look) -> Mesh:
+def shower_glass(appearance: Appearance) -> Mesh:
     """A fixed pane in a metal frame; round a corner where its box is deep."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     if min(w, d) < 0.3:
-        w, h, d, along_z = across(look)
-        return turned(_glazed(look, w, h, min(d, 0.06)), along_z)
+        w, h, d, along_z = across(appearance)
+        return turned(_glazed(appearance, w, h, min(d, 0.06)), along_z)
     mesh, thick = Mesh(), 0.05
-    x, z = _CORNERS.get(look.scene, (1, 1))
-    mesh.add(_glazed(look, w, h, thick), at=(0, 0, z * (d - thick) / 2))
-    mesh.add(_glazed(look, d - thick, h, thick), turn=("y", 90), at=(x * (w - thick) / 2, 0, 0))
+    x, z = _CORNERS.get(appearance.scene, (1, 1))
+    mesh.add(_glazed(appearance, w, h, thick), at=(0, 0, z * (d - thick) / 2))
+    mesh.add(
+        _glazed(appearance, d - thick, h, thick), turn=("y", 90), at=(x * (w - thick) / 2, 0, 0)
+    )
     return mesh
 
 
 @shape("ShowerHead")
-def shower_head(look: Look) -> Mesh:
+def shower_head(appearance: Appearance) -> Mesh:
     """A broad rose on a tall rail, with a hose and a mixer."""
-    w, h, d = look.size
-    mesh, metal = Mesh(), mixed(_CHROME, look.palette.metal, 0.25)
+    w, h, d = appearance.size
+    mesh, metal = Mesh(), mixed(_CHROME, appearance.palette.metal, 0.25)
     rail = -d / 2 + 0.05
     mesh.tube([(0, 0.04 * h, rail), (0, 0.97 * h, rail)], 0.019, metal, segments=8)
     for y in (0.05, 0.95):
@@ -353,96 +354,11 @@ def shower_head(look: Look) -> Mesh:
     mesh.tube(hose, 0.011, shaded(metal, 0.75), segments=5)
     mesh.tube([(-0.4 * w, 0.35 * h, rail), (0.4 * w, 0.35 * h, rail)], 0.024, metal, segments=8)
     mesh.box((0, 0.35 * h, rail + 0.03), (0.03, 0.05, 0.06), shaded(metal, 0.8))
-    if look.on:
+    if appearance.on:
         for k in range(9):
             a, share = 2 * pi * k / 8, 0.0 if k == 8 else 0.7 * r
             x, z = share * cos(a), share * sin(a)
             start = at + np.array([x, 0.0, z * cos(tilt)])
             end = start + np.array([0.5 * x, -0.8, 0.24 + 0.3 * z])
             mesh.tube([start, end], 0.005, _STREAM, "glowing", segments=4)
-    return mesh
-
-
-def odd_axis(size: tuple[float, float, float]) -> int:
-    """The axis of a roll: that whose length is unlike the two others'."""
-    middle = sorted(size)[1]
-    return max(range(3), key=lambda k: abs(size[k] - middle))
-
-
-def roll(look: Look, paper: Colour, used: bool, material: str = "plain") -> Mesh:
-    """A roll of paper round a tube of cardboard, or the bare tube."""
-    axis = odd_axis(look.size)
-    others = [look.size[k] for k in range(3) if k != axis]
-    length, r = look.size[axis], min(others) / 2
-    at, cut = (0.0, look.size[1] / 2, 0.0), AXES[axis]
-    mesh, half = Mesh(), length / 2
-    bore = min(0.42 * r, 0.024)
-    if used:
-        r = min(r, 0.024)
-        bore = 0.86 * r
-    skin = _CARD if used else paper
-    inside = [(bore, half), (bore, -half)]
-    outside = [(bore, -half), (r, -half), (r, half), (bore, half)]
-    mesh.lathe(outside, skin, material, at=at, axis=cut, segments=16)
-    mesh.lathe(inside, shaded(_CARD, 0.75), at=at, axis=cut, segments=12)
-    if not used:
-        for side in (-1, 1):
-            ring = [(1.5 * bore, side * (half + 0.002)), (bore, side * (half + 0.002))]
-            mesh.lathe(ring[::-side], _CARD, at=at, axis=cut, segments=12)
-    return mesh
-
-
-@shape("ToiletPaper")
-def toilet_paper(look: Look) -> Mesh:
-    """A short white roll with a brown core and a loose end."""
-    used = look.used_up or "Used_Up" in look.asset
-    mesh = roll(look, _PAPER, used)
-    if used:
-        return mesh
-    w, h, d = look.size
-    if odd_axis(look.size) == 1:
-        mesh.box((0.16 * w, 0.5 * h, 0.49 * d), (0.32 * w, 0.97 * h, 0.02 * d), _PAPER)
-    else:
-        mesh.box((0, 0.24 * h, 0.48 * d), (0.98 * w, 0.48 * h, 0.03 * d), _PAPER)
-    return mesh
-
-
-@shape("ToiletPaperHanger")
-def toilet_paper_hanger(look: Look) -> Mesh:
-    """A bar between two arms that come out of the wall; under a hood where its box is high."""
-    w, h, d = look.size
-    mesh, metal = Mesh(), mixed(_CHROME, look.palette.metal, 0.4)
-    r = min(0.013, 0.3 * h)
-    y, front = (0.5 * h if h < 0.1 else 0.03), d / 2 - 1.4 * r
-    for side in (-1, 1):
-        x = side * (w / 2 - 1.6 * r)
-        plate = (min(0.05, 0.3 * w), max(2 * r, min(h, 2 * y)), 0.016)
-        mesh.rounded((x * 0.93, y, -d / 2 + 0.008), plate, metal, 0.005)
-        mesh.box((x, y, 0), (2.2 * r, 2.2 * r, d), shaded(metal, 0.85))
-    if h >= 0.1:
-        mesh.box((0, h / 2, -d / 2 + 0.006), (0.8 * w, h, 0.012), shaded(metal, 0.9), faces="xXYZ")
-        hood = [
-            [(x, h, -d / 2), (x, h, 0.2 * d), (x, 0.75 * h, d / 2)] for x in (-0.4 * w, 0.4 * w)
-        ]
-        mesh.skin(hood, metal, closed=False, smooth=False, both=True)
-    mesh.tube([(-w / 2, y, front), (w / 2, y, front)], r, metal, segments=8)
-    return mesh
-
-
-@shape("SoapBar")
-def soap_bar(look: Look) -> Mesh:
-    """A pastel bar with round edges and a sunk oval."""
-    w, h, d = look.size
-    mesh, colour = Mesh(), look.pick(*_SOAPS)
-    rings = [(0.7 * w, 0.8 * d, 0), (0.95 * w, 0.96 * d, 0.22 * h), (w, d, 0.5 * h),
-             (0.95 * w, 0.96 * d, 0.78 * h), (0.75 * w, 0.82 * d, h),
-             (0.62 * w, 0.66 * d, 0.97 * h)]  # fmt: skip
-    _vessel(mesh, rings, colour, 3.2, segments=12)
-    _vessel(mesh, [rings[-1], (0.54 * w, 0.58 * d, 0.8 * h)], shaded(colour, 0.7), 3.2, segments=12)
-    _vessel(
-        mesh,
-        [(0.54 * w, 0.58 * d, 0.8 * h), (0.0, 0.0, 0.85 * h)],
-        mixed(colour, _PAPER, 0.25),
-        3.2,
-    )
     return mesh

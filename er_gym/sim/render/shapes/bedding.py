@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.render.look import Look, mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour
 from er_gym.sim.render.shapes.joinery import legs
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.shapes.registry import shape
 
 _SHEET, _PILLOW = (0.93, 0.92, 0.89), (0.96, 0.95, 0.92)
 _STAIN = (0.40, 0.28, 0.15)
@@ -18,15 +20,15 @@ _HEADBOARD = 0.08
 
 
 @shape("Bed")
-def bed(look: Look) -> Mesh:
+def bed(appearance: Appearance) -> Mesh:
     """A mattress under a blanket that is turned down before pillows and a headboard."""
-    w, h, d = look.size
-    random, palette = look.random(), look.palette
+    w, h, d = appearance.size
+    random, palette = appearance.random(), appearance.palette
     colours = (palette.fabric, mixed(palette.accent, palette.fabric, 0.4), palette.accent)
     blanket = colours[int(random.integers(len(colours)))]
     material = ("fabric", "stripes")[int(random.integers(2))]
     wood = shaded(palette.wood, 0.85)
-    top = 0.55 * h if look.surface is None else min(max(look.surface, 0.3 * h), h)
+    top = 0.55 * h if appearance.surface is None else min(max(appearance.surface, 0.3 * h), h)
     rail = 0.42 * top if top < 1.0 else top - 0.35  # a high one is a loft over a desk
     beam = min(0.5 * rail, 0.22)
     mesh = Mesh()
@@ -36,16 +38,16 @@ def bed(look: Look) -> Mesh:
     mesh.rounded(at, size, wood, 0.02, "wood")
     mesh.rounded((0, 0.62 * h, d / 2 - _HEADBOARD - 0.005), (0.86 * w, 0.62 * h, 0.03),
                  shaded(wood, 1.2), 0.02, "wood")  # fmt: skip
-    if look.dirty:
-        _unmade(mesh, look, top, rail, blanket, material)
+    if appearance.dirty:
+        _unmade(mesh, appearance, top, rail, blanket, material)
     else:
-        _made(mesh, look, top, rail, blanket, material)
+        _made(mesh, appearance, top, rail, blanket, material)
     return mesh
 
 
-def _mattress(mesh: Mesh, look: Look, top: float, rail: float) -> tuple[float, float]:
+def _mattress(mesh: Mesh, appearance: Appearance, top: float, rail: float) -> tuple[float, float]:
     """A mattress in a sheet; where its foot is, and how long it is."""
-    w, _, d = look.size
+    w, _, d = appearance.size
     foot, head = -d / 2 + 0.02, d / 2 - _HEADBOARD
     thick = top - 0.015 - rail
     at = (0, rail + thick / 2, (head + foot) / 2)
@@ -53,10 +55,12 @@ def _mattress(mesh: Mesh, look: Look, top: float, rail: float) -> tuple[float, f
     return foot, head - foot
 
 
-def _made(mesh: Mesh, look: Look, top: float, rail: float, colour: Colour, material: str) -> None:
+def _made(
+    mesh: Mesh, appearance: Appearance, top: float, rail: float, colour: Colour, material: str
+) -> None:
     """A blanket, smooth, with its turned-down edge, and pillows side by side."""
-    w = look.size[0]
-    foot, long = _mattress(mesh, look, top, rail)
+    w = appearance.size[0]
+    foot, long = _mattress(mesh, appearance, top, rail)
     covered, drop = 0.68 * long, 0.8 * (top - rail)
     z = foot + covered / 2 - 0.01
     mesh.rounded((0, top - drop / 2, z), (w, drop, covered), colour, 0.03, material, turns=0.5)
@@ -65,10 +69,12 @@ def _made(mesh: Mesh, look: Look, top: float, rail: float, colour: Colour, mater
     _pillows(mesh, w, top, foot + long, long, 0.0)
 
 
-def _unmade(mesh: Mesh, look: Look, top: float, rail: float, colour: Colour, material: str) -> None:
+def _unmade(
+    mesh: Mesh, appearance: Appearance, top: float, rail: float, colour: Colour, material: str
+) -> None:
     """A blanket thrown back askew in folds, a stained sheet, and pillows at odds."""
-    w = look.size[0]
-    foot, long = _mattress(mesh, look, top, rail)
+    w = appearance.size[0]
+    foot, long = _mattress(mesh, appearance, top, rail)
     for k, (z, turn, wide) in enumerate(((0.1, 4, 0.98), (0.27, -8, 0.94), (0.42, 13, 0.8))):
         heap = Mesh()
         high = 0.05 + 0.025 * k
@@ -92,10 +98,12 @@ def _pillows(mesh: Mesh, w: float, top: float, head: float, long: float, askew: 
 
 
 @shape("Pillow")
-def pillow(look: Look) -> Mesh:
+def pillow(appearance: Appearance) -> Mesh:
     """Thick in its middle and thin at its drawn-out corners."""
-    size, palette = look.size, look.palette
-    colour = look.pick(_PILLOW, palette.accent, palette.fabric, mixed(palette.accent, _PILLOW, 0.5))
+    size, palette = appearance.size, appearance.palette
+    colour = appearance.pick(
+        _PILLOW, palette.accent, palette.fabric, mixed(palette.accent, _PILLOW, 0.5)
+    )
     thin = size.index(min(size))
     w, h, d = size
     mesh = Mesh()
@@ -142,10 +150,10 @@ def _normals(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @shape("DogBed")
-def dog_bed(look: Look) -> Mesh:
+def dog_bed(appearance: Appearance) -> Mesh:
     """A round padded rim about a soft pale cushion, open at the front."""
-    w, h, d = look.size
-    colour = look.pick(_BROWN, shaded(look.palette.fabric, 0.8), (0.35, 0.36, 0.40))
+    w, h, d = appearance.size
+    colour = appearance.pick(_BROWN, shaded(appearance.palette.fabric, 0.8), (0.35, 0.36, 0.40))
     rim = min(0.14, 0.5 * h / min(w, d) + 0.03)
     mesh = Mesh()
     outline = [(0.46, 0), (0.5, 0.2 * h), (0.5, 0.75 * h), (0.5 - 0.3 * rim, h)]

@@ -9,10 +9,13 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.render.look import Look, mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh
-from er_gym.sim.render.shapes.bathroom import AXES, odd_axis, outline, roll
-from er_gym.sim.render.shapes.table import Shape, shape
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour
+from er_gym.sim.render.shapes.bathroom import outline
+from er_gym.sim.render.shapes.registry import Shape, shape
+from er_gym.sim.render.shapes.toiletries import AXES, odd_axis, roll
 
 _WHITE, _DARK, _BLACK = (0.96, 0.96, 0.95), (0.15, 0.15, 0.16), (0.08, 0.08, 0.09)
 _RUBBER, _HANDLE = ((0.68, 0.15, 0.12), (0.16, 0.16, 0.17), (0.55, 0.20, 0.14)), (0.80, 0.62, 0.40)
@@ -44,15 +47,19 @@ def _also_lying(draw: Shape) -> Shape:
     """For what stands: laid on its side where its box is not high."""
 
     @wraps(draw)
-    def drawn(look: Look) -> Mesh:
-        w, h, d = look.size
+    def drawn(appearance: Appearance) -> Mesh:
+        w, h, d = appearance.size
         if h >= 0.7 * max(w, d):
-            return draw(look)
+            return draw(appearance)
         mesh = Mesh()
         if d >= w:
-            mesh.add(draw(replace(look, size=(w, d, h))), turn=("x", 90), at=(0, h / 2, -d / 2))
+            mesh.add(
+                draw(replace(appearance, size=(w, d, h))), turn=("x", 90), at=(0, h / 2, -d / 2)
+            )
         else:
-            mesh.add(draw(replace(look, size=(h, w, d))), turn=("z", 90), at=(w / 2, h / 2, 0))
+            mesh.add(
+                draw(replace(appearance, size=(h, w, d))), turn=("z", 90), at=(w / 2, h / 2, 0)
+            )
         return mesh
 
     return drawn
@@ -87,10 +94,10 @@ def _labelled(
 
 @shape("Plunger")
 @_also_lying
-def plunger(look: Look) -> Mesh:
+def plunger(appearance: Appearance) -> Mesh:
     """A wooden stick on a wide rubber bell."""
-    w, h, d = look.size
-    mesh, rubber = Mesh(), look.pick(*_RUBBER)
+    w, h, d = appearance.size
+    mesh, rubber = Mesh(), appearance.pick(*_RUBBER)
     r = min(w, d) / 2
     bell = min(0.26 * h, 1.5 * r)
     line = [(0, 0.4 * bell), (0.7 * r, 0), (r, 0), (r, 0.12 * bell), (0.86 * r, 0.2 * bell),
@@ -104,9 +111,9 @@ def plunger(look: Look) -> Mesh:
 
 @shape("ScrubBrush")
 @_also_lying
-def scrub_brush(look: Look) -> Mesh:
+def scrub_brush(appearance: Appearance) -> Mesh:
     """A toilet brush: a white holder, blue bristles over its edge, a handle with a knob."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     mesh = Mesh()
     r, cup = min(w, d) / 2, 0.27 * h
     mesh.lathe([(0, 0), (r, 0), (0.92 * r, 0.04 * h), (0.72 * r, 0.09 * h), (0.88 * r, cup),
@@ -124,9 +131,9 @@ def scrub_brush(look: Look) -> Mesh:
     return mesh
 
 
-def _standing(look: Look) -> tuple[float, float, float, bool]:
+def _standing(appearance: Appearance) -> tuple[float, float, float, bool]:
     """Width, height and depth, turned (then True) so that the depth is the longer level side."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     return (d, h, w, True) if w > 1.05 * d else (w, h, d, False)
 
 
@@ -138,10 +145,10 @@ def _turned(mesh: Mesh, turn: bool) -> Mesh:
 
 @shape("SprayBottle")
 @_also_lying
-def spray_bottle(look: Look) -> Mesh:
+def spray_bottle(appearance: Appearance) -> Mesh:
     """A waisted bottle whose head is a pistol: nozzle, trigger, butt."""
-    w, h, d, turn = _standing(look)
-    mesh, random = Mesh(), look.random()
+    w, h, d, turn = _standing(appearance)
+    mesh, random = Mesh(), appearance.random()
     colour = _SPRAYS[int(random.integers(len(_SPRAYS)))]
     head = _TRIGGERS[int(random.integers(len(_TRIGGERS)))]
     wide, deep = w, min(0.72 * d, 2.6 * w)
@@ -168,10 +175,10 @@ def spray_bottle(look: Look) -> Mesh:
 
 @shape("SoapBottle")
 @_also_lying
-def soap_bottle(look: Look) -> Mesh:
+def soap_bottle(appearance: Appearance) -> Mesh:
     """A plump bottle with a pump: a thin stem and a nozzle to one side."""
-    w, h, d, turn = _standing(look)
-    mesh, random = Mesh(), look.random()
+    w, h, d, turn = _standing(appearance)
+    mesh, random = Mesh(), appearance.random()
     colour = _SOAPS[int(random.integers(len(_SOAPS)))]
     slope = 0.5 + 0.1 * random.random()
     pump = shaded(_WHITE, 1.0) if random.random() < 0.6 else _DARK
@@ -194,9 +201,9 @@ def soap_bottle(look: Look) -> Mesh:
 
 
 @shape("DishSponge")
-def dish_sponge(look: Look) -> Mesh:
+def dish_sponge(appearance: Appearance) -> Mesh:
     """A yellow block with a green scouring side."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     mesh = Mesh()
     mesh.rounded((0, 0.64 * h, 0), (w, 0.72 * h, d), _SPONGE, 0.12 * h, "carpet", turns=0.08)
     mesh.box((0, 0.14 * h, 0), (w, 0.28 * h, d), _SCOUR, "carpet", faces="xXYzZ", turns=0.08)
@@ -204,24 +211,24 @@ def dish_sponge(look: Look) -> Mesh:
 
 
 @shape("PaperTowelRoll")
-def paper_towel_roll(look: Look) -> Mesh:
+def paper_towel_roll(appearance: Appearance) -> Mesh:
     """A tall white roll, blue print round it, its brown core showing."""
-    mesh = roll(look, _PAPER, look.used_up)
-    if look.used_up:
+    mesh = roll(appearance, _PAPER, appearance.used_up)
+    if appearance.used_up:
         return mesh
-    axis = odd_axis(look.size)
-    length, r = look.size[axis], min(look.size[k] for k in range(3) if k != axis) / 2
+    axis = odd_axis(appearance.size)
+    length, r = appearance.size[axis], min(appearance.size[k] for k in range(3) if k != axis) / 2
     for share in (-0.32, -0.02, 0.28):
         low, high = share * length, (share + 0.05) * length
         mesh.lathe([(1.06 * r, low), (1.06 * r, high)], _PRINT,
-                   at=(0, look.size[1] / 2, 0), axis=AXES[axis], segments=16)  # fmt: skip
+                   at=(0, appearance.size[1] / 2, 0), axis=AXES[axis], segments=16)  # fmt: skip
     return mesh
 
 
 @shape("AluminumFoil")
-def aluminum_foil(look: Look) -> Mesh:
+def aluminum_foil(appearance: Appearance) -> Mesh:
     """A long carton from which a silver roll and a torn sheet come out."""
-    w, h, d, turn = _standing(look)
+    w, h, d, turn = _standing(appearance)
     mesh = Mesh()
     mesh.box((0, 0.3 * h, 0), (w, 0.6 * h, d), _CARTON, faces="xXyzZ")
     for side in (-1, 1):
@@ -237,17 +244,17 @@ def aluminum_foil(look: Look) -> Mesh:
 
 
 @shape("TissueBox")
-def tissue_box(look: Look) -> Mesh:
+def tissue_box(appearance: Appearance) -> Mesh:
     """A patterned box with a white tissue that stands out of a slot."""
-    w, h, d = look.size
-    mesh, random = Mesh(), look.random()
+    w, h, d = appearance.size
+    mesh, random = Mesh(), appearance.random()
     colour = mixed(_BOXES[int(random.integers(len(_BOXES)))], _WHITE, 0.3)
     top = 0.66 * h
     for low, high, tint in ((0, 0.25, 0.7), (0.25, 0.4, 2.0), (0.4, 1, 1.0)):
         at = (0, (low + high) / 2 * top, 0)
         mesh.box(at, (w, (high - low) * top, d), shaded(colour, tint), faces="xXYzZ")
     mesh.lathe([(0.30, top + 0.004), (0, top + 0.004)], _DARK, squash=(w, 0.8 * d), segments=12)
-    if look.used_up:
+    if appearance.used_up:
         return mesh
     for k, light in enumerate((1.5, 1.25)):
         lean = (-1) ** k * 0.18
@@ -261,10 +268,10 @@ def tissue_box(look: Look) -> Mesh:
 
 
 @shape("GarbageCan")
-def garbage_can(look: Look) -> Mesh:
+def garbage_can(appearance: Appearance) -> Mesh:
     """A bin that widens upwards, open and dark inside, some with a bag over the rim."""
-    w, h, d = look.size
-    mesh, random = Mesh(), look.random()
+    w, h, d = appearance.size
+    mesh, random = Mesh(), appearance.random()
     colour = _BINS[int(random.integers(len(_BINS)))]
     power = 2.0 if random.random() < 0.5 else 5.0
     lined = random.random() < 0.45
@@ -289,10 +296,10 @@ def garbage_can(look: Look) -> Mesh:
 
 
 @shape("GarbageBag")
-def garbage_bag(look: Look) -> Mesh:
+def garbage_bag(appearance: Appearance) -> Mesh:
     """A full black sack, wrinkled, tied at the top with two ears."""
-    w, h, d = look.size
-    mesh, random = Mesh(), look.random()
+    w, h, d = appearance.size
+    mesh, random = Mesh(), appearance.random()
     n, rings, tints = 16, [], []
     angle = np.arange(n) / n * 2 * pi
     for y, r in ((0, 0.62), (0.06, 0.88), (0.25, 0.98), (0.42, 0.92), (0.58, 0.72), (0.70, 0.38),
@@ -312,11 +319,11 @@ def garbage_bag(look: Look) -> Mesh:
 
 
 @shape("VacuumCleaner")
-def vacuum_cleaner(look: Look) -> Mesh:
+def vacuum_cleaner(appearance: Appearance) -> Mesh:
     """An upright vacuum cleaner: flat head on the floor, round dust tank, long handle."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     mesh = Mesh()
-    colour = look.pick((0.78, 0.16, 0.18), (0.42, 0.22, 0.62), (0.15, 0.42, 0.70))
+    colour = appearance.pick((0.78, 0.16, 0.18), (0.42, 0.22, 0.62), (0.15, 0.42, 0.70))
     mesh.rounded((0, 0.045 * h, 0.22 * d), (w, 0.09 * h, 0.55 * d), colour, 0.03)
     mesh.box((0, 0.05 * h, d / 2 - 0.004), (0.9 * w, 0.03 * h, 0.008), _DARK, faces="Z")
     for side in (-1, 1):

@@ -7,9 +7,10 @@ from math import atan2, cos, degrees, hypot, pi, sin
 
 import numpy as np
 
-from er_gym.sim.render.look import Look, shaded
+from er_gym.sim.render.appearance import Appearance
 from er_gym.sim.render.mesh import Mesh
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.palette import shaded
+from er_gym.sim.render.shapes.registry import shape
 from er_gym.sim.render.shapes.tableware import lengthwise
 
 _BLADE, _STEEL, _EDGE = (0.76, 0.80, 0.86), (0.52, 0.55, 0.60), (0.94, 0.96, 0.98)
@@ -19,24 +20,24 @@ _THICK = 0.005
 """Of blades and flat handles, metres."""
 
 
-def _extent(look: Look) -> tuple[float, float, float]:
+def _extent(appearance: Appearance) -> tuple[float, float, float]:
     """Length, breadth and thickness of a thing that lies, or leans if its box is high."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     length, breadth = max(w, d), min(w, d)
-    return (hypot(length, h) if _leans(look) else length), breadth, h
+    return (hypot(length, h) if _leans(appearance) else length), breadth, h
 
 
-def _leans(look: Look) -> bool:
-    return look.size[1] > 0.3 * max(look.size[::2])
+def _leans(appearance: Appearance) -> bool:
+    return appearance.size[1] > 0.3 * max(appearance.size[::2])
 
 
-def _laid(look: Look, mesh: Mesh) -> Mesh:
+def _laid(appearance: Appearance, mesh: Mesh) -> Mesh:
     """A tool made along x from its grip to its head (at +x), put as its box lies."""
-    if not _leans(look):
-        return lengthwise(look, mesh)
-    leaning, rise = Mesh(), degrees(atan2(look.size[1], max(look.size[::2])))
-    leaning.add(mesh, turn=("z", rise), at=(0.0, look.size[1] / 2, 0.0))
-    return lengthwise(look, leaning)
+    if not _leans(appearance):
+        return lengthwise(appearance, mesh)
+    leaning, rise = Mesh(), degrees(atan2(appearance.size[1], max(appearance.size[::2])))
+    leaning.add(mesh, turn=("z", rise), at=(0.0, appearance.size[1] / 2, 0.0))
+    return lengthwise(appearance, leaning)
 
 
 def _grip(mesh: Mesh, start: float, end: float, breadth: float, colour: tuple[float, ...]) -> None:
@@ -46,9 +47,9 @@ def _grip(mesh: Mesh, start: float, end: float, breadth: float, colour: tuple[fl
 
 
 @shape("Knife")
-def knife(look: Look) -> Mesh:
+def knife(appearance: Appearance) -> Mesh:
     """A broad blade with a point, on a dark handle with rivets."""
-    length, breadth, _ = _extent(look)
+    length, breadth, _ = _extent(appearance)
     mesh, half, b = Mesh(), length / 2, breadth / 2
     heel, belly = -0.10 * length, 0.22 * length
     low, high = 0.002, 0.002 + _THICK
@@ -57,27 +58,27 @@ def knife(look: Look) -> Mesh:
     bevel = [(heel, -b), (0.12 * length, -0.9 * b), (belly + 0.06 * length, -0.45 * b), (half, b)]
     mesh.prism([*bevel, (belly, -0.25 * b), (heel, -0.35 * b)], low, high, _EDGE)
     handle, wide = Mesh(), 0.95 * b
-    _grip(handle, -half, heel, wide, look.pick(_BLACK, _WALNUT))
+    _grip(handle, -half, heel, wide, appearance.pick(_BLACK, _WALNUT))
     handle.box((heel - 0.008, 0.3 * wide, 0), (0.016, 0.66 * wide, 1.05 * wide), _STEEL)
     for x in (-0.42, -0.32, -0.22):
         handle.box((x * length, 0.3 * wide, 0), (0.008, 0.7 * wide, 0.008), _BLADE, faces="Y")
     mesh.add(handle, at=(0.0, 0.0, 0.5 * b))
-    return _laid(look, mesh)
+    return _laid(appearance, mesh)
 
 
 @shape("ButterKnife")
-def butter_knife(look: Look) -> Mesh:
+def butter_knife(appearance: Appearance) -> Mesh:
     """All steel and narrow; a rounded tip, no point."""
-    length, breadth, _ = _extent(look)
+    length, breadth, _ = _extent(appearance)
     mesh, half, b = Mesh(), length / 2, 0.62 * breadth
-    thick = max(_THICK, 0.5 * look.size[1])
+    thick = max(_THICK, 0.5 * appearance.size[1])
     blade = [(0.0, 0.3 * b), (0.02 * length, -0.45 * b), (0.38 * length, -0.8 * b)]
     blade += [(0.46 * length, -0.7 * b), (half, -0.1 * b), (0.47 * length, 0.4 * b)]
     mesh.prism([*blade, (0.40 * length, 0.5 * b)], 0.0, thick, _BLADE)
     handle = [(-half, 0.3 * b), (-half, -0.3 * b), (-0.46 * length, -0.5 * b), (0.0, -0.25 * b)]
     mesh.prism([*handle, (0.0, 0.25 * b), (-0.46 * length, 0.5 * b)], 0.0, thick, _STEEL)
     mesh.box((0.01 * length, thick / 2, 0), (0.03 * length, 1.6 * thick, 0.6 * b), _STEEL)
-    return _laid(look, mesh)
+    return _laid(appearance, mesh)
 
 
 def _shaft(mesh: Mesh, points: list[tuple[float, float]], wide: float, narrow: float) -> None:
@@ -94,9 +95,9 @@ def _shaft(mesh: Mesh, points: list[tuple[float, float]], wide: float, narrow: f
 
 
 @shape("Fork")
-def fork(look: Look) -> Mesh:
+def fork(appearance: Appearance) -> Mesh:
     """Steel; four tines with gaps between them."""
-    length, breadth, h = _extent(look)
+    length, breadth, h = _extent(appearance)
     mesh, half = Mesh(), length / 2
     rise = min(h, 0.03) - _THICK
     _shaft(mesh, [(-half, 0.5 * rise), (-0.2 * length, rise), (0.14 * length, 0.25 * rise)],
@@ -112,13 +113,13 @@ def fork(look: Look) -> Mesh:
         z = (k - 1.5) * (breadth - tine) / 3
         points = [(root, z - tine / 2), (root, z + tine / 2), (half, z + tine / 4)]
         mesh.prism([*points, (half, z - tine / 4)], y, y + _THICK, _BLADE)
-    return _laid(look, mesh)
+    return _laid(appearance, mesh)
 
 
 @shape("Spoon")
-def spoon(look: Look) -> Mesh:
+def spoon(appearance: Appearance) -> Mesh:
     """Steel; an oval bowl at the end of the handle."""
-    length, breadth, h = _extent(look)
+    length, breadth, h = _extent(appearance)
     mesh, half = Mesh(), length / 2
     deep, long = min(0.7 * h, 0.016), 0.32 * length
     middle = half - long / 2
@@ -131,13 +132,13 @@ def spoon(look: Look) -> Mesh:
     mesh.lathe(rim, shaded(_STEEL, 1.3), at=at, squash=squash, segments=14)
     inside = [(0.84 * r, deep + 0.001), (0.5 * r, 0.45 * deep), (0, 0.3 * deep)]
     mesh.lathe(inside, shaded(_STEEL, 0.75), at=at, squash=squash, segments=14)
-    return _laid(look, mesh)
+    return _laid(appearance, mesh)
 
 
 @shape("Spatula")
-def spatula(look: Look) -> Mesh:
+def spatula(appearance: Appearance) -> Mesh:
     """A flat black head with slots, a steel shaft and a coloured grip."""
-    length, breadth, h = _extent(look)
+    length, breadth, h = _extent(appearance)
     mesh, half = Mesh(), length / 2
     root, thick = half - 0.34 * length, 0.006
     rise = min(h, 0.03) - 0.012
@@ -150,15 +151,15 @@ def spatula(look: Look) -> Mesh:
         mesh.box((x, thick / 2, 0.0), (wide, thick, breadth), _PLASTIC)
     mesh.tube([(root, thick, 0), (-0.12 * length, thick + 0.5 * rise, 0)], 0.005, _STEEL)
     handle = Mesh()
-    _grip(handle, -half, -0.1 * length, 0.024, look.pick(*_GRIPS))
+    _grip(handle, -half, -0.1 * length, 0.024, appearance.pick(*_GRIPS))
     mesh.add(handle, at=(0.0, max(rise - 0.004, 0.0), 0.0))
-    return _laid(look, mesh)
+    return _laid(appearance, mesh)
 
 
 @shape("Ladle")
-def ladle(look: Look) -> Mesh:
+def ladle(appearance: Appearance) -> Mesh:
     """A deep round bowl; a long handle rises from it and ends in a hook."""
-    length, h, breadth = max(look.size[::2]), look.size[1], min(look.size[::2])
+    length, h, breadth = max(appearance.size[::2]), appearance.size[1], min(appearance.size[::2])
     mesh, half, r = Mesh(), length / 2, min(0.5 * breadth, 0.18 * length)
     deep, middle, thick = min(0.9 * r, 0.6 * h), half - r, 0.006
     t = np.linspace(0, pi / 2, 5)
@@ -172,4 +173,4 @@ def ladle(look: Look) -> Mesh:
     path += [(-half + thick, top - 0.04 * length, 0)]
     mesh.tube(path, thick, _STEEL, segments=6)
     mesh.tube(path[1:3], 1.5 * thick, _BLACK, segments=6)
-    return lengthwise(look, mesh)
+    return lengthwise(appearance, mesh)

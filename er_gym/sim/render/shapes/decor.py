@@ -7,10 +7,12 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from er_gym.sim.render.look import Look, mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh, Triple
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour, Triple
+from er_gym.sim.render.shapes.registry import shape
 from er_gym.sim.render.shapes.statues import STATUES, base
-from er_gym.sim.render.shapes.table import shape
 
 _GLAZES: tuple[Colour, ...] = (
     (0.20, 0.45, 0.62), (0.80, 0.50, 0.30), (0.88, 0.87, 0.82), (0.32, 0.55, 0.45),
@@ -58,13 +60,13 @@ _VASES: dict[str, Outline] = {
 
 
 @shape("Vase")
-def vase(look: Look) -> Mesh:
+def vase(appearance: Appearance) -> Mesh:
     """A swelling body with a painted band, a narrow neck and a flared dark mouth."""
-    w, h, d = look.size
-    glaze = look.pick(*_GLAZES)
-    if look.broken:
-        return _shards(look.size, glaze)
-    kind = next((name for name in _VASES if f"_{name}_" in look.asset), "Tall")
+    w, h, d = appearance.size
+    glaze = appearance.pick(*_GLAZES)
+    if appearance.broken:
+        return _shards(appearance.size, glaze)
+    kind = next((name for name in _VASES if f"_{name}_" in appearance.asset), "Tall")
     line, mesh, squash = [(r * w, y * h) for r, y in _VASES[kind]], Mesh(), (1.0, d / w)
     band = max(range(len(line)), key=lambda k: line[k][0] if 0.2 * h < line[k][1] < 0.75 * h else 0)
     pale = mixed(glaze, (0.97, 0.95, 0.88), 0.75) if sum(glaze) < 2.4 else (0.25, 0.40, 0.62)
@@ -113,12 +115,12 @@ def _shards(size: Triple, colour: Colour) -> Mesh:
 
 
 @shape("Statue")
-def statue(look: Look) -> Mesh:
+def statue(appearance: Appearance) -> Mesh:
     """A carved figure of one colour on a dark base: a dog, a hand, a person or a head of stone."""
-    stone = look.pick(*_STONES)
-    if look.broken:
-        return _rubble(look.size, stone)
-    return STATUES.get(look.asset.split("_")[0], STATUES["Towel"])(look.size, stone)
+    stone = appearance.pick(*_STONES)
+    if appearance.broken:
+        return _rubble(appearance.size, stone)
+    return STATUES.get(appearance.asset.split("_")[0], STATUES["Towel"])(appearance.size, stone)
 
 
 def _rubble(size: Triple, stone: Colour) -> Mesh:
@@ -141,12 +143,12 @@ def _rubble(size: Triple, stone: Colour) -> Mesh:
 
 
 @shape("HousePlant")
-def house_plant(look: Look) -> Mesh:
+def house_plant(appearance: Appearance) -> Mesh:
     """A pot with earth, and leaves above it: a bush, blades, fronds that hang over, or a tree."""
-    w, h, d = look.size
-    mesh, random = Mesh(), look.random()
+    w, h, d = appearance.size
+    mesh, random = Mesh(), appearance.random()
     pot, green = _POTS[random.integers(len(_POTS))], _GREENS[random.integers(len(_GREENS))]
-    number = look.asset.rpartition("_")[2]
+    number = appearance.asset.rpartition("_")[2]
     habit = _HABITS[int(number) % len(_HABITS)] if number.isdigit() else _bush
     tall = min(0.36 * h, 0.34)
     r = min(0.32 * min(w, d), 0.16)
@@ -154,9 +156,9 @@ def house_plant(look: Look) -> Mesh:
     mesh.lathe(line, pot, segments=12)
     rim = [(1.08 * r, 0.80 * tall), (1.10 * r, tall), (0.92 * r, tall), (0.92 * r, 0.88 * tall)]
     mesh.lathe([(0.95 * r, 0.80 * tall), *rim], shaded(pot, 1.1), segments=12, smooth=False)
-    soil = _WET_SOIL if look.filled else _DRY_SOIL
+    soil = _WET_SOIL if appearance.filled else _DRY_SOIL
     mesh.lathe([(0.93 * r, 0.90 * tall), (0, 0.94 * tall)], soil, segments=12)
-    habit(mesh, look.size, 0.9 * tall, r, green, random)
+    habit(mesh, appearance.size, 0.9 * tall, r, green, random)
     return mesh
 
 
@@ -263,10 +265,10 @@ _HABITS = (_bush, _fronds, _tree, _blades)
 
 
 @shape("WateringCan")
-def watering_can(look: Look) -> Mesh:
+def watering_can(appearance: Appearance) -> Mesh:
     """A round can with a long spout that ends in a rose, and a bow for a handle."""
-    w, h, d = look.size
-    colour = look.pick((0.20, 0.48, 0.32), (0.20, 0.42, 0.62), (0.78, 0.25, 0.20))
+    w, h, d = appearance.size
+    colour = appearance.pick((0.20, 0.48, 0.32), (0.20, 0.42, 0.62), (0.78, 0.25, 0.20))
     mesh, r, tall, z = Mesh(), 0.44 * w, 0.62 * h, -0.12 * d
     pale = mixed(colour, (1, 1, 1), 0.25)
     mesh.lathe(
@@ -274,7 +276,7 @@ def watering_can(look: Look) -> Mesh:
     )
     mesh.lathe([(1.02 * r, 0.05 * h), (1.01 * r, 0.11 * h)], pale, at=(0, 0, z))
     mesh.lathe([(0.94 * r, tall - 0.05 * h), (0.92 * r, tall)], pale, at=(0, 0, z))
-    inside, level = (_WATER, 0.96) if look.filled else (_INSIDE, 0.90)
+    inside, level = (_WATER, 0.96) if appearance.filled else (_INSIDE, 0.90)
     mesh.lathe([(0.76 * r, level * tall), (0, level * tall)], inside, at=(0, 0, z))
     nose = (0, 0.84 * h, 0.40 * d)
     spout = [(0, 0.22 * h, z + 0.8 * r), (0, 0.40 * h, z + 1.35 * r), nose]
@@ -292,11 +294,11 @@ def watering_can(look: Look) -> Mesh:
 
 
 @shape("RoomDecor")
-def room_decor(look: Look) -> Mesh:
+def room_decor(appearance: Appearance) -> Mesh:
     """A floor vase with bare twigs that carry pale tufts."""
-    w, h, d = look.size
-    mesh, random = Mesh(), look.random()
-    clay = look.pick((0.25, 0.24, 0.26), (0.55, 0.30, 0.22), (0.82, 0.80, 0.74))
+    w, h, d = appearance.size
+    mesh, random = Mesh(), appearance.random()
+    clay = appearance.pick((0.25, 0.24, 0.26), (0.55, 0.30, 0.22), (0.82, 0.80, 0.74))
     wide, tall = 0.7 * min(w, d), 0.42 * h
     line = [(0, 0), (0.30, 0), (0.50, 0.40), (0.42, 0.70), (0.20, 0.90), (0.26, 1.0)]
     mesh.lathe([(r * wide, y * tall) for r, y in line], clay, segments=14)
@@ -314,16 +316,16 @@ def room_decor(look: Look) -> Mesh:
 
 
 @shape("TableTopDecor")
-def table_top_decor(look: Look) -> Mesh:
+def table_top_decor(appearance: Appearance) -> Mesh:
     """A shallow tray with woven balls of several colours."""
-    w, h, d = look.size
-    mesh, tray = Mesh(), shaded(look.palette.wood, 0.7)
+    w, h, d = appearance.size
+    mesh, tray = Mesh(), shaded(appearance.palette.wood, 0.7)
     rim = 0.32 * h
     side = [(0, 0), (0.40, 0), (0.50, 1), (0.46, 1), (0.38, 0.3), (0, 0.3)]
     line = [(r * w, y * rim) for r, y in side]
     mesh.lathe(line, tray, "wood", segments=16, squash=(1, d / w), smooth=False)
     r = 0.42 * h
-    tones = ((0.85, 0.70, 0.45), look.palette.accent, (0.90, 0.88, 0.82), (0.45, 0.32, 0.22))
+    tones = ((0.85, 0.70, 0.45), appearance.palette.accent, (0.90, 0.88, 0.82), (0.45, 0.32, 0.22))
     spots = ((-0.20, 0.08, 1.0), (0.14, 0.17, 0.85), (0.06, -0.18, 1.0), (0.28, -0.06, 0.7))
     for (x, z, share), tone in zip(spots, tones, strict=True):
         at, wide = (x * w, 0.1 * h + share * r, z * d), 2 * share * r

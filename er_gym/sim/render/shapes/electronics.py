@@ -6,10 +6,12 @@ from math import atan2, cos, degrees, hypot, pi, sin
 
 import numpy as np
 
-from er_gym.sim.render.look import Look, shaded
-from er_gym.sim.render.mesh import Colour, Mesh, Triple
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import shaded
+from er_gym.sim.render.patch import Colour, Triple
 from er_gym.sim.render.shapes.forms import laid, roundel
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.shapes.registry import shape
 
 _BLACK, _DARK, _SILVER = (0.06, 0.06, 0.07), (0.15, 0.15, 0.16), (0.72, 0.73, 0.76)
 _WHITE, _KEYS, _LIT = (0.94, 0.93, 0.90), (0.10, 0.10, 0.11), (1.0, 1.0, 1.0)
@@ -24,12 +26,12 @@ _FRONT = 0.006
 # -- screens -------------------------------------------------------------------------------------
 
 
-def _screen(look: Look, width: float, height: float, material: str) -> Mesh:
+def _screen(appearance: Appearance, width: float, height: float, material: str) -> Mesh:
     """A screen about the origin that faces forwards: dark, lit or shattered."""
     mesh = Mesh()
-    if look.broken:
-        _shattered(mesh, width, height, look.on)
-    elif look.on:
+    if appearance.broken:
+        _shattered(mesh, width, height, appearance.on)
+    elif appearance.on:
         mesh.panel((0, 0, 0), (width, height), _LIT, material)
     else:
         mesh.panel((0, 0, 0), (width, height), _GLOSS)
@@ -65,17 +67,17 @@ def _rim(mesh: Mesh, y: float, size: tuple[float, float], border: float, colour:
 
 
 @shape("Television")
-def television(look: Look) -> Mesh:
+def television(appearance: Appearance) -> Mesh:
     """A wide screen in a thin frame: on a foot, or flat to the wall."""
-    w, h, d = look.size
-    mesh, frame = Mesh(), look.pick(_BLACK, _DARK, (0.30, 0.30, 0.32))
-    stands = d > 0.2 or look.height < 0.6
+    w, h, d = appearance.size
+    mesh, frame = Mesh(), appearance.pick(_BLACK, _DARK, (0.30, 0.30, 0.32))
+    stands = d > 0.2 or appearance.height < 0.6
     foot = 0.10 * h if stands else 0.0
     thick, border = min(d, 0.06), 0.03
     front = thick / 2 if stands else d / 2
     middle = (h + foot) / 2
     mesh.rounded((0, middle, front - thick / 2 - _FRONT), (w, h - foot, thick), frame, 0.012)
-    screen = _screen(look, w - 2 * border, h - foot - 2 * border, "screen")
+    screen = _screen(appearance, w - 2 * border, h - foot - 2 * border, "screen")
     mesh.add(screen, at=(0, middle, front))
     if stands:
         mesh.box((0, 0.6 * foot, -thick / 2), (0.12 * w, 1.2 * foot, 0.03), frame, faces="xXzZ")
@@ -87,20 +89,20 @@ def television(look: Look) -> Mesh:
 
 
 @shape("Laptop")
-def laptop(look: Look) -> Mesh:
+def laptop(appearance: Appearance) -> Mesh:
     """A slab with keys, and a screen that is hinged at its back."""
-    w, h, d = look.size
-    mesh, body = Mesh(), look.pick(_SILVER, (0.82, 0.82, 0.83), (0.32, 0.33, 0.36))
+    w, h, d = appearance.size
+    mesh, body = Mesh(), appearance.pick(_SILVER, (0.82, 0.82, 0.83), (0.32, 0.33, 0.36))
     shut = h < 0.1
     thick = min(0.02, h / 2)
     depth = d if shut else 0.80 * d
     # An open lid leans back over its hinge as far as the box goes.
     behind, rise = (0.3 * d, 0.9 * d) if shut else (d - depth, h - thick)
     opened = 180.0 - degrees(atan2(rise, behind))
-    reach = depth + (hypot(behind, rise) - depth) * look.openness
+    reach = depth + (hypot(behind, rise) - depth) * appearance.openness
     hinge = (0.0, thick, d / 2 - depth)
     mesh.box((0, thick / 2, (d - depth) / 2), (w, thick, depth), body, faces="xXYzZ")
-    if look.openness > 0:
+    if appearance.openness > 0:
         top = thick + 0.004
         keys = (0, top, hinge[2] + 0.33 * depth)
         mesh.panel(keys, (0.88 * w, 0.46 * depth), _LIT, "keys", facing="Y")
@@ -108,23 +110,23 @@ def laptop(look: Look) -> Mesh:
         mesh.panel(pad, (0.30 * w, 0.28 * depth), shaded(body, 0.7), facing="Y")
     lid = Mesh()  # as it lies when shut: its screen looks down
     lid.box((0, 0, reach / 2), (w, 0.012, reach), body)
-    screen = _screen(look, 0.95 * w, 0.93 * reach, "desktop")
+    screen = _screen(appearance, 0.95 * w, 0.93 * reach, "desktop")
     lid.add(screen, at=(0, -0.011, reach / 2), turn=("x", 90))
     lid.panel((0, 0.010, reach / 2), (0.14 * w, 0.10 * w), shaded(body, 0.6), facing="Y")
     lift = (0, thick + 0.012, hinge[2])
-    mesh.add(lid, at=lift, turn=("x", -opened * look.openness))
+    mesh.add(lid, at=lift, turn=("x", -opened * appearance.openness))
     return mesh
 
 
 @shape("Desktop")
-def desktop(look: Look) -> Mesh:
+def desktop(appearance: Appearance) -> Mesh:
     """A screen on a foot, a tower beside it, keys and a mouse before it."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     mesh = Mesh()
     wide, tall, left = 0.74 * w, 0.76 * h, -0.13 * w
     back = -0.15 * d
     mesh.rounded((left, h - tall / 2, back), (wide, tall, 0.04), _BLACK, 0.01)
-    screen = _screen(look, wide - 0.05, tall - 0.05, "desktop")
+    screen = _screen(appearance, wide - 0.05, tall - 0.05, "desktop")
     mesh.add(screen, at=(left, h - tall / 2, back + 0.02 + _FRONT))
     mesh.box((left, 0.6 * (h - tall), back - 0.02), (0.08, 1.2 * (h - tall), 0.02), _DARK)
     mesh.box((left, 0.008, back), (0.30 * wide, 0.016, 0.5 * d), _DARK, faces="xXYzZ")
@@ -136,19 +138,19 @@ def desktop(look: Look) -> Mesh:
     for k, colour in enumerate((_SILVER, _SILVER, (0.35, 0.36, 0.38))):
         y = (0.88 - 0.13 * k) * high
         mesh.panel((at, y, d / 2 + 0.004), (0.75 * case, 0.07 * high), colour)
-    lamp = ((0.3, 1.0, 0.4), "glowing") if look.on else ((0.1, 0.25, 0.12), "plain")
+    lamp = ((0.3, 1.0, 0.4), "glowing") if appearance.on else ((0.1, 0.25, 0.12), "plain")
     mesh.panel((at, 0.35 * high, d / 2 + 0.004), (0.025, 0.025), *lamp)
     return mesh
 
 
 @shape("CellPhone")
-def cell_phone(look: Look) -> Mesh:
+def cell_phone(appearance: Appearance) -> Mesh:
     """A thin dark slab, nearly all of it a screen, in a bright edge."""
-    case = look.pick(_SILVER, (0.88, 0.86, 0.82), (0.75, 0.60, 0.42), (0.25, 0.35, 0.60))
-    return laid(look.size, lambda size: _phone(look, size, case))
+    case = appearance.pick(_SILVER, (0.88, 0.86, 0.82), (0.75, 0.60, 0.42), (0.25, 0.35, 0.60))
+    return laid(appearance.size, lambda size: _phone(appearance, size, case))
 
 
-def _phone(look: Look, size: Triple, case: Colour) -> Mesh:
+def _phone(appearance: Appearance, size: Triple, case: Colour) -> Mesh:
     w, h, d = size
     mesh, turned = Mesh(), w > d
     short, long = min(w, d), max(w, d)
@@ -156,7 +158,7 @@ def _phone(look: Look, size: Triple, case: Colour) -> Mesh:
     mesh.panel((0, h / 2, 0), (w, d), case, facing="Y")  # seen through cracks in the seams above
     border = 0.07 * short
     _rim(mesh, h, (w, d), border, case)
-    screen = _screen(look, short - 2 * border, long - 2 * border, "phone")
+    screen = _screen(appearance, short - 2 * border, long - 2 * border, "phone")
     upright = Mesh()
     upright.add(screen, turn=("x", -90))
     mesh.add(upright, at=(0, h, 0), turn=("y", 90 if turned else 0))
@@ -164,12 +166,12 @@ def _phone(look: Look, size: Triple, case: Colour) -> Mesh:
 
 
 @shape("RemoteControl")
-def remote_control(look: Look) -> Mesh:
+def remote_control(appearance: Appearance) -> Mesh:
     """Long, dark and narrow, with rows of bright buttons and a red one."""
-    case = look.pick(_DARK, (0.22, 0.22, 0.24), (0.10, 0.10, 0.12))
-    w, h, d = look.size
+    case = appearance.pick(_DARK, (0.22, 0.22, 0.24), (0.10, 0.10, 0.12))
+    w, h, d = appearance.size
     if h > max(w, d):
-        return laid(look.size, lambda size: _remote(size, case))
+        return laid(appearance.size, lambda size: _remote(size, case))
     mesh = Mesh()
     mesh.add(_remote((min(w, d), h, max(w, d)), case), turn=("y", 90 if w > d else 0))
     return mesh
@@ -204,19 +206,23 @@ def _remote(size: Triple, case: Colour) -> Mesh:
 
 
 @shape("AlarmClock")
-def alarm_clock(look: Look) -> Mesh:
+def alarm_clock(appearance: Appearance) -> Mesh:
     """Two bells over a round face; or a box with a face; or a low one with glowing digits."""
-    w, h, _ = look.size
-    colour = look.pick(
+    w, h, _ = appearance.size
+    colour = appearance.pick(
         (0.75, 0.16, 0.14), (0.16, 0.40, 0.55), (0.20, 0.50, 0.35), (0.85, 0.65, 0.20)
     )
     if w > 1.25 * h:
-        return _digital_clock(look)
-    return _bell_clock(look, colour) if look.random().random() < 0.75 else _box_clock(look, colour)
+        return _digital_clock(appearance)
+    return (
+        _bell_clock(appearance, colour)
+        if appearance.random().random() < 0.75
+        else _box_clock(appearance, colour)
+    )
 
 
-def _bell_clock(look: Look, colour: Colour) -> Mesh:
-    w, h, d = look.size
+def _bell_clock(appearance: Appearance, colour: Colour) -> Mesh:
+    w, h, d = appearance.size
     mesh, radius = Mesh(), min(0.5 * w, 0.38 * h)
     y, deep = 0.09 * h + radius, 0.7 * d
     mesh.cylinder((0, y, 0), radius, deep, colour, axis="z", segments=16)
@@ -239,8 +245,8 @@ def _bell_clock(look: Look, colour: Colour) -> Mesh:
     return mesh
 
 
-def _box_clock(look: Look, colour: Colour) -> Mesh:
-    w, h, d = look.size
+def _box_clock(appearance: Appearance, colour: Colour) -> Mesh:
+    w, h, d = appearance.size
     mesh, body = Mesh(), 0.90 * h
     mesh.rounded((0, body / 2, -0.003), (w, body, d - 0.012), colour, 0.015)
     side = 0.86 * min(w, body)
@@ -249,10 +255,10 @@ def _box_clock(look: Look, colour: Colour) -> Mesh:
     return mesh
 
 
-def _digital_clock(look: Look) -> Mesh:
-    w, h, d = look.size
+def _digital_clock(appearance: Appearance) -> Mesh:
+    w, h, d = appearance.size
     mesh, top = Mesh(), 0.92 * h
-    case = look.pick(_DARK, _WHITE, (0.36, 0.22, 0.13))
+    case = appearance.pick(_DARK, _WHITE, (0.36, 0.22, 0.13))
     mesh.box((0, top / 2, -0.004), (w, top, d - 0.008), case, faces="xXYzZ", taper=0.96)
     mesh.box((0, 0.96 * h, 0), (0.4 * w, 0.08 * h, 0.3 * d), _SILVER, faces="xXYzZ")
     mesh.panel((0, 0.46 * h, d / 2), (0.90 * w, 0.72 * h), _LIT, "digits")
@@ -260,11 +266,11 @@ def _digital_clock(look: Look) -> Mesh:
 
 
 @shape("Watch")
-def watch(look: Look) -> Mesh:
+def watch(appearance: Appearance) -> Mesh:
     """A loop of strap with a round dial on top."""
-    w, h, d = look.size
-    strap = look.pick((0.45, 0.26, 0.14), (0.20, 0.20, 0.23), (0.24, 0.30, 0.52))
-    mesh, case = Mesh(), (0.86, 0.72, 0.35) if look.random().random() < 0.5 else _SILVER
+    w, h, d = appearance.size
+    strap = appearance.pick((0.45, 0.26, 0.14), (0.20, 0.20, 0.23), (0.24, 0.30, 0.52))
+    mesh, case = Mesh(), (0.86, 0.72, 0.35) if appearance.random().random() < 0.5 else _SILVER
     radius, wide, ring = min(d, w) / 2, 0.52 * d, 0.86 * h
     loop = [
         (w / 2, -wide / 2), (w / 2, wide / 2), (0.42 * w, wide / 2), (0.42 * w, -wide / 2),

@@ -8,9 +8,11 @@ from math import cos, pi, sin
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from er_gym.sim.render.look import Look, mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour
+from er_gym.sim.render.shapes.registry import shape
 from er_gym.sim.render.shapes.tableware import lengthwise
 
 _RED, _GREEN, _BLUSH = (0.78, 0.10, 0.10), (0.50, 0.66, 0.18), (0.86, 0.66, 0.24)
@@ -80,9 +82,9 @@ def _blend(one: Colour, other: Colour, share: Points) -> Points:
     return np.asarray(one) * (1 - kept) + np.asarray(other) * kept
 
 
-def _lumps(look: Look, amount: float, pitch: float) -> Callable[[Points], Points]:
+def _lumps(appearance: Appearance, amount: float, pitch: float) -> Callable[[Points], Points]:
     """An uneven surface."""
-    random = look.random()
+    random = appearance.random()
     waves, phase = random.normal(size=(4, 3)) * pitch, random.uniform(0, 2 * pi, 4)
     return lambda out: np.asarray(1 + amount * np.sin(out @ waves.T + phase).mean(axis=1) * 2)
 
@@ -91,10 +93,13 @@ def _lumps(look: Look, amount: float, pitch: float) -> Callable[[Points], Points
 
 
 @shape("Apple")
-def apple(look: Look) -> Mesh:
+def apple(appearance: Appearance) -> Mesh:
     """Widest above its middle, dented at the stalk, with a leaf."""
-    w, h, d = look.size
-    mesh, red = Mesh(), mixed(_RED, _GREEN, float(look.random().choice([0.0, 0.0, 0.15, 0.9])))
+    w, h, d = appearance.size
+    mesh, red = (
+        Mesh(),
+        mixed(_RED, _GREEN, float(appearance.random().choice([0.0, 0.0, 0.15, 0.9]))),
+    )
     body = (
         (0.06, 0.03), (0.18, 0.0), (0.34, 0.07), (0.46, 0.28), (0.50, 0.52), (0.46, 0.72),
         (0.33, 0.84),
@@ -113,9 +118,9 @@ def apple(look: Look) -> Mesh:
 
 
 @shape("Tomato")
-def tomato(look: Look) -> Mesh:
+def tomato(appearance: Appearance) -> Mesh:
     """Flat and ribbed, orange red, with a green star on top."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     mesh = Mesh()
 
     def ribs(out: Points) -> Points:
@@ -134,31 +139,31 @@ def tomato(look: Look) -> Mesh:
 
 
 @shape("Potato")
-def potato(look: Look) -> Mesh:
+def potato(appearance: Appearance) -> Mesh:
     """Lumpy, long and brown with dark eyes; cooked: browned, cut open crosswise."""
-    mesh, random = Mesh(), look.random()
+    mesh, random = Mesh(), appearance.random()
     skin = mixed(_SKIN, (0.76, 0.60, 0.36), float(random.random()))
-    skin = mixed(skin, _BROWNED, 0.55) if look.cooked else skin
+    skin = mixed(skin, _BROWNED, 0.55) if appearance.cooked else skin
     eyes = random.normal(size=(14, 3))
     eyes /= np.linalg.norm(eyes, axis=1, keepdims=True)
 
     def tint(out: Points) -> ArrayLike:
         return _blend(skin, _EYE, 14 * ((out @ eyes.T).max(axis=1) - 0.93))
 
-    _blob(mesh, look.size, tint, bump=_lumps(look, 0.10, 2.2), power=0.9, rings=9)
-    if look.cooked:
-        w, h, d = look.size
+    _blob(mesh, appearance.size, tint, bump=_lumps(appearance, 0.10, 2.2), power=0.9, rings=9)
+    if appearance.cooked:
+        w, h, d = appearance.size
         for wide, long in ((0.14 * w, 0.5 * d), (0.5 * w, 0.12 * d)):
             mesh.rounded((0, 0.93 * h, 0), (wide, 0.18 * h, long), _STARCH, 0.05 * h)
     return mesh
 
 
 @shape("Bread")
-def bread(look: Look) -> Mesh:
+def bread(appearance: Appearance) -> Mesh:
     """A loaf: rounded, dark on top with three pale scores, lighter at its sides."""
-    length, h, breadth = max(look.size[::2]), look.size[1], min(look.size[::2])
+    length, h, breadth = max(appearance.size[::2]), appearance.size[1], min(appearance.size[::2])
     mesh = Mesh()
-    crust = mixed(_CRUST, _TOP, 0.4 * float(look.random().random()))
+    crust = mixed(_CRUST, _TOP, 0.4 * float(appearance.random().random()))
 
     def bake(out: Points) -> ArrayLike:
         return _blend(crust, mixed(crust, _TOP, 0.9), 1.5 * out[:, 1] + 0.2)
@@ -174,22 +179,22 @@ def bread(look: Look) -> Mesh:
             for u, v, t in [*path, (-0.06, 0.93, 0.28)]
         ]
         mesh.tube(points, 0.045 * h + 0.004, _CRUMB, segments=5)
-    return lengthwise(look, mesh)
+    return lengthwise(appearance, mesh)
 
 
 @shape("Lettuce")
-def lettuce(look: Look) -> Mesh:
+def lettuce(appearance: Appearance) -> Mesh:
     """A head of ruffled leaves, pale within and below, dark at the edges."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     mesh = Mesh()
 
     def leaves(out: Points) -> ArrayLike:
         return _blend(_PALE, _FRESH, 0.6 + 0.5 * np.sin(9 * np.arctan2(out[:, 2], out[:, 0])))
 
-    _blob(mesh, (0.84 * w, 0.97 * h, 0.84 * d), leaves, bump=_lumps(look, 0.10, 4.0), segments=14,
-          rings=7, at=(0.0, 0.03 * h, 0.0))  # fmt: skip
+    _blob(mesh, (0.84 * w, 0.97 * h, 0.84 * d), leaves, bump=_lumps(appearance, 0.10, 4.0),
+          segments=14, rings=7, at=(0.0, 0.03 * h, 0.0))  # fmt: skip
     for k in range(6):
-        _outer_leaf(mesh, look.size, 2 * pi * k / 6, 0.12 if k % 2 else 0.0)
+        _outer_leaf(mesh, appearance.size, 2 * pi * k / 6, 0.12 if k % 2 else 0.0)
     return mesh
 
 
@@ -219,34 +224,34 @@ def _outer_leaf(mesh: Mesh, size: tuple[float, float, float], angle: float, lift
 
 
 @shape("Egg")
-def egg(look: Look) -> Mesh:
+def egg(appearance: Appearance) -> Mesh:
     """Smooth and pale, one end narrower."""
-    w, h, _ = look.size
-    if look.broken:
-        return egg_cracked(look)
-    mesh, shell = Mesh(), look.pick(*_SHELLS)
-    long = max(look.size)
+    w, h, _ = appearance.size
+    if appearance.broken:
+        return egg_cracked(appearance)
+    mesh, shell = Mesh(), appearance.pick(*_SHELLS)
+    long = max(appearance.size)
 
     def taper(out: Points) -> Points:
         along = out[:, 0] if w == long else out[:, 1] if h == long else out[:, 2]
         return np.asarray(1 - 0.16 * along + 0.04 * along**2)
 
-    _blob(mesh, look.size, shell, bump=taper, rings=8)
+    _blob(mesh, appearance.size, shell, bump=taper, rings=8)
     return mesh
 
 
 # -- sliced --------------------------------------------------------------------------------------
 
 
-def _slab(look: Look) -> tuple[float, float, float]:
+def _slab(appearance: Appearance) -> tuple[float, float, float]:
     """Breadth, height and thickness of a slice, with a gap to the next one."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     return max(w, d), h, 0.8 * min(w, d)
 
 
-def _round_slice(mesh: Mesh, look: Look, skin: Colour, flesh: Colour) -> None:
+def _round_slice(mesh: Mesh, appearance: Appearance, skin: Colour, flesh: Colour) -> None:
     """An upright disc, cut surfaces to the front and the back."""
-    breadth, h, thick = _slab(look)
+    breadth, h, thick = _slab(appearance)
     cut, rim, t = 0.86, 0.2 * thick, thick / 2
     at, squash, r = (0.0, h / 2, 0.0), (1.0, h / breadth), breadth / 2
     for profile, colour in (
@@ -262,7 +267,7 @@ def _round_slice(mesh: Mesh, look: Look, skin: Colour, flesh: Colour) -> None:
 
 def _dots(
     mesh: Mesh,
-    look: Look,
+    appearance: Appearance,
     spots: list[tuple[float, float]],
     size: tuple[float, float],
     colour: Colour,
@@ -272,7 +277,7 @@ def _dots(
 
     ``off``: how far they stand off, a share of its thickness.
     """
-    breadth, h, thick = _slab(look)
+    breadth, h, thick = _slab(appearance)
     for x, y in spots:
         angle = np.linspace(0, 2 * pi, 7)[:-1] + 0.2
         outline = [
@@ -283,66 +288,66 @@ def _dots(
 
 
 @shape("AppleSliced")
-def apple_slice(look: Look) -> Mesh:
+def apple_slice(appearance: Appearance) -> Mesh:
     """A pale disc with a red rim, a core and dark pips."""
     mesh = Mesh()
-    _round_slice(mesh, look, _RED, _FLESH)
-    _dots(mesh, look, [(0.0, 0.0)], (0.30, 0.42), shaded(_FLESH, 0.86))
+    _round_slice(mesh, appearance, _RED, _FLESH)
+    _dots(mesh, appearance, [(0.0, 0.0)], (0.30, 0.42), shaded(_FLESH, 0.86))
     pips = [(0.07, 0.09), (-0.07, -0.09), (-0.07, 0.09), (0.07, -0.09)]
-    _dots(mesh, look, pips, (0.10, 0.15), _PIP, off=0.11)
-    return lengthwise(look, mesh)
+    _dots(mesh, appearance, pips, (0.10, 0.15), _PIP, off=0.11)
+    return lengthwise(appearance, mesh)
 
 
 @shape("TomatoSliced")
-def tomato_slice(look: Look) -> Mesh:
+def tomato_slice(appearance: Appearance) -> Mesh:
     """A red disc with chambers of yellow seeds."""
     mesh = Mesh()
-    _round_slice(mesh, look, _TOMATO, mixed(_TOMATO, _WHITE, 0.12))
+    _round_slice(mesh, appearance, _TOMATO, mixed(_TOMATO, _WHITE, 0.12))
     spots = [(0.26 * cos(a), 0.26 * sin(a)) for a in (0.5, 1.75, 3.0, 4.25, 5.5)]
-    _dots(mesh, look, spots, (0.20, 0.20), _SEEDS)
-    return lengthwise(look, mesh)
+    _dots(mesh, appearance, spots, (0.20, 0.20), _SEEDS)
+    return lengthwise(appearance, mesh)
 
 
 @shape("PotatoSliced")
-def potato_slice(look: Look) -> Mesh:
+def potato_slice(appearance: Appearance) -> Mesh:
     """A plain yellowish disc with a thin brown rim; cooked: fried brown."""
     mesh = Mesh()
-    skin = mixed(_SKIN, _BROWNED, 0.6 if look.cooked else 0.0)
-    flesh = mixed(_STARCH, (0.70, 0.38, 0.10), 0.8 if look.cooked else 0.0)
-    _round_slice(mesh, look, skin, flesh)
-    if look.cooked:
+    skin = mixed(_SKIN, _BROWNED, 0.6 if appearance.cooked else 0.0)
+    flesh = mixed(_STARCH, (0.70, 0.38, 0.10), 0.8 if appearance.cooked else 0.0)
+    _round_slice(mesh, appearance, skin, flesh)
+    if appearance.cooked:
         spots = [(0.2, 0.15), (-0.22, 0.05), (0.02, -0.22)]
-        _dots(mesh, look, spots, (0.22, 0.18), _BROWNED)
-    return lengthwise(look, mesh)
+        _dots(mesh, appearance, spots, (0.22, 0.18), _BROWNED)
+    return lengthwise(appearance, mesh)
 
 
 @shape("BreadSliced")
-def bread_slice(look: Look) -> Mesh:
+def bread_slice(appearance: Appearance) -> Mesh:
     """The outline of a loaf: crumb within a brown crust; cooked: toast."""
-    breadth, h, thick = _slab(look)
+    breadth, h, thick = _slab(appearance)
     mesh = Mesh()
     outline = np.array(
         [(-0.44, 0.0), (0.44, 0.0), (0.44, 0.56), (0.5, 0.68), (0.46, 0.86), (0.30, 0.97),
          (0.0, 1.0), (-0.30, 0.97), (-0.46, 0.86), (-0.5, 0.68), (-0.44, 0.56)]
     )  # fmt: skip
-    crust = mixed(_CRUST, _BROWNED, 0.75 if look.cooked else 0.2)
-    crumb = mixed(_CRUMB, (0.62, 0.34, 0.12), 0.85 if look.cooked else 0.0)
+    crust = mixed(_CRUST, _BROWNED, 0.75 if appearance.cooked else 0.2)
+    crumb = mixed(_CRUMB, (0.62, 0.34, 0.12), 0.85 if appearance.cooked else 0.0)
     size = np.array([breadth, h])
     mesh.prism(outline * size, -0.36 * thick, 0.36 * thick, crust, axis="z")
     inner = (outline - (0.0, 0.5)) * 0.86 + (0.0, 0.5)
     mesh.prism(inner * size, -0.5 * thick, 0.5 * thick, crumb, axis="z")
-    if look.cooked:
+    if appearance.cooked:
         dark = (outline - (0.0, 0.5)) * 0.55 + (0.0, 0.48)
         mesh.prism(
             dark * size, -0.5 * thick - 0.003, 0.5 * thick + 0.003, shaded(crumb, 0.6), axis="z"
         )
-    return lengthwise(look, mesh)
+    return lengthwise(appearance, mesh)
 
 
 @shape("LettuceSliced")
-def lettuce_slice(look: Look) -> Mesh:
+def lettuce_slice(appearance: Appearance) -> Mesh:
     """A ragged sheet of leaf: a pale rib, green, dark wavy edges."""
-    breadth, h, thick = _slab(look)
+    breadth, h, thick = _slab(appearance)
     mesh, count = Mesh(), 14
     points, colours = [(0.0, 0.12 * h, 0.0)], [_PALE]
     for radius, wave, colour in ((0.5, 0.25, _FRESH), (1.0, 0.5, _DARK)):
@@ -360,24 +365,24 @@ def lettuce_slice(look: Look) -> Mesh:
         normals = [(0.3 * sign * x / breadth, 0.3, sign) for x, _, _ in points]
         mesh.triangles("plain", points, normals, np.zeros((len(points), 2)), colours, faces)
     mesh.tube([(0, 0.03 * h, 0), (0, 0.72 * h, 0)], min(0.006, 0.25 * thick), _PALE, segments=5)
-    return lengthwise(look, mesh)
+    return lengthwise(appearance, mesh)
 
 
 @shape("EggCracked")
-def egg_cracked(look: Look) -> Mesh:
+def egg_cracked(appearance: Appearance) -> Mesh:
     """A yolk in its white, and half a shell beside it; cooked: fried, brown at the edges."""
-    w, h, d = look.size
-    mesh, shell = Mesh(), look.pick(*_SHELLS)
-    edge = mixed(_WHITE, (0.55, 0.30, 0.10), 0.85) if look.cooked else shaded(_WHITE, 0.9)
+    w, h, d = appearance.size
+    mesh, shell = Mesh(), appearance.pick(*_SHELLS)
+    edge = mixed(_WHITE, (0.55, 0.30, 0.10), 0.85) if appearance.cooked else shaded(_WHITE, 0.9)
     count, thick = 12, 0.004
     wavy = [(0.5 if k % 3 else 0.42, 2 * pi * k / count) for k in range(count)]
     for share, high, colour in ((1.0, thick, edge), (0.84, 2 * thick, _WHITE)):
         outline = [(share * r * w * cos(a), share * r * d * sin(a)) for r, a in wavy]
         mesh.prism(outline, 0.0, high, colour)
-    yolk = mixed(_YOLK, (0.95, 0.55, 0.10), 0.6 if look.cooked else 0.0)
+    yolk = mixed(_YOLK, (0.95, 0.55, 0.10), 0.6 if appearance.cooked else 0.0)
     size = (0.46 * w, 0.28 * h, 0.46 * d)
     _blob(mesh, size, yolk, rings=6, at=(0.1 * w, thick, 0.06 * d))
-    if not look.cooked:
+    if not appearance.cooked:
         half, r = Mesh(), 0.2 * min(w, d)
         profile = [(0, 0), (0.7, 0.25), (1, 0.8), (0.94, 0.8), (0.6, 0.3), (0, 0.12)]
         half.lathe([(a * r, b * 1.3 * r) for a, b in profile], shell, segments=8)

@@ -7,7 +7,8 @@ from math import atan2, degrees, hypot, pi
 
 import numpy as np
 
-from er_gym.sim.render.mesh import Colour, Mesh, Triple
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.patch import Colour, Triple
 
 
 def laid(size: Triple, build: Callable[[Triple], Mesh]) -> Mesh:

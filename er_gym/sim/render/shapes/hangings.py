@@ -6,9 +6,11 @@ from dataclasses import replace
 from itertools import pairwise
 from math import cos, pi, sin
 
-from er_gym.sim.render.look import Look, mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh, Triple
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour, Triple
+from er_gym.sim.render.shapes.registry import shape
 
 _WHITE, _IVORY, _BLACK = (0.95, 0.95, 0.94), (0.90, 0.88, 0.82), (0.10, 0.10, 0.11)
 _GILT, _WALNUT, _TAPE = (0.76, 0.58, 0.25), (0.33, 0.21, 0.13), (0.85, 0.80, 0.55)
@@ -20,9 +22,9 @@ _APART = 0.006
 """How far layers that lie on each other are kept apart, metres."""
 
 
-def across(look: Look) -> tuple[float, float, float, bool]:
+def across(appearance: Appearance) -> tuple[float, float, float, bool]:
     """Width, height and depth of what is flat, and whether it stands along z instead of x."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     return (d, h, w, True) if d > w else (w, h, d, False)
 
 
@@ -101,18 +103,18 @@ _CORNER, _AT_THE_BACK = 0.5, 0.1
 
 
 @shape("Window")
-def window(look: Look) -> Mesh:
+def window(appearance: Appearance) -> Mesh:
     """Sky behind cross bars, a deep white frame, a sill."""
-    w, h, d, along_z = across(look)
+    w, h, d, along_z = across(appearance)
     if d > _CORNER:
         # The box of a window in the corner of a room is the room's: it is at the back of it.
         thin = Mesh()
-        wide, tall, _ = look.size
-        flat = replace(look, size=(wide, tall, _AT_THE_BACK))
-        thin.add(window(flat), at=(0.0, 0.0, (_AT_THE_BACK - look.size[2]) / 2))
+        wide, tall, _ = appearance.size
+        flat = replace(appearance, size=(wide, tall, _AT_THE_BACK))
+        thin.add(window(flat), at=(0.0, 0.0, (_AT_THE_BACK - appearance.size[2]) / 2))
         return thin
     mesh = Mesh()
-    colour = look.pick(_WHITE, _IVORY, mixed(look.palette.wood, _WHITE, 0.25))
+    colour = appearance.pick(_WHITE, _IVORY, mixed(appearance.palette.wood, _WHITE, 0.25))
     bar = min(0.07, 0.14 * min(w, h))
     sill = min(0.05, 0.1 * h)
     inside = (w - 2 * bar, h - 2 * bar)
@@ -127,39 +129,41 @@ def window(look: Look) -> Mesh:
     if h > 0.6:
         mesh.box((0, 0.55 * h, z), (inside[0], cross, 0.055), colour, faces="yYzZ")
     mesh.box((0, sill / 2, d / 2), (w, sill, 0.04), shaded(colour, 0.92))
-    if look.broken:
+    if appearance.broken:
         cracks(mesh, inside, h / 2, z, 0.034)
     return turned(mesh, along_z)
 
 
 @shape("Mirror")
-def mirror(look: Look) -> Mesh:
+def mirror(appearance: Appearance) -> Mesh:
     """A pale, gleaming pane in a frame."""
-    w, h, d, along_z = across(look)
+    w, h, d, along_z = across(appearance)
     mesh = Mesh()
-    colour = look.pick(_WALNUT, _BLACK, look.palette.metal, look.palette.wood, _GILT)
+    colour = appearance.pick(
+        _WALNUT, _BLACK, appearance.palette.metal, appearance.palette.wood, _GILT
+    )
     bar = min(0.055, 0.1 * min(w, h))
     thick = min(d, 0.05)
     frame(mesh, (w, h, thick), bar, colour)
     inside = (w - 2 * bar, h - 2 * bar)
     pane(mesh, inside, h / 2, 0.0, "mirror", 0.2 * thick)
-    if d > 0.15 and look.height < 0.1:  # it stands on the floor
+    if d > 0.15 and appearance.height < 0.1:  # it stands on the floor
         for x in (-0.4 * w, 0.4 * w):
             mesh.box((x, 0.02, 0), (0.05, 0.04, d), colour)
-    if look.dirty:
+    if appearance.dirty:
         _smears(mesh, inside, h / 2, 0.2 * thick + _APART)
-    if look.broken:
+    if appearance.broken:
         cracks(mesh, inside, h / 2, 0.0, 0.2 * thick + _APART)
     return turned(mesh, along_z)
 
 
 @shape("Painting")
-def painting(look: Look) -> Mesh:
+def painting(appearance: Appearance) -> Mesh:
     """A picture with a pale border in a wide frame."""
-    w, h, d, along_z = across(look)
-    mesh, random = Mesh(), look.random()
+    w, h, d, along_z = across(appearance)
+    mesh, random = Mesh(), appearance.random()
     picture = f"picture{int(random.integers(_PICTURES))}"
-    colour = (_GILT, _WALNUT, _BLACK, _WHITE, look.palette.wood)[int(random.integers(5))]
+    colour = (_GILT, _WALNUT, _BLACK, _WHITE, appearance.palette.wood)[int(random.integers(5))]
     bordered = random.random() < 0.5
     bar, thick = min(0.06, 0.11 * min(w, h)), min(d, 0.1)
     frame(mesh, (w, h, thick), bar, colour)
@@ -173,10 +177,10 @@ def painting(look: Look) -> Mesh:
 
 
 @shape("Poster")
-def poster(look: Look) -> Mesh:
+def poster(appearance: Appearance) -> Mesh:
     """A thin sheet without a frame: a white edge, taped at its corners, one of them curled."""
-    w, h, d, along_z = across(look)
-    mesh, random = Mesh(), look.random()
+    w, h, d, along_z = across(appearance)
+    mesh, random = Mesh(), appearance.random()
     picture = f"picture{int(random.integers(_PICTURES))}"
     edge, curl = 0.05 * min(w, h), 0.12 * min(w, h)
     z = -min(0.4 * d, 0.03)
@@ -188,7 +192,7 @@ def poster(look: Look) -> Mesh:
         mesh.triangles("plain", points, [(0, 0, side)] * 5, [(0, 0)] * 5, _WHITE, fan)
     size = (w - 2 * edge, h - 2 * edge - 0.09 * h)
     pane(mesh, size, h / 2 + 0.045 * h, z, picture, 0.003 + _APART)
-    title = shaded(look.palette.accent, 0.8)
+    title = shaded(appearance.palette.accent, 0.8)
     mesh.box((-0.1 * w, edge + 0.035 * h, z), (0.6 * w, 0.035 * h, 0.02), title, faces="zZ")
     corner = [(w / 2 - curl, 0, z), (w / 2, curl, z), (w / 2 - 0.9 * curl, 0.9 * curl, 0.45 * d)]
     lifted = [corner[0], corner[1], corner[2], corner[2]]
@@ -199,12 +203,12 @@ def poster(look: Look) -> Mesh:
 
 
 @shape("LightSwitch")
-def light_switch(look: Look) -> Mesh:
+def light_switch(appearance: Appearance) -> Mesh:
     """A white plate with a rocker or several, up and lit when on."""
-    w, h, d, along_z = across(look)
+    w, h, d, along_z = across(appearance)
     mesh = Mesh()
     rockers = 1 if w < 0.13 else 2 if w < 0.2 else 3
-    plate = look.pick(_WHITE, _IVORY, _WHITE)
+    plate = appearance.pick(_WHITE, _IVORY, _WHITE)
     thick = max(0.4 * d, 0.006)
     mesh.rounded((0, h / 2, -d / 2 + thick / 2), (w, h, thick), plate, 0.2 * thick)
     front = -d / 2 + thick
@@ -212,13 +216,13 @@ def light_switch(look: Look) -> Mesh:
     for k in range(rockers):
         x = (k - (rockers - 1) / 2) * w / rockers * 0.85
         mesh.box((x, h / 2, front + 0.002), (1.35 * wide, 1.2 * tall, 0.004), _GREY, faces="xXyYZ")
-        up = 1 if look.on else -1
+        up = 1 if appearance.on else -1
         for half in (-1, 1):  # the half that sticks out is the one to press next
             out = deep if half == up else 0.35 * deep
             tint = _WHITE if half == up else shaded(plate, 0.72)
             at = (x, h / 2 + half * tall / 4, front + out / 2)
             mesh.box(at, (wide, tall / 2, out), tint, faces="xXyYZ")
-        mark = _LIT if look.on else _DARK
+        mark = _LIT if appearance.on else _DARK
         at = (x, h / 2 + up * 0.3 * tall, front + deep + 0.004)
-        mesh.panel(at, (0.5 * wide, 0.07 * h), mark, "glowing" if look.on else "plain")
+        mesh.panel(at, (0.5 * wide, 0.07 * h), mark, "glowing" if appearance.on else "plain")
     return turned(mesh, along_z)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from er_gym.sim.render.look import Palette, shaded
-from er_gym.sim.render.mesh import Colour, Mesh, Triple
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import Palette, shaded
+from er_gym.sim.render.patch import Colour, Triple
 from er_gym.sim.space.solids.built_in import Box
 
 WALL = 0.02

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from er_gym.sim.render.look import Look, mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour
 from er_gym.sim.render.shapes.forms import leant
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.shapes.registry import shape
 
 _SHADES: tuple[Colour, ...] = (
     (0.88, 0.83, 0.72), (0.72, 0.62, 0.48), (0.62, 0.66, 0.66), (0.80, 0.74, 0.66),
@@ -23,44 +25,44 @@ _WICK = (0.12, 0.10, 0.09)
 
 
 @shape("FloorLamp")
-def floor_lamp(look: Look) -> Mesh:
+def floor_lamp(appearance: Appearance) -> Mesh:
     """A shade as high as a person, on a thin pole with a round foot."""
-    _, h, d = look.size
-    mesh, stem = Mesh(), look.pick(*_STEMS)
+    _, h, d = appearance.size
+    mesh, stem = Mesh(), appearance.pick(*_STEMS)
     bottom = 0.77 * h
     mesh.lathe([(0.26 * d, 0), (0.26 * d, 0.018), (0.05, 0.04), (0, 0.04)], stem, segments=14)
     mesh.cylinder((0, 0.46 * h, 0), 0.016, 0.92 * h, stem, segments=6)
     mesh.ball((0, bottom - 0.05, 0), (0.06, 0.05, 0.06), stem, segments=8, rings=4)
-    _shade(mesh, look, bottom, h)
+    _shade(mesh, appearance, bottom, h)
     return mesh
 
 
 @shape("DeskLamp")
-def desk_lamp(look: Look) -> Mesh:
+def desk_lamp(appearance: Appearance) -> Mesh:
     """A wide shade on a turned or thin stem with a foot."""
-    w, h, d = look.size
-    mesh, stem = Mesh(), look.pick(*_STEMS)
+    w, h, d = appearance.size
+    mesh, stem = Mesh(), appearance.pick(*_STEMS)
     r, bottom = 0.26 * min(w, d), 0.52 * h
     mesh.lathe([(r, 0), (r, 0.02 * h), (0.5 * r, 0.06 * h), (0, 0.06 * h)], stem, segments=12)
-    if look.random().random() < 0.5:
+    if appearance.random().random() < 0.5:
         belly = [(0.25, 0.05), (0.85, 0.20), (0.95, 0.30), (0.35, 0.46), (0.2, 0.50)]
         line = [(x * r, y * h) for x, y in belly]
-        mesh.lathe(line, mixed(stem, look.palette.accent, 0.6), segments=12)
+        mesh.lathe(line, mixed(stem, appearance.palette.accent, 0.6), segments=12)
     mesh.cylinder((0, 0.45 * h, 0), 0.012, 0.86 * h, stem, segments=6)
-    _shade(mesh, look, bottom, h)
+    _shade(mesh, appearance, bottom, h)
     return mesh
 
 
-def _shade(mesh: Mesh, look: Look, bottom: float, top: float) -> None:
+def _shade(mesh: Mesh, appearance: Appearance, bottom: float, top: float) -> None:
     """A shade of cloth about a bulb: it glows from within, or hangs there dull."""
-    w, _, d = look.size
-    cloth = look.pick(*_SHADES)
-    narrow = 0.5 * w * (0.55 + 0.3 * look.random().random())
+    w, _, d = appearance.size
+    cloth = appearance.pick(*_SHADES)
+    narrow = 0.5 * w * (0.55 + 0.3 * appearance.random().random())
     outside = [(0.5 * w, bottom), (narrow, top)]
     inside = [(0.96 * narrow, top), (0.48 * w, bottom)]
     edge = 0.03 * (top - bottom)
     around, squash = 16, (1.0, d / w)
-    if look.on:
+    if appearance.on:
         fade = np.repeat([_GLOW, shaded(_GLOW, 0.82)], around + 1, axis=0)
         mesh.lathe(outside, fade, "glowing", segments=around, squash=squash)
         mesh.lathe(inside, _CORE, "glowing", segments=around, squash=squash)
@@ -75,22 +77,24 @@ def _shade(mesh: Mesh, look: Look, bottom: float, top: float) -> None:
             [(1.01 * r, band[0]), (1.01 * r, band[1])], rings, segments=around, squash=squash
         )
     bulb = (0.24 * w, 0.4 * (top - bottom), 0.24 * d)
-    colour, material = (_CORE, "glowing") if look.on else (_BULB_OFF, "plain")
+    colour, material = (_CORE, "glowing") if appearance.on else (_BULB_OFF, "plain")
     mesh.ball((0, bottom + 0.32 * (top - bottom), 0), bulb, colour, material, segments=8, rings=5)
 
 
 @shape("Candle")
-def candle(look: Look) -> Mesh:
+def candle(appearance: Appearance) -> Mesh:
     """A wax rod with a dark wick; a flame when it burns."""
-    w, h, d = look.size
-    wax = look.pick(*_WAXES)
-    thick = sorted(look.size)[1] if max(w, d) <= h else min(look.size)
+    w, h, d = appearance.size
+    wax = appearance.pick(*_WAXES)
+    thick = sorted(appearance.size)[1] if max(w, d) <= h else min(appearance.size)
     return leant(
-        look.size, min(thick, 0.06), lambda length: _candle(look, length, min(w, d, h, 0.06), wax)
+        appearance.size,
+        min(thick, 0.06),
+        lambda length: _candle(appearance, length, min(w, d, h, 0.06), wax),
     )
 
 
-def _candle(look: Look, length: float, thick: float, wax: Colour) -> Mesh:
+def _candle(appearance: Appearance, length: float, thick: float, wax: Colour) -> Mesh:
     mesh, r = Mesh(), thick / 2
     wick = min(0.10 * length, 0.012)
     top = length - wick
@@ -104,7 +108,7 @@ def _candle(look: Look, length: float, thick: float, wax: Colour) -> Mesh:
     ]
     mesh.lathe(rod, wax, segments=12, smooth=False)
     mesh.cylinder((0, top + wick / 2, 0), max(0.0015, 0.06 * r), wick, _WICK, segments=5)
-    if look.on:
+    if appearance.on:
         tall = max(0.035, 1.6 * thick)
         line = [(0, 0), (0.16, 0.12), (0.22, 0.30), (0.15, 0.60), (0, 1.0)]
         flame = [(x * tall, y * tall) for x, y in line]

@@ -6,10 +6,12 @@ from math import atan2, cos, degrees, pi
 
 import numpy as np
 
-from er_gym.sim.render.look import Look, mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour
 from er_gym.sim.render.shapes.forms import leant
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.shapes.registry import shape
 
 _ORANGE, _SEAM = (0.86, 0.40, 0.13), (0.10, 0.08, 0.07)
 _ASH, _GRIP, _ALUMINIUM = (0.85, 0.64, 0.38), (0.14, 0.13, 0.13), (0.72, 0.74, 0.78)
@@ -23,10 +25,10 @@ _SOLE, _LINING, _CREAM, _NOSE = (
 
 
 @shape("BasketBall")
-def basket_ball(look: Look) -> Mesh:
+def basket_ball(appearance: Appearance) -> Mesh:
     """An orange ball with black seams."""
-    _, h, _ = look.size
-    mesh, r = Mesh(), min(look.size) / 2
+    _, h, _ = appearance.size
+    mesh, r = Mesh(), min(appearance.size) / 2
     mesh.ball((0, h / 2, 0), (1.96 * r, 1.96 * r, 1.96 * r), _ORANGE, segments=14, rings=9)
     seam = 0.035 * r
     for axis, offset in (("y", 0.0), ("x", 0.0), ("z", 0.0), ("x", 0.62), ("x", -0.62)):
@@ -38,12 +40,12 @@ def basket_ball(look: Look) -> Mesh:
 
 
 @shape("BaseballBat")
-def baseball_bat(look: Look) -> Mesh:
+def baseball_bat(appearance: Appearance) -> Mesh:
     """A thick barrel that narrows to a wrapped grip with a knob."""
-    thick = min(0.075, *look.size)
-    metal = look.random().random() < 0.3
+    thick = min(0.075, *appearance.size)
+    metal = appearance.random().random() < 0.3
     colour, material = (_ALUMINIUM, "metal") if metal else (_ASH, "wood")
-    grip = look.pick(_GRIP, (0.65, 0.14, 0.13), (0.14, 0.22, 0.50))
+    grip = appearance.pick(_GRIP, (0.65, 0.14, 0.13), (0.14, 0.22, 0.50))
 
     def bat(length: float) -> Mesh:
         mesh = Mesh()
@@ -60,14 +62,16 @@ def baseball_bat(look: Look) -> Mesh:
         mesh.lathe(band, shaded(grip, 1.2), segments=10)
         return mesh
 
-    return leant(look.size, thick, bat)
+    return leant(appearance.size, thick, bat)
 
 
 @shape("TennisRacket")
-def tennis_racket(look: Look) -> Mesh:
+def tennis_racket(appearance: Appearance) -> Mesh:
     """An oval frame with strings on a long grip."""
-    w, h, d = look.size
-    frame = look.pick((0.80, 0.15, 0.15), (0.10, 0.35, 0.70), (0.95, 0.75, 0.10), (0.15, 0.55, 0.3))
+    w, h, d = appearance.size
+    frame = appearance.pick(
+        (0.80, 0.15, 0.15), (0.10, 0.35, 0.70), (0.95, 0.75, 0.10), (0.15, 0.55, 0.3)
+    )
     thick, turned = 0.035, w < d if h > min(w, d) else w > d
     width, run = (min(w, d), max(w, d)) if h <= min(w, d) else (max(w, d), min(w, d))
     width = min(width, 0.30)
@@ -112,9 +116,9 @@ def _strip(left: float, right: float, low: float, high: float) -> list[tuple[flo
 
 
 @shape("Dumbbell")
-def dumbbell(look: Look) -> Mesh:
+def dumbbell(appearance: Appearance) -> Mesh:
     """Two heavy heads on a short bright bar."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     mesh, bar = Mesh(), Mesh()
     long, r, y = max(w, d), min(min(w, d), h) / 2, h / 2
     bar.cylinder((0, y, 0), 0.24 * r, 0.5 * long, _CHROME, "metal", axis="z", segments=8)
@@ -128,10 +132,10 @@ def dumbbell(look: Look) -> Mesh:
 
 
 @shape("TeddyBear")
-def teddy_bear(look: Look) -> Mesh:
+def teddy_bear(appearance: Appearance) -> Mesh:
     """It sits: a round head with ears and a snout, a pale belly, arms and legs stretched out."""
-    w, h, d = look.size
-    fur = look.pick((0.58, 0.36, 0.18), (0.72, 0.50, 0.28), (0.45, 0.27, 0.14))
+    w, h, d = appearance.size
+    fur = appearance.pick((0.58, 0.36, 0.18), (0.72, 0.50, 0.28), (0.45, 0.27, 0.14))
     mesh, pale = Mesh(), mixed(fur, _CREAM, 0.75)
 
     def ball(x: float, y: float, z: float, a: float, b: float, c: float, colour: Colour) -> None:
@@ -155,10 +159,10 @@ def teddy_bear(look: Look) -> Mesh:
 
 
 @shape("Boots")
-def boots(look: Look) -> Mesh:
+def boots(appearance: Appearance) -> Mesh:
     """A pair of tall boots, toes to the front."""
-    w, h, d = look.size
-    leather = look.pick((0.42, 0.25, 0.13), (0.25, 0.17, 0.12), (0.55, 0.36, 0.18))
+    w, h, d = appearance.size
+    leather = appearance.pick((0.42, 0.25, 0.13), (0.25, 0.17, 0.12), (0.55, 0.36, 0.18))
     mesh = Mesh()
     for side in (-1, 1):
         mesh.add(_boot(0.46 * w, h, d, leather), at=(side * 0.26 * w, 0, 0))

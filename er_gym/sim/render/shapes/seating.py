@@ -2,45 +2,55 @@
 
 from __future__ import annotations
 
-from er_gym.sim.render.look import Look, mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour
 from er_gym.sim.render.shapes.joinery import legs
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.shapes.registry import shape
 
 _LEATHERS = ((0.38, 0.22, 0.14), (0.22, 0.20, 0.20), (0.62, 0.45, 0.30))
 _BLACK = (0.13, 0.12, 0.12)
 _CREAM = (0.80, 0.74, 0.62)
 
 
-def _seat_height(look: Look, share: float) -> float:
+def _seat_height(appearance: Appearance, share: float) -> float:
     """How high the seat is; ``share``: of the height, where the record does not show it."""
-    h = look.size[1]
-    shown = look.surface
+    h = appearance.size[1]
+    shown = appearance.surface
     return share * h if shown is None or not 0.25 * h < shown < 0.85 * h else shown
 
 
 @shape("Chair")
-def chair(look: Look) -> Mesh:
+def chair(appearance: Appearance) -> Mesh:
     """A seat on four legs and an upright back of slats, rungs or a padded board."""
-    w, _, d = look.size
-    random, wood = look.random(), look.palette.wood
-    style, seat = int(random.integers(3)), _seat_height(look, 0.5)
-    cushion = (look.palette.accent, look.palette.fabric, _CREAM)[int(random.integers(3))]
+    w, _, d = appearance.size
+    random, wood = appearance.random(), appearance.palette.wood
+    style, seat = int(random.integers(3)), _seat_height(appearance, 0.5)
+    cushion = (appearance.palette.accent, appearance.palette.fabric, _CREAM)[
+        int(random.integers(3))
+    ]
     frame = shaded(wood, (0.85, 1.0, 0.65)[style])
     side = min(0.045, w / 8)
     mesh = Mesh()
     legs(mesh, (w, seat - 0.05, d), side, frame, taper=0.75)
     mesh.box((0, seat - 0.06, 0), (w - 0.01, 0.05, d - 0.01), frame, "wood")
     mesh.rounded((0, seat - 0.023, 0.01), (w - 0.02, 0.046, d - 0.03), cushion, 0.02, "fabric")
-    _chair_back(mesh, look, seat, side, frame, cushion if style == 2 else frame, style)
+    _chair_back(mesh, appearance, seat, side, frame, cushion if style == 2 else frame, style)
     return mesh
 
 
 def _chair_back(
-    mesh: Mesh, look: Look, seat: float, side: float, frame: Colour, filling: Colour, style: int
+    mesh: Mesh,
+    appearance: Appearance,
+    seat: float,
+    side: float,
+    frame: Colour,
+    filling: Colour,
+    style: int,
 ) -> None:
     """Two posts at the back, a rail at the top, and slats (0), rungs (1) or a pad (2)."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     z, high = -d / 2 + side / 2, h - seat
     for sign in (-1, 1):
         at = (sign * (w - side) / 2, seat + high / 2 - 0.02, z)
@@ -64,26 +74,26 @@ def _chair_back(
 
 
 @shape("Sofa")
-def sofa(look: Look) -> Mesh:
+def sofa(appearance: Appearance) -> Mesh:
     """Long and low between two arms, with two or three seat cushions and a back."""
-    random, palette = look.random(), look.palette
+    random, palette = appearance.random(), appearance.palette
     colour = (palette.fabric, shaded(palette.fabric, 0.8), *_LEATHERS)[int(random.integers(5))]
-    w = look.size[0]
-    return _upholstered(look, colour, max(2, min(4, round(0.76 * w / 0.68))))
+    w = appearance.size[0]
+    return _upholstered(appearance, colour, max(2, min(4, round(0.76 * w / 0.68))))
 
 
 @shape("ArmChair")
-def arm_chair(look: Look) -> Mesh:
+def arm_chair(appearance: Appearance) -> Mesh:
     """A sofa for one: a single broad cushion between two padded arms."""
-    random, palette = look.random(), look.palette
+    random, palette = appearance.random(), appearance.palette
     colours = (mixed(palette.accent, palette.fabric, 0.4), palette.fabric, *_LEATHERS[:2], _CREAM)
-    return _upholstered(look, colours[int(random.integers(len(colours)))], 1)
+    return _upholstered(appearance, colours[int(random.integers(len(colours)))], 1)
 
 
-def _upholstered(look: Look, colour: Colour, cushions: int) -> Mesh:
+def _upholstered(appearance: Appearance, colour: Colour, cushions: int) -> Mesh:
     """A seat between two arms, with a back and cushions, where the engine takes them to be."""
-    w, h, d = look.size
-    seat = _seat_height(look, 0.5)
+    w, h, d = appearance.size
+    seat = _seat_height(appearance, 0.5)
     arm, back, rest = 0.12 * w, 0.25 * d, min(h, seat + 0.4 * (h - seat))
     foot = min(0.09, 0.25 * seat)
     inner, thick = w - 2 * arm, min(0.17, 0.42 * seat)
@@ -113,13 +123,13 @@ def _upholstered(look: Look, colour: Colour, cushions: int) -> Mesh:
 
 
 @shape("Stool")
-def stool(look: Look) -> Mesh:
+def stool(appearance: Appearance) -> Mesh:
     """A small seat without a back on four splayed legs that rungs hold together."""
-    w, h, d = look.size
-    random, wood = look.random(), look.palette.wood
-    seat = (wood, look.palette.accent, _BLACK)[int(random.integers(3))]
+    w, h, d = appearance.size
+    random, wood = appearance.random(), appearance.palette.wood
+    seat = (wood, appearance.palette.accent, _BLACK)[int(random.integers(3))]
     frame = shaded(wood, 0.75)
-    top = h if look.surface is None else min(max(look.surface, 0.7 * h), h)
+    top = h if appearance.surface is None else min(max(appearance.surface, 0.7 * h), h)
     thick = min(0.06, 0.12 * h)
     mesh = Mesh()
     outline = [(0, top - thick), (0.44, top - thick), (0.5, top - 0.6 * thick)]
@@ -141,12 +151,14 @@ def stool(look: Look) -> Mesh:
 
 
 @shape("Ottoman")
-def ottoman(look: Look) -> Mesh:
+def ottoman(appearance: Appearance) -> Mesh:
     """A low padded block to put one's feet on, with a seam round it and buttons on top."""
-    w, h, d = look.size
-    palette = look.palette
-    colour = look.pick(mixed(palette.fabric, palette.accent, 0.5), palette.fabric, _LEATHERS[0])
-    top = h if look.surface is None else min(max(look.surface, 0.7 * h), h)
+    w, h, d = appearance.size
+    palette = appearance.palette
+    colour = appearance.pick(
+        mixed(palette.fabric, palette.accent, 0.5), palette.fabric, _LEATHERS[0]
+    )
+    top = h if appearance.surface is None else min(max(appearance.surface, 0.7 * h), h)
     foot, lid = 0.07, 0.32 * top
     mesh = Mesh()
     legs(mesh, (w, foot, d), 0.06, _BLACK, inset=0.03, taper=0.6)
@@ -161,11 +173,11 @@ def ottoman(look: Look) -> Mesh:
 
 
 @shape("Footstool")
-def footstool(look: Look) -> Mesh:
+def footstool(appearance: Appearance) -> Mesh:
     """A small round cushion on four short wooden legs."""
-    w, h, d = look.size
-    colour = look.pick(look.palette.accent, look.palette.fabric)
-    thick, wood = min(0.45 * h, 0.14), shaded(look.palette.wood, 0.8)
+    w, h, d = appearance.size
+    colour = appearance.pick(appearance.palette.accent, appearance.palette.fabric)
+    thick, wood = min(0.45 * h, 0.14), shaded(appearance.palette.wood, 0.8)
     low = h - thick
     mesh = Mesh()
     outline = [(0, low), (0.46, low), (0.5, low + 0.3 * thick), (0.5, low + 0.6 * thick)]

@@ -7,10 +7,12 @@ from math import asin, cos, degrees, pi, sin
 
 import numpy as np
 
-from er_gym.sim.render.look import Look, shaded
-from er_gym.sim.render.mesh import Colour, Mesh, Triple
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import shaded
+from er_gym.sim.render.patch import Colour, Triple
 from er_gym.sim.render.shapes.forms import laid, leant, roundel
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.shapes.registry import shape
 
 _COVERS: tuple[Colour, ...] = (
     (0.66, 0.13, 0.12), (0.13, 0.28, 0.58), (0.13, 0.43, 0.26), (0.85, 0.60, 0.16),
@@ -32,12 +34,12 @@ _YELLOW, _RAW_WOOD, _ERASER, _LEAD = (
 
 
 @shape("Book")
-def book(look: Look) -> Mesh:
+def book(appearance: Appearance) -> Mesh:
     """Coloured covers about pale pages, a title; open: two pages of print."""
-    cover = look.pick(*_COVERS)
-    if look.openness <= 0:
-        return laid(look.size, lambda size: _shut_book(size, cover))
-    return laid(look.size, lambda size: _open_book(size, cover, look.openness))
+    cover = appearance.pick(*_COVERS)
+    if appearance.openness <= 0:
+        return laid(appearance.size, lambda size: _shut_book(size, cover))
+    return laid(appearance.size, lambda size: _open_book(size, cover, appearance.openness))
 
 
 def _shut_book(size: Triple, cover: Colour) -> Mesh:
@@ -109,9 +111,9 @@ def _half_book(size: Triple, cover: Colour) -> Mesh:
 
 
 @shape("Newspaper")
-def newspaper(look: Look) -> Mesh:
+def newspaper(appearance: Appearance) -> Mesh:
     """Grey-white and folded, its sheets fanned out, with a headline and columns of print."""
-    return laid(look.size, _newspaper)
+    return laid(appearance.size, _newspaper)
 
 
 def _newspaper(size: Triple) -> Mesh:
@@ -147,11 +149,11 @@ def _newspaper(size: Triple) -> Mesh:
 
 
 @shape("Pen")
-def pen(look: Look) -> Mesh:
+def pen(appearance: Appearance) -> Mesh:
     """A dark blue rod with a steel tip and a cap with a clip."""
-    thick = sorted(look.size)[0]
-    body = look.pick(_INK, (0.08, 0.20, 0.62), (0.12, 0.12, 0.30))
-    return leant(look.size, thick, lambda length: _pen(length, thick, body))
+    thick = sorted(appearance.size)[0]
+    body = appearance.pick(_INK, (0.08, 0.20, 0.62), (0.12, 0.12, 0.30))
+    return leant(appearance.size, thick, lambda length: _pen(length, thick, body))
 
 
 def _pen(length: float, thick: float, body: Colour) -> Mesh:
@@ -171,10 +173,10 @@ def _pen(length: float, thick: float, body: Colour) -> Mesh:
 
 
 @shape("Pencil")
-def pencil(look: Look) -> Mesh:
+def pencil(appearance: Appearance) -> Mesh:
     """Yellow and six-sided, with a wooden point and a pink eraser."""
-    thick = sorted(look.size)[0]
-    return leant(look.size, thick, lambda length: _pencil(length, thick))
+    thick = sorted(appearance.size)[0]
+    return leant(appearance.size, thick, lambda length: _pencil(length, thick))
 
 
 def _pencil(length: float, thick: float) -> Mesh:
@@ -195,12 +197,12 @@ def _pencil(length: float, thick: float) -> Mesh:
 
 
 @shape("CreditCard")
-def credit_card(look: Look) -> Mesh:
+def credit_card(appearance: Appearance) -> Mesh:
     """A bright card with a golden chip and rows of figures."""
-    colour = look.pick(
+    colour = appearance.pick(
         (0.12, 0.36, 0.75), (0.80, 0.14, 0.20), (0.90, 0.65, 0.15), (0.10, 0.55, 0.45)
     )
-    return laid(look.size, lambda size: _card(size, colour))
+    return laid(appearance.size, lambda size: _card(size, colour))
 
 
 def _card(size: Triple, edge: Colour) -> Mesh:
@@ -214,10 +216,10 @@ def _card(size: Triple, edge: Colour) -> Mesh:
 
 
 @shape("KeyChain")
-def key_chain(look: Look) -> Mesh:
+def key_chain(appearance: Appearance) -> Mesh:
     """A ring with keys that spread out, and a coloured tag."""
-    tag = look.pick((0.80, 0.15, 0.15), (0.15, 0.40, 0.75), (0.20, 0.60, 0.30))
-    return laid(look.size, lambda size: _keys(size, tag))
+    tag = appearance.pick((0.80, 0.15, 0.15), (0.15, 0.40, 0.75), (0.20, 0.60, 0.30))
+    return laid(appearance.size, lambda size: _keys(size, tag))
 
 
 def _keys(size: Triple, tag: Colour) -> Mesh:
@@ -257,9 +259,9 @@ def _key(length: float, bow: float, thick: float, colour: Colour) -> Mesh:
 
 
 @shape("CD")
-def cd(look: Look) -> Mesh:
+def cd(appearance: Appearance) -> Mesh:
     """A silver disc with a hole, which shimmers in all colours."""
-    return laid(look.size, _disc)
+    return laid(appearance.size, _disc)
 
 
 def _disc(size: Triple) -> Mesh:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from er_gym.sim.render.look import mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh, Triple
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour, Triple
 
 _BASE, _NOSE = (0.16, 0.14, 0.13), (0.10, 0.09, 0.09)
 

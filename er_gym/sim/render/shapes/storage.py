@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from er_gym.sim.render.look import Look, mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh, Triple
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour, Triple
 from er_gym.sim.render.shapes.joinery import (
     CLEAR,
     HANDLE,
@@ -16,7 +18,7 @@ from er_gym.sim.render.shapes.joinery import (
     legs,
     panels,
 )
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.shapes.registry import shape
 from er_gym.sim.space.solids.carcass import LET_IN, LIP, SLAB, SUNK, TALL, without
 
 _CARD, _TAPE = (0.72, 0.54, 0.34), (0.86, 0.76, 0.52)
@@ -28,45 +30,51 @@ _BACK = 0.03
 """How far the sides of a counter stand back from its edges, metres."""
 
 
-def _fitted(look: Look) -> Colour:
+def _fitted(appearance: Appearance) -> Colour:
     """Kitchens and bathrooms have cabinets of one colour, other rooms that of their furniture."""
-    return look.palette.cabinet if look.room in ("kitchens", "bathrooms") else look.palette.wood
+    return (
+        appearance.palette.cabinet
+        if appearance.room in ("kitchens", "bathrooms")
+        else appearance.palette.wood
+    )
 
 
 @shape("Cabinet")
-def cabinet(look: Look) -> Mesh:
+def cabinet(appearance: Appearance) -> Mesh:
     """A case with one door, or two where it is wide, hinged at its sides, and upright handles."""
-    w, h, d = look.size
-    colour, mesh = _fitted(look), Mesh()
+    w, h, d = appearance.size
+    colour, mesh = _fitted(appearance), Mesh()
     thick = min(WALL, 0.4 * d)
     face = d / 2 - min(HANDLE, 0.5 * d) - thick
     if d > 0.06:
         low, high = (-w / 2, 0.0, -d / 2), (w / 2, h, face - 0.002)
         case(mesh, low, high, shaded(colour, 0.92), shaded(mixed(colour, _LINEN, 0.3), 0.75))
-        if not look.boards and h > 0.6:
+        if not appearance.boards and h > 0.6:
             at, size = (0, h / 2, -0.08 * d), (w - 0.04, 0.016, 0.6 * d)
             mesh.box(at, size, shaded(colour, 0.8), faces="yYZ")
-    doors, left = (2, True) if w > 0.7 else (1, bool(look.random().random() < 0.5))
-    wide, turn = w / doors, 100.0 * look.openness
+    doors, left = (2, True) if w > 0.7 else (1, bool(appearance.random().random() < 0.5))
+    wide, turn = w / doors, 100.0 * appearance.openness
     for k in range(doors):
         hinge = -1 if (k == 0) == (doors == 2 or left) else 1
         x = wide * (k + 0.5) - w / 2
-        door = _door(look, wide - 0.008, h - 0.008, thick, hinge)
+        door = _door(appearance, wide - 0.008, h - 0.008, thick, hinge)
         mesh.add(
             door, at=(x, h / 2, face), turn=("y", hinge * turn), about=(hinge * wide / 2, 0, 0)
         )
     return mesh
 
 
-def _door(look: Look, w: float, h: float, thick: float, hinge: int) -> Mesh:
+def _door(appearance: Appearance, w: float, h: float, thick: float, hinge: int) -> Mesh:
     """A cabinet's door about its middle; ``hinge``: the side that it hangs on, -1 or 1."""
-    mesh = front((w, h), _fitted(look), thick)
+    mesh = front((w, h), _fitted(appearance), thick)
     long = min(0.16, 0.4 * h)
     # In reach: near the lower edge of what hangs high, near the upper of what stands low.
-    y = -h / 2 + 0.06 + long / 2 if look.height > 1.2 else h / 2 - 0.06 - long / 2
-    y = min(max(1.05 - look.height - h / 2, -h / 4), h / 4) if h > 1.4 else y
-    mesh.add(bar((-hinge * (w / 2 - 0.035), y, thick), long, look.palette.metal, upright=True))
-    if look.broken:
+    y = -h / 2 + 0.06 + long / 2 if appearance.height > 1.2 else h / 2 - 0.06 - long / 2
+    y = min(max(1.05 - appearance.height - h / 2, -h / 4), h / 4) if h > 1.4 else y
+    mesh.add(
+        bar((-hinge * (w / 2 - 0.035), y, thick), long, appearance.palette.metal, upright=True)
+    )
+    if appearance.broken:
         for a, b, c, e in ((-0.4, 0.1, 0.3, -0.3), (-0.1, 0.4, 0.05, -0.4), (-0.05, 0, 0.4, 0.3)):
             path = [(a * w, b * h, thick + 0.008), (c * w, e * h, thick + 0.008)]
             mesh.tube(path, 0.005, _CRACK, segments=4)
@@ -74,17 +82,17 @@ def _door(look: Look, w: float, h: float, thick: float, hinge: int) -> Mesh:
 
 
 @shape("Drawer")
-def drawer(look: Look) -> Mesh:
+def drawer(appearance: Appearance) -> Mesh:
     """A broad front with a level handle, and behind it a box that is open at its top."""
-    w, h, d = look.size
-    colour = _fitted(look)
+    w, h, d = appearance.size
+    colour = _fitted(appearance)
     mesh, thick = Mesh(), min(WALL, 0.3 * d)
     face = d / 2 - min(HANDLE, 0.4 * d) - thick
     mesh.add(front((w - 0.004, h - 0.006), shaded(colour, 1.08), thick), at=(0, h / 2, face))
     count = 2 if w > 0.85 else 1
     for k in range(count):
         at = (w / count * (k + 0.5) - w / 2, h / 2, face + thick)
-        mesh.add(bar(at, min(0.16, 0.4 * w), look.palette.metal, upright=False))
+        mesh.add(bar(at, min(0.16, 0.4 * w), appearance.palette.metal, upright=False))
     _tray(
         mesh, (w - 0.03, 0.75 * h, face + d / 2), -d / 2, shaded(mixed(colour, _LINEN, 0.45), 0.9)
     )
@@ -103,53 +111,59 @@ def _tray(mesh: Mesh, size: Triple, back: float, colour: Colour) -> None:
 
 
 @shape("CounterTop")
-def counter_top(look: Look) -> Mesh:
+def counter_top(appearance: Appearance) -> Mesh:
     """A slab of stone with holes for sinks; one that reaches to the floor has sides as well.
 
     What other slabs rest on is no object: :mod:`er_gym.sim.render.carcasses` draws it.
     """
-    h = look.size[1]
-    stone, mesh = look.palette.counter, Mesh()
-    top = min(max(h if look.surface is None else look.surface, 0.0), h) - SUNK
+    h = appearance.size[1]
+    stone, mesh = appearance.palette.counter, Mesh()
+    top = min(max(h if appearance.surface is None else appearance.surface, 0.0), h) - SUNK
     # The rim of a sink lies on the slab.
     holes = [
         (low[0] + LIP, low[2] + LIP, high[0] - LIP, high[2] - LIP)
-        for kind, (low, high) in look.built_in
+        for kind, (low, high) in appearance.built_in
         if kind in LET_IN and low[1] < top - 0.05 < high[1]
     ]
-    for low, high in look.parts:
+    for low, high in appearance.parts:
         for x0, z0, x1, z1 in without((low[0], low[2], high[0], high[2]), holes):
             at, size = ((x0 + x1) / 2, top - SLAB / 2, (z0 + z1) / 2), (x1 - x0, SLAB, z1 - z0)
             mesh.box(at, size, stone, "stone")
     if h > TALL:
-        fitted = [box for kind, box in look.built_in if kind not in LET_IN]
+        fitted = [box for kind, box in appearance.built_in if kind not in LET_IN]
         footprint = [
             (low[0] + _BACK, low[2] + _BACK, high[0] - _BACK, high[2] - _BACK)
-            for low, high in look.parts
+            for low, high in appearance.parts
         ]
-        panels(mesh, footprint, (-look.height, top - SLAB), fitted, carcass_colour(look.palette))
+        panels(
+            mesh,
+            footprint,
+            (-appearance.height, top - SLAB),
+            fitted,
+            carcass_colour(appearance.palette),
+        )
     return mesh
 
 
 @shape("Shelf")
-def shelf(look: Look) -> Mesh:
+def shelf(appearance: Appearance) -> Mesh:
     """A plain board under the room for things that the record calls a shelf."""
-    w, _, d = look.size
+    w, _, d = appearance.size
     mesh = Mesh()
-    mesh.box((0, -0.006, 0), (w, WALL, d), shaded(look.palette.wood, 1.05), "wood")
+    mesh.box((0, -0.006, 0), (w, WALL, d), shaded(appearance.palette.wood, 1.05), "wood")
     return mesh
 
 
 @shape("ShelvingUnit")
-def shelving_unit(look: Look) -> Mesh:
+def shelving_unit(appearance: Appearance) -> Mesh:
     """An open frame of four posts with boards one above the other, to be seen through."""
-    w, h, d = look.size
-    wood, mesh = look.palette.wood, Mesh()
-    frame = look.pick(shaded(wood, 0.8), (0.24, 0.25, 0.27))
+    w, h, d = appearance.size
+    wood, mesh = appearance.palette.wood, Mesh()
+    frame = appearance.pick(shaded(wood, 0.8), (0.24, 0.25, 0.27))
     post = min(0.04, w / 8, d / 5)
     material = grain(frame)
     legs(mesh, (w, h, d), post, frame, material)
-    for height in _boards(look):
+    for height in _boards(appearance):
         at = (0.0, height - WALL / 2, 0.0)
         mesh.box(at, (w - 0.02, WALL, d - 0.02), wood, "wood")
     for sign in (-1, 1):
@@ -163,11 +177,11 @@ def shelving_unit(look: Look) -> Mesh:
     return mesh
 
 
-def _boards(look: Look) -> list[float]:
+def _boards(appearance: Appearance) -> list[float]:
     """Heights of the upper sides of a unit's boards, metres."""
-    h = look.size[1]
-    top = h if look.surface is None or look.surface < 0.5 * h else look.surface
-    asked = [max(b - CLEAR, WALL) for b in look.boards]
+    h = appearance.size[1]
+    top = h if appearance.surface is None or appearance.surface < 0.5 * h else appearance.surface
+    asked = [max(b - CLEAR, WALL) for b in appearance.boards]
     if not asked:
         count = max(2, round(h / 0.4))
         asked = [0.06 + (top - 0.06) * k / count for k in range(count)]
@@ -179,11 +193,11 @@ def _boards(look: Look) -> list[float]:
 
 
 @shape("Dresser")
-def dresser(look: Look) -> Mesh:
+def dresser(appearance: Appearance) -> Mesh:
     """A chest: a top that juts out over a case that drawers fill, on short feet."""
-    w, h, d = look.size
-    wood, mesh = look.palette.wood, Mesh()
-    top = h if look.surface is None else min(max(look.surface, 0.6 * h), h)
+    w, h, d = appearance.size
+    wood, mesh = appearance.palette.wood, Mesh()
+    top = h if appearance.surface is None else min(max(appearance.surface, 0.6 * h), h)
     body = shaded(wood, 0.72)
     foot, slab = 0.03 * min(h, 1.0), 0.022
     case(mesh, (-w / 2 + 0.004, foot, -d / 2), (w / 2 - 0.004, top - 0.01, d / 2 - 0.03), body,
@@ -197,13 +211,15 @@ def dresser(look: Look) -> Mesh:
 
 
 @shape("TVStand")
-def tv_stand(look: Look) -> Mesh:
+def tv_stand(appearance: Appearance) -> Mesh:
     """Low and wide with open bays for boxes and cables under a broad top."""
-    w, h, d = look.size
-    wood, mesh = look.palette.wood, Mesh()
-    colour = look.pick(shaded(wood, 0.75), (0.20, 0.18, 0.17), mixed(wood, (1.0, 1.0, 1.0), 0.5))
-    top = h if look.surface is None else min(max(look.surface, 0.6 * h), h)
-    foot = 0.1 * top if look.height < 0.1 else 0.0
+    w, h, d = appearance.size
+    wood, mesh = appearance.palette.wood, Mesh()
+    colour = appearance.pick(
+        shaded(wood, 0.75), (0.20, 0.18, 0.17), mixed(wood, (1.0, 1.0, 1.0), 0.5)
+    )
+    top = h if appearance.surface is None else min(max(appearance.surface, 0.6 * h), h)
+    foot = 0.1 * top if appearance.height < 0.1 else 0.0
     dark = shaded(colour, 0.55)
     case(
         mesh, (-w / 2 + 0.01, foot, -d / 2), (w / 2 - 0.01, top - 0.01, d / 2 - 0.03), colour, dark
@@ -214,7 +230,7 @@ def tv_stand(look: Look) -> Mesh:
     middle = (foot + top) / 2
     at, size = (0, middle, -0.02), (WALL, top - foot - 0.02, d - 0.05)
     mesh.box(at, size, colour, "wood", faces="xXZ")
-    heights = [b - CLEAR for b in look.boards if foot + 0.06 < b < top - 0.06] or [middle]
+    heights = [b - CLEAR for b in appearance.boards if foot + 0.06 < b < top - 0.06] or [middle]
     for height in heights:
         at, size = (0, height - WALL / 2, -0.02), (w - 0.05, WALL, d - 0.06)
         mesh.box(at, size, colour, "wood", faces="yYZ")
@@ -222,10 +238,10 @@ def tv_stand(look: Look) -> Mesh:
 
 
 @shape("Safe")
-def safe(look: Look) -> Mesh:
+def safe(appearance: Appearance) -> Mesh:
     """A steel box with a thick door that bears a dial and a three-armed handle."""
-    w, h, d = look.size
-    mesh, steel = Mesh(), look.pick(_STEEL, _GUNMETAL, (0.24, 0.30, 0.26))
+    w, h, d = appearance.size
+    mesh, steel = Mesh(), appearance.pick(_STEEL, _GUNMETAL, (0.24, 0.30, 0.26))
     proud = 0.1 * d
     face, rim = d / 2 - proud, 0.07 * w
     case(mesh, (-w / 2, 0, -d / 2), (w / 2, h, face - 0.002), steel, (0.34, 0.34, 0.36))
@@ -246,7 +262,7 @@ def safe(look: Look) -> Mesh:
         end = (hub[0] + 0.13 * w * x, hub[1] + 0.13 * w * y, z + 0.012)
         door.tube([(*hub, z + 0.012), end], 0.018 * w, _BRASS, segments=6)
     hinge = (-wide / 2, 0, 0)
-    mesh.add(door, at=(0, h / 2, face), turn=("y", -105.0 * look.openness), about=hinge)
+    mesh.add(door, at=(0, h / 2, face), turn=("y", -105.0 * appearance.openness), about=hinge)
     for share in (0.25, 0.75):
         at = (-w / 2 + 0.8 * rim, share * h, face + 0.012)
         mesh.cylinder(at, 0.03 * w, 0.14 * h, _STEEL, segments=8)
@@ -254,16 +270,16 @@ def safe(look: Look) -> Mesh:
 
 
 @shape("Box")
-def cardboard_box(look: Look) -> Mesh:
+def cardboard_box(appearance: Appearance) -> Mesh:
     """Brown cardboard, taped along its top, or with its four flaps thrown open."""
-    w, h, d = look.size
-    mesh, card = Mesh(), shaded(_CARD, 0.9 + 0.2 * float(look.random().random()))
+    w, h, d = appearance.size
+    mesh, card = Mesh(), shaded(_CARD, 0.9 + 0.2 * float(appearance.random().random()))
     lip, skin = h - 0.012, 0.004
     size = (w - 2 * skin, lip, d - 2 * skin)
     mesh.box((0, lip / 2, 0), size, card, "cardboard", faces="xXyzZ", turns=0.5)
     at = (-0.22 * w, 0.62 * h, d / 2)
     mesh.panel(at, (0.3 * w, 0.34 * h), _LINEN, "label")
-    if look.openness:
+    if appearance.openness:
         inside = shaded(card, 0.7)
         mesh.panel((-w / 2 + 0.01, lip / 2, 0), (d, lip), inside, "cardboard", facing="X")
         mesh.panel((w / 2 - 0.01, lip / 2, 0), (d, lip), inside, "cardboard", facing="x")
@@ -271,7 +287,7 @@ def cardboard_box(look: Look) -> Mesh:
         mesh.panel((0, lip / 2, d / 2 - 0.01), (w, lip), inside, "cardboard", facing="z")
         mesh.panel((0, 0.012, 0), (w, d), inside, "cardboard", facing="Y")
     turned = Mesh()
-    _flaps(turned, max(w, d) - 2 * skin, min(w, d) - 2 * skin, h, card, look.openness)
+    _flaps(turned, max(w, d) - 2 * skin, min(w, d) - 2 * skin, h, card, appearance.openness)
     mesh.add(turned, turn=("y", 0.0 if w >= d else 90.0))
     return mesh
 
@@ -304,10 +320,10 @@ def _corners(long: float, near: float, far: float) -> list[tuple[float, float]]:
 
 
 @shape("LaundryHamper")
-def laundry_hamper(look: Look) -> Mesh:
+def laundry_hamper(appearance: Appearance) -> Mesh:
     """A tall oval basket of wicker with a lid; open, one sees the washing in it."""
-    w, h, d = look.size
-    mesh, wicker = Mesh(), look.pick(*_WICKERS)
+    w, h, d = appearance.size
+    mesh, wicker = Mesh(), appearance.pick(*_WICKERS)
     rim, turns = 0.88 * h, (8.0, 0.2)
     outline = [(0, 0.01), (0.38, 0), (0.46, rim), (0.47, rim + 0.02), (0.43, rim + 0.02)]
     outline += [(0.42, rim - 0.02), (0.37, 0.3 * h)]
@@ -317,7 +333,7 @@ def laundry_hamper(look: Look) -> Mesh:
         band = [(r, height - 0.015), (r + 0.015, height), (r, height + 0.015)]
         mesh.lathe(band, shaded(wicker, 0.75), squash=(w, d), segments=18)
     heap = [(0.37, 0.3 * h), (0.3, 0.5 * h), (0.12, 0.58 * h), (0, 0.56 * h)]
-    mesh.lathe(heap, look.pick(_LINEN, _LAUNDRY), "fabric", squash=(w, d), segments=12)
+    mesh.lathe(heap, appearance.pick(_LINEN, _LAUNDRY), "fabric", squash=(w, d), segments=12)
     lid = Mesh()
     top = h - rim - 0.02
     cover = [(0.42, 0), (0.5, 0), (0.5, 0.35 * top), (0.4, 0.75 * top), (0, 0.8 * top)]
@@ -327,5 +343,5 @@ def laundry_hamper(look: Look) -> Mesh:
         (0, 0.8 * top, 0), (0.1 * w, 0.4 * top, 0.1 * w), shaded(wicker, 0.6), segments=8, rings=4
     )
     hinge = (0, 0, -0.46 * d)
-    mesh.add(lid, at=(0, rim + 0.02, 0), turn=("x", -100.0 * look.openness), about=hinge)
+    mesh.add(lid, at=(0, rim + 0.02, 0), turn=("x", -100.0 * appearance.openness), about=hinge)
     return mesh

@@ -6,10 +6,12 @@ from math import pi
 
 import numpy as np
 
-from er_gym.sim.render.look import Look, mixed, shaded
-from er_gym.sim.render.mesh import Colour, Mesh
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.palette import mixed, shaded
+from er_gym.sim.render.patch import Colour
 from er_gym.sim.render.shapes.hangings import across, turned
-from er_gym.sim.render.shapes.table import shape
+from er_gym.sim.render.shapes.registry import shape
 
 _TOWELS = ((0.72, 0.24, 0.26), (0.22, 0.42, 0.62), (0.30, 0.55, 0.45), (0.85, 0.62, 0.30))
 _HAND_TOWELS = ((0.96, 0.93, 0.86), (0.93, 0.80, 0.55), (0.70, 0.85, 0.88), (0.95, 0.78, 0.80))
@@ -49,24 +51,24 @@ def _hanging(
 
 
 @shape("Towel")
-def towel(look: Look) -> Mesh:
+def towel(appearance: Appearance) -> Mesh:
     """A wide thick cloth folded over a bar, with stripes at its hem."""
-    w, h, d, along_z = across(look)
-    mesh, colour = Mesh(), look.pick(*_TOWELS)
+    w, h, d, along_z = across(appearance)
+    mesh, colour = Mesh(), appearance.pick(*_TOWELS)
     if h < 0.5 * min(w, max(d, 0.1)):
-        return _folded(look, colour)
+        return _folded(appearance, colour)
     _hanging(mesh, w, h, d, colour, (0.10, 0.17, 0.24), mixed(colour, _WHITE, 0.7))
     return turned(mesh, along_z)
 
 
 @shape("HandTowel")
-def hand_towel(look: Look) -> Mesh:
+def hand_towel(appearance: Appearance) -> Mesh:
     """A narrow cloth pinched at its top, wider and in folds below, with one coloured hem."""
-    w, h, d, along_z = across(look)
-    mesh, colour = Mesh(), look.pick(*_HAND_TOWELS)
-    tint = shaded(mixed(colour, look.palette.accent, 0.75), 0.9)
+    w, h, d, along_z = across(appearance)
+    mesh, colour = Mesh(), appearance.pick(*_HAND_TOWELS)
+    tint = shaded(mixed(colour, appearance.palette.accent, 0.75), 0.9)
     if h < 0.5 * min(w, max(d, 0.05)):
-        return _folded(look, colour)
+        return _folded(appearance, colour)
     rings = []
     tints = []
     for y, wide, deep in ((0, 1.0, 0.7), (0.1, 1.0, 0.7), (0.101, 1.0, 0.7), (0.2, 0.98, 0.7),
@@ -83,9 +85,9 @@ def hand_towel(look: Look) -> Mesh:
     return turned(mesh, along_z)
 
 
-def _folded(look: Look, colour: Colour) -> Mesh:
+def _folded(appearance: Appearance, colour: Colour) -> Mesh:
     """A cloth that lies folded in layers."""
-    w, h, d = look.size
+    w, h, d = appearance.size
     mesh = Mesh()
     for k in range(2):
         at = (0, h * (k + 0.5) / 2, 0)
@@ -94,10 +96,10 @@ def _folded(look: Look, colour: Colour) -> Mesh:
 
 
 @shape("TowelHolder")
-def towel_holder(look: Look) -> Mesh:
+def towel_holder(appearance: Appearance) -> Mesh:
     """A long bar held off the wall by two posts."""
-    w, h, d = look.size
-    mesh, metal = Mesh(), mixed(_CHROME, look.palette.metal, 0.4)
+    w, h, d = appearance.size
+    mesh, metal = Mesh(), mixed(_CHROME, appearance.palette.metal, 0.4)
     r = min(0.016, 0.4 * h)
     y, front = h / 2, d / 2 - 1.2 * r
     mesh.tube([(-w / 2, y, front), (w / 2, y, front)], r, metal, segments=8)
@@ -110,10 +112,10 @@ def towel_holder(look: Look) -> Mesh:
 
 
 @shape("HandTowelHolder")
-def hand_towel_holder(look: Look) -> Mesh:
+def hand_towel_holder(appearance: Appearance) -> Mesh:
     """A ring that hangs from a round plate."""
-    w, h, d = look.size
-    mesh, metal = Mesh(), mixed(_CHROME, look.palette.metal, 0.4)
+    w, h, d = appearance.size
+    mesh, metal = Mesh(), mixed(_CHROME, appearance.palette.metal, 0.4)
     thick = min(0.011, 0.3 * d)
     r = min(w, 0.85 * h) / 2 - thick
     top = h - 0.035
@@ -130,10 +132,10 @@ def hand_towel_holder(look: Look) -> Mesh:
 
 
 @shape("Cloth")
-def cloth(look: Look) -> Mesh:
+def cloth(appearance: Appearance) -> Mesh:
     """A crumpled rag of one colour, lying about; stained when dirty."""
-    w, h, d = look.size
-    mesh, random = Mesh(), look.random()
+    w, h, d = appearance.size
+    mesh, random = Mesh(), appearance.random()
     colour = _CLOTHS[int(random.integers(len(_CLOTHS)))]
     n = 9
     u = np.linspace(-0.5, 0.5, n)
@@ -150,7 +152,7 @@ def cloth(look: Look) -> Mesh:
     tint = np.array(colour) * (0.6 + 0.4 * bump[..., None])
     band = (np.abs(np.abs(x) - 0.375) < 0.01) | (np.abs(np.abs(z) - 0.375) < 0.01)
     tint = np.where(band[..., None], 0.5 * tint + 0.4 * np.array(_WHITE), tint)
-    if look.dirty:
+    if appearance.dirty:
         blot = np.hypot(x + 0.1, z - 0.08) < 0.24
         blot |= np.hypot(x - 0.26, z + 0.25) < 0.17
         tint = np.where(blot[..., None], _STAIN, tint * (0.72, 0.66, 0.56))
@@ -187,11 +189,11 @@ def _folds(
 
 
 @shape("Curtains")
-def curtains(look: Look) -> Mesh:
+def curtains(appearance: Appearance) -> Mesh:
     """Cloth in folds on a rod with knobs: one at each side where it is wide."""
-    w, h, d, along_z = across(look)
-    mesh, rod = Mesh(), shaded(look.palette.wood, 0.7)
-    colour = mixed(look.pick(*_DRAPES), look.palette.fabric, 0.35)
+    w, h, d, along_z = across(appearance)
+    mesh, rod = Mesh(), shaded(appearance.palette.wood, 0.7)
+    colour = mixed(appearance.pick(*_DRAPES), appearance.palette.fabric, 0.35)
     colours = colour, shaded(mixed(colour, _WHITE, 0.35), 0.9)
     r = min(0.022, 0.25 * d)
     if w > 1.4 and h > 0.8:
@@ -217,16 +219,16 @@ def curtains(look: Look) -> Mesh:
 
 
 @shape("ShowerCurtain")
-def shower_curtain(look: Look) -> Mesh:
+def shower_curtain(appearance: Appearance) -> Mesh:
     """A pale curtain on rings; gathered as recorded, drawn along the tub when open."""
-    w, h, d = look.size
-    along_z = not look.asset  # as their tubs lie
+    w, h, d = appearance.size
+    along_z = not appearance.asset  # as their tubs lie
     w, d = (d, w) if along_z else (w, d)
-    mesh, colour = Mesh(), look.pick(*_SHOWER)
-    right = -w / 2 + w * (1 + (_DRAWN - 1) * look.openness)
+    mesh, colour = Mesh(), appearance.pick(*_SHOWER)
+    right = -w / 2 + w * (1 + (_DRAWN - 1) * appearance.openness)
     ring, folds = 0.06, 7
-    deep = d * (0.9 - 0.6 * look.openness)
-    colours = colour, shaded(mixed(colour, look.palette.accent, 0.6), 0.95)
+    deep = d * (0.9 - 0.6 * appearance.openness)
+    colours = colour, shaded(mixed(colour, appearance.palette.accent, 0.6), 0.95)
     _folds(mesh, (-w / 2, right), (0, h - ring), deep, folds, colours)
     mesh.tube(
         [(-w / 2, h - 0.014, 0), (max(right, w / 2), h - 0.014, 0)], 0.014, _CHROME, segments=7
@@ -240,13 +242,16 @@ def shower_curtain(look: Look) -> Mesh:
 
 
 @shape("Blinds")
-def blinds(look: Look) -> Mesh:
+def blinds(appearance: Appearance) -> Mesh:
     """Slats under a rail; gathered at the top as recorded, let down over the window when open."""
-    w, h, d, along_z = across(look)
-    mesh, colour = Mesh(), look.pick(_CREAM, mixed(look.palette.wood, _CREAM, 0.35), _WHITE)
+    w, h, d, along_z = across(appearance)
+    mesh, colour = (
+        Mesh(),
+        appearance.pick(_CREAM, mixed(appearance.palette.wood, _CREAM, 0.35), _WHITE),
+    )
     short = h < 0.45
     rest = h if short else 0.2
-    drop = rest + look.openness * ((_LET_DOWN - 1) * h if short else h - rest)
+    drop = rest + appearance.openness * ((_LET_DOWN - 1) * h if short else h - rest)
     rail = min(0.05, 0.3 * rest)
     mesh.box((0, h - rail / 2, 0), (w, rail, d), shaded(colour, 0.9))
     slats = max(8, min(28, round(_LET_DOWN * rest / _SLAT)))

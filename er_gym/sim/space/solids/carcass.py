@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.scene import PROPERTIES, Scene, load_scene
+from er_gym.sim.space.recorded_surfaces import recorded_surfaces
 from er_gym.sim.space.solids.built_in import Front, Rectangle, built_in, fronts
-from er_gym.sim.space.solids.counters import rectangles
-from er_gym.sim.space.surfaces import recorded_surfaces
+from er_gym.sim.space.solids.counter_tops import rectangles
 
 SLAB = 0.035
 """Thickness of a counter's slab, metres."""

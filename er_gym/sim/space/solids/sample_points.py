@@ -22,7 +22,7 @@ from er_gym.sim.space.solids.surface_points import (
 )
 from er_gym.sim.world_cache import ObjectCacheKey
 
-SOLID = ("Drawer", "Cabinet", "CounterTop", "StoveBurner")
+SEEN_FROM_OUTSIDE = ("Drawer", "Cabinet", "CounterTop", "StoveBurner")
 """Types that are seen from outside only: their own boxes hide the points on their far sides."""
 SLABS = (
     "CounterTop", "Desk", "CoffeeTable", "SideTable", "DiningTable", "Dresser", "TVStand", "Sofa",
@@ -92,14 +92,14 @@ def _make_points(world: SceneObjects, i: int) -> Floats:
         return points_on_top(np.array([world.low[i], world.high[i]]))
     if kind == "CounterTop" and i < len(world.scene):
         return np.concatenate([_slab(box) for box in carcass(world.scene.name, i).slab])
-    if kind == "Drawer" or kind in _FROM_OUTSIDE:
+    if kind == "Drawer" or kind in _POINTS_FROM_OUTSIDE:
         middle, size, yaw = upright_box(world, i)
         built_in = i in hosts(world.scene.name)
         box = np.array([-size / 2, size / 2])
         if kind == "Drawer":
             points: Floats = _drawer(box, world.state(i, "isOpen"))
         else:
-            points = _FROM_OUTSIDE[kind](box, built_in)
+            points = _POINTS_FROM_OUTSIDE[kind](box, built_in)
         return np.asarray(points @ unity_rotation((0.0, yaw, 0.0)).T + middle)
     inset = INSET
     if kind in _ROUND or (kind not in _SQUARE and world.has(i, "pickupable")):
@@ -138,7 +138,7 @@ def _shelf(box: Floats, built_in: bool) -> Floats:
     return _slab(board, 0.005, 0.0)
 
 
-_FROM_OUTSIDE = {"Cabinet": _cabinet, "Shelf": _shelf}
+_POINTS_FROM_OUTSIDE = {"Cabinet": _cabinet, "Shelf": _shelf}
 
 
 def _slab(box: Floats, above: float = _OUT, out: float = _OUT) -> Floats:

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from er_gym.sim.scene import Scene
 from er_gym.sim.scene_objects import SceneObjects
+from er_gym.sim.space.recorded_surfaces import recorded_surfaces
 from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.solids.box_transforms import trimmed, turned
 from er_gym.sim.space.solids.carcass import carcass
-from er_gym.sim.space.solids.counters import rectangles
+from er_gym.sim.space.solids.counter_tops import rectangles
 from er_gym.sim.space.solids.facing import facings
 from er_gym.sim.space.solids.families import family, parts
-from er_gym.sim.space.surfaces import recorded_surfaces
 from er_gym.sim.world_cache import ObjectCacheKey
 
 _HOB, _UNDER = 0.03, 0.004

@@ -1,0 +1,170 @@
+"""Putting a thing at a point, wherever the agent is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er_gym.sim import consequences
+from er_gym.sim.actions.checks import FARTHEST, within
+from er_gym.sim.actions.pick_place import fall, shift
+from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.errors import ActionFailed
+from er_gym.sim.space.clearance import Clearance
+from er_gym.sim.space.placement import spawn_points
+from er_gym.sim.space.receptacles import receptacles_of
+from er_gym.sim.world import World
+
+_LIFT = 0.01
+"""How far over a surface the points lie that GetSpawnCoordinatesAboveReceptacle tells, metres."""
+
+
+@action("GetSpawnCoordinatesAboveReceptacle")
+def get_spawn_coordinates(
+    world: World, *, objectId: str, anywhere: bool = True
+) -> list[dict[str, float]]:
+    """Points a little over the surface of a receptacle, 5 cm apart, metres.
+
+    Args:
+        anywhere: else only those in the agent's picture.
+    """
+    i = world.find(objectId)
+    if not world.has(i, "receptacle"):
+        raise ActionFailed(f"{objectId} is not a receptacle.")
+    points = spawn_points(world, i, None if anywhere else world.agent)
+    return [{"x": x, "y": y + _LIFT, "z": z} for x, y, z in points.tolist()]
+
+
+def _loose(world: World, object_id: str) -> int:
+    i = world.find(object_id)
+    if not (world.has(i, "pickupable") or world.has(i, "moveable")):
+        raise ActionFailed(f"{object_id} can neither be picked up nor moved.")
+    return i
+
+
+def _sane(*vectors: Vector | None) -> None:
+    for vector in vectors:
+        for axis in "xyz" if vector is not None else "":
+            within(axis, getattr(vector, axis), -FARTHEST, FARTHEST)
+
+
+def _array(vector: Vector) -> np.ndarray:
+    return np.array([vector.x, vector.y, vector.z])
+
+
+def _settle(world: World, i: int, stays: bool) -> None:
+    """Say in what object i lies now; unless it stays where it is, it falls if in nothing."""
+    if i == world.held:
+        world.held = -1
+    parents = receptacles_of(world, i)
+    if parents or stays:
+        world.relocate(i, parents)
+        consequences.apply(world)
+    else:
+        fall(world, i, (world.low[i] + world.high[i]) / 2)
+
+
+def _around(world: World, point: np.ndarray) -> tuple[int, ...]:
+    """The furniture whose box a (3,) point is in: that box has air in it, as a cabinet's has."""
+    within = ((world.low <= point) & (point <= world.high)).all(axis=1)
+    return tuple(
+        k
+        for k in np.flatnonzero(within).tolist()
+        if world.has(k, "receptacle") and not world.has(k, "pickupable")
+    )
+
+
+def _moved(
+    world: World,
+    i: int,
+    rotation: Vector | None,
+    position: np.ndarray,
+    forced: bool,
+    standing: bool = False,
+) -> str | None:
+    """Put object i somewhere; what is in the way there, if it is not forced and then not done.
+
+    Args:
+        standing: the position is where the middle of its underside goes.
+    """
+    rows = [i, *world.inside(i)]
+    arrays = (world.position, world.rotation, world.low, world.high)
+    were = [array[rows].copy() for array in arrays]
+    if rotation is not None:
+        world.set_pose(i, world.position[i].copy(), _array(rotation))
+    if standing:
+        foot = (world.low[i] + world.high[i]) / 2
+        foot[1] = world.low[i, 1]
+        position = world.position[i] + position - foot
+    offset = position - world.position[i]
+    foot = (world.low[i] + world.high[i]) / 2 + offset
+    foot[1] = world.low[i, 1] + offset[1]
+    clearance = Clearance(world, i, _around(world, foot))
+    obstacle = None if forced else clearance.obstacle(offset, anew=True)
+    if obstacle is None:
+        shift(world, i, offset)
+        return None
+    for array, was in zip(arrays, were, strict=True):
+        array[rows] = was
+    world.move_by(i, np.zeros(3))
+    return obstacle
+
+
+@action("PlaceObjectAtPoint")
+def place_object_at_point(
+    world: World,
+    *,
+    objectId: str,
+    position: Vector,
+    rotation: Vector | None = None,
+    forceKinematic: bool = False,
+) -> None:
+    """Stand an object with its underside on a point, if nothing is in the way there; metres.
+
+    What then lies in nothing falls, unless ``forceKinematic`` holds it.
+    """
+    _sane(position, rotation)
+    i = _loose(world, objectId)
+    obstacle = _moved(world, i, rotation, _array(position), forced=False, standing=True)
+    if obstacle is not None:
+        raise ActionFailed(f"spawn area not clear ({obstacle}), can't place object at that point")
+    _settle(world, i, forceKinematic)
+
+
+@action("TeleportObject")
+def teleport_object(
+    world: World,
+    *,
+    objectId: str,
+    position: Vector | None = None,
+    positions: list[Vector] | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    z: float | None = None,
+    rotation: Vector | None = None,
+    forceAction: bool = False,
+    allowTeleportOutOfHand: bool = False,
+    forceKinematic: bool = False,
+    makeUnbreakable: bool = False,
+    includeErrorMessage: bool = False,
+) -> None:
+    """Put an object's position at a point, or at the first of several that is free; metres.
+
+    ``forceAction`` asks for no room. What then lies in nothing falls, unless ``forceKinematic``
+    holds it. ``makeUnbreakable`` and ``includeErrorMessage`` have no effect.
+    """
+    if x is not None and y is not None and z is not None:
+        position = Vector(x=x, y=y, z=z)
+    wanted = [position] if position is not None else list(positions or ())
+    if not wanted:
+        raise ActionFailed("Give a position, or positions, to teleport the object to.")
+    _sane(rotation, *wanted)
+    i = _loose(world, objectId)
+    if i == world.held and not allowTeleportOutOfHand:
+        raise ActionFailed("Cannot teleport object while it is being held.")
+    obstacle = None
+    for each in wanted:
+        obstacle = _moved(world, i, rotation, _array(each), forceAction)
+        if obstacle is None:
+            _settle(world, i, forceKinematic)
+            return
+    raise ActionFailed(f"{objectId} would collide with {obstacle} there.")

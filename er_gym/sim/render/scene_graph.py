@@ -1,0 +1,170 @@
+"""The scene graph of a room: what of it is drawn, and where.
+
+Nothing is drawn anew that looks as it did: a thing's triangles are kept by its look, its node by
+its look, heading and number, and of a world's objects only those are looked at that have changed.
+
+Yet a picture depends on the world alone, whatever was drawn before. Of surfaces at the same depth
+the one drawn first is seen: the room's, then the objects', in an order that they themselves say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from er_gym.sim.render.appearance import Appearance, appearance_of
+from er_gym.sim.render.camera import Camera
+from er_gym.sim.render.carcasses import carcasses
+from er_gym.sim.render.fixtures import fixtures
+from er_gym.sim.render.lighting import lit_colours
+from er_gym.sim.render.panda import (
+    DRAWING,
+    MOST_INSTANCES,
+    Frames,
+    core,
+    geometry,
+    rasteriser,
+)
+from er_gym.sim.render.patch import Patch
+from er_gym.sim.render.room_shell import room_shell
+from er_gym.sim.render.shapes import UNSEEN, build
+from er_gym.sim.space.solids import Solid, solid_of
+from er_gym.sim.world import World
+from er_gym.sim.world_cache import CacheKey
+
+_SCENES = 64
+"""Rooms whose graphs are kept."""
+_SHOWN: CacheKey[object] = CacheKey("state that a scene graph shows")
+_NODES = 2048
+_BEFORE = 8
+"""What is no object is drawn before what is: the order of that begins here, below zero."""
+_HEADING = 1.0
+"""Things are lit as if they stood at a multiple of so many degrees."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """An object in the graph, and what it was placed by."""
+
+    appearance: Appearance
+    solid: Solid
+    order: int
+    path: Any
+
+
+class SceneGraph:
+    """The graph of one scene; use :func:`scene_graph_of`."""
+
+    def __init__(self, scene_name: str) -> None:
+        self._name = scene_name
+        self._build()
+        self._state: object | None = object()  # whose world it shows; None while it changes
+
+    def draw(self, world: World, camera: Camera, depth: bool = False) -> Frames:
+        """What a camera sees of a world of this scene; object i is instance i + 1.
+
+        Several threads may draw at once; they take turns.
+        """
+        with DRAWING:
+            self._follow(world)
+            return rasteriser().draw(self._root, camera, depth)
+
+    def _build(self) -> None:
+        """The room without its objects."""
+        self._root = core().NodePath(self._name)
+        self._placed: dict[int, _Placed] = {}
+        shell = room_shell(self._name)
+        around = {"room": shell.rest, "fixtures": fixtures(self._name)}
+        for k, (name, patches) in enumerate({**around, "carcasses": carcasses(self._name)}.items()):
+            self._root.attachNewNode(_drawn(patches, 0, name), k - _BEFORE)
+        self._floor, self._floor_number = shell.floor, -1
+
+    def _follow(self, world: World) -> None:
+        """Change what has changed in the world."""
+        before, self._state = self._state, None
+        if before is None:  # an exception left it half changed
+            self._build()
+        elif world.cache.state.get(_SHOWN) is before:
+            for i in world.in_hand:  # nothing has changed, but where the hand is
+                if i in self._placed:
+                    self._place(world, i, self._placed[i].order)
+            self._state = before
+            return
+        shown, order = (~world.hidden).tolist(), _order(world)
+        for i in range(max(len(world), max(self._placed, default=-1) + 1)):
+            if i >= len(world) or not shown[i]:
+                self._remove(i)
+            elif world.types[i] in UNSEEN:
+                self._lay_floor(i)
+            else:
+                self._place(world, i, order[i])
+        self._state = world.cache.state.put(_SHOWN, object())
+
+    def _lay_floor(self, i: int) -> None:
+        if self._floor_number != i + 1:
+            self._root.attachNewNode(_drawn(self._floor, i + 1, "floor"), -1)
+            self._floor_number = i + 1
+
+    def _remove(self, i: int) -> None:
+        placed = self._placed.pop(i, None)
+        if placed is not None:
+            placed.path.removeNode()
+
+    def _place(self, world: World, i: int, order: int) -> None:
+        seen, solid, before = appearance_of(world, i), solid_of(world, i), self._placed.get(i)
+        same = before is not None and before.appearance == seen and before.order == order
+        if before is not None and same and before.solid is solid:
+            return
+        heading = _heading(solid)
+        if before is not None and same and _heading(before.solid) == heading:
+            path = before.path
+        else:
+            self._remove(i)
+            number = i + 1 if i < MOST_INSTANCES else 0  # copies without end have no instance
+            # A copy, with the same triangles: where it stands is a property of the node.
+            path = self._root.attachNewNode(_node(seen, heading, number).makeCopy(), order)
+        x, y, z = solid.middle.tolist()
+        path.setPosHpr(x, z, y + float(solid.upright[:, 0, 1].min()), -solid.yaw, 0.0, 0.0)
+        self._placed[i] = _Placed(seen, solid, order, path)
+
+
+def _order(world: World) -> list[int]:
+    """Which objects are drawn first: the recorded ones by row, then the others by name.
+
+    In which rows slices and copies are depends on what was made first.
+    """
+    recorded = len(world.scene)
+    others = sorted(range(recorded, len(world)), key=lambda i: world.names[i])
+    rank = {i: recorded + k for k, i in enumerate(others)}
+    return [*range(recorded), *(rank[i] for i in range(recorded, len(world)))]
+
+
+def _heading(solid: Solid) -> float:
+    return round(solid.yaw / _HEADING) * _HEADING % 360.0
+
+
+def _drawn(patches: dict[str, Patch], number: int, name: str) -> Any:
+    """A node of triangles that are lit already."""
+    parts = [(m, p.vertices, p.colours, p.uv, p.triangles) for m, p in patches.items()]
+    return geometry(parts, number, name)
+
+
+@lru_cache(maxsize=_NODES)
+def _node(seen: Appearance, heading: float, number: int) -> Any:
+    parts = [
+        (m, p.vertices, lit_colours(m, p, heading, seen.size[1], seen.height), p.uv, p.triangles)
+        for m, p in build(seen).items()
+    ]
+    return geometry(parts, number, seen.kind)
+
+
+@lru_cache(maxsize=_SCENES)
+def _scene_graph(scene_name: str) -> SceneGraph:
+    return SceneGraph(scene_name)
+
+
+def scene_graph_of(scene_name: str) -> SceneGraph:
+    """The graph of a scene; those of the scenes last drawn are kept."""
+    with DRAWING:  # or two threads would make two
+        return _scene_graph(scene_name)

@@ -1,0 +1,52 @@
+"""The table from object type to shape."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+from er_gym.sim.render.appearance import Appearance
+from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.patch import Patch
+
+Shape = Callable[[Appearance], Mesh]
+SHAPES: dict[str, Shape] = {}
+"""Object type to what draws it."""
+UNSEEN = frozenset({"Floor"})
+"""Types that are drawn with the room."""
+_KEPT = 256
+
+
+def shape(*kinds: str) -> Callable[[Shape], Shape]:
+    """Register a function as the shape of some object types."""
+
+    def register(function: Shape) -> Shape:
+        for kind in kinds:
+            if kind in SHAPES:
+                raise ValueError(f"{kind} has two shapes")
+            SHAPES[kind] = function
+        return function
+
+    return register
+
+
+@lru_cache(maxsize=_KEPT)
+def build(appearance: Appearance) -> dict[str, Patch]:
+    """The triangles of a thing by material; a plain box for types without a shape."""
+    function = SHAPES.get(appearance.kind, _plain_box)
+    return function(appearance).patches()
+
+
+def _plain_box(appearance: Appearance) -> Mesh:
+    mesh = Mesh()
+    mesh.box(
+        (0.0, appearance.size[1] / 2, 0.0),
+        appearance.size,
+        appearance.pick(appearance.palette.accent),
+    )
+    return mesh
+
+
+def without_shape(kinds: list[str]) -> list[str]:
+    """Those of some types that have no shape yet."""
+    return [kind for kind in kinds if kind not in SHAPES and kind not in UNSEEN]

@@ -1,0 +1,148 @@
+"""From where an object can be interacted with: AI2-THOR's ``GetInteractablePoses``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.agent import CAMERA_CROUCHING, CAMERA_STANDING, Agent
+from er_gym.sim.space.line_of_sight_builder import lines_of_sight
+from er_gym.sim.space.outlines import Outlines
+from er_gym.sim.space.solids import solid_of
+from er_gym.sim.space.solids.sample_points import sample_points
+from er_gym.sim.space.visibility import in_frustum, visible
+from er_gym.sim.world import World
+
+HORIZONS = (-30.0, 0.0, 30.0, 60.0)
+"""Camera tilts that AI2-THOR tries when none are asked for, degrees, down positive."""
+_REMEMBERED = 64
+"""Answers over more positions than these are not kept."""
+_BATCH = 64
+"""Camera positions that one call of the ray kernel looks from."""
+
+Poses = NDArray[np.float64]
+"""(K, 6): x, y and z in metres, rotation and horizon in degrees, 1 for standing or 0."""
+
+
+def interactable_poses(
+    world: World,
+    i: int,
+    positions: NDArray[np.float64],
+    rotations: Sequence[float],
+    horizons: Sequence[float],
+    standings: Sequence[bool],
+    max_poses: int | None = None,
+    max_distance: float | None = None,
+) -> Poses:
+    """Poses from which object i is visible, hence can be interacted with.
+
+    Args:
+        positions: (P, 2) x and z where the agent may stand, tried in order.
+        rotations, horizons: degrees. standings: whether to stand or crouch.
+        max_poses: stop after so many.
+        max_distance: metres that the object may be away; the visibility distance if None.
+    """
+    distance = world.settings.visibility_distance if max_distance is None else max_distance
+    filters = (tuple(rotations), tuple(horizons), tuple(standings), max_poses, distance)
+
+    def search() -> Poses:
+        found = _search(world, i, positions, *filters)
+        found.setflags(write=False)
+        return found
+
+    in_hand = i in world.in_hand
+    one = len(positions) == len(rotations) == len(horizons) == len(standings) == 1
+    if one and not in_hand and max_distance is None:
+        # Whoever asks for one pose will take it next, and look about: that is asked for already.
+        return _one_pose(world, i, positions[0], rotations[0] % 360.0, horizons[0], standings[0])
+    # Where the hand is, is no part of an arrangement; and the poses of a whole room take megabytes.
+    if in_hand or len(positions) > _REMEMBERED:
+        return search()
+    settings = world.settings
+    lens = (settings.field_of_view, settings.width / settings.height)
+    question = (i, positions.tobytes(), filters, lens, world.agent.position[1])
+    return lines_of_sight(world).cached(question, search)
+
+
+def _search(
+    world: World,
+    i: int,
+    positions: NDArray[np.float64],
+    rotations: Sequence[float],
+    horizons: Sequence[float],
+    standings: Sequence[bool],
+    max_poses: int | None,
+    distance: float,
+) -> Poses:
+    found = [np.empty((0, 6))]
+    if world.hidden[i]:
+        return found[0]
+    settings = world.settings
+    near = _within_reach(world, i, positions, distance)
+    yaws, tilts = np.array(rotations) % 360.0, np.array(horizons)
+    upright = np.array(standings, dtype=bool)
+    lifts = np.where(upright, CAMERA_STANDING, CAMERA_CROUCHING)
+    eyes, count = np.empty((len(near) * len(lifts), 3)), 0
+    eyes[:, [0, 2]] = np.repeat(near, len(lifts), axis=0)
+    eyes[:, 1] = world.agent.position[1] + np.tile(lifts, len(near))
+    for first in range(0, len(eyes), _BATCH):
+        batch = eyes[first : first + _BATCH]
+        points, clear = _lines_to(world, i, batch)
+        eye, point = clear.nonzero()
+        if not len(eye):
+            continue
+        in_picture = in_frustum(
+            (points[point] - batch[eye])[:, None, None],
+            yaws[:, None],
+            tilts,
+            settings.field_of_view,
+            settings.width / settings.height,
+        )
+        some, where = np.unique(eye, return_index=True)
+        eye, yaw, tilt = np.logical_or.reduceat(in_picture, where).nonzero()
+        place, body = np.divmod(first + some[eye], len(lifts))
+        poses = np.empty((len(eye), 6))
+        poses[:, [0, 2]], poses[:, 1] = near[place], world.agent.position[1]
+        poses[:, 3], poses[:, 4], poses[:, 5] = yaws[yaw], tilts[tilt], upright[body]
+        found.append(poses)
+        count += len(poses)
+        if max_poses is not None and count >= max_poses:
+            break
+    return np.concatenate(found)[:max_poses]
+
+
+def _one_pose(
+    world: World,
+    i: int,
+    position: NDArray[np.float64],
+    rotation: float,
+    horizon: float,
+    standing: bool,
+) -> Poses:
+    x, y, z = float(position[0]), float(world.agent.position[1]), float(position[1])
+    pose = Agent(np.array([x, y, z]), rotation, horizon, standing)
+    if not visible(world, pose)[i]:
+        return np.empty((0, 6))
+    return np.array([[x, y, z, rotation, horizon, standing]])
+
+
+def _within_reach(
+    world: World, i: int, positions: NDArray[np.float64], distance: float
+) -> NDArray[np.float64]:
+    """Those of (P, 2) positions that object i is within so many metres of."""
+    away = np.abs(np.array(lines_of_sight(world).extent)[:, None] - positions).max(
+        axis=0, initial=0.0
+    )
+    if i not in world.in_hand and (np.hypot(away[:, 0], away[:, 1]) <= distance).all():
+        return positions  # all that there is, is
+    return positions[Outlines.of([solid_of(world, i)]).gaps(positions)[:, 0] <= distance]
+
+
+def _lines_to(
+    world: World, i: int, eyes: NDArray[np.float64]
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Object i's sample points (Q, 3), and (E, Q) from which eyes (E, 3) nothing hides which."""
+    points = sample_points(world, i).astype(np.float32)
+    return points, lines_of_sight(world).unobstructed(eyes, points, i)

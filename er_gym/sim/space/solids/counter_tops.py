@@ -1,0 +1,130 @@
+"""Counters that bend: what the agent's body leaves over of their boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.scene import load_scene
+from er_gym.sim.space.recorded_floor import recorded_cells
+from er_gym.sim.space.solids.built_in import Front, Rectangle, fronts
+
+_CELL = 0.05
+_AGENT_RADIUS = 0.2
+_NEIGHBOURS = frozenset({"Fridge", "DiningTable", "SideTable", "Dresser", "Sofa", "ArmChair"})
+_OVERHANG = 0.04
+"""How far a counter juts out over the fronts under it, metres."""
+_OPENS = 0.35
+"""So far before a front there is no counter, metres."""
+_IN_LINE, _GAP = 0.06, 0.8
+"""How much cabinets of one row may be apart, ahead and to the side, metres."""
+_NARROW = 0.15
+"""Strips of counter that are narrower than this are left out, metres."""
+
+
+@lru_cache(maxsize=512)
+def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
+    """(R, 2, 2) corners x, z of the rectangles that the box of recorded object i comes down to.
+
+    What the agent's body sweeps as it walks is free floor, whatever the box says. Where other
+    large furniture stands there is no counter either, nor right before a cabinet or a drawer. The
+    largest rectangle of the rest is taken, then the largest of what that leaves, and so on. A box
+    that is swept altogether is left whole: one can walk under it.
+    """
+    scene = load_scene(scene_name)
+    low = (scene.aabb_center[i] - scene.aabb_size[i] / 2)[[0, 2]]
+    high = low + scene.aabb_size[i][[0, 2]]
+    first, left = _not_swept(scene_name, low, high)
+    for k, kind in enumerate(scene.types):
+        if kind in _NEIGHBOURS:
+            reach = scene.aabb_size[k][[0, 2]] / 2
+            edges = scene.aabb_center[k][[0, 2]] + np.array([-reach, reach])
+            (x0, z0), (x1, z1) = np.clip(np.ceil((edges - first) / _CELL), 0, None).astype(int)
+            left[x0:x1, z0:z1] = False
+    for x0, z0, x1, z1 in _before_fronts(scene_name, i, low, high):
+        a, b = np.clip(np.ceil((np.array([[x0, z0], [x1, z1]]) - first) / _CELL), 0, None).astype(
+            int
+        )
+        left[a[0] : b[0], a[1] : b[1]] = False
+    found = []
+    while True:
+        x0, x1, z0, z1 = _largest_rectangle(left)
+        edges = first + _CELL * (np.array([(x0, z0), (x1, z1)]) - 0.5)
+        corners = np.clip(edges, low, high)
+        if (corners[1] - corners[0] < np.minimum(_NARROW, high - low)).any():
+            break
+        found.append(corners)
+        left[x0:x1, z0:z1] = False
+    boxes = np.array(found or [np.array([low, high])])
+    boxes.setflags(write=False)
+    return boxes
+
+
+def _before_fronts(
+    scene_name: str, i: int, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> Iterator[Rectangle]:
+    """Where doors and drawers under counter i open: not where its box ends anyway."""
+    rows: dict[tuple[int, int], list[Front]] = {}
+    for front in fronts(scene_name, i):
+        rows.setdefault((front.axis, front.sign), []).append(front)
+    for (axis, sign), row in rows.items():
+        # One row of cabinets has gaps, for an oven or a dishwasher.
+        spans: list[list[float]] = []
+        for front in sorted(row, key=lambda f: (round(f.at, 1), f.low)):
+            last = spans[-1] if spans else [np.inf, 0.0, 0.0]
+            if abs(front.at - last[0]) < _IN_LINE and front.low - last[2] < _GAP:
+                last[2] = max(last[2], front.high)
+                last[0] = sign * max(sign * front.at, sign * last[0])
+            else:
+                spans.append([front.at, front.low, front.high])
+        for at, first, last_end in spans:
+            near, far = at + sign * _OVERHANG, at + sign * _OPENS
+            end = high[axis] if sign > 0 else low[axis]
+            if sign * (end - far) > 0.0:
+                across = sorted((near, far))
+                ends = [0.0] * 4
+                ends[axis], ends[axis + 2] = across
+                ends[1 - axis], ends[3 - axis] = first, last_end
+                yield ends[0], ends[1], ends[2], ends[3]
+
+
+def _not_swept(
+    scene_name: str, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """The centre (2,) of the first cell over an area, metres, and which of its cells are free."""
+    swept = recorded_cells(scene_name, _CELL).grown(_AGENT_RADIUS)
+    origin = swept.origin
+    from_cell = np.round((low - origin) / _CELL).astype(int)
+    to_cell = np.round((high - origin) / _CELL).astype(int) + 1
+    free = np.ones(to_cell - from_cell, dtype=bool)
+    inner_low, inner_high = np.maximum(from_cell, 0), np.minimum(to_cell, swept.on.shape)
+    if (inner_low < inner_high).all():
+        (x0, z0), (x1, z1) = inner_low, inner_high
+        dx, dz = inner_low - from_cell
+        free[dx : dx + x1 - x0, dz : dz + z1 - z0] = ~swept.on[x0:x1, z0:z1]
+    return origin + from_cell * _CELL, free
+
+
+def _largest_rectangle(cells: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """The rectangle x0, x1, z0, z1 (half-open) of most true cells.
+
+    Row by row, each column has a run of true cells that ends there: the largest rectangle under a
+    histogram, found with a stack of columns of rising height.
+    """
+    best, area = (0, 0, 0, 0), 0
+    runs = [0] * cells.shape[1]
+    for x, row in enumerate(cells.tolist()):
+        runs = [run + 1 if true else 0 for run, true in zip(runs, row, strict=True)]
+        rising: list[tuple[int, int]] = []  # (first column, height)
+        for z, run in enumerate([*runs, 0]):
+            start = z
+            while rising and rising[-1][1] >= run:
+                start, height = rising.pop()
+                if height * (z - start) > area:
+                    area = height * (z - start)
+                    best = (x + 1 - height, x + 1, start, z)
+            rising.append((start, run))
+    return best
