@@ -50,7 +50,7 @@ def test_glass_and_lattices_hide_nothing():
 def test_few_boxes_hide_things():
     """Each costs time in every line of sight: there are fewer than objects."""
     worlds = [World.load(load_scene(name), Settings()) for name in SCENE_NAMES[::10]]
-    assert sum(len(lines_of_sight(w).low) for w in worlds) < sum(len(w) for w in worlds)
+    assert sum(len(lines_of_sight(w).box_low) for w in worlds) < sum(len(w) for w in worlds)
 
 
 # -- in the world ----------------------------------------------------------------------------------

@@ -18,14 +18,14 @@ import numpy as np
 from er_gym.sim.render.panda import RenderDeviceError, use_device
 from tests.sim.render.test_scene_graph import camera_of, stand, world_of
 use_device(sys.argv[1])
-from er_gym.sim.render.scene_graph import stage
+from er_gym.sim.render.scene_graph import scene_graph_of
 found = {}
 try:
     for scene, pose in (("FloorPlan1", (-0.5, 1.5, 150.0)), ("FloorPlan403", (-0.75, 1.75, 0.0))):
         world = world_of(scene)
         stand(world, *pose)
         for size in ((200, 150), (320, 240)):
-            frames = stage(scene).draw(world, camera_of(world, *size), depth=True)
+            frames = scene_graph_of(scene).draw(world, camera_of(world, *size), depth=True)
             name = f"{scene}-{size[0]}"
             found["rgb-" + name], found["ids-" + name] = frames.rgb, frames.ids
             found["depth-" + name] = frames.depth
