@@ -1,6 +1,6 @@
-"""What follows from what: water washes, flames cook, the fridge cools.
+"""The side effects of the world: running water washes and fills, heat cooks, the fridge cools.
 
-Applied after every action that changes the world; idempotent.
+:func:`apply` runs after every action that changes the world. Running it twice changes nothing more.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from er_gym.sim.world import World
 
 HOT, COLD = "Hot", "Cold"
 _SINK_REACH = 1.0
-"""A faucet feeds the nearest basin within so many metres of it."""
+"""A faucet feeds the nearest basin within this distance, metres."""
 
 
 def _basin_of(world: World, faucet: int) -> int | None:
-    """The basin that a faucet runs into: the nearest one."""
+    """The row of the nearest basin, which the faucet runs into; None if none is near."""
     basins = list(world.of_type("SinkBasin", "BathtubBasin")) or list(
         world.of_type("Sink", "Bathtub")
     )
@@ -31,14 +31,14 @@ def _basin_of(world: World, faucet: int) -> int | None:
 
 
 def fill(world: World, i: int, liquid: str) -> None:
-    """Fill object i, which keeps what it was filled with first."""
+    """Fill object i. A vessel that is filled already keeps its liquid."""
     if world.has(i, "canFillWithLiquid") and not world.state(i, "isFilledWithLiquid"):
         world.set_state(i, "isFilledWithLiquid", True)
         world.fill_liquid[i] = liquid
 
 
 def cook(world: World, i: int) -> None:
-    """Cook object i if it can be."""
+    """Heat object i, and cook it if it is cookable."""
     world.set_temperature(i, HOT)
     if world.has(i, "cookable") and not world.state(i, "isCooked"):
         world.set_state(i, "isCooked", True)
@@ -86,7 +86,7 @@ def _switched_on(world: World) -> Iterator[tuple[int, Callable[[World, int], Non
 
 
 def apply(world: World) -> None:
-    """Let everything that is on do its work."""
+    """Apply the effects of everything that is switched on, and of the fridges."""
     for i, effect in _switched_on(world):
         effect(world, i)
     for fridge in world.of_type("Fridge"):

@@ -19,7 +19,7 @@ from er_gym.sim.render.view import View
 _TAKEN = frozenset(
     {"server_class", "start_unity", "local_executable_path", "local_build", "platform", "host"}
 )
-"""Arguments of the official controller that choose a Unity build; they mean nothing here."""
+"""Arguments of the official controller that choose a Unity build; refused here."""
 
 
 _READ_BY_EVENT = ("screenWidth", "screenHeight", "colors")
@@ -27,13 +27,13 @@ _RENAMED = {
     "renderClassImage": "renderSemanticSegmentation",
     "renderObjectImage": "renderInstanceSegmentation",
 }
-"""Old names of arguments, which the client goes on accepting for any action."""
+"""Old names of arguments. The client still accepts them for any action."""
 
 
 class EventMetadata(LazyMetadata, ai2thor.server.MetadataWrapper):  # type: ignore[misc]  # untyped
-    """Lazy, the receiver's own to change, and with the client's aliases for old keys.
+    """Metadata that are computed when read, that the caller may change, and that know old keys.
 
-    What reads them as a whole, such as ``dict`` or ``json``, finds plain dictionaries.
+    ``dict`` and ``json`` read them as a whole and find plain dictionaries.
     """
 
     instead: ClassVar = {"objects": writable_objects}
@@ -46,16 +46,16 @@ class EventMetadata(LazyMetadata, ai2thor.server.MetadataWrapper):  # type: igno
 
 
 class EmbeddedEvent(ai2thor.server.Event):  # type: ignore[misc]  # untyped
-    """An event that keeps lazy metadata lazy, and is gone as soon as nobody keeps it."""
+    """An event that keeps lazy metadata lazy and is freed as soon as nobody refers to it."""
 
     def __init__(self, metadata: LazyMetadata) -> None:
-        # Event copies the metadata it is given, and a copy has to have everything worked out.
+        # Event copies the metadata that it gets, and a copy computes every value.
         super().__init__({name: metadata[name] for name in _READ_BY_EVENT})
         self.metadata = metadata
 
     @property
     def events(self) -> list[EmbeddedEvent]:
-        """Itself, as if there were several agents."""
+        """The events of all agents: there is only one agent."""
         return [self]
 
     @events.setter
@@ -65,7 +65,7 @@ class EmbeddedEvent(ai2thor.server.Event):  # type: ignore[misc]  # untyped
 
 
 class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is untyped
-    """Stands where the client's pipe to Unity would be: ``send`` acts, ``receive`` hands over."""
+    """Replaces the client's pipe to Unity: ``send`` acts, ``receive`` returns the event."""
 
     server_type = "EMBEDDED"
 
@@ -77,18 +77,18 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
         self.unity_proc = self
 
     def start(self) -> None:
-        """Begin; the first event, which the client waits for, is the scene at rest."""
+        """Start. The client waits for a first event, which shows the scene before any action."""
         self.started = True
         self.send({"action": "Pass", "renderImage": False})
 
     def stop(self) -> None:
-        """End; there is no process to end."""
+        """Stop. There is no process to end."""
         self.started = False
 
     def send(self, action: dict[str, Any]) -> None:
-        """Do an action at once."""
+        """Do an action and keep its event for :meth:`receive`."""
         if action.get("action") == "Reset":
-            # The client drops this event for that of the Initialize which it sends next.
+            # The client drops this event in favour of that of the Initialize which it sends next.
             action = {**action, "renderImage": False}
         metadata, frames = self._engine.step(action)
         event = EmbeddedEvent(metadata)
@@ -102,14 +102,14 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
         return event
 
     def _attach(self, event: ai2thor.server.Event, view: View) -> None:
-        """Give an event its pictures, as it would have read them off the wire."""
+        """Add the images to an event, in the form in which the client reads them off the wire."""
         depth = {
             "depth_format": self.depth_format,
             "camera_near_plane": self.camera_near_plane,
             "camera_far_plane": self.camera_far_plane,
         }
         noise = {"add_noise": self.add_depth_noise, "noise_indices": self.noise_indices}
-        event.frame = view.rgb.copy()  # the view is handed out again while nothing changes
+        event.frame = view.rgb.copy()  # later events share the view
         if view.depth is not None:
             event.add_image_depth(_upside_down(view.depth), **depth, **noise)
         if view.instances is not None:
@@ -132,10 +132,10 @@ def _upside_down(picture: NDArray[Any]) -> bytes:
 class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  # untyped
     """The official ``ai2thor.controller.Controller`` on the embedded engine.
 
-    Takes the official controller's arguments (``scene``, ``width``, ``height``, ``gridSize``,
-    ``visibilityDistance``, ``fieldOfView``, ``renderDepthImage`` …), less those that choose a Unity
-    build, and behaves as it does: ``step`` and ``reset`` return an ``ai2thor.server.Event``, calls
-    that are wrong in themselves raise ValueError.
+    It takes the official controller's arguments (``scene``, ``width``, ``height``, ``gridSize``,
+    ``visibilityDistance``, ``fieldOfView``, ``renderDepthImage`` …), except for those that choose a
+    Unity build. It behaves as the official one does: ``step`` and ``reset`` return an
+    ``ai2thor.server.Event``, and invalid calls raise ValueError.
 
     Raises:
         TypeError: an argument chooses a Unity build.
@@ -156,11 +156,11 @@ class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  
     def step(
         self, action: str | dict[str, Any] | None = None, **arguments: Any
     ) -> ai2thor.server.Event:
-        """Do an action, as the official ``step`` does, less its deep copies for the wire.
+        """Do an action, as the official ``step`` does, but without its deep copies for the wire.
 
         Raises:
-            ValueError: the call is wrong in itself: no such action, or wrong arguments.
-            RuntimeError: it failed and ``raise_for_failure`` is set.
+            ValueError: the call is invalid: no such action, or wrong arguments.
+            RuntimeError: the action failed and ``raise_for_failure`` is set.
         """
         request: dict[str, Any] = dict(action) if isinstance(action, dict) else {"action": action}
         raise_for_failure = arguments.pop("raise_for_failure", False)
@@ -173,7 +173,7 @@ class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  
         for old in _RENAMED.keys() & request.keys():
             request[_RENAMED[old]] = request[old]
         self.last_action = request
-        # An event that nobody else keeps need not have its objects worked out.
+        # If nobody else refers to the last event, its objects are never computed.
         self.last_event = None
         assert self.server is not None
         self.server.send(request)

@@ -1,8 +1,8 @@
-"""Dictionaries of which each reader has its own, though they are made from shared ones.
+"""Dictionaries that share nested values with others and copy one when it is read.
 
-An object's metadata hold some forty single values and twenty little lists and dictionaries. To copy
-these for every reader takes twenty times as long as to make the rest, and few readers look at more
-than a handful.
+The metadata of an object have some forty single values and twenty small lists and dictionaries.
+Copying these for every reader takes twenty times as long as everything else, and most readers look
+at only a few of them.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ _CONTAINERS = (dict, list)
 
 
 class CopyOnReadDict(dict[str, Any]):
-    """A dict in every respect, but that nested values are copied when somebody asks for them.
+    """A dict that copies a nested value when somebody asks for it.
 
-    It is made of the values that need no copy; whoever makes it sets :attr:`shared`.
+    It is created with the values that need no copy. Its creator then sets :attr:`shared`.
 
     Attributes:
-        shared: the other values, which are not to be changed. They share no key with the first.
+        shared: all other values, which must not be changed. They have no key in common with the
+            first.
     """
 
     __slots__ = ("shared",)
@@ -28,7 +29,7 @@ class CopyOnReadDict(dict[str, Any]):
     shared: Mapping[str, Any]
 
     def settle(self) -> None:
-        """Copy all that has not been."""
+        """Copy every value that has not been copied yet."""
         shared, self.shared = self.shared, _NOTHING
         for key, value in shared.items():
             if not dict.__contains__(self, key):
@@ -46,7 +47,7 @@ class CopyOnReadDict(dict[str, Any]):
         """As ``dict.get``."""
         return self[key] if key in self else default  # noqa: SIM401  (this is that method)
 
-    # All else looks at the whole.
+    # All other methods look at the whole dictionary.
 
     def __len__(self) -> int:
         self.settle()
@@ -100,7 +101,7 @@ class CopyOnReadDict(dict[str, Any]):
         super().clear()
 
     def copy(self) -> dict[str, Any]:
-        """A plain dict of the same."""
+        """A plain dict with the same values."""
         return dict(self)
 
     def __or__(self, other: Any) -> Any:
@@ -129,7 +130,7 @@ class CopyOnReadDict(dict[str, Any]):
 
 
 def copied(value: Any) -> Any:
-    """A copy of plain data: of a dictionary all the way down, of a list and the lists in it."""
+    """A copy of plain data: of a dictionary at all depths, of a list and the lists in it."""
     if type(value) is dict:
         if any(type(part) in _CONTAINERS for part in value.values()):
             return {key: copied(part) for key, part in value.items()}

@@ -1,4 +1,4 @@
-"""The embedded engine: one action in, metadata and frames out. Dispatch, and nothing else."""
+"""The embedded engine: an action goes in, metadata and images come out. It only dispatches."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ class Engine:
     def step(self, request: Mapping[str, Any]) -> tuple[LazyMetadata, View | None]:
         """Do one action, given as the AI2-THOR client sends it.
 
-        Whatever goes wrong is said in the metadata (``lastActionSuccess``, ``errorMessage``,
-        ``errorCode``); nothing is raised.
+        This raises nothing. The metadata report every failure (``lastActionSuccess``,
+        ``errorMessage``, ``errorCode``).
 
         Returns:
-            The metadata, and the frames unless ``renderImage`` is False.
+            The metadata, and the images unless ``renderImage`` is False.
         """
         name = str(request.get("action"))
         last = None if self._last is None else self._last()
-        if last is not None and name != "Reset":  # after which there is another world
-            last.settle()  # somebody keeps it: it must not speak of what comes now
+        if last is not None and name != "Reset":  # Reset makes a new world
+            last.settle()  # its reader wants the state before this action
         reply, error, code = None, "", None
         try:
             if name == "Reset":
@@ -71,7 +71,7 @@ class Engine:
         return report, frames
 
     def _reset(self, request: Mapping[str, Any]) -> None:
-        name = request.get("sceneName") or self.world.scene.name  # none: the same again
+        name = request.get("sceneName") or self.world.scene.name  # by default the same scene again
         if not isinstance(name, str):
             raise ActionFailed(f"sceneName is a text such as FloorPlan1, not {name!r:.200}.")
         try:

@@ -1,4 +1,4 @@
-"""How an action says that it was not done, and how a call says that it was wrong."""
+"""The exceptions of refused actions and of invalid calls."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ INVALID_ACTION = "InvalidAction"
 MISSING_ARGUMENTS = "MissingArguments"
 INVALID_ARGUMENT = "InvalidArgument"
 CLIENT_ERRORS = frozenset({INVALID_ACTION, MISSING_ARGUMENTS, INVALID_ARGUMENT, "AmbiguousAction"})
-"""AI2-THOR's ``errorCode`` at which the official client raises ValueError: the call was wrong."""
+"""AI2-THOR's ``errorCode`` values for invalid calls. The official client raises ValueError for
+them."""
 
 
 class ActionFailed(Exception):
-    """An action was refused; it becomes an event with ``lastActionSuccess`` False.
+    """An action was refused. It becomes an event with ``lastActionSuccess`` False.
 
-    Handlers raise this and nothing else. It cannot carry one of :data:`CLIENT_ERRORS`, so that no
+    Handlers raise no other exception. ``code`` cannot be one of :data:`CLIENT_ERRORS`, so no
     handler makes a client raise.
 
     Attributes:
-        code: AI2-THOR's ``errorCode``, which is None for all refusals but a few.
+        code: AI2-THOR's ``errorCode``, None for nearly all refusals.
         reply: the event's ``actionReturn``.
     """
 
@@ -29,9 +30,9 @@ class ActionFailed(Exception):
 
 
 class WrongCall(Exception):
-    """A call that no action answers to, at which the official client raises ValueError.
+    """A call is invalid, and the official client raises ValueError for it.
 
-    Dispatch raises this, before any handler runs.
+    Dispatch raises this before any handler runs.
 
     Attributes:
         code: one of :data:`CLIENT_ERRORS`.

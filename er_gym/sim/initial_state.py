@@ -1,4 +1,4 @@
-"""What every world of a scene begins with, made of the record and kept for the scenes last used."""
+"""What every world of a scene starts with. It is computed once for each recently used scene."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from er_gym.sim.nesting import Nesting
 from er_gym.sim.scene import PROPERTIES, Scene
 
 USED_UP = ("PaperTowelRoll", "SoapBottle", "TissueBox", "ToiletPaper")
-"""Types that ProcTHOR's asset database says can be used up."""
+"""Types that can be used up, from ProcTHOR's asset database."""
 
 
 def properties(scene: Scene) -> NDArray[np.bool_]:
-    """The recorded properties, and ``canBeUsedUp``, which the record leaves out."""
+    """The recorded properties, and ``canBeUsedUp``, which the record lacks."""
     found = scene.properties.copy()
     found[:, PROPERTIES.index("canBeUsedUp")] |= np.isin(scene.types, USED_UP)
     return found
@@ -24,11 +24,11 @@ def properties(scene: Scene) -> NDArray[np.bool_]:
 
 @lru_cache(maxsize=128)
 def parents(scene: Scene) -> tuple[tuple[int, ...], ...]:
-    """The recorded containments, less the 20 that cannot be.
+    """The recorded receptacles of each object, without 20 impossible ones.
 
-    AI2-THOR's trigger boxes overlap: a few records put a fridge into the cabinet beside it, a
-    counter onto a plate, the floor into a bin. What cannot be carried is in nothing that opens or
-    can be carried, and the floor is in nothing.
+    AI2-THOR's trigger boxes overlap, so a few records put a fridge into the cabinet beside it, a
+    counter onto a plate, or the floor into a bin. Two rules remove them. An object that cannot be
+    picked up is in no receptacle that opens or can be picked up. And the floor is in no receptacle.
     """
     carried = scene.properties[:, PROPERTIES.index("pickupable")]
     no_place = carried | scene.properties[:, PROPERTIES.index("openable")]
@@ -40,7 +40,7 @@ def parents(scene: Scene) -> tuple[tuple[int, ...], ...]:
 
 @lru_cache(maxsize=128)
 def rows_by_type(scene: Scene) -> Mapping[str, tuple[int, ...]]:
-    """The rows of each type that there is, in scene order."""
+    """The rows of each object type, in scene order."""
     found: dict[str, tuple[int, ...]] = {}
     for i, kind in enumerate(scene.types):
         found[kind] = (*found.get(kind, ()), i)
@@ -49,5 +49,5 @@ def rows_by_type(scene: Scene) -> Mapping[str, tuple[int, ...]]:
 
 @lru_cache(maxsize=128)
 def nesting(scene: Scene) -> Nesting:
-    """What lies in what, as recorded."""
+    """The recorded containment of all objects."""
     return Nesting.of(parents(scene), np.ones(len(scene), dtype=bool))

@@ -1,6 +1,6 @@
-"""Metadata whose parts are made when they are first read.
+"""Metadata whose values are computed when they are first read.
 
-Most steps of most programs look at few of them, and the objects are nine tenths of the work.
+Most programs look at few values in most steps, and the objects are nine tenths of the work.
 """
 
 from __future__ import annotations
@@ -10,18 +10,18 @@ from typing import Any, ClassVar
 
 
 class LazyMetadata(dict[str, Any]):
-    """A dict in every respect, but that some values are worked out when somebody asks.
+    """A dict that computes some values when somebody asks for them.
 
-    Whoever is about to change the source that it describes calls :meth:`settle` first.
+    Code that is about to change the source has to call :meth:`settle` first.
 
     Args:
         ready: the values that are known.
-        later: for each other key, what makes its value out of the source.
-        source: what they are made from.
+        later: for each other key, the function that computes its value from the source.
+        source: the argument of these functions.
     """
 
     instead: ClassVar[Mapping[str, Callable[[Any], Any]]] = {}
-    """What makes some of the values in this kind of metadata, in place of ``later``."""
+    """Functions that a subclass uses in place of those in ``later``."""
 
     def __init__(
         self, ready: dict[str, Any], later: Mapping[str, Callable[[Any], Any]], source: object
@@ -33,18 +33,18 @@ class LazyMetadata(dict[str, Any]):
 
     @property
     def source(self) -> object | None:
-        """What this describes; None once that may have become something else."""
+        """The source, None once the source may have changed."""
         return self._source
 
     def settle(self) -> None:
-        """Work out all that has not been, and keep nothing but the values."""
+        """Compute all remaining values and let go of the source."""
         while self._later:
             key, make = self._later.popitem()
             super().__setitem__(key, make(self._source))
         self._source = None
 
     def read_whole(self) -> None:
-        """What is done before somebody looks at all of it."""
+        """Prepare for a reader that looks at all values."""
         self.settle()
 
     def __getitem__(self, key: str) -> Any:
@@ -71,7 +71,7 @@ class LazyMetadata(dict[str, Any]):
         self.read_whole()
         return super().setdefault(key, default)
 
-    # dict(x), {**x}, json and msgpack come in by one of these.
+    # dict(x), {**x}, json and msgpack use one of these.
 
     def __iter__(self) -> Iterator[str]:
         self.read_whole()
@@ -93,7 +93,7 @@ class LazyMetadata(dict[str, Any]):
         return super().values()
 
     def copy(self) -> dict[str, Any]:
-        """A plain dict of the same."""
+        """A plain dict with the same values."""
         return dict(self)
 
     def __eq__(self, other: object) -> bool:

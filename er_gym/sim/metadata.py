@@ -1,4 +1,4 @@
-"""The world as AI2-THOR 5 metadata: dictionaries are made here, once, at the edge."""
+"""The metadata of AI2-THOR 5 for a world. All dictionaries are made here, at the edge."""
 
 from __future__ import annotations
 
@@ -45,18 +45,18 @@ def _held_pose(world: World) -> dict[str, Any]:
 
 @lru_cache(maxsize=65536)
 def instance_color(object_id: str) -> tuple[int, int, int]:
-    """The RGB colour that stands for an object id or a type; the same in every run."""
+    """The RGB colour of an object id or an object type in segmentations, the same in every run."""
     number = zlib.crc32(object_id.encode()) & 0xFFFFFF
     return number >> 16, number >> 8 & 255, number & 255
 
 
 def _colors(world: World) -> list[dict[str, Any]] | None:
-    """Which colour means what in the segmentations, None while none is drawn.
+    """The colours of the segmentation images by name, None while none is drawn.
 
-    As in AI2-THOR, both objects and types are named whichever is drawn. The official client looks
-    for the masks of a class among the colours of objects whose ids begin with its name; so what
-    bears another's name, such as a SinkBasin (``Sink|…|SinkBasin``), is also named by its type. The
-    name that comes last is what the client takes a colour for.
+    As in AI2-THOR, objects and types are both listed, whichever is drawn. The official client finds
+    the masks of a class among the colours of those objects whose ids begin with its name. So an
+    object whose id begins with another name, such as a SinkBasin (``Sink|…|SinkBasin``), is also
+    listed under its type. If a colour has several names, the client uses the last one.
     """
     if not world.settings.draws_colors:
         return None
@@ -97,7 +97,7 @@ _LATER: dict[str, Callable[[World], Any]] = {
     "inventoryObjects": _inventory,
     "sceneBounds": scene_bounds,
 }
-"""What of an event is worked out when it is read."""
+"""Values that are computed when they are read."""
 
 
 def metadata(
@@ -108,9 +108,9 @@ def metadata(
     action_return: Any = None,
     kind: type[LazyMetadata] = LazyMetadata,
 ) -> LazyMetadata:
-    """Everything that an AI2-THOR event says about the world, after an action.
+    """All metadata of an AI2-THOR event about the world after an action.
 
-    Most of it is worked out when it is read; before the world changes, ``settle`` it.
+    Most values are computed when they are read. Call ``settle`` before the world changes.
     """
     settings = world.settings
     report = {
@@ -128,14 +128,14 @@ def metadata(
         "screenWidth": settings.width,
         "screenHeight": settings.height,
         "agentId": 0,
-        "colors": _colors(world),  # now: a step may ask for segmentation for itself alone
+        "colors": _colors(world),  # now, because a step may ask for segmentation for itself alone
         "updateCount": 0,
         "fixedUpdateCount": 0,
         "currentTime": 0.0,
         "visibleRange": None,
         "actionReturn": action_return,
         "depthFormat": "Meters",
-        # What older actions answered in, before there was actionReturn.
+        # Old fields for answers, from before there was actionReturn.
         "actionFloatReturn": 0.0,
         "actionFloatsReturn": [],
         "actionIntReturn": 0,

@@ -1,4 +1,4 @@
-"""What lies in what, directly and through other things."""
+"""Which objects contain which, directly and through other objects."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Nesting:
-    """The containments of N objects.
+    """The containment of N objects.
 
     Attributes:
-        contents: for each object, the rows of what lies in or on it, in scene order.
-        within: (N, N) bool, row i: the receptacles that object i is in, directly or through others.
+        contents: for each object, the rows of the objects in or on it, in scene order.
+        within: (N, N) bool; row i marks the receptacles that object i is in, directly or through
+            others.
     """
 
     contents: list[list[int]]
@@ -24,7 +25,7 @@ class Nesting:
 
     @staticmethod
     def of(parents: Sequence[Sequence[int]], exists: NDArray[np.bool_]) -> Nesting:
-        """From each object's receptacles; objects that are no more lie in nothing."""
+        """The nesting for each object's receptacles. Objects that do not exist are in none."""
         count = len(parents)
         contents: list[list[int]] = [[] for _ in range(count)]
         there = exists.tolist()
@@ -35,7 +36,7 @@ class Nesting:
         within = np.zeros((count, count), dtype=bool)
         depth = [len(lies_in) for lies_in in parents]
         within[np.repeat(np.arange(count), depth), list(chain.from_iterable(parents))] = True
-        while True:  # a few rounds: a fork in a pan on a burner is as deep as it gets
+        while True:  # a few rounds, since nesting is shallow: a fork in a pan on a burner
             steps = within.astype(np.float32)
             through = within | (steps @ steps > 0.0)
             if (through == within).all():

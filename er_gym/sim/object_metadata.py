@@ -27,7 +27,7 @@ from er_gym.sim.world_cache import ObjectCacheKey
 
 Entry = dict[str, Any]
 Parts = tuple[Entry, Entry, Entry]
-"""What is said of an object but for the agent: all, its single values, those that nest others."""
+"""An object's metadata without the agent's part: all values, the single ones, the nested ones."""
 
 _AABB_CORNERS = np.array(list(product((1.0, 0.0), repeat=3)))
 """Corners of an axis-aligned box in AI2-THOR's order, as fractions of its size."""
@@ -40,8 +40,8 @@ _ENTRIES: ObjectCacheKey[Parts] = ObjectCacheKey("metadata")
 _SCENES_KEPT = 128
 _RECEPTACLE = PROPERTIES.index("receptacle")
 _NEVER = {"canBeUsedUp": False, "isUsedUp": False}
-"""AI2-THOR 5 says so of every object: in its ``SimObjPhysics`` these two are placeholders.
-``UseUpObject`` works all the same."""
+"""AI2-THOR 5 reports these values for every object: they are placeholders in its ``SimObjPhysics``.
+``UseUpObject`` works nevertheless."""
 
 
 def vector(values: Sequence[float] | NDArray[np.float64]) -> dict[str, float]:
@@ -60,7 +60,7 @@ def box(low: NDArray[np.float64], high: NDArray[np.float64]) -> dict[str, Any]:
 
 
 def objects(world: World) -> list[Entry]:
-    """The metadata of every object, in scene order; nested values are not to be changed."""
+    """The metadata of every object, in scene order. The caller must not change nested values."""
     return [
         {**entry, "visible": seen, "isInteractable": seen, "distance": away}
         for (entry, _, _), seen, away in _parts(world)
@@ -68,7 +68,7 @@ def objects(world: World) -> list[Entry]:
 
 
 def writable_objects(world: World) -> list[Entry]:
-    """The same, the caller's to change."""
+    """The same metadata, which the caller may change."""
     found: list[Entry] = []
     for (_, single, nested), seen, away in _parts(world):
         entry = CopyOnReadDict(single, visible=seen, isInteractable=seen, distance=away)
@@ -78,7 +78,7 @@ def writable_objects(world: World) -> list[Entry]:
 
 
 def _parts(world: World) -> Iterator[tuple[Parts, bool, float]]:
-    """What is said of every object, whether the agent sees it, and how far from it it is."""
+    """For every listed object its metadata, whether it is visible, and its distance in metres."""
     entries = world.cache.of_objects(_ENTRIES)
     rows = _listed(world)
     stale = [i for i in rows if i not in entries]
@@ -92,7 +92,7 @@ def _parts(world: World) -> Iterator[tuple[Parts, bool, float]]:
 
 
 def _listed(world: World) -> list[int]:
-    """The rows of the objects that the metadata list: what is there, and wholes cut up."""
+    """The rows that the metadata list: existing objects, and wholes that were sliced or broken."""
     listed = world.exists
     if world.remains:
         listed = listed.copy()
@@ -105,7 +105,7 @@ _recorded: OrderedDict[str, dict[int, Parts]] = OrderedDict()
 
 
 def _as_recorded(world: World) -> dict[int, Parts]:
-    """The entries of a scene in which nothing has happened yet, kept for the scenes last used."""
+    """The metadata of an unchanged scene, kept for recently used scenes."""
     name = world.scene.name
     if name not in _recorded:
         rows = list(range(len(world)))
@@ -116,7 +116,7 @@ def _as_recorded(world: World) -> dict[int, Parts]:
 
 
 def _entries(world: World, rows: list[int]) -> list[Parts]:
-    """What does not change with where the agent is, for some objects."""
+    """The metadata of some objects, without the values that depend on the agent."""
     low, high = (corners[rows] for corners in boxes_with_doors(world))
     turned = world.obb[rows] @ np.swapaxes(unity_rotation(world.rotation[rows]), 1, 2)
     oriented = turned[:, :1] + _OBB_CORNERS @ turned[:, 1:] + world.position[rows, None]

@@ -1,8 +1,8 @@
-"""Which object types a receptacle type takes: AI2-THOR's placement restrictions.
+"""The object types that each receptacle type accepts: AI2-THOR's placement restrictions.
 
-The table is written by families, since AI2-THOR's own follows from what a thing is: food goes where
-food goes. Facts from AI2-THOR's documentation of object types, joined with every containment that
-the 120 recorded scenes show.
+The table groups object types, because AI2-THOR's own table does too: every food goes to much the
+same places. It joins AI2-THOR's documentation of object types with every containment that the 120
+recorded scenes show.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ _ACCEPTED_BY: dict[str, str] = {
 
 @lru_cache(maxsize=1)
 def placement_table() -> dict[str, frozenset[str]]:
-    """Object type to the receptacle types that take it."""
+    """For each object type the receptacle types that accept it."""
     return {
         object_type: frozenset(receptacles.split())
         for family, receptacles in _ACCEPTED_BY.items()
@@ -90,5 +90,5 @@ def placement_table() -> dict[str, frozenset[str]]:
 
 
 def accepts(object_type: str, receptacle_type: str) -> bool:
-    """Whether AI2-THOR lets ``PutObject`` place the one in or on the other."""
+    """Whether AI2-THOR's ``PutObject`` accepts this object type in or on this receptacle type."""
     return receptacle_type in placement_table().get(object_type, frozenset())

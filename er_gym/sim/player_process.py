@@ -2,10 +2,10 @@
 
     Controller(local_executable_path=er_gym.thor_executable(), x_display=":0", ...)
 
-It answers over the transport that the client names in the environment, and differs from the
-in-process controller in nothing else. It ends when the connection does, on SIGTERM, and soon after
-its parent; it writes no file. Its arguments are Unity's, and ``-parent``, the process that it must
-not outlive.
+The player answers over the transport that the client names in the environment. In everything else
+it equals the in-process controller. It ends when the connection ends, on SIGTERM, and soon after
+its parent process. It writes no file. It takes Unity's arguments, and ``-parent``, the id of the
+process that it must not outlive.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from er_gym.sim.size import check_size
 from er_gym.sim.transports import TRANSPORTS, Message, Transport
 
 NOT_BY_THE_CLIENT = 2
-"""The exit code when somebody else than AI2-THOR's client starts the player."""
+"""The exit code if anything but AI2-THOR's client has started the player."""
 _SECONDS_TO_CONNECT = 300
-"""As long as the client waits for a player, a player waits for the client."""
+"""The player waits as long for the client as the client waits for a player."""
 _QUESTIONS = frozenset(
     {
         *("GetReachablePositions", "GetInteractablePoses", "GetObjectInFrame"),
@@ -36,11 +36,12 @@ _QUESTIONS = frozenset(
         *("GetShortestPathToPoint", "ObjectNavExpertAction"),
     }
 )
-"""Actions that Unity answers, with ``fastActionEmit``, by what has changed, which saves the client
-most of its work. After all others it sends everything: of one message the client makes several
-events, so that a program that writes into one event's objects writes into the next event's too."""
+"""With ``fastActionEmit``, Unity answers these actions with the changes only, which saves the
+client most of its work. For all other actions the whole metadata are sent. The client makes several
+events of one message, so a program that writes into one event's objects would write into the next
+event's too."""
 _HEARTBEAT = 0.25
-"""Seconds between looks at whether the parent lives."""
+"""Seconds between two checks that the parent process is alive."""
 
 
 class PlayerProcess:
@@ -48,7 +49,7 @@ class PlayerProcess:
 
     Args:
         width, height: size of frames, pixels.
-        transport: whom it answers.
+        transport: the connection to the client.
     """
 
     def __init__(self, width: int, height: int, transport: Transport) -> None:
@@ -60,7 +61,7 @@ class PlayerProcess:
         self._may_patch = True
 
     def answer(self, request: dict[str, Any]) -> None:
-        """Do one action and send what comes of it."""
+        """Do one action and send its event."""
         action = request.get("action")
         if action == "Initialize":
             self._may_patch = request.get("fastActionEmit") is not False
@@ -98,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(_not_by_the_client(kind), file=sys.stderr)
         return NOT_BY_THE_CLIENT
     words = sys.argv[1:] if arguments is None else arguments
-    given = dict(pairwise(words))  # Unity's come as `-name value`, and so does ours
+    given = dict(pairwise(words))  # arguments come as `-name value`, Unity's and ours
     _end_with(int(given.get("-parent", os.getppid())))
     width, height = (int(given.get(f"-screen-{side}", 300)) for side in ("width", "height"))
     try:
@@ -130,14 +131,14 @@ def _not_by_the_client(kind: str) -> str:
 
 
 def _end_with(parent: int) -> None:
-    """See to it that this process ends soon after the one that started it.
+    """Make this process end soon after the one that started it.
 
-    End of file on a pipe says so too, but not before both pipes are open, nor while a fork of the
-    client keeps its end. The kernel's PR_SET_PDEATHSIG will not do: it strikes when the *thread*
-    ends that started the player, and clients are made in pools of threads.
+    The end of file on a pipe reports the same, but only once both pipes are open, and not while a
+    fork of the client keeps its end open. The kernel's PR_SET_PDEATHSIG does not help: it fires
+    when the *thread* that started the player ends, and clients are made in thread pools.
     """
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the client's to answer
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the client handles Ctrl-C
     signal.alarm(_SECONDS_TO_CONNECT)
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 

@@ -1,9 +1,10 @@
-"""What goes over the wire to AI2-THOR's client, as ``ai2thor==5.0.0`` reads it.
+"""The messages to and from AI2-THOR's client, as ``ai2thor==5.0.0`` reads them.
 
-Over FIFO a message is a row of fields, each a header (one byte of type, four bytes of big-endian
-length) and its body, and ends with an empty field of type 255. The client sends one JSON field; the
-player answers with metadata in msgpack and then images. Over WSGI the metadata is JSON and the
-images are parts of a form. Images go bottom row first. Facts measured with a stub.
+Over FIFO a message is a sequence of fields. Each field has a header (one byte of type, four bytes
+of big-endian length) and a body. An empty field of type 255 ends the message. The client sends one
+JSON field. The player answers with metadata in msgpack and then images. Over WSGI the metadata is
+JSON and the images are parts of a form. Images go bottom row first. All this was measured with a
+stub in place of Unity.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _HEADER = struct.Struct("!BI")
 
 
 class Field(IntEnum):
-    """Types of fields; those of pictures that nobody draws here are left out."""
+    """Types of fields, without those of images that the embedded engine does not draw."""
 
     METADATA = 1
     ACTION = 2
@@ -51,7 +52,7 @@ FORM_NAMES = {
     Field.THIRD_PARTY_INSTANCES: "image_thirdParty_image_ids",
     Field.THIRD_PARTY_CLASSES: "image_thirdParty_classes",
 }
-"""What the client's WSGI server calls the pictures."""
+"""The names of the images in the form that the client's WSGI server reads."""
 _END = _HEADER.pack(Field.END, 0)
 _FIELDS = {
     "rgb": (Field.RGB, Field.THIRD_PARTY_RGB),
@@ -59,11 +60,11 @@ _FIELDS = {
     "classes": (Field.CLASSES, Field.THIRD_PARTY_CLASSES),
     "instances": (Field.INSTANCES, Field.THIRD_PARTY_INSTANCES),
 }
-"""Attribute of a view to the field that its pixels are sent in: the agent's, third parties'."""
+"""For each attribute of a view its fields: the agent's and the third-party cameras'."""
 
 
 def read_request(pipe: IO[bytes]) -> dict[str, Any] | None:
-    """The next action of the client, None when it has closed its end."""
+    """The client's next action, None when the client has closed its end."""
     request: dict[str, Any] | None = None
     while True:
         header = pipe.read(_HEADER.size)
@@ -93,7 +94,7 @@ def send(pipe: int, fields: Sequence[tuple[Field, bytes]]) -> None:
 
 
 def images(view: View) -> Iterator[tuple[Field, bytes]]:
-    """The pictures of a view as fields, the agent's and then each third-party camera's."""
+    """The images of a view as fields: the agent's first, then those of each third-party camera."""
     for name, (own, third_party) in _FIELDS.items():
         for kind, shown in ((own, view), *((third_party, other) for other in view.third_party)):
             picture = getattr(shown, name)
@@ -104,15 +105,16 @@ def images(view: View) -> Iterator[tuple[Field, bytes]]:
 
 
 def rgba(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """(H, W, 3) colours with the opaque alpha that the client expects of segmentations."""
+    """(H, W, 4) colours: (H, W, 3) ones with the opaque alpha that the client expects in
+    segmentations."""
     return np.pad(colours, ((0, 0), (0, 0), (0, 1)), constant_values=255)
 
 
 class ObjectCache:
-    """Encoded objects; one that says the same as last time is not encoded again.
+    """Encoded objects. An object whose metadata are unchanged is not encoded again.
 
     Args:
-        encode: from an object's metadata to what is sent of it.
+        encode: turns an object's metadata into bytes.
     """
 
     def __init__(self, encode: Callable[[dict[str, Any]], bytes]) -> None:
@@ -127,20 +129,20 @@ class ObjectCache:
         return kept[1]
 
     def forget(self) -> None:
-        """Drop everything: another scene comes."""
+        """Forget all objects, because another scene follows."""
         self._kept.clear()
 
 
 class MetadataPacker:
-    """Metadata as msgpack, as FIFO sends it."""
+    """Encodes metadata as msgpack, which FIFO sends."""
 
     def __init__(self) -> None:
-        # A lone surrogate in a string cannot be sent, and must not end the player.
+        # A string with a lone surrogate cannot be encoded and must not end the player.
         self._packer = msgpack.Packer(unicode_errors="replace")
         self.objects = ObjectCache(self._packer.pack)
 
     def __call__(self, metadata: dict[str, Any], sequence_id: int) -> bytes:
-        """The message's metadata: that of the one agent, and what the client keeps beside it."""
+        """The metadata of a message: that of the one agent, and what the client keeps beside it."""
         pack = self._packer.pack
         return b"".join(
             (
@@ -159,7 +161,7 @@ class MetadataPacker:
         )
 
     def patch(self, changes: dict[str, Any]) -> bytes:
-        """What has changed since the last message, whose pictures the client keeps too."""
+        """The changes since the last message, whose images the client keeps as well."""
         packed: bytes = self._packer.pack({"agentId": 0, **changes})
         return packed
 
@@ -175,13 +177,13 @@ class MetadataPacker:
 
 
 class MetadataJson:
-    """Metadata as JSON, as WSGI sends it."""
+    """Encodes metadata as JSON, which WSGI sends."""
 
     def __init__(self) -> None:
         self.objects = ObjectCache(_json)
 
     def __call__(self, metadata: dict[str, Any], sequence_id: int) -> bytes:
-        """The same as :class:`MetadataPacker` says."""
+        """The same metadata as :class:`MetadataPacker` encodes."""
         cameras = _json(metadata["thirdPartyCameras"])
         agent = b",".join(
             b"%b:%b" % (_json(name), self._objects(value) if name == "objects" else _json(value))

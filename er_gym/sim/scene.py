@@ -1,7 +1,7 @@
-"""The immutable scene: everything recorded about one iTHOR room, as arrays.
+"""A recorded iTHOR scene: everything that is known about one room, as read-only arrays.
 
-The tables are figures read from AI2-THOR itself, built by :mod:`er_gym.sim.data.build_scenes`; no
-Unity build is needed to load them. Lengths are metres, angles degrees, positions in AI2-THOR's
+The tables hold figures read from AI2-THOR itself. :mod:`er_gym.sim.data.build_scenes` builds them,
+and loading them needs no Unity build. Lengths are metres, angles degrees, positions in AI2-THOR's
 world frame (x right, y up, z forward, left-handed; rotation clockwise seen from above).
 """
 

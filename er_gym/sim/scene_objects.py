@@ -1,4 +1,4 @@
-"""The objects of a scene as they are now: where they are, in which states and in what they lie.
+"""The objects of a scene as they are now: poses, states, and which receptacles they are in.
 
 Struct of arrays: row ``i`` of every array is object ``i``. No row is ever removed. An object that
 has left the scene (a whole apple after slicing) has ``exists[i]`` False.
@@ -27,13 +27,13 @@ _HIDDEN: CacheKey[NDArray[np.bool_]] = CacheKey("hidden objects")
 
 @dataclass(kw_only=True)
 class SceneObjects:
-    """The objects of a scene and what can be asked about them. :class:`World` can change them.
+    """The objects of a scene, to be read. :class:`er_gym.sim.world.World` can change them.
 
-    Most attributes mirror AI2-THOR's object metadata, with N objects.
+    Most attributes mirror AI2-THOR's object metadata. N is the number of objects.
 
     Attributes:
         scene: the scene as recorded.
-        object_ids, names, types, asset_ids: N texts each.
+        object_ids, names, types, asset_ids: N strings each.
         position, rotation: (N, 3) metres and Unity's Euler angles in degrees.
         low, high: (N, 3) corners of the axis-aligned boxes, metres.
         obb: (N, 4, 3) oriented boxes, as :class:`er_gym.sim.scene.Scene` has them.
@@ -41,7 +41,7 @@ class SceneObjects:
         openness: (N,) 0 closed to 1 open.
         mass: (N,) kilograms.
         exists: (N,) whether the object is in the scene.
-        temperature, fill_liquid: N texts each; a liquid is None where there is none.
+        temperature, fill_liquid: N strings each; the liquid of an unfilled object is None.
         parents: for each object the receptacles that it is in, innermost first as recorded.
         controlled: for each object the rows that it switches, None for what cannot be toggled.
         salient_materials: for each object its materials, None where none is recorded.
@@ -49,10 +49,10 @@ class SceneObjects:
         remains: rows of wholes that were sliced or broken. The metadata still list them.
         disabled: rows that ``EnableObject`` can bring back, with the rows of their contents.
         listed: the only rows that the metadata list, None for all.
-        untouched: True until something has been changed.
+        untouched: True until something has changed.
         touched: rows of the objects that have changed since the scene was loaded.
         index: rows by object id.
-        cache: what readers have worked out from all this.
+        cache: what readers have computed from all this.
     """
 
     scene: Scene
@@ -107,7 +107,7 @@ class SceneObjects:
         """The row of an object.
 
         Raises:
-            ActionFailed: there is none of that id, or it has been cut up.
+            ActionFailed: no object has that id, or the object has been sliced or broken.
         """
         i = None if object_id is None else self.index.get(object_id)
         if i is not None and i in self.remains:
@@ -130,14 +130,14 @@ class SceneObjects:
 
     @property
     def nesting(self) -> Nesting:
-        """What lies in what."""
+        """Which objects contain which."""
         if self._nesting is None:
             self._nesting = Nesting.of(self.parents, self.exists)
         return self._nesting
 
     @property
     def contents(self) -> list[list[int]]:
-        """For each object, the rows of what lies in or on it."""
+        """For each object, the rows of the objects in or on it."""
         return self.nesting.contents
 
     def ancestors(self, i: int) -> set[int]:
@@ -145,7 +145,7 @@ class SceneObjects:
         return set(np.flatnonzero(self.nesting.within[i]).tolist())
 
     def inside(self, i: int) -> list[int]:
-        """Everything in or on object i, directly or through others, nearest first."""
+        """The rows of all objects in or on object i, directly or through others, nearest first."""
         found: list[int] = []
         todo = list(self.contents[i])
         while todo:
@@ -156,9 +156,9 @@ class SceneObjects:
         return found
 
     def is_shut(self, i: int) -> bool:
-        """Whether i is a receptacle that opens and is closed now.
+        """Whether object i is a receptacle that can be opened and is closed now.
 
-        A toilet never is: things stand on its cistern, not under its lid.
+        A toilet never is, because things stand on its cistern and not under its lid.
         """
         return (
             self.has(i, "receptacle")
@@ -169,7 +169,7 @@ class SceneObjects:
 
     @property
     def hidden(self) -> NDArray[np.bool_]:
-        """(N,) which objects lie in something shut, or are no more."""
+        """(N,) objects that are in something closed, or out of the scene."""
         found = self.cache.arrangement.get(_HIDDEN)
         if found is None:
             shut = (
@@ -184,19 +184,21 @@ class SceneObjects:
 
     @property
     def in_hand(self) -> list[int]:
-        """The held object and all that lies in it; empty when the hand is."""
+        """The held object and all objects in it; empty when the hand is."""
         return [] if self.held < 0 else [self.held, *self.inside(self.held)]
 
     def displaced(self) -> list[int]:
-        """Objects that may be elsewhere, or in something else, than when the scene was loaded."""
+        """Rows of the objects that have been moved, or put into another receptacle, since the scene
+        was loaded."""
         return sorted(self._displaced)
 
     def is_where_recorded(self, i: int) -> bool:
-        """Whether object i has never been moved: what is known of the recorded one holds."""
+        """Whether object i has never been moved, so that all knowledge about its recorded pose
+        holds."""
         return i < len(self.scene) and i not in self._displaced
 
     def obb_corners(self, i: int) -> NDArray[np.float64] | None:
-        """(8, 3) corners of object i's oriented box in AI2-THOR's order, None where none is."""
+        """(8, 3) corners of object i's oriented box in AI2-THOR's order, None if it has none."""
         if np.isnan(self.obb[i, 0, 0]):
             return None
         turn = unity_rotation(self.rotation[i])

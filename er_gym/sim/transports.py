@@ -1,7 +1,7 @@
-"""How the player and AI2-THOR's client exchange messages: one class a transport.
+"""How the player and AI2-THOR's client exchange messages: one class for each transport.
 
-The client names the transport and where it listens in the player's environment. Each class opens
-its connection from there, sends what comes of an action and receives the next one.
+The player's environment names the transport and its address. Each class opens its connection from
+there, sends events and receives actions.
 """
 
 from __future__ import annotations
@@ -17,23 +17,24 @@ from typing import IO, Any, Protocol
 from er_gym.sim.protocol import FORM_NAMES, Field, MetadataJson, MetadataPacker, read_request, send
 
 _PIPE_BYTES = 1 << 20
-"""A picture goes through a pipe of this size in one write; Linux allows it to anybody."""
+"""The size of the pipe, bytes. An image goes through it in one write, and Linux allows any user
+this size."""
 _ONLY_WHOLE = frozenset({"objects", "thirdPartyCameras"})
-"""Where these have changed, or a picture has, FIFO sends a whole message; else, as Unity's
-``fastActionEmit`` does, only what has changed. It saves the client most of its work."""
+"""When one of these or an image has changed, FIFO sends the whole metadata. Otherwise it sends the
+changes only, as Unity's ``fastActionEmit`` does, which saves the client most of its work."""
 
 
 @dataclass(frozen=True)
 class Message:
-    """What came of an action.
+    """The answer to an action.
 
     Attributes:
-        sequence_id: the request's number, which the client compares.
-        metadata: all that the agent is told.
-        changes: the part of it that differs from the last message.
-        images: the pictures, as :func:`er_gym.sim.protocol.images` gives them.
-        same_images: whether they are the last message's.
-        may_patch: whether the client agrees to be told the changes alone.
+        sequence_id: the number of the request; the client compares it.
+        metadata: all metadata of the event.
+        changes: the part that differs from the last message.
+        images: the images, as :func:`er_gym.sim.protocol.images` gives them.
+        same_images: whether the images equal those of the last message.
+        may_patch: whether the client accepts a message with the changes only.
     """
 
     sequence_id: int
@@ -51,10 +52,10 @@ class Transport(Protocol):
     """
 
     def send(self, message: Message) -> None:
-        """Tell the client what came of an action."""
+        """Send the answer to an action."""
 
     def receive(self) -> dict[str, Any] | None:
-        """The client's next action; None when there are no more."""
+        """The client's next action, None when there are no more."""
 
 
 class Fifo:
@@ -66,7 +67,7 @@ class Fifo:
         to_client, self._from_client = (environment[name] for name in self.VARIABLES)
         self._to_client = os.open(to_client, os.O_WRONLY)
         if hasattr(fcntl, "F_SETPIPE_SZ"):  # Linux, Python 3.10
-            with contextlib.suppress(OSError):  # the user's pipes are at their limit
+            with contextlib.suppress(OSError):  # the user's pipes have reached their limit
                 fcntl.fcntl(self._to_client, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
         self._requests: IO[bytes] | None = None
         self._pack = MetadataPacker()
@@ -83,29 +84,29 @@ class Fifo:
 
     def receive(self) -> dict[str, Any] | None:
         if self._requests is None:
-            # Not before the first message has gone: the client opens its end for writing after it.
+            # The client opens its end for writing only after the first message.
             self._requests = open(self._from_client, "rb")  # noqa: SIM115  # for as long as we play
         return read_request(self._requests)
 
 
 class Wsgi:
-    """The client serves HTTP: an event is a form that is posted, the response the next action."""
+    """The client is an HTTP server: it gets events as forms and responds with actions."""
 
     VARIABLES = ("AI2THOR_HOST", "AI2THOR_PORT")
 
     def __init__(self, environment: Mapping[str, str]) -> None:
-        from http.client import HTTPConnection  # takes 40 ms, which a player on FIFO does not need
+        from http.client import HTTPConnection  # takes 40 ms, which a player on FIFO can save
 
         host, port = (environment[name] for name in self.VARIABLES)
         self._token = environment.get("AI2THOR_CLIENT_TOKEN", "")
-        self._boundary = os.urandom(16).hex()  # a picture holds it with a chance of 1 in 10³⁰
+        self._boundary = os.urandom(16).hex()  # in an image with a probability of 1 in 10³⁰
         self._connection = HTTPConnection(host, int(port))
         self._encode = MetadataJson()
 
     def send(self, message: Message) -> None:
         if "sceneName" in message.changes:
             self._encode.objects.forget()
-        metadata = self._encode(message.metadata, message.sequence_id)  # WSGI has no patches
+        metadata = self._encode(message.metadata, message.sequence_id)  # WSGI knows no patches
         parts: list[bytes] = []
         for name, text in (("metadata", metadata), ("token", self._token.encode())):
             parts += [self._head(name, "text/plain; charset=utf-8"), text]
@@ -122,15 +123,15 @@ class Wsgi:
         try:
             response = self._connection.getresponse()
             body = response.read()
-        except HTTPException as error:  # it broke off in the middle
+        except HTTPException as error:  # the connection broke in the middle
             raise ConnectionError(f"{type(error).__name__}: {error}") from error
         if response.status != OK:
             raise ConnectionError(f"AI2-THOR's client answered {response.status} {response.reason}")
         request: dict[str, Any] = json.loads(body)
-        return request if "action" in request else None  # so the client says that it stops
+        return request if "action" in request else None  # the client says in this way that it stops
 
     def _head(self, disposition: str, kind: str) -> bytes:
-        # The client's parser wants these two names in these very letters.
+        # The client's parser wants these two names in exactly this spelling.
         return (
             f"\r\n--{self._boundary}\r\n"
             f"Content-Type: {kind}\r\n"
@@ -139,4 +140,4 @@ class Wsgi:
 
 
 TRANSPORTS: dict[str, type[Fifo] | type[Wsgi]] = {"FIFO": Fifo, "WSGI": Wsgi}
-"""What the client says in ``AI2THOR_SERVER_TYPE`` to the class that speaks it."""
+"""For each value of ``AI2THOR_SERVER_TYPE`` the class that implements it."""

@@ -1,7 +1,7 @@
-"""The mutable state of a scene: what is where, in which state, and where the agent is.
+"""The mutable state of a scene: its objects, the agent and the settings.
 
 Every method that changes something calls :meth:`World.arrangement_changed` or
-:meth:`World.state_changed`. They empty the caches, so that readers work out their values again.
+:meth:`World.state_changed`. They empty the caches, so that readers compute their values again.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from er_gym.sim.start_pose import start_pose
 from er_gym.sim.world_cache import WorldCache
 
 _STEP = 2.0**-40
-"""Metres, a picometre: recorded coordinates, and whole steps beside them, add without rounding."""
+"""Metres, about a picometre. Recorded coordinates and multiples of this add without rounding."""
 
 
 def upright_rotation(rotation: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
-    """(3,) degrees: a rotation with its tilts rounded to quarter turns, and another heading."""
+    """(3,) degrees: a rotation with its tilts rounded to quarter turns and with a new heading."""
     x, _, z = np.round(rotation / 90.0) * 90.0 % 360.0
     return np.array([x, yaw % 360.0, z])
 
 
 def reversible_offset(offset: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3,) metres: an offset after which the opposite one leads back to the same place exactly.
+    """(3,) metres: an offset that the opposite offset undoes exactly.
 
-    The sums of others do not: what is carried about or slid out and in would end up elsewhere by
-    its last bits, which a picture may show.
+    Other offsets do not cancel out. An object that is carried about, or a drawer that slides out
+    and in, would end up elsewhere by its last bits, and a picture may show that.
     """
     return np.asarray(np.round(offset / _STEP) * _STEP)
 
@@ -65,7 +65,7 @@ class World(SceneObjects):
 
     @staticmethod
     def load(scene: Scene, settings: Settings) -> World:
-        """The scene as recorded, with the agent where AI2-THOR starts it."""
+        """The scene as recorded, with the agent at AI2-THOR's start pose."""
         half = scene.aabb_size / 2
         world = World(
             scene=scene,
@@ -100,16 +100,16 @@ class World(SceneObjects):
         return world
 
     def snapshot(self) -> World:
-        """The objects as they are now, to be restored by :meth:`restore`; they are its :attr:`base`
-        from now on."""
+        """A copy of the objects as they are now, which :meth:`restore` takes. It becomes
+        :attr:`base`."""
         self.base = replace(self, **_objects(self))
         return self.base
 
     def restore(self, kept: World) -> None:
         """Put every object into the state of a snapshot of the same scene.
 
-        The agent stays where it is. What has been worked out from where things are is shared, until
-        something is moved.
+        The agent stays where it is. Both worlds share what was computed from the arrangement until
+        something moves.
         """
         for name, value in _objects(kept).items():
             setattr(self, name, value)
@@ -123,69 +123,69 @@ class World(SceneObjects):
         self._displace(rows)
 
     def _touch(self, rows: Iterable[int]) -> None:
-        """Forget what was said of some objects."""
+        """Forget the cached values of some objects that depend on their states."""
         self.untouched = False
         for i in rows:
             self.touched.add(i)
             self.cache.object_changed(i)
 
     def _displace(self, rows: Iterable[int]) -> None:
-        """Forget that too, and what was worked out from where they are and what they lie in."""
+        """Forget that, and the values that depend on where the objects are and what they are in."""
         rows = list(rows)
         self._touch(rows)
         self._displaced.update(rows)
         self.cache.objects_moved(rows)
 
     def forget(self) -> None:
-        """Forget what readers have worked out; they work it out again when next asked for it."""
+        """Empty all caches, so that readers compute their values again."""
         self.cache = WorldCache()
         self._nesting = None
 
     # -- changing --------------------------------------------------------------------------------
 
     def arrangement_changed(self) -> None:
-        """Say that something is elsewhere than it was, or has been opened or shut."""
+        """Note that an object has moved, opened or closed."""
         self.state_changed()
         self.cache.arrangement_changed()
 
     def state_changed(self) -> None:
-        """Say that something is in another state than it was, where it is."""
+        """Note that an object has another state, in the same place."""
         self.untouched = False
         self.cache.state_changed()
 
     def _renested(self) -> None:
-        """Say that something lies elsewhere than it did."""
+        """Note that an object is in other receptacles."""
         self._nesting = None
         self.arrangement_changed()
 
     def set_state(self, i: int, name: str, value: bool) -> None:
         """Put object i into a state of :data:`er_gym.sim.scene.STATES`, or out of it."""
         self.states[i, STATE_COLUMN[name]] = value
-        self._touch([i, *(self.controlled[i] or ())])  # a burner glows by its knob
+        self._touch([i, *(self.controlled[i] or ())])  # a burner glows while its knob is on
         if name == "isOpen":
             self.arrangement_changed()
         else:
             self.state_changed()
 
     def set_temperature(self, i: int, temperature: str) -> None:
-        """Make object i "Hot", "Cold" or "RoomTemp"."""
+        """Set the temperature of object i: "Hot", "Cold" or "RoomTemp"."""
         self.temperature[i] = temperature
         self._touch([i])
 
     def set_mass(self, i: int, mass: float) -> None:
-        """Give object i another mass, kilograms."""
+        """Set the mass of object i, kilograms."""
         self.mass[i] = mass
         self._touch([i])
         self.state_changed()
 
     def set_property(self, i: int, name: str, value: bool) -> None:
-        """Give object i a property, or take it away."""
+        """Set or clear a property of object i."""
         self.properties[i, PROPERTY_COLUMN[name]] = value
         self._touch([i])
         self.arrangement_changed()
 
     def relocate(self, i: int, parents: Sequence[int]) -> None:
-        """Say in which receptacles object i lies from now on; what lies in it goes along."""
+        """Put object i, with everything in it, into other receptacles."""
         within = self.inside(i)
         moving = {i, *within}
         self._touch([*self.parents[i], *parents])
@@ -198,16 +198,17 @@ class World(SceneObjects):
         self._renested()
 
     def relocate_alone(self, i: int, parents: Sequence[int]) -> None:
-        """Say in which receptacles object i lies; what lies in it does not change."""
+        """Put object i into other receptacles; its contents keep theirs."""
         self._touch([*self.parents[i], *parents])
         self._displace([i, *self.inside(i)])
         self.parents[i] = tuple(parents)
         self._renested()
 
     def turn(self, i: int, yaw: float) -> None:
-        """Turn object i about the vertical to a heading in degrees, its box following.
+        """Turn object i about the vertical to a heading in degrees, with its box.
 
-        What was leaning is set straight, to the nearest quarter turn: what lay flat lies flat.
+        Its tilts are rounded to quarter turns: a leaning object is set straight, a lying one stays
+        flat.
         """
         self.rotation[i] = upright_rotation(self.rotation[i], yaw)
         corners = self.obb_corners(i)
@@ -217,16 +218,17 @@ class World(SceneObjects):
         self.arrangement_changed()
 
     def move_by(self, i: int, offset: NDArray[np.float64]) -> None:
-        """Shift object i by (3,) metres, and what lies in it with it."""
+        """Shift object i by (3,) metres, with everything in it."""
         self._shift([i, *self.inside(i)], offset)
         self.arrangement_changed()
 
     def set_pose(
         self, i: int, position: NDArray[np.float64], rotation: NDArray[np.float64]
     ) -> None:
-        """Put object i, alone, at (3,) metres and degrees, its box following.
+        """Put object i, without its contents, at a position (3,) in metres and a rotation (3,) in
+        degrees.
 
-        A box that is recorded without its orientation moves and does not turn.
+        Its box follows. A box that is recorded without an orientation moves but does not turn.
         """
         offset = position - self.position[i]
         self.position[i], self.rotation[i] = position, rotation
@@ -240,7 +242,7 @@ class World(SceneObjects):
         self.arrangement_changed()
 
     def rename(self, i: int, object_id: str) -> None:
-        """Give object i another id, which nothing else has."""
+        """Give object i another id, which no other object may have."""
         del self.index[self.object_ids[i]]
         self.object_ids[i] = object_id
         self.index[object_id] = i
@@ -248,7 +250,7 @@ class World(SceneObjects):
         self.state_changed()
 
     def remove(self, i: int) -> None:
-        """Take object i out of the scene; what lies in it stays where it is."""
+        """Take object i out of the scene; its contents stay where they are."""
         if i == self.held:
             self.held = -1
         for child in self.contents[i]:
@@ -261,22 +263,23 @@ class World(SceneObjects):
         self._renested()
 
     def cut_up(self, i: int, state: str) -> None:
-        """Take a whole away of which there are parts now; the metadata go on listing it.
+        """Replace a whole by its parts, which exist already. The metadata go on listing the whole.
 
         Args:
-            state: what it is from now on, ``"isSliced"`` or ``"isBroken"``.
+            state: the new state of the whole, ``"isSliced"`` or ``"isBroken"``.
         """
         self.remove(i)
         self.remains.add(i)
         self.set_state(i, state, True)
 
     def disable(self, i: int) -> None:
-        """Take object i out of the scene until it is brought back by :meth:`enable`."""
+        """Take object i out of the scene until :meth:`enable` brings it back."""
         self.disabled[i] = tuple(self.contents[i])
         self.remove(i)
 
     def enable(self, i: int) -> tuple[int, ...]:
-        """Bring back what was disabled, in no receptacle yet; returns what lay in it."""
+        """Bring a disabled object back, into no receptacle yet, and return the rows of its former
+        contents."""
         lay_in_it = self.disabled.pop(i)
         self.exists[i] = True
         self._displace([i])
@@ -284,17 +287,17 @@ class World(SceneObjects):
         return lay_in_it
 
     def place_agent(self, agent: Agent) -> None:
-        """Put the agent somewhere; what it holds goes along."""
+        """Put the agent at a pose, with the object that it holds."""
         self.agent = agent
         if self.held >= 0:
             self.carry()
 
     def carry(self) -> None:
-        """Bring the held object to where the hand is."""
+        """Move the held object to the hand."""
         centre = (self.low[self.held] + self.high[self.held]) / 2
         heading = unity_rotation(np.array([self.agent.horizon, self.agent.rotation, 0.0]))
         hand = self.agent.camera + heading @ HAND_OFFSET
-        # What is in the hand hides nothing, so lines of sight stay as they were: no `changed`.
+        # The held object hides nothing, so lines of sight stay valid: no `arrangement_changed`.
         self._shift(self.in_hand, hand - centre)
 
     def add_object(self, like: int, object_id: str, object_type: str, name: str) -> int:
@@ -329,7 +332,7 @@ class World(SceneObjects):
 
 
 def _objects(world: World) -> dict[str, Any]:
-    """Copies of all that is said of a world's objects; what they look like is to be found anew."""
+    """Copies of the fields that describe a world's objects, with a cache of their own."""
     copies = {
         each.name: copy(getattr(world, each.name))
         for each in fields(world)

@@ -1,7 +1,8 @@
-"""Values that are worked out from a world's state and kept until that state changes.
+"""Values that are computed from a world's state and kept until that state changes.
 
-The world does not know who keeps what. Each reader declares a typed key for its value, so the
-renderer, the metadata and the lines of sight can cache here without the world importing them.
+The world does not know what is kept. Each reader declares a typed key for its values. So the
+renderer, the metadata and the lines of sight can keep values here, and the world imports none of
+them.
 """
 
 from __future__ import annotations
@@ -15,10 +16,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class CacheKey(Generic[T]):
-    """The key of one value that is worked out from the whole state.
+    """The key of one value that is computed from the whole state.
 
     Attributes:
-        name: says in error messages and in a debugger what the value is.
+        name: describes the value in a debugger.
     """
 
     name: str
@@ -26,13 +27,13 @@ class CacheKey(Generic[T]):
 
 @dataclass(frozen=True, eq=False)
 class ObjectCacheKey(Generic[T]):
-    """The key of one value for each object, by the object's row.
+    """The key of one value for each object.
 
     Attributes:
-        name: says in error messages and in a debugger what the values are.
-        until_moved: True for values that depend only on where the object is and what it lies in,
+        name: describes the values in a debugger.
+        until_moved: True for values that depend only on where the object is and what it is in,
             False for values that depend on any of its states.
-        in_snapshots: whether a snapshot of the world takes the values along.
+        in_snapshots: whether a snapshot of the world includes the values.
     """
 
     name: str
@@ -62,12 +63,12 @@ class Cache:
 
 @dataclass
 class WorldCache:
-    """All that is kept of one world.
+    """All values that are kept for one world.
 
     Attributes:
         state: values that hold until anything in the world changes.
-        arrangement: values that hold until an object moves, opens or shuts. Worlds that are
-            arranged alike share this cache, so it is replaced rather than cleared.
+        arrangement: values that hold until an object moves, opens or closes. Worlds in the same
+            arrangement share this cache, so a change replaces it and does not clear it.
     """
 
     state: Cache = field(default_factory=Cache)
@@ -75,18 +76,19 @@ class WorldCache:
     _objects: dict[ObjectCacheKey[Any], dict[int, Any]] = field(default_factory=dict)
 
     def of_objects(self, key: ObjectCacheKey[T]) -> dict[int, T]:
-        """The values kept for objects, by row. The caller reads this dictionary and adds to it."""
+        """The values of objects, by row. Readers look values up in this dictionary and add new
+        ones."""
         found = self._objects.get(key)
         if found is None:
             found = self._objects[key] = {}
         return found
 
     def state_changed(self) -> None:
-        """Forget what was worked out from the whole state."""
+        """Forget the values that depend on the whole state."""
         self.state.clear()
 
     def arrangement_changed(self) -> None:
-        """Forget that, and what was worked out from where things are."""
+        """Forget these, and the values that depend on where objects are."""
         self.state_changed()
         self.arrangement = Cache()
 
@@ -104,6 +106,6 @@ class WorldCache:
                     values.pop(i, None)
 
     def snapshot(self) -> WorldCache:
-        """A cache for another world in the same state; the two share the arrangement's values."""
+        """A cache for a snapshot. It shares the values of the arrangement."""
         objects = {key: dict(values) for key, values in self._objects.items() if key.in_snapshots}
         return WorldCache(arrangement=self.arrangement, _objects=objects)
