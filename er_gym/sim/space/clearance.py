@@ -1,4 +1,4 @@
-"""Whether a thing runs into anything where it is wanted, or on its way along."""
+"""Whether an object would collide with anything at another place, or on a straight way."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from er_gym.sim.space.solids import solid_of
 from er_gym.sim.world import World
 
 _SKIN = 0.02
-"""Boxes may overlap by this much, metres: recorded ones are generous."""
+"""Boxes may overlap by this much without a collision, metres: recorded boxes are generous."""
 _STEP = 0.025
-"""Between the places at which a way is looked at, metres."""
+"""Distance between two tested places on a way, metres."""
 _FLOOR = [0, 2]
 
 
 class Clearance:
-    """What object i, with what lies in it, may run into.
+    """The obstacles for object i and its contents.
 
     Args:
-        ignored: rows of what it may pass through, besides itself and what it lies in or on.
+        ignored: rows that it may pass through, besides itself and its receptacles.
     """
 
     def __init__(self, world: World, i: int, ignored: tuple[int, ...] = ()) -> None:
@@ -32,19 +32,23 @@ class Clearance:
         self._room = room_bounds(world.scene.name)
         self._ids = world.object_ids
         self._low, self._high = world.low[i].copy(), world.high[i].copy()
-        # What it overlaps already, by the record, is not in its way.
+        # Boxes that it overlaps at the start, by the record, are no obstacles.
         self._beside = ~self._overlaps(np.zeros(3))
 
     def _overlaps(self, offset: NDArray[np.float64]) -> NDArray[np.bool_]:
         low, high = self._low + offset + _SKIN, self._high + offset - _SKIN
-        high = np.maximum(low + 1e-6, high)  # of what is thinner than that, the lower side
+        high = np.maximum(low + 1e-6, high)  # a box thinner than that is tested at its lower side
         return np.asarray(((self._boxes[:, 0] < high) & (self._boxes[:, 1] > low)).all(axis=1))
 
     def obstacle(self, offset: NDArray[np.float64], anew: bool = False) -> str | None:
-        """What the thing runs into when shifted by (3,) metres: an id, "a wall", None for nothing.
+        """The obstacle that the object meets after a shift by (3,) metres.
 
         Args:
-            anew: it is put there, not pushed: what it overlaps where it is now counts as well.
+            anew: the object is put there and not pushed, so boxes that it overlaps now count as
+                well.
+
+        Returns:
+            The obstacle's id, "a wall", or None if the place is free.
         """
         low, high = self._room
         if ((self._low + offset)[_FLOOR] < low[_FLOOR]).any() or (
@@ -58,7 +62,8 @@ class Clearance:
         return self._ids[rows[0]] if len(rows) else None
 
     def way(self, ahead: NDArray[np.float64], reach: float) -> float:
-        """How far it slides along a level (3,) direction until it touches something, metres."""
+        """How far the object slides along a level (3,) direction until it meets an obstacle,
+        metres."""
         for far in np.arange(_STEP, reach + _STEP / 2, _STEP):
             if self.obstacle(far * ahead) is not None:
                 return float(far - _STEP)

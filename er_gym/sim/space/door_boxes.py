@@ -1,7 +1,7 @@
-"""How far an open door makes an object's box grow.
+"""Axis-aligned boxes with open doors, as AI2-THOR reports them.
 
-AI2-THOR's axis-aligned box encloses all colliders of an object, an open door's as well. What the
-agent sees and runs into goes by the body's parts, without the door.
+AI2-THOR's axis-aligned box encloses all colliders of an object, including an open door. Visibility
+and collisions do not use these boxes: they use the object's solid, without the door.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from er_gym.sim.space.solids import solid_of
 from er_gym.sim.world import World
 
 _SWINGING = ("Fridge",)
-"""Types whose door is taken to be as wide as they are and to open by a quarter turn. Cabinets have
-one door or two, and the record does not tell which; so it is with the others that swing."""
+"""Types whose door is as wide as they are and opens by a quarter turn. Cabinets are left out: they
+have one door or two, and the record does not say which. The same holds for other swinging doors."""
 _QUARTER = np.pi / 2
 
 
@@ -34,7 +34,7 @@ def boxes_with_doors(world: World) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def _swept(world: World, i: int) -> NDArray[np.float64]:
-    """(4, 3) points around the door of object i, at the height of its middle."""
+    """(4, 3) corners of the area that the door of object i sweeps, at the height of its middle."""
     solid = solid_of(world, i)
     left, right = solid.upright[:, :, 0].min(), solid.upright[:, :, 0].max()
     front = solid.upright[:, :, 2].max()

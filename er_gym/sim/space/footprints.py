@@ -1,7 +1,7 @@
-"""What the agent's body runs into: the parts of things, seen from above.
+"""The obstacles of the agent's body, seen from above.
 
-AI2-THOR tests an upright capsule of 0.2 m radius. Its ends are round, so it comes nearer to what is
-low than to what is as high as its side.
+AI2-THOR tests an upright capsule of 0.2 m radius. Its ends are round, so it comes nearer to low
+obstacles than to high ones.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from er_gym.sim.space.solids import Solid, solid_of
 from er_gym.sim.world import World
 
 RADIUS = 0.2
-"""Of the agent's capsule, metres."""
+"""Radius of the agent's capsule, metres."""
 _TOP = 1.75
 """Height of the top of the capsule over the floor, metres."""
 _COUNTER_DEPTH = 0.7
-"""Depth of the arms of a counter that bends, metres."""
+"""Depth of the arms of an L- or U-shaped counter, metres."""
 _PANES = frozenset({"Window", "ShowerGlass"})
 _PANE = 0.4
-"""A pane whose box is thicker is bent or goes round a corner: its box is air, metres."""
+"""A pane with a thicker box is bent or goes round a corner, metres. Its box is mostly air."""
 _BOWL_WIDTH = 0.45
-"""Width of a toilet's bowl, metres. The box of some holds the open lid, too."""
+"""Width of a toilet's bowl, metres. Some recorded boxes include the open lid."""
 
 
 @dataclass(frozen=True)
 class Footprints:
-    """Q parts that stand in the way, each a rectangle in its own frame.
+    """Q obstacles, each a rectangle in its own frame.
 
     Attributes:
         middle: (Q, 2) x and z of the rectangle's middle, world frame, metres.
         turn: (Q, 2) cosine and sine of its heading.
         half: (Q, 2) half its width and depth, metres.
-        reach: (Q,) how near to it the agent's middle can come, metres.
+        reach: (Q,) the least distance between it and the agent's middle, metres.
     """
 
     middle: NDArray[np.float64]
@@ -45,7 +45,7 @@ class Footprints:
 
     @staticmethod
     def of(world: World, slack: float = 0.0) -> Footprints:
-        """All parts that the capsule, made ``slack`` metres thinner, meets on the floor."""
+        """The obstacles on the floor of a world for a capsule that is ``slack`` metres thinner."""
         parts = [
             (solid, part)
             for i, kind in enumerate(world.types)
@@ -66,10 +66,10 @@ class Footprints:
         return Footprints(middle[met], np.stack([cos, sin], axis=1)[met], half[met], reach[met])
 
     def gaps(self, q: int, x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Metres from points to part q; inside it, negative to its edge.
+        """Metres from points to obstacle q; inside it, minus the distance to its edge.
 
         Args:
-            x, z: of the points, metres; of shapes that broadcast.
+            x, z: coordinates of the points, metres; their shapes must broadcast.
         """
         (dx, dz), (cos, sin) = self.middle[q], self.turn[q]
         x, z = x - dx, z - dz
@@ -79,7 +79,7 @@ class Footprints:
         return np.asarray(outside + np.minimum(np.maximum(across, along), 0.0))
 
     def spans(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lower and upper corners (Q, 2) of the area in which each part is in the way, metres."""
+        """Lower and upper corners (Q, 2) of the area that each obstacle blocks, metres."""
         cos, sin = np.abs(self.turn).T
         wide, deep = self.half.T
         out = np.stack([wide * cos + deep * sin, wide * sin + deep * cos], axis=1)
@@ -88,7 +88,8 @@ class Footprints:
 
 
 def _reach(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(Q,) how near the capsule's middle comes to parts from (Q,) heights to others; 0: over it."""
+    """(Q,) how near the capsule's middle comes to obstacles between two heights (Q,); 0 if it
+    passes."""
     below = np.clip(RADIUS - high, 0.0, RADIUS)
     above = np.clip(low - (_TOP - RADIUS), 0.0, RADIUS)
     inside = (high > 0.0) & (low < _TOP)
@@ -97,7 +98,8 @@ def _reach(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def _obstructing_parts(kind: str, solid: Solid) -> NDArray[np.float64]:
-    """(K, 2, 3) corners of what is solid of a thing, about its middle, before its turn."""
+    """(K, 2, 3) corners of the parts that block the agent, about the solid's middle, before its
+    turn."""
     if kind in _PANES and np.ptp(solid.upright[..., [0, 2]], axis=(0, 1)).min() > _PANE:
         return solid.upright[:0]
     if kind == "CounterTop" and len(solid.upright) > 1:
@@ -114,10 +116,11 @@ def _obstructing_parts(kind: str, solid: Solid) -> NDArray[np.float64]:
 
 
 def _arms(parts: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of parts (K, 2, 3) of a counter that bends, what is near its box's edges.
+    """The strips of a bent counter's parts (K, 2, 3) that lie near the edges of its box.
 
-    Such a counter runs along walls, which are where its box ends. The parts are what the recorded
-    positions, 0.25 m apart, leave over of the box; they reach too far into the room.
+    Such a counter runs along walls, and its box ends at them. Its parts are the area of the box
+    that the recorded positions leave free. Those are 0.25 m apart, so the parts reach too far into
+    the room.
     """
     low, high = parts[:, 0].min(axis=0), parts[:, 1].max(axis=0)
     strips = []

@@ -1,4 +1,4 @@
-"""From where an object can be interacted with: AI2-THOR's ``GetInteractablePoses``."""
+"""AI2-THOR's ``GetInteractablePoses``: the poses from which an object can be interacted with."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from er_gym.sim.space.visibility import in_frustum, visible
 from er_gym.sim.world import World
 
 HORIZONS = (-30.0, 0.0, 30.0, 60.0)
-"""Camera tilts that AI2-THOR tries when none are asked for, degrees, down positive."""
+"""Camera tilts that AI2-THOR tries if none are given, degrees, positive looking down."""
 _REMEMBERED = 64
-"""Answers over more positions than these are not kept."""
+"""Answers for more positions than these are not cached."""
 _BATCH = 64
-"""Camera positions that one call of the ray kernel looks from."""
+"""Camera positions in one call of the ray kernel."""
 
 Poses = NDArray[np.float64]
 """(K, 6): x, y and z in metres, rotation and horizon in degrees, 1 for standing or 0."""
@@ -36,13 +36,14 @@ def interactable_poses(
     max_poses: int | None = None,
     max_distance: float | None = None,
 ) -> Poses:
-    """Poses from which object i is visible, hence can be interacted with.
+    """Poses from which object i is visible and so can be interacted with.
 
     Args:
         positions: (P, 2) x and z where the agent may stand, tried in order.
-        rotations, horizons: degrees. standings: whether to stand or crouch.
-        max_poses: stop after so many.
-        max_distance: metres that the object may be away; the visibility distance if None.
+        rotations, horizons: degrees.
+        standings: whether to stand or crouch.
+        max_poses: stop after this many poses.
+        max_distance: the largest distance to the object, metres; None for the visibility distance.
     """
     distance = world.settings.visibility_distance if max_distance is None else max_distance
     filters = (tuple(rotations), tuple(horizons), tuple(standings), max_poses, distance)
@@ -55,9 +56,10 @@ def interactable_poses(
     in_hand = i in world.in_hand
     one = len(positions) == len(rotations) == len(horizons) == len(standings) == 1
     if one and not in_hand and max_distance is None:
-        # Whoever asks for one pose will take it next, and look about: that is asked for already.
+        # A caller who asks for one pose mostly goes there next, so this visibility is needed
+        # anyway.
         return _one_pose(world, i, positions[0], rotations[0] % 360.0, horizons[0], standings[0])
-    # Where the hand is, is no part of an arrangement; and the poses of a whole room take megabytes.
+    # An arrangement does not include the hand's position. The poses of a whole room take megabytes.
     if in_hand or len(positions) > _REMEMBERED:
         return search()
     settings = world.settings
@@ -131,18 +133,18 @@ def _one_pose(
 def _within_reach(
     world: World, i: int, positions: NDArray[np.float64], distance: float
 ) -> NDArray[np.float64]:
-    """Those of (P, 2) positions that object i is within so many metres of."""
+    """The (P, 2) positions at which object i is within a distance, metres."""
     away = np.abs(np.array(lines_of_sight(world).extent)[:, None] - positions).max(
         axis=0, initial=0.0
     )
     if i not in world.in_hand and (np.hypot(away[:, 0], away[:, 1]) <= distance).all():
-        return positions  # all that there is, is
+        return positions  # everything in the room is within the distance
     return positions[Outlines.of([solid_of(world, i)]).gaps(positions)[:, 0] <= distance]
 
 
 def _lines_to(
     world: World, i: int, eyes: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Object i's sample points (Q, 3), and (E, Q) from which eyes (E, 3) nothing hides which."""
+    """(Q, 3) sample points of object i, and (E, Q) whether nothing hides them from eyes (E, 3)."""
     points = sample_points(world, i).astype(np.float32)
     return points, lines_of_sight(world).unobstructed(eyes, points, i)

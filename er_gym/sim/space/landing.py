@@ -1,4 +1,4 @@
-"""What things come to rest on."""
+"""The surface on which a falling object comes to rest."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ _FLOOR = [0, 2]
 
 
 def landing(world: World, i: int, point: NDArray[np.float64]) -> tuple[float, list[int]] | None:
-    """Where object i comes to lie when let go of at a (3,) point: on the floor or on furniture.
+    """Where object i comes to rest when it is released at a (3,) point: on the floor or on
+    furniture.
 
     Returns:
-        The height of its underside and the receptacles that it then is in, None inside a wall.
+        The height of its underside and the receptacles that it is then in; None inside a wall.
     """
     if floor_of(world.scene.name).contains(point[_FLOOR]):
         return world.ground, list(world.of_type("Floor"))[:1]

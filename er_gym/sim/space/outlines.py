@@ -1,8 +1,8 @@
-"""How far things are from the agent, as AI2-THOR measures it.
+"""The distance from the agent to objects, as AI2-THOR measures it.
 
-AI2-THOR looks for objects in an upright capsule around the agent: an object is within reach when
-any part of it is no farther than the visibility distance, measured along the floor. Which of its
-points is seen then does not matter: one sees the far end of a table by which one stands.
+AI2-THOR looks for objects in an upright capsule around the agent. An object is within reach when
+any part of it is no farther than the visibility distance, measured along the floor. It does not
+matter which of its points is seen: at one end of a table, the agent may see only the other end.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ _FLOOR = [0, 2]
 
 @dataclass(frozen=True)
 class Outlines:
-    """The parts of K objects seen from above, each in the frame turned to its object's heading.
+    """The parts of K objects seen from above, each in a frame with its object's heading.
 
     Attributes:
-        middle: (Q, 2) x and z that the corners of part q count from, world frame, metres.
+        middle: (Q, 2) x and z of the origin of part q's frame, world frame, metres.
         turn: (Q, 2) cosine and sine of its heading.
-        low, high: (Q, 2) corners.
-        first: (K,) the first part of each object.
+        low, high: (Q, 2) corners in that frame, metres.
+        first: (K,) index of each object's first part.
     """
 
     middle: NDArray[np.float64]
@@ -37,7 +37,7 @@ class Outlines:
 
     @staticmethod
     def of(solids: Sequence[Solid]) -> Outlines:
-        """The outlines of some shapes, each of one part or more."""
+        """The outlines of some solids, each of which has at least one part."""
         counts = [len(solid.upright) for solid in solids]
         corners = np.concatenate([solid.upright for solid in solids])[:, :, _FLOOR]
         yaw = np.radians([solid.yaw for solid in solids])
@@ -52,7 +52,7 @@ class Outlines:
         )
 
     def gaps(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(P, K) metres along the floor from (P, 2) x, z positions to the objects."""
+        """(P, K) metres along the floor from positions (P, 2), x and z, to the objects."""
         away = positions[:, None] - self.middle
         cos, sin = self.turn.T
         own = np.stack(

@@ -1,4 +1,4 @@
-"""Where there is room for an object in or on a receptacle."""
+"""Free spots for an object in or on a receptacle."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from er_gym.sim.world import World, upright_rotation
 
 @dataclass(frozen=True)
 class _Manner:
-    """How a type of receptacle takes things, where that is not side by side.
+    """How a type of receptacle holds objects, if not side by side.
 
     Attributes:
-        vessel: it is made for one thing, which may stick out over its rim.
-        heaps: when it is full, things lie on top of each other.
+        vessel: it holds one object, which may stick out over its rim.
+        heaps: once it is full, objects lie on top of each other.
     """
 
     vessel: bool = False
@@ -41,28 +41,28 @@ _MANNERS_BY_TYPES = {
 _MANNERS = {name: manner for names, manner in _MANNERS_BY_TYPES.items() for name in names.split()}
 _SIDE_BY_SIDE = _Manner()
 _STEP = 0.05
-"""Spacing of the spots that are tried, metres."""
+"""Spacing of the grid of spots, metres."""
 _FINE_STEP = 0.02
-"""The same in what is made for one thing, and where space is tight, metres."""
+"""The spacing in vessels and in tight spaces, metres."""
 _SKIN = 0.005
-"""Gap that is left between things, metres."""
+"""Gap between objects, metres."""
 _GIVE = 0.02
-"""How much a thing may be too large, metres: recorded boxes are generous."""
+"""How much too large an object may be, metres: recorded boxes are generous."""
 _RISES = 0.03
-"""A fixed thing is in the way on a surface that it rises above by more than this, metres."""
+"""A fixed object is an obstacle on a surface if it rises above it by more than this, metres."""
 _OVERHANG = 1.0
-"""Farther from a receptacle than this nothing is in the way of what is put there, metres."""
+"""Objects farther from a receptacle than this are no obstacles, metres."""
 _PICKUPABLE = PROPERTIES.index("pickupable")
 _HOLES = frozenset({"Sink", "SinkBasin", "StoveBurner"})
-"""What is let into a counter, where nothing else can stand."""
+"""Types that are built into a counter and leave no place for other objects."""
 _INTO = 0.15
-"""How far under a surface the top of what is let into it may lie, metres."""
+"""How far below a surface the top of these types may lie, metres."""
 
 
 def surface_height(world: World, receptacle: int) -> float:
-    """Height at which things stand in or on a receptacle, metres.
+    """Height at which objects stand in or on a receptacle, metres.
 
-    Taken from what the record shows standing there, where it shows anything, else from the type.
+    The height comes from recorded objects on that receptacle if there are any, else from its type.
     """
     low, high = world.low[receptacle, 1], world.high[receptacle, 1]
     recorded = recorded_surfaces(world.scene.name).get(receptacle)
@@ -78,7 +78,7 @@ def _stand(world: World, receptacle: int) -> float | None:
 
 
 def is_vessel(world: World, receptacle: int) -> bool:
-    """Whether a receptacle is made for one thing, as a cup or a stove burner is."""
+    """Whether a receptacle holds one object, as a cup or a stove burner does."""
     return _manner(world, receptacle).vessel
 
 
@@ -87,7 +87,7 @@ def _manner(world: World, receptacle: int) -> _Manner:
 
 
 def _places(world: World, receptacle: int) -> NDArray[np.float64]:
-    """(R, 2, 2) corners x, z of the rectangles in or on a receptacle that things stand in."""
+    """(R, 2, 2) corners x, z of the rectangles in or on a receptacle where objects can stand."""
     if world.types[receptacle] == "CounterTop":
         return solid_of(world, receptacle).boxes[:, :, [0, 2]]
     if _stand(world, receptacle) is None:
@@ -107,11 +107,11 @@ def free_spots(
 
     Args:
         seen_by: spots in this agent's picture come before all others.
-        squeeze: where no spot of the usual grid is free, look into the gaps between things, too
+        squeeze: if no spot of the grid is free, look into the gaps between objects as well
             (:func:`_tight_spots`).
 
     Yields:
-        The heading in degrees at which it fits, and the (3,) centre of its box's underside.
+        The heading in degrees at which the object fits, and the (3,) centre of its box's underside.
     """
     if is_vessel(world, receptacle):
         yield from _in_vessel(world, i, receptacle)
@@ -144,10 +144,10 @@ def free_spots(
 
 
 def spawn_points(world: World, receptacle: int, seen_by: Agent | None) -> NDArray[np.float64]:
-    """(S, 3) points on the surface of a receptacle, whatever stands there; metres.
+    """(S, 3) points on the surface of a receptacle, free or not, metres.
 
     Args:
-        seen_by: leave out what is not in this agent's picture.
+        seen_by: leave out points that are not in this agent's picture.
     """
     height = surface_height(world, receptacle)
     spots = np.unique(_spots(_places(world, receptacle), np.zeros(2)).round(6), axis=0)
@@ -157,14 +157,14 @@ def spawn_points(world: World, receptacle: int, seen_by: Agent | None) -> NDArra
 
 
 def _distance(spots: NDArray[np.float64], near: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(S,) from (S, 2) spots to a (2,) point."""
+    """(S,) distances from (S, 2) spots to a (2,) point."""
     return np.asarray(np.hypot(spots[:, 0] - near[0], spots[:, 1] - near[1]))
 
 
 def _in_picture(
     world: World, agent: Agent, spots: NDArray[np.float64], height: float
 ) -> NDArray[np.bool_]:
-    """(S,) which spots, (S, 2) x and z at one height, an agent's camera has in its picture."""
+    """(S,) whether each spot, (S, 2) x and z at one height, is in the agent's picture."""
     settings = world.settings
     points = np.column_stack([spots[:, 0], np.full(len(spots), height), spots[:, 1]])
     aspect = settings.width / settings.height
@@ -176,7 +176,7 @@ def _in_picture(
 def _in_vessel(
     world: World, i: int, receptacle: int
 ) -> Iterator[tuple[float, NDArray[np.float64]]]:
-    """Places in a vessel, or on top of what is in it already: its middle first."""
+    """Spots in a vessel, or on top of its contents, from the middle outwards."""
     inside = world.contents[receptacle]
     if inside and not _manner(world, receptacle).heaps:
         return
@@ -195,7 +195,8 @@ def _in_vessel(
 
 
 def _headings(world: World, i: int) -> list[tuple[float, NDArray[np.float64]]]:
-    """Headings in degrees that align object i's box with the axes, and its (2,) half-size then."""
+    """Headings in degrees that align object i's box with the axes, each with the box's (2,)
+    half-size."""
     tilt = upright_rotation(world.rotation[i], 0.0)
     edges = world.obb[i, 1:] @ unity_rotation(tilt).T
     if np.isnan(edges).any():
@@ -210,7 +211,7 @@ def _headings(world: World, i: int) -> list[tuple[float, NDArray[np.float64]]]:
 
 
 def _height(world: World, i: int) -> float:
-    """How high object i stands once it is set straight, metres."""
+    """Height of object i's box once it stands upright, metres."""
     edges = world.obb[i, 1:] @ unity_rotation(upright_rotation(world.rotation[i], 0.0)).T
     if np.isnan(edges).any():
         return float(world.high[i, 1] - world.low[i, 1])
@@ -223,7 +224,7 @@ def _height(world: World, i: int) -> float:
 def _spots(
     places: NDArray[np.float64], half: NDArray[np.float64], step: float = _STEP
 ) -> NDArray[np.float64]:
-    """(S, 2) x, z centres in rectangles (R, 2, 2) where a thing of half-size (2,) fits."""
+    """(S, 2) x, z spots in rectangles (R, 2, 2) where a box of half-size (2,) fits."""
     found = [np.empty((0, 2))]
     for low, high in places:
         if (2 * half > high - low + _GIVE).any():
@@ -238,13 +239,13 @@ def _spots(
 def _obstacles(
     world: World, receptacle: int, i: int, height: float
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """What may be in the way of object i there: loose things and fixed parts.
+    """The obstacles for object i in or on a receptacle.
+
+    Loose objects count wherever they are, since they could be anywhere. Fixed objects count only on
+    top of furniture, since the boxes of furniture with room inside overlap their neighbours.
 
     Returns:
-        (Q, 2, 3) boxes, and the (L,) rows of the loose things, whose boxes come first.
-
-    Loose things count wherever they are, for they could be anywhere; fixed ones only on top of
-    things, for the boxes of what holds a room overlap with those of its neighbours.
+        (Q, 2, 3) boxes, and the (L,) rows of the loose objects, whose boxes come first.
     """
     aside = {receptacle, i, *world.inside(i), *world.ancestors(receptacle)}
     on_top = _stand(world, receptacle) is not None and not is_vessel(world, receptacle)
@@ -254,7 +255,7 @@ def _obstacles(
     close = world.exists & (world.high > low).all(axis=1) & (world.low < high).all(axis=1)
     middle = (world.low[receptacle] + world.high[receptacle]) / 2
     loose = world.properties[:, _PICKUPABLE]
-    # What a receptacle is part of, as a drawer is of a dresser, is not in its way.
+    # A drawer is part of a dresser, so the dresser is no obstacle in it.
     around = (world.low <= middle).all(axis=1) & (middle <= world.high).all(axis=1)
     close &= loose | ~around
     close[list(aside)] = False
@@ -279,14 +280,14 @@ def _free(
     tall: float,
     obstacles: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """(S,) which spots overlap none of the obstacles' boxes."""
+    """(S,) whether each spot is free of obstacles."""
     same_height = _at_height(obstacles, height, tall)
     low, high = obstacles[same_height][:, :, [0, 2]].swapaxes(0, 1)
     return np.asarray(~_overlap(spots, half + _SKIN, low, high).any(axis=1))
 
 
 def _at_height(obstacles: NDArray[np.float64], height: float, tall: float) -> NDArray[np.bool_]:
-    """(Q,) which boxes reach into the air that a thing standing at a height takes up."""
+    """(Q,) whether each box is at the height of an object that stands at ``height``."""
     return np.asarray((obstacles[:, 0, 1] < height + tall) & (obstacles[:, 1, 1] > height + _SKIN))
 
 
@@ -299,11 +300,11 @@ def _tight_spots(
     obstacles: NDArray[np.float64],
     loose: NDArray[np.intp],
 ) -> NDArray[np.float64]:
-    """(S, 3) heading, x and z of the spots that a person would find among the clutter.
+    """(S, 3) heading, x and z of the free spots that a person would find among the clutter.
 
-    If a thing fits anywhere between upright boxes, it fits where it touches one of them, or an
-    edge, in x and one in z; so that is where to look, besides a fine grid. Loose things take up
-    their oriented boxes here, not the larger boxes along the axes around these.
+    An object that fits between upright boxes also fits where it touches one of them, or an edge, in
+    x and one in z. So these spots are tried besides a fine grid. Loose objects take up their
+    oriented boxes here, which are smaller than their axis-aligned ones.
 
     Args:
         headings: see :func:`_headings`.
@@ -322,7 +323,7 @@ def _tight_spots(
             first, last = np.minimum(place[0] + wide, place.mean(axis=0)), place[1] - wide
             lines = []
             for axis in (0, 1):
-                # Where it just touches is not free, by the last digit of a float.
+                # The margin is for rounding: an exact touch could count as an overlap.
                 touching = np.concatenate(
                     [low[:, axis] - wide[axis] - 1e-9, high[:, axis] + wide[axis] + 1e-9]
                 )
@@ -340,7 +341,7 @@ def _tight_spots(
 
 
 def _footprint(world: World, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Object k's box seen from above: its middle, (2,) x and z, and its (E, 2) edges."""
+    """Object k's box seen from above: (2,) x and z of its middle, and its (E, 2) edges."""
     middle = ((world.low[k] + world.high[k]) / 2)[[0, 2]]
     edges = world.obb[k, 1:] @ unity_rotation(world.rotation[k]).T
     if np.isnan(edges).any():
@@ -354,9 +355,9 @@ def _overlap_turned(
     middle: NDArray[np.float64],
     edges: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """(S,) at which spots a thing of half-size (2,) is not beside any of a footprint's edges.
+    """(S,) whether no edge of a footprint separates it from a box of half-size (2,) at each spot.
 
-    It overlaps a :func:`_footprint` if it also overlaps the box along the axes around it.
+    The box overlaps the :func:`_footprint` if it also overlaps the axis-aligned box around that.
     """
     met = np.ones(len(spots), dtype=bool)
     for edge in edges:
@@ -374,7 +375,7 @@ def _overlap(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """(S, Q) which rectangles (Q, 2), (Q, 2) a thing of half-size (2,) covers at which spots."""
+    """(S, Q) whether a box of half-size (2,) at each spot overlaps rectangles (Q, 2) to (Q, 2)."""
     x, z = spots[:, 0, None], spots[:, 1, None]
     found = (x > low[:, 0] - half[0]) & (x < high[:, 0] + half[0])
     found &= z > low[:, 1] - half[1]
@@ -389,9 +390,9 @@ def _tops(
     rim: float,
     obstacles: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(S,) height of the heap under a thing of half-size (2,) at each spot, below the rim, metres.
+    """(S,) height of the heap under a box of half-size (2,) at each spot, below the rim, metres.
 
-    What begins over the rim is not in the heap.
+    Objects that begin above the rim are not part of the heap.
     """
     heaped = obstacles[(obstacles[:, 0, 1] < rim) & (obstacles[:, 1, 1] > height)]
     low, high = heaped[:, 0][:, [0, 2]], heaped[:, 1][:, [0, 2]]

@@ -1,7 +1,7 @@
 """Lines of sight against axis-aligned boxes.
 
-A box in which the eye or the point looked at itself lies does not count: recorded boxes of concave
-things (a chair, an L-shaped counter) contain air. Slab method, in single precision throughout.
+A box that contains the eye or the target does not block: recorded boxes of concave objects (a
+chair, an L-shaped counter) contain air. All computations use the slab method in single precision.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Floats = NDArray[np.float32]
 
 
 def _inverse(direction: Floats) -> Floats:
-    """One over each, in place; what is next to nothing counts as a little."""
+    """1 / direction, in place. Values next to zero count as a small number."""
     direction[np.abs(direction) < _TINY] = _TINY
     return np.asarray(np.divide(np.float32(1.0), direction, out=direction))
 
@@ -27,7 +27,7 @@ def _inverse(direction: Floats) -> Floats:
 def blocked_by(
     origins: Floats, targets: Floats, box_min: Floats, box_max: Floats
 ) -> NDArray[np.bool_]:
-    """Which boxes stand between each origin and its target, every one against every one.
+    """Which boxes stand between each origin and its target; every pair is tested.
 
     Args:
         origins: (R, 3) or (1, 3), metres, world frame.
@@ -51,11 +51,11 @@ def blocked_by(
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """Points to look at, in K groups that each lie together.
+    """Points to look at, in K groups of consecutive points.
 
     Attributes:
         points: (3, P) metres, world frame.
-        first, count: (K,) where each group begins in ``points`` and how many it has.
+        first, count: (K,) index of each group's first point, and its number of points.
         low, high: (3, K) corners of the box around each group.
     """
 
@@ -69,18 +69,18 @@ class Targets:
 def crossings(
     eye: Floats, targets: Targets, box_min: Floats, box_max: Floats, pairs: NDArray[np.bool_]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Which boxes stand between one eye and which points, for the pairs that are asked for.
+    """Which boxes stand between one eye and which points, for some pairs of groups and boxes.
 
-    As :func:`blocked_by`, of which it leaves out what cannot be: a box that does not reach between
-    the eye and a group of points hides none of it.
+    The result equals that of :func:`blocked_by`. This function is faster: a box that does not reach
+    between the eye and a group hides no point of the group.
 
     Args:
         eye: (3,).
         box_min, box_max: (3, M) corners.
-        pairs: (K, M) bool, which boxes are asked about for which groups.
+        pairs: (K, M) bool, the boxes to test for each group.
 
     Returns:
-        (H,) points and (H,) boxes, one pair for each line of sight that a box crosses.
+        (H,) points and (H,) boxes, a pair for each line of sight that a box blocks.
     """
     between = pairs
     for axis in range(3):
@@ -113,7 +113,7 @@ def crossings(
 
 
 def _slab(scale: Floats, near: Floats, far: Floats) -> tuple[Floats, Floats]:
-    """Where lines enter and leave the space between two planes, as shares of their length."""
+    """Where lines enter and leave the space between two planes, as fractions of their length."""
     near *= scale
     far *= scale
     return np.minimum(near, far), np.maximum(near, far)

@@ -1,7 +1,7 @@
-"""Where the agent gets to by steps of one length: what AI2-THOR's GetReachablePositions lists.
+"""AI2-THOR's GetReachablePositions: the positions that the agent reaches by steps of one length.
 
-AI2-THOR's agent walked to all recorded positions. So whoever gets to one of them gets to all that
-are on the grid, even where our boxes leave no way between them.
+AI2-THOR's agent walked to all recorded positions. So an agent that reaches one of them reaches all
+that are on its grid, even where our boxes leave no gap.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from er_gym.sim.space.walkable_floor import Floor, floor_of
 
 _STEPS = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)])
 _ON_GRID = 1e-4
-"""How far from a place of the grid a recorded position may be and count as on it, metres."""
+"""How far from a node a recorded position may be and count as on the grid, metres."""
 _OFF_GRID = 7
-"""Decimals, in metres, by which places on a grid are told from places off it."""
+"""Decimals, in metres, to which two positions of one grid agree."""
 
 
 class Grid:
-    """The grid of a step that one point is on, cut into the pieces that hang together.
+    """A grid of positions with a given step, divided into connected parts.
 
     Args:
-        floor: what the agent walks on.
-        recorded: (R, 2) x and z of positions that one gets to from each other.
-        step: of the grid, metres.
+        floor: the floor that the agent walks on.
+        recorded: (R, 2) x and z of positions that can all be reached from each other.
+        step: spacing of the grid, metres.
         yaw: heading of its second axis, degrees clockwise from +z.
-        offset: (right, ahead) of any of its points along its axes, metres.
+        offset: (right, ahead) coordinates of any node along the grid's axes, metres.
     """
 
     def __init__(
@@ -63,9 +63,9 @@ class Grid:
         return np.asarray((along / self._step).round().astype(np.int64))
 
     def reachable_from(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(P, 2) x and z of the places that one walks to from (2,) ``start``, itself included.
+        """(P, 2) x and z of the positions that can be reached from (2,) ``start``, itself included.
 
-        They are sorted, and read-only.
+        They are sorted and read-only.
         """
         first = self.node(start)
         if first not in self._places:
@@ -73,7 +73,7 @@ class Grid:
             places = self.place(nodes).round(6)
             places = places[np.lexsort(places.T[::-1])]
             places.setflags(write=False)
-            if self._floor.contains(start):  # from elsewhere there may be no way back
+            if self._floor.contains(start):  # off the floor there may be no way back
                 self._places.update(dict.fromkeys(map(tuple, nodes.tolist()), places))
             else:
                 self._places[first] = places
@@ -90,7 +90,7 @@ class Grid:
         return found
 
     def _spread(self, frontier: NDArray[np.int64], seen: set[tuple[int, int]]) -> NDArray[np.int64]:
-        """The nodes of the frontier, and those not seen yet that one gets to from there."""
+        """The nodes of the frontier, and all new nodes that can be reached from them."""
         found = [frontier]
         while len(frontier):
             ends = (frontier[:, None] + _STEPS).reshape(-1, 2)
@@ -118,12 +118,13 @@ def _grid(scene_name: str, step: float, yaw: float, offset: tuple[float, float])
 def reachable_positions(
     scene_name: str, start: NDArray[np.float64], step: float, yaw: float = 0.0
 ) -> NDArray[np.float64]:
-    """(P, 2) x and z where one gets to from (2,) ``start`` by steps along a heading and across.
+    """(P, 2) x and z of the positions that the agent reaches from (2,) ``start``.
 
     Args:
-        step: metres. yaw: the heading, degrees clockwise from +z.
+        step: of the grid, metres.
+        yaw: direction of the steps, degrees clockwise from +z; steps across it count as well.
     """
-    turned = round(yaw % 90.0, 3)  # a grid is the same after a quarter turn
+    turned = round(yaw % 90.0, 3)  # a quarter turn gives the same grid
     along = start @ _axes(turned).T
     right, ahead = ((along % step).round(_OFF_GRID) % step).tolist()
     return _grid(scene_name, step, turned, (right, ahead)).reachable_from(start)

@@ -1,4 +1,4 @@
-"""In which receptacles a thing lies, worked out from where it is."""
+"""The receptacles that an object is in, computed from its place."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from er_gym.sim.world import World
 _FLOOR = [0, 2]
 _RECEPTACLE = PROPERTIES.index("receptacle")
 _BESIDE = 0.02
-"""How far the middle of a thing may be off what it lies on, metres: recorded boxes are rough."""
+"""How far outside its receptacle the middle of an object may be, metres: boxes are rough."""
 _SLACK = 0.06
-"""How far the underside of a thing may be off the height at which things stand, metres."""
+"""How far an object's underside may be off the receptacle's surface, metres."""
 _LOW = 0.3
-"""Nothing stands on a table or bed under this share of its height."""
+"""Objects do not stand lower on a table or bed than this share of its height."""
 _HANGERS = frozenset({"TowelHolder", "HandTowelHolder", "ToiletPaperHanger"})
 _CASES = frozenset({"Cabinet", "Drawer", "Fridge", "Microwave", "Safe"})
-"""What is on top of these, or sticks out of them, is not in them."""
+"""Objects on top of these types, or sticking out of them, are not in them."""
 
 
 def receptacles_of(world: World, i: int) -> tuple[int, ...]:
-    """The receptacles that object i is in where it stands now, the innermost first.
+    """The receptacles that object i is in at its present place, innermost first.
 
-    That is the smallest of those at whose height things stand that it stands at, and what that lies
-    in if it can be carried, as a plate can. For 97 % of the things that can be carried the first is
-    one that AI2-THOR's own record names (see docs/fidelity.md).
+    The innermost one is the smallest receptacle at whose surface the object stands. If that can be
+    picked up, as a plate can, its own receptacles follow. For 97 % of the pickupable objects the
+    first one is a receptacle that AI2-THOR's own record names (see docs/fidelity.md).
     """
     within = {i, *world.inside(i)}
     found = []
-    # What is not even near on the floor plan need not be looked at one by one.
+    # Skip receptacles that are not near on the floor plan.
     low, high = world.low[:, _FLOOR], world.high[:, _FLOOR]
     near = ((low[i] <= high + _SLACK) & (high[i] >= low - _SLACK)).all(axis=1)
     for r in np.flatnonzero(near & world.exists & world.properties[:, _RECEPTACLE]).tolist():
@@ -48,7 +48,7 @@ def receptacles_of(world: World, i: int) -> tuple[int, ...]:
 
 
 def _fit(world: World, r: int, i: int) -> int | None:
-    """How well object i stands in or on receptacle r: 0 well, 1 perhaps, None not."""
+    """How well object i fits in or on receptacle r: 0 well, 1 perhaps, None not at all."""
     kind = world.types[r]
     low, high = world.low[r], world.high[r]
     underside, top = world.low[i, 1], world.high[i, 1]
@@ -66,7 +66,7 @@ def _fit(world: World, r: int, i: int) -> int | None:
         if kind in _CASES:
             ceiling = high[1] - _BESIDE if top <= high[1] + _SLACK else -np.inf
         elif kind == "Shelf":
-            # A board with the air over it, up to the next board, which is another's.
+            # A shelf is a board and the air above it, up to the next shelf's board.
             ceiling = low[1] + max(_SLACK, tall / 2)
         return 0 if low[1] - _SLACK <= underside <= ceiling else None
     if abs(underside - (low[1] + stand * tall)) <= _SLACK:
@@ -75,7 +75,7 @@ def _fit(world: World, r: int, i: int) -> int | None:
 
 
 def _over(world: World, r: int, i: int) -> bool:
-    """Whether the middle of object i is over receptacle r; a counter may bend around it."""
+    """Whether the middle of object i is over receptacle r. A counter may be bent."""
     middle = ((world.low[i] + world.high[i]) / 2)[_FLOOR]
     if world.types[r] == "CounterTop":
         low, high = solid_of(world, r).boxes[:, :, _FLOOR].swapaxes(0, 1)

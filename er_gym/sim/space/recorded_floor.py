@@ -1,8 +1,8 @@
-"""The floor that is certain: the recorded positions and what lies between them.
+"""The floor that the record proves: the recorded positions and the area between them.
 
-The record is a set of positions on a 0.25 m grid that AI2-THOR's agent walked to. It passes freely
-between neighbours, so the positions, the segments between neighbours and the squares whose four
-corners are recorded are floor, whatever boxes overlap them.
+AI2-THOR's agent walked to the recorded positions, on a grid of 0.25 m. It passes freely between
+neighbours. So three things are floor, whatever boxes overlap them: the positions, the segments
+between neighbours, and the squares whose four corners are recorded.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ class Cells:
     on: NDArray[np.bool_]
 
     def grown(self, radius: float) -> Cells:
-        """The cells that a disc of ``radius`` metres covers as its middle goes over those on."""
+        """The cells that a disc of ``radius`` metres covers when its middle moves over all cells
+        that are on."""
         reach = int(radius / self.side + 1e-9)
         wide, deep = self.on.shape
         found = np.zeros((wide + 2 * reach, deep + 2 * reach), dtype=bool)
-        # A row of the disc at a time: the cells within `half` of one that is on, along z.
+        # Add one row of the disc at a time: the cells within `half` along z of a cell that is on.
         counts = np.zeros((wide, deep + 2 * reach + 1), dtype=np.int16)
         counts[:, reach + 1 : reach + 1 + deep] = self.on
         counts = np.cumsum(counts, axis=1, dtype=np.int16)
@@ -55,7 +56,7 @@ class Cells:
 
 @lru_cache(maxsize=256)
 def recorded_cells(scene_name: str, side: float) -> Cells:
-    """The certain floor of a recorded scene, in cells that divide the recorded step evenly."""
+    """The proven floor of a recorded scene, in cells that divide the recorded step evenly."""
     per_step = round(RECORDED_STEP / side)
     nodes = np.round(load_scene(scene_name).reachable / RECORDED_STEP).astype(int)
     low = nodes.min(axis=0) - 1

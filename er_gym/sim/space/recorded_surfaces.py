@@ -1,4 +1,4 @@
-"""At which height things stand in or on a receptacle, as the record shows it."""
+"""The heights at which the record shows objects standing in or on receptacles."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from er_gym.sim.scene import PROPERTIES, load_scene
 
 @lru_cache(maxsize=128)
 def recorded_surfaces(scene_name: str) -> Mapping[int, float]:
-    """Receptacle row to how far above its box's floor the record shows things to stand, metres."""
+    """For each receptacle row, how far above its underside recorded objects stand, metres."""
     scene = load_scene(scene_name)
     bottoms = scene.aabb_center[:, 1] - scene.aabb_size[:, 1] / 2
     lies_in: dict[int, list[float]] = {}

@@ -1,9 +1,9 @@
-"""How large a room is: AI2-THOR's ``sceneBounds``, which no record of objects holds.
+"""The size of a room: AI2-THOR's ``sceneBounds``, which is not part of the recorded data.
 
-AI2-THOR encloses everything it draws; walls and ceilings are drawn but are not objects. What is
-known is the Floor's box and what hangs on the walls: a room ends a wall's thickness beyond what
-stands in it, and its ceiling is a little above the highest thing. The figures here are what 40
-recorded bounds have in common (see docs/fidelity.md, with what is missed).
+AI2-THOR encloses everything that it draws, and walls and ceilings are drawn without being objects.
+Known are the Floor's box and the objects on the walls. A room ends a wall's thickness beyond its
+outermost objects, and its ceiling is a little above the highest one. The constants here fit 40
+recorded bounds (see docs/fidelity.md, also for the error).
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from numpy.typing import NDArray
 from er_gym.sim.scene import SCENE_NUMBERS, Scene, load_scene
 
 _UNDER_FLOOR = 0.2
-"""From the bottom of the bounds to the floor that one stands on, metres."""
+"""Distance from the bottom of the bounds up to the floor, metres."""
 
 
 class Slacks(NamedTuple):
-    """How far the bounds are from what the record holds, metres.
+    """Distances from recorded objects to the bounds, metres.
 
     Attributes:
         wall: from the outermost object on a side to the outside of the wall.
         lintel: from the top of the highest window to the top of the ceiling.
-        headroom: the same from the highest of all other things. Less than over a window: cabinets,
-            curtains and shower heads reach higher up.
-        storey: the least from the floor to the top of the ceiling in living rooms and bedrooms,
-            which need hold nothing tall. The other kinds have cabinets or a shower.
+        headroom: from the highest other object to the top of the ceiling. It is less than over a
+            window, because cabinets, curtains and shower heads reach higher.
+        storey: the least height from the floor to the top of the ceiling in living rooms and
+            bedrooms, which may hold nothing tall. The other rooms have cabinets or a shower.
     """
 
     wall: float = 0.1
@@ -40,22 +40,22 @@ class Slacks(NamedTuple):
 
 @lru_cache(maxsize=128)
 def room_bounds(scene_name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The lower and upper corner (3,) of a recorded scene, walls and ceiling included; metres."""
+    """Lower and upper corner (3,) of a recorded scene with its walls and ceiling, metres."""
     return estimate_bounds(load_scene(scene_name), Slacks())
 
 
 def estimate_bounds(
     scene: Scene, slacks: Slacks
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """As :func:`room_bounds`, with other slacks; not cached."""
+    """The same with other slacks; not cached."""
     half = scene.aabb_size / 2
-    # Upwards and outwards on all sides: the lower corner with its sign turned, then the upper.
+    # The lower corner with its sign turned, then the upper one: both grow outwards.
     ends = np.stack([half - scene.aabb_center, half + scene.aabb_center])
     floor = scene.types.index("Floor")
     ground = ends[:, floor]
     outer = np.delete(ends, floor, axis=1).max(axis=1) + slacks.wall
     number = int(scene.name.removeprefix("FloorPlan"))
-    # A bathroom's floor goes on behind the walls (up to 2.3 m); elsewhere it ends with them.
+    # A bathroom's floor continues behind the walls (up to 2.3 m). Other floors end at the walls.
     if number not in SCENE_NUMBERS["bathrooms"]:
         outer = np.maximum(outer, ground)
     above = [slacks.lintel if kind == "Window" else slacks.headroom for kind in scene.types]

@@ -24,7 +24,7 @@ def unity_rotation(rotation: ArrayLike) -> NDArray[np.float64]:
         ``world = position + R @ local``.
     """
     angles = np.asarray(rotation, dtype=np.float64)
-    if angles.ndim == 1:  # plain numbers, ten times as fast as arrays of one
+    if angles.ndim == 1:  # plain numbers, ten times as fast as small arrays
         turns = [radians(angle) for angle in angles.tolist()]
         return np.array(_matrix([sin(a) for a in turns], [cos(a) for a in turns]))
     turned = np.moveaxis(np.radians(angles), -1, 0)

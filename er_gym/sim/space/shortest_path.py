@@ -1,4 +1,4 @@
-"""Shortest ways over the floor, told as AI2-THOR tells them: by the corners to walk between."""
+"""Shortest paths over the floor. Like AI2-THOR's, a path is the list of its corners."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Cell = tuple[int, int]
 
 
 class ShortestPaths:
-    """The ways over a floor that begin in one cell.
+    """The shortest paths from one cell to all others.
 
     Args:
-        floor: what the agent walks on.
-        start: a cell that is free.
+        floor: the floor that the agent walks on.
+        start: a free cell.
     """
 
     def __init__(self, floor: Floor, start: Cell) -> None:
@@ -33,7 +33,7 @@ class ShortestPaths:
         self._spread()
 
     def _spread(self) -> None:
-        """Dijkstra over the free cells; they touch no edge of the bitmap."""
+        """Dijkstra's algorithm over the free cells. No free cell touches the edge of the bitmap."""
         length, free = self._length, self._free.tolist()
         reached = length.tolist()
         reached[self._start[0]][self._start[1]] = 0.0
@@ -44,7 +44,7 @@ class ShortestPaths:
                 continue
             for di, dk, step in _NEIGHBOURS:
                 x, z = i + di, k + dk
-                # Not between two cells that touch at a corner only.
+                # Two cells that touch only at a corner are not connected.
                 if not (free[x][z] and free[x][k] and free[i][z]) or (
                     so_far + step >= reached[x][z]
                 ):
@@ -55,11 +55,11 @@ class ShortestPaths:
         self._length = np.array(reached)
 
     def length_to(self, cell: Cell) -> float:
-        """Metres to a cell along its sides and diagonals; infinite if there is no way."""
+        """Length of the path to a cell, metres; infinite if there is no path."""
         return float(self._length[cell]) * CELL
 
     def corners(self, cell: Cell) -> list[Cell]:
-        """The cells between which one walks straight, the first and the last included."""
+        """The corners of the path to a cell, with its start and its end."""
         way = [cell]
         while way[-1] != self._start:
             way.append(self._before[way[-1]])
@@ -82,20 +82,22 @@ class ShortestPaths:
 
 @lru_cache(maxsize=64)
 def shortest_paths_from(scene_name: str, start: Cell) -> ShortestPaths:
-    """All ways that begin in a free cell of a scene's floor."""
+    """The shortest paths from a free cell of a scene's floor."""
     return ShortestPaths(floor_of(scene_name), start)
 
 
 def shortest_path(
     scene_name: str, start: NDArray[np.float64], ends: NDArray[np.float64], error: float
 ) -> tuple[int, NDArray[np.float64]] | None:
-    """The shortest way over the floor from one place to the nearest of several.
+    """The shortest path over the floor from one position to the nearest of several.
 
     Args:
-        start: (2,) x and z. ends: (E, 2). error: how far these may be off the floor; metres.
+        start: (2,) x and z, metres.
+        ends: (E, 2) x and z, metres.
+        error: how far these may be off the floor, metres.
 
     Returns:
-        Which of the ends it leads to, and its (C, 2) corners with both ends; None if there is none.
+        The index of the nearest end, and the path's (C, 2) corners; None if there is no path.
     """
     floor = floor_of(scene_name)
     first = floor.nearest_free(start, error)

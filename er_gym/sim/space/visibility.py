@@ -27,17 +27,18 @@ def in_frustum(
     field_of_view: float,
     aspect: float,
 ) -> NDArray[np.bool_]:
-    """Which points a camera has in its picture.
+    """Which points are in a camera's picture.
 
     Args:
         offsets: (..., 3) from the camera to the points, metres, world frame.
         rotation, horizon: degrees, broadcast against the points.
-        field_of_view: vertical, degrees. aspect: the picture's width by its height.
+        field_of_view: vertical, degrees.
+        aspect: width of the picture divided by its height.
     """
     yaw, pitch = np.radians(rotation), np.radians(horizon)
     x, y, z = offsets[..., 0], offsets[..., 1], offsets[..., 2]
     sin_yaw, cos_yaw, sin_pitch, cos_pitch = np.sin(yaw), np.cos(yaw), np.sin(pitch), np.cos(pitch)
-    # In place, which is half the time.
+    # Computing in place takes half the time.
     right, ahead = x * cos_yaw, x * sin_yaw
     right -= z * sin_yaw
     ahead += z * cos_yaw
@@ -53,7 +54,7 @@ def in_frustum(
 
 
 def visible(world: World, agent: Agent | None = None) -> NDArray[np.bool_]:
-    """(N,) which objects the agent sees, from where it is or from another pose."""
+    """(N,) whether the agent sees each object, from its pose or from another one."""
     agent = agent or world.agent
     known, settings = lines_of_sight(world), world.settings
     question = (

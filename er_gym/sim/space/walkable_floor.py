@@ -1,10 +1,10 @@
-"""Where the agent can stand: where its capsule touches nothing, near what the record shows it on.
+"""The floor that the agent can stand on.
 
-AI2-THOR walks a capsule about and lists where it gets to. Here the capsule is tested against the
-parts of things (:mod:`er_gym.sim.space.footprints`). Walls are not objects, so how far free floor
-goes on is not known; it is taken to end a little beyond the recorded positions, whose grid of
-0.25 m leaves out what lies between its points and the furniture. Recorded positions are floor
-whatever overlaps them. docs/fidelity.md has the comparison with AI2-THOR.
+AI2-THOR moves a capsule about and lists the positions that it reaches. Here the capsule is tested
+against the parts of objects (:mod:`er_gym.sim.space.footprints`). Walls are not objects, so the
+edge of the floor is not known. It is taken to lie a little beyond the recorded positions: their
+grid of 0.25 m leaves a gap to the furniture. Recorded positions are floor, whatever overlaps them.
+docs/fidelity.md compares the result with AI2-THOR's.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from er_gym.sim.space.recorded_floor import RECORDED_STEP, Cells, recorded_cells
 from er_gym.sim.world import World
 
 CELL = 0.025
-"""Side of the cells that the floor is cut into, metres."""
+"""Side of a cell of the floor, metres."""
 _TOUCH = 0.01
-"""How deep in a part the agent's middle can be and count as beside it, metres."""
+"""How deep inside an obstacle the agent's middle may be and still count as beside it, metres."""
 
 Bitmap = NDArray[np.bool_]
 
 
 class Rules(NamedTuple):
-    """What the comparison with AI2-THOR's positions settled, metres (see docs/fidelity.md).
+    """Constants that fit AI2-THOR's positions best, metres (see docs/fidelity.md).
 
     Attributes:
-        beyond: how far beyond the recorded floor free floor goes on.
-        wall: how far from the edge of the scene's Floor the agent stays: that goes on under walls.
+        beyond: how far the floor extends beyond the recorded floor.
+        wall: how far the agent stays from the edge of the Floor object, which extends under walls.
         slack: how much nearer to a box than its radius the body comes; recorded boxes are generous.
     """
 
@@ -46,13 +46,13 @@ class Rules(NamedTuple):
 
 @dataclass(frozen=True)
 class Floor:
-    """Where the agent can stand and walk, as bitmaps of cells of 2.5 cm.
+    """The floor as bitmaps of cells of 2.5 cm.
 
     Attributes:
         origin: (2,) x and z of the middle of cell [0, 0], metres.
-        free: (X, Z) bool, where it can stand. The outermost cells are not free.
-        passable: (X, Z) bool, the same and the ways between neighbouring recorded positions.
-        certain: (X, Z) bool, the free floor that the record shows.
+        free: (X, Z) bool, where the agent can stand. The outermost cells are not free.
+        passable: (X, Z) bool, the free cells and the lines between neighbouring recorded positions.
+        certain: (X, Z) bool, the free floor that the record proves.
     """
 
     origin: NDArray[np.float64]
@@ -61,17 +61,17 @@ class Floor:
     certain: Bitmap
 
     def contains(self, points: NDArray[np.float64]) -> Bitmap:
-        """Which of (..., 2) x, z points the agent can stand on, to within 1.3 cm."""
+        """Whether the agent can stand on each of (..., 2) x, z points, to within 1.3 cm."""
         return self._look_up(self.free, points)
 
     def is_certain(self, points: NDArray[np.float64]) -> Bitmap:
-        """Which of (..., 2) x, z points are on floor that the record shows."""
+        """Whether each of (..., 2) x, z points is on floor that the record proves."""
         return self._look_up(self.certain, points)
 
     def path_is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
-        """Whether the agent can go straight from one (2,) x, z point to another, and stand there.
+        """Whether the agent can move straight from one (2,) x, z point to another and stand there.
 
-        The start itself is not asked about: whoever was forced into furniture can step out of it.
+        The start is not tested, so that an agent that was forced into furniture can step out of it.
         """
         count = max(2, int(np.ceil(np.linalg.norm(end - start) / CELL)) + 1)
         way = start + np.linspace(0.0, 1.0, count)[1:, None] * (end - start)
@@ -79,9 +79,9 @@ class Floor:
         return bool(on_the_way and self.contains(end))
 
     def nearest_free(self, point: NDArray[np.float64], error: float) -> tuple[int, int] | None:
-        """The free cell nearest to a (2,) point; None if the nearest is farther off than an error.
+        """The free cell nearest to a (2,) point, None if it is farther away than ``error`` metres.
 
-        Half a cell is none.
+        A distance of up to one cell is always accepted.
         """
         cells = np.argwhere(self.free)
         away = np.linalg.norm(self.origin + cells * CELL - point, axis=1)
@@ -101,10 +101,11 @@ class Floor:
         return np.asarray(self._look_up(self.passable, ways).all(axis=1) & self.contains(ends))
 
     def grid(self, step: float, offset: tuple[float, float]) -> NDArray[np.float64]:
-        """(G, 2) x, z places on a grid, sorted: what one gets to from the recorded floor.
+        """(G, 2) x, z of the grid's nodes that can be reached from the recorded floor, sorted.
 
         Args:
-            step: of the grid, metres. offset: x and z of any of its points.
+            step: spacing of the grid, metres.
+            offset: x and z of any node.
         """
         high = self.origin + np.array(self.free.shape) * CELL
         axes = [
@@ -113,13 +114,13 @@ class Floor:
         ]
         points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         on = self.contains(points)
-        if step < RECORDED_STEP:  # between points farther apart, floor may be that no point is on
+        if step < RECORDED_STEP:  # a coarser grid may have no node on some floor
             on = connected(on & self.is_certain(points), on)
         return np.asarray(points[on].round(6))
 
     def _look_up(self, bitmap: Bitmap, points: NDArray[np.float64]) -> Bitmap:
         wide, deep = bitmap.shape
-        if points.ndim == 1:  # one place, as at every step: ten times as fast
+        if points.ndim == 1:  # a single point, as at every step: ten times as fast
             (x, z), (west, south) = points.tolist(), self.origin.tolist()
             column = min(max(round((x - west) / CELL), 0), wide - 1)
             row = min(max(round((z - south) / CELL), 0), deep - 1)
@@ -130,7 +131,7 @@ class Floor:
 
 
 def connected(seeds: Bitmap, on: Bitmap) -> Bitmap:
-    """(X, Z) cells of ``on`` that one gets to from ``seeds``, which are on, by sides of cells."""
+    """(X, Z) cells of ``on`` that are connected by their sides to ``seeds``, which are all on."""
     found, before = seeds.copy(), 0
     while (count := int(np.count_nonzero(found))) > before:
         before = count
@@ -143,12 +144,12 @@ def connected(seeds: Bitmap, on: Bitmap) -> Bitmap:
 
 @lru_cache(maxsize=128)
 def floor_of(scene_name: str) -> Floor:
-    """The floor of a recorded scene, as it is before anything is moved or opened."""
+    """The floor of a recorded scene, before anything is moved or opened."""
     return compute_floor(scene_name, Rules())
 
 
 def compute_floor(scene_name: str, rules: Rules) -> Floor:
-    """As :func:`floor_of`, with other rules; not cached."""
+    """The same with other rules; not cached."""
     scene = load_scene(scene_name)
     recorded = recorded_cells(scene_name, CELL)
     grown = recorded.grown(rules.beyond)
@@ -160,7 +161,7 @@ def compute_floor(scene_name: str, rules: Rules) -> Floor:
     prints = Footprints.of(World.load(scene, Settings()), rules.slack)
     touched, covered, bent = _stamped(prints, origin, near, nodes)
     if bent.any():
-        passed = np.zeros_like(near)  # what the body sweeps on the recorded floor
+        passed = np.zeros_like(near)  # the area that the body covers on the recorded floor
         _lay(recorded.grown(RADIUS), passed, origin)
         _lay(Cells(origin, CELL, bent & ~passed).grown(RADIUS - _TOUCH), touched, origin)
     lines = _between_neighbours(certain, at[0])
@@ -174,10 +175,11 @@ def compute_floor(scene_name: str, rules: Rules) -> Floor:
 def standing_places(
     scene_name: str, step: float, offset: tuple[float, float] = (0.0, 0.0)
 ) -> NDArray[np.float64]:
-    """(G, 2) x, z places of a scene where the agent can stand, on a grid; sorted, read-only.
+    """(G, 2) x, z of the grid's nodes where the agent can stand in a scene; sorted, read-only.
 
     Args:
-        step: of the grid, metres. offset: x and z of any of its points.
+        step: spacing of the grid, metres.
+        offset: x and z of any node.
     """
     places = floor_of(scene_name).grid(step, offset)
     places.setflags(write=False)
@@ -187,11 +189,12 @@ def standing_places(
 def _stamped(
     prints: Footprints, origin: NDArray[np.float64], near: Bitmap, nodes: Bitmap
 ) -> tuple[Bitmap, Bitmap, Bitmap]:
-    """Where, about the floor that is near, the body touches a part, and its middle is in one.
+    """Three bitmaps: where the body touches an obstacle, where its middle is inside one, and bent
+    ones.
 
-    The box of a part that a recorded position is in is wrong there: a round table's, a bent desk's.
-    The third bitmap has such boxes; only so much of them is solid as the body does not pass through
-    on the recorded floor.
+    If a recorded position is inside an obstacle, the obstacle's box is wrong: the table is round,
+    or the desk is bent. The third bitmap holds such boxes. They are solid only where the body does
+    not pass on the recorded floor.
     """
     touched, covered, bent = (np.zeros_like(nodes) for _ in range(3))
     x, z = (west + np.arange(n) * CELL for west, n in zip(origin, nodes.shape, strict=True))
@@ -213,7 +216,7 @@ def _stamped(
 
 
 def _lay(cells: Cells, over: Bitmap, origin: NDArray[np.float64]) -> None:
-    """Set the cells that are on in a bitmap whose cell [0, 0] has its middle at (2,) origin."""
+    """Switch on the cells in a bitmap whose cell [0, 0] has its middle at (2,) origin."""
     first = np.round((cells.origin - origin) / CELL).astype(int)
     (x0, z0), (x1, z1) = np.maximum(first, 0), np.minimum(first + cells.on.shape, over.shape)
     (i0, k0), (i1, k1) = (x0, z0) - first, (x1, z1) - first
@@ -235,7 +238,8 @@ def _inside_walls(
 
 
 def _between_neighbours(certain: Bitmap, node: NDArray[np.int64]) -> Bitmap:
-    """The recorded floor on the lines of the recorded grid, one point of which is (2,) ``node``."""
+    """The recorded floor on the lines of the recorded grid, one node of which is the cell (2,)
+    ``node``."""
     per_step = round(RECORDED_STEP / CELL)
     i, k = (
         np.arange(n) % per_step == at % per_step for n, at in zip(certain.shape, node, strict=True)

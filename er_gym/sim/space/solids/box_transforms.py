@@ -1,4 +1,4 @@
-"""From a thing's own frame to the world's."""
+"""Boxes from an object's own frame to the world's."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 _TRIM = 0.03
-"""Share of its width by which a hiding box is cut at each side: recorded boxes are generous."""
+"""Share of its width that is cut from each side of a hiding box: recorded boxes are generous."""
 
 
 def turned(boxes: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
     """(K, 2, 3) axis-aligned boxes after a turn about the vertical through the origin.
 
-    Exact for quarter turns; otherwise each is the box of the same middle and area.
+    The result is exact for quarter turns. For other turns it is the axis-aligned box with the same
+    middle and area.
 
     Args:
-        boxes: (K, 2, 3) corners, metres. yaw: degrees, clockwise from above.
+        boxes: (K, 2, 3) corners, metres.
+        yaw: degrees, clockwise seen from above.
     """
     cos, sin = cosine(radians(yaw)), sine(radians(yaw))
     middle, half = (boxes[:, 0] + boxes[:, 1]) / 2, (boxes[:, 1] - boxes[:, 0]) / 2
@@ -35,7 +37,7 @@ def turned(boxes: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
 
 
 def trimmed(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(K, 2, 3) boxes made a little narrower and less deep."""
+    """(K, 2, 3) boxes, a little narrower and less deep."""
     inset = (boxes[:, 1] - boxes[:, 0]) * np.array([_TRIM, 0.0, _TRIM])
     found = boxes.copy()
     found[:, 0] += inset

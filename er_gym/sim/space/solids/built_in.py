@@ -1,4 +1,4 @@
-"""What is built into furniture, as recorded: sinks in counters, cabinets and drawers under them."""
+"""Objects that are built into furniture, as recorded: sinks, cabinets and drawers."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from er_gym.sim.space.solids.facing import SIDES, facings
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Low and high corner, metres."""
 Rectangle = tuple[float, float, float, float]
-"""From x and z, to x and z, metres."""
+"""Low x and z, high x and z, metres."""
 _FITTED = frozenset({"Cabinet", "Drawer", "Sink", "Bathtub"})
 _HOSTS = frozenset({"CounterTop", "Desk", "SideTable", "DiningTable", "CoffeeTable"})
 _CASES = frozenset({"Dresser", "TVStand", "ShelvingUnit"})
-"""What is built into these is drawn as if it stood alone."""
+"""Types that are drawn without regard to the objects built into them."""
 _MARGIN = 0.05
-"""How far what is built in may stick out, metres."""
+"""How far a built-in object may stick out, metres."""
 
 
 @lru_cache(maxsize=4096)
 def built_in(scene_name: str, i: int) -> tuple[tuple[str, Box], ...]:
-    """Type and box of what is built into recorded object i, in its own frame.
+    """Type and box of each object that is built into recorded object i, in i's own frame.
 
-    The frame is upright and turned to its heading (a counter's is not turned); its origin is the
-    middle of the underside.
+    The frame is upright and has object i's heading (a counter's frame is not turned). Its origin is
+    the middle of the underside.
     """
     scene = load_scene(scene_name)
     if i >= len(scene) or scene.types[i] not in _HOSTS:
@@ -51,14 +51,14 @@ def built_in(scene_name: str, i: int) -> tuple[tuple[str, Box], ...]:
 
 @lru_cache(maxsize=128)
 def hosts(scene_name: str) -> Mapping[int, int]:
-    """Row of what is built in to that of what it is built into; of several the last."""
+    """For each built-in object the row of the object that it is built into; of several the last."""
     scene = load_scene(scene_name)
     found = [i for i, kind in enumerate(scene.types) if kind in _HOSTS | _CASES]
     return {k: i for i in found for k in fitted_rows(scene_name, i)}
 
 
 def fitted_rows(scene_name: str, i: int) -> list[int]:
-    """The rows of what is built into object i."""
+    """The rows of the objects that are built into object i."""
     scene = load_scene(scene_name)
     half = scene.aabb_size[i] / 2 + _MARGIN
     away = scene.aabb_center - scene.aabb_center[i]
@@ -73,8 +73,10 @@ class Front:
     """The front of a cabinet or a drawer, in the world's frame.
 
     Attributes:
-        axis: 0 where it is at one x, 1 where it is at one z. sign: 1 or -1, which way it faces.
-        at: that coordinate. low, high: its ends along the other axis, metres.
+        axis: 0 if the front is at one x, 1 if it is at one z.
+        sign: 1 or -1, the direction along the axis that it faces.
+        at: that coordinate, metres.
+        low, high: its ends along the other axis, metres.
     """
 
     axis: int

@@ -1,7 +1,7 @@
-"""Counters: the slab that the record calls CounterTop, and what it rests on, which is no object.
+"""Counters: the slab, which is the CounterTop object, and the carcass under it, which is no object.
 
-The record's box of nearly every counter is a slab 2 cm thick. Cabinets and drawers under it are
-objects; the carcass between and behind them is not. Only a few counters reach down to the floor.
+The recorded box of nearly every counter is a slab 2 cm thick. Cabinets and drawers under it are
+objects, the carcass between and behind them is not. Only a few counters reach down to the floor.
 """
 
 from __future__ import annotations
@@ -21,46 +21,46 @@ from er_gym.sim.space.solids.counter_tops import rectangles
 SLAB = 0.035
 """Thickness of a counter's slab, metres."""
 SUNK = 0.001
-"""How far under what stands on it a slab ends, metres: what lies flat is thin."""
+"""How far a slab ends below the objects on it, metres, because some of them are very thin."""
 LET_IN = frozenset({"Sink", "Bathtub"})
-"""What goes through a slab."""
+"""Types that are let into a slab."""
 LIP = 0.02
-"""How far what is let in reaches over the edge of its hole, metres."""
+"""How far they overlap the edge of their hole, metres."""
 _BACK = 0.03
-"""How far a carcass stands back from the slab's edges, metres."""
+"""How far the carcass stands back from the slab's edges, metres."""
 _FAR_BACK = 0.3
-"""How far at most where nothing is built in under the counter, metres."""
+"""The same, at most, if nothing is built in under the counter, metres."""
 _BEHIND = 0.01
-"""How far behind the fronts of what is built in it ends, metres."""
+"""How far behind the fronts of built-in objects the carcass ends, metres."""
 _DEEP = 0.35
-"""Fronts farther in than this do not make a carcass end at them on its whole side, metres."""
+"""Fronts farther in than this do not limit the carcass on its whole side, metres."""
 _TOUCH = 0.05
-"""Parts of a counter that are no farther apart than this go on without an edge, metres."""
+"""Parts of a counter that are no farther apart than this have no edge between them, metres."""
 TALL = 0.3
-"""A counter whose box is higher than this is its own carcass, metres."""
+"""A counter with a higher box is its own carcass, metres."""
 _NARROW = 0.3
-"""A counter that is narrower than this, with nothing built in under it, is a shelf, metres."""
+"""A narrower counter with nothing built in under it is a shelf, metres."""
 _NICHE = 0.02
-"""The room around what stands under a counter, metres."""
+"""Free space around an object that stands under a counter, metres."""
 _LEAST = 0.08
-"""Narrower pieces of a carcass are left out, metres."""
+"""Narrower pieces of a carcass are dropped, metres."""
 _MOST_OF_IT = 0.75
-"""A slab of which more than this share rests on its carcass juts out little."""
+"""A slab with a larger share on its carcass is not tested for hiding: it juts out too little."""
 _ON_THE_FLOOR = 0.1
 _OPEN_UNDER = frozenset({"Shelf", "ShelvingUnit"})
-"""Fixed things under a counter that are open at their front."""
+"""Fixed types under a counter that are open at their front."""
 
 
 @dataclass(frozen=True, eq=False)
 class Carcass:
-    """What a counter is made of, in the world's frame, metres.
+    """The parts of a counter, in the world's frame, metres.
 
     Attributes:
-        slab: (S, 2, 3) boxes, with what is let in left open.
+        slab: (S, 2, 3) boxes, with holes for sinks.
         footprint: the rectangles on the floor that the carcass stands on.
-        fitted: (K, 2, 3) boxes of the cabinets and drawers that are built in.
-        holes: (H, 2, 3) boxes of what is let in.
-        floor, under: heights between which the carcass is.
+        fitted: (K, 2, 3) boxes of the built-in cabinets and drawers.
+        holes: (H, 2, 3) boxes of the sinks.
+        floor, under: heights of the carcass's underside and top.
         own: whether the carcass is part of the counter's own box.
     """
 
@@ -74,10 +74,9 @@ class Carcass:
 
     @property
     def hiding(self) -> NDArray[np.float64]:
-        """(B, 2, 3) boxes that hide what is behind them: few, for each costs time.
+        """(B, 2, 3) boxes that hide what is behind them. They are few, because each costs time.
 
-        The carcass, up to the top and hollow where something is let in; and the slab as well where
-        it juts out far.
+        These are the carcass up to the top, hollow at sinks, and the slab if it juts out far.
         """
         found: list[NDArray[np.float64]] = []
         top = self.under + SLAB
@@ -135,7 +134,7 @@ def carcass(scene_name: str, i: int) -> Carcass:
 
 
 def slab_top(scene_name: str, i: int) -> float:
-    """How high the upper side of recorded counter i is: where the record shows things to stand."""
+    """Height of recorded counter i's upper side, from the objects that the record shows on it."""
     scene = load_scene(scene_name)
     height = float(scene.aabb_size[i, 1])
     surface = recorded_surfaces(scene_name).get(i, height)
@@ -145,9 +144,9 @@ def slab_top(scene_name: str, i: int) -> float:
 def _set_back(
     part: Rectangle, others: Sequence[Rectangle], row: Sequence[Front], fitted: bool
 ) -> Rectangle:
-    """What a part rests on: a little narrower, or much where nothing is known to be built in.
+    """The carcass under one part of a counter: a little narrower, or much if nothing is built in.
 
-    On a side where another part goes on it is not; where there are fronts, it ends at them.
+    It is not narrower on a side where another part follows. On a side with fronts it ends at them.
     """
     x0, z0, x1, z1 = part
     back = _BACK if fitted else min(_FAR_BACK, 0.2 * min(x1 - x0, z1 - z0))
@@ -173,7 +172,7 @@ def _set_back(
 
 
 def _before(front: Front, part: Rectangle) -> Rectangle | None:
-    """What of a part is before a front, if it is the front of something in the part."""
+    """The area of a part in front of a front, None if the front is not in the part."""
     ends, near, far = list(part), front.axis, front.axis + 2
     at = front.at - front.sign * _BEHIND
     if not part[near] < at < part[far]:
@@ -184,7 +183,8 @@ def _before(front: Front, part: Rectangle) -> Rectangle | None:
 
 
 def _open(part: Rectangle, niche: Rectangle) -> Rectangle | None:
-    """What of a part a niche takes up: as far as the side that it is nearest to."""
+    """The area of a part that a niche takes up, as far as the nearest side; None if it takes up
+    none."""
     common = _common(part, niche)
     if common is None:
         return None
@@ -195,7 +195,7 @@ def _open(part: Rectangle, niche: Rectangle) -> Rectangle | None:
 
 
 def _niches(scene: Scene, floor: float, under: float) -> list[Rectangle]:
-    """Where something stands that is not built in: on the floor, or a shelf."""
+    """The areas of objects that stand under a counter without being built in."""
     found = []
     moves = scene.properties[:, [PROPERTIES.index(name) for name in ("moveable", "pickupable")]]
     for j in range(len(scene)):
@@ -208,7 +208,7 @@ def _niches(scene: Scene, floor: float, under: float) -> list[Rectangle]:
 
 
 def without(rectangle: Rectangle, holes: Sequence[Rectangle]) -> list[Rectangle]:
-    """A rectangle cut up so that it leaves holes open."""
+    """A rectangle cut into pieces that leave holes open."""
     x0, z0, x1, z1 = rectangle
     for k, hole in enumerate(holes):
         common = _common(rectangle, hole)

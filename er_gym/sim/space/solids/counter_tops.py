@@ -1,4 +1,4 @@
-"""Counters that bend: what the agent's body leaves over of their boxes."""
+"""Bent counters: the part of their box that the agent's body leaves free."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ _NEIGHBOURS = frozenset({"Fridge", "DiningTable", "SideTable", "Dresser", "Sofa"
 _OVERHANG = 0.04
 """How far a counter juts out over the fronts under it, metres."""
 _OPENS = 0.35
-"""So far before a front there is no counter, metres."""
+"""The counter ends at this distance in front of a front, metres."""
 _IN_LINE, _GAP = 0.06, 0.8
-"""How much cabinets of one row may be apart, ahead and to the side, metres."""
+"""How far apart cabinets of one row may be, ahead and to the side, metres."""
 _NARROW = 0.15
-"""Strips of counter that are narrower than this are left out, metres."""
+"""Narrower strips of a counter are dropped, metres."""
 
 
 @lru_cache(maxsize=512)
 def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
-    """(R, 2, 2) corners x, z of the rectangles that the box of recorded object i comes down to.
+    """(R, 2, 2) corners x, z of the rectangles that make up the box of recorded counter i.
 
-    What the agent's body sweeps as it walks is free floor, whatever the box says. Where other
-    large furniture stands there is no counter either, nor right before a cabinet or a drawer. The
-    largest rectangle of the rest is taken, then the largest of what that leaves, and so on. A box
-    that is swept altogether is left whole: one can walk under it.
+    Three areas are cut from the box: the area that the agent's body covers as it walks, that of
+    other large furniture, and that right in front of cabinets and drawers. Of the rest the largest
+    rectangle is taken, then the largest of what remains, and so on. If nothing remains, the whole
+    box is returned: the agent walks under it.
     """
     scene = load_scene(scene_name)
     low = (scene.aabb_center[i] - scene.aabb_size[i] / 2)[[0, 2]]
@@ -66,12 +66,12 @@ def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
 def _before_fronts(
     scene_name: str, i: int, low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> Iterator[Rectangle]:
-    """Where doors and drawers under counter i open: not where its box ends anyway."""
+    """The areas where doors and drawers under counter i open, unless its box ends there anyway."""
     rows: dict[tuple[int, int], list[Front]] = {}
     for front in fronts(scene_name, i):
         rows.setdefault((front.axis, front.sign), []).append(front)
     for (axis, sign), row in rows.items():
-        # One row of cabinets has gaps, for an oven or a dishwasher.
+        # A row of cabinets has gaps for an oven or a dishwasher.
         spans: list[list[float]] = []
         for front in sorted(row, key=lambda f: (round(f.at, 1), f.low)):
             last = spans[-1] if spans else [np.inf, 0.0, 0.0]
@@ -94,7 +94,8 @@ def _before_fronts(
 def _not_swept(
     scene_name: str, low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The centre (2,) of the first cell over an area, metres, and which of its cells are free."""
+    """The centre (2,) of the first cell over an area, metres, and whether each of its cells is
+    free."""
     swept = recorded_cells(scene_name, _CELL).grown(_AGENT_RADIUS)
     origin = swept.origin
     from_cell = np.round((low - origin) / _CELL).astype(int)
@@ -109,10 +110,10 @@ def _not_swept(
 
 
 def _largest_rectangle(cells: NDArray[np.bool_]) -> tuple[int, int, int, int]:
-    """The rectangle x0, x1, z0, z1 (half-open) of most true cells.
+    """The rectangle x0, x1, z0, z1 (half-open) with the most true cells.
 
-    Row by row, each column has a run of true cells that ends there: the largest rectangle under a
-    histogram, found with a stack of columns of rising height.
+    In each row, every column has a run of true cells that ends there. The runs form a histogram,
+    and the largest rectangle under it is found with a stack of columns of rising height.
     """
     best, area = (0, 0, 0, 0), 0
     runs = [0] * cells.shape[1]

@@ -1,8 +1,8 @@
-"""Which way the front of a fixed thing points.
+"""The heading of a fixed object's front.
 
-For most types AI2-THOR's own +z is the front: from all recorded fridges, microwaves, sofas,
-dressers and desks the room lies there. Drawers and cabinets are not authored so; their front is
-the side that the room is on, and a drawer's that of the furniture it is part of.
+For most types the front is AI2-THOR's own +z: seen from every recorded fridge, microwave, sofa,
+dresser and desk, the room lies there. Drawers and cabinets are not authored so. Their front is the
+side that faces the room, and a drawer's front is that of the furniture it is part of.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from er_gym.sim.scene import load_scene
 _BY_THE_ROOM = frozenset({"Drawer", "Cabinet"})
 _HOSTS = frozenset({"Dresser", "SideTable", "Desk", "TVStand", "CoffeeTable"})
 _TWO_SIDED = frozenset({"CoffeeTable"})
-"""What stands in the open and has drawers on both sides."""
+"""Types that stand in the open and have drawers on two sides."""
 _MARGIN = 0.1
-"""How far a drawer may stick out of the furniture that it is part of, metres."""
+"""How far a drawer may stick out of its furniture, metres."""
 _AT_THE_BACK = 0.2
-"""A drawer that is nearer to the back of its furniture by so much opens there, metres."""
+"""A drawer that is nearer to the back of its furniture by this much opens there, metres."""
 _DOUBT = 0.3
-"""Sides whose distances to the floor differ by less could each be the front, metres."""
+"""Two sides may each be the front if their distances to the floor differ by less, metres."""
 _ASIDE = 3.0
-"""What a metre to the side counts, against a metre ahead."""
+"""How many metres ahead a metre to the side counts for."""
 SIDES = ((1, 1), (0, 1), (1, -1), (0, -1))
 """World axis (0 x, 1 z) and sign of each side, by quarter turns of its heading from +z."""
 
 
 @lru_cache(maxsize=128)
 def facings(scene_name: str) -> NDArray[np.float64]:
-    """(N,) heading of each object's front as recorded, degrees; quarter turns for fixed things."""
+    """(N,) recorded heading of each object's front, degrees; quarter turns for fixed objects."""
     scene = load_scene(scene_name)
     found = scene.rotation[:, 1].copy()
     for i in np.flatnonzero(np.isnan(scene.obb[:, 0, 0])).tolist():
@@ -45,7 +45,7 @@ def facings(scene_name: str) -> NDArray[np.float64]:
 
 
 def _towards_the_room(scene_name: str, i: int, quarters: int) -> int:
-    """The quarter turns of a drawer's or cabinet's front; ``quarters``: of its own rotation."""
+    """Quarter turns of a drawer's or cabinet's front; ``quarters`` are those of its rotation."""
     scene = load_scene(scene_name)
     half = scene.aabb_size / 2
     low, high = scene.aabb_center - half, scene.aabb_center + half
@@ -85,7 +85,7 @@ def _gap(
     axis: int,
     sign: int,
 ) -> float:
-    """How far from one side of a box the agent can stand, metres; to the side counts more."""
+    """Metres from one side of a box to where the agent can stand; sideways counts more."""
     across, ahead = reachable[:, 1 - axis], reachable[:, axis]
     face = high[2 * axis] if sign > 0 else low[2 * axis]
     beyond = (ahead - face) * sign

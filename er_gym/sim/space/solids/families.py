@@ -1,9 +1,9 @@
-"""The table of shapes: which boxes a thing of a type and size is made of.
+"""The table of families: the boxes that an object of a given type and size is made of.
 
-A builder takes a thing's own size, width w (left to right), height h and depth d (back to front),
-and the height s at which things stand in or on it, all metres; it returns boxes with corners
-(x, y, z) counted from the thing's left lower back corner. Where things stand on a part of the
-thing only, that part is the first.
+A builder takes an object's width w (left to right), height h and depth d (back to front), and the
+height s at which things stand in or on it, all in metres. It returns boxes with corners (x, y, z),
+counted from the object's left lower back corner. If things stand on one part only, that part comes
+first.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ _LEG = 0.05
 """Side of a leg, metres."""
 
 _DOOR = 0.03
-"""Thickness of a front, as a share of the depth of what is behind it."""
+"""Thickness of a front, as a share of the furniture's depth."""
 _PEDESTAL = 0.45
-"""A sink that is higher than this stands on a foot, metres."""
+"""A higher sink stands on a foot, metres."""
 
 
 def whole(w: float, h: float, d: float, s: float) -> Parts:
@@ -47,7 +47,7 @@ def _legs(w: float, h: float, d: float) -> Parts:
 
 
 def table(w: float, h: float, d: float, s: float) -> Parts:
-    """A top on legs; what rises above where things stand is a panel at the back."""
+    """A top on legs; the part above the surface is a panel at the back."""
     slab = min(0.06, 0.15 * s)
     panel = [((0.0, s, 0.0), (w, h, _BOARD))] if h - s > 0.1 else []
     return [((0, s - slab, 0), (w, s, d)), *panel, *_legs(w, s - slab, d)]
@@ -71,7 +71,7 @@ def sofa(w: float, h: float, d: float, s: float) -> Parts:
 
 
 def bed(w: float, h: float, d: float, s: float) -> Parts:
-    """A mattress on its frame, with a headboard where the record has the pillows: in front."""
+    """A mattress on its frame, with a headboard in front, where the record has the pillows."""
     return [((0, 0, 0), (w, s, d - 0.08)), ((0, 0, d - 0.08), (w, h, d))]
 
 
@@ -97,7 +97,7 @@ def basin(w: float, h: float, d: float, s: float) -> Parts:
 
 
 def bowl(w: float, h: float, d: float, s: float) -> Parts:
-    """What of a sink hides things: the bowl of one on a foot; the rim of one let in is flat."""
+    """The hiding parts of a sink: the bowl if it stands on a foot, nothing if it is let in."""
     low, wall = h - 0.28, 0.1 * min(w, d)
     if h < _PEDESTAL:
         return []
@@ -118,12 +118,12 @@ def boards(w: float, h: float, d: float, s: float) -> Parts:
 
 
 def shelf(w: float, h: float, d: float, s: float) -> Parts:
-    """The board under the room that the record calls a shelf."""
+    """The board under the space that the record calls a shelf."""
     return [((0, 0, 0), (w, min(_BOARD, h), d))]
 
 
 def desk(w: float, h: float, d: float, s: float) -> Parts:
-    """What of a desk hides things: its top, two upright sides and a board behind the knees."""
+    """The hiding parts of a desk: its top, two upright sides and a board behind the knees."""
     slab = min(0.04, 0.15 * s)
     under, side = s - slab, _BOARD + 0.02
     return [
@@ -135,12 +135,12 @@ def desk(w: float, h: float, d: float, s: float) -> Parts:
 
 
 def closed(w: float, h: float, d: float, s: float) -> Parts:
-    """All but a little at the front and the back: doors and drawers stand before it."""
+    """The box without a little at the front and the back, where doors and drawers are."""
     return [((0, 0, _DOOR * d), (w, h, (1 - _DOOR) * d))]
 
 
 def open_case(w: float, h: float, d: float, s: float) -> Parts:
-    """A case that is open at its front, but for its bottom."""
+    """A case that is open at its front except for its bottom."""
     return boards(w, s if s > 0.6 * h else h, d, s)[1:]
 
 
@@ -168,15 +168,15 @@ def nothing(w: float, h: float, d: float, s: float) -> Parts:
 
 @dataclass(frozen=True)
 class Family:
-    """How things of some types are made.
+    """How objects of some types are made.
 
     Attributes:
-        parts: what they consist of.
-        hides: what of them hides what is behind it, if not all parts: leaves, glass and lattices
-            hide nothing.
-        snug: whether the boxes that hide things are as wide as they are recorded.
-        stand: where things stand, as a share of the height, where the record shows none standing;
-            None for near the floor of the box.
+        parts: builds their parts.
+        hides: builds the boxes that hide what is behind, None if all parts do. Leaves, glass and
+            lattices hide nothing.
+        snug: whether the hiding boxes are as wide as recorded.
+        stand: the surface's height as a share of the object's, if the record shows nothing standing
+            there; None for near the floor of the box.
     """
 
     parts: Builder = whole
@@ -189,7 +189,7 @@ _CASE = Family(stand=None)
 _VESSEL = Family(hides=_core(0.7, 0.95), stand=None)
 _SEE_THROUGH = Family(hides=nothing)
 _SMALL = Family(hides=_core(0.7, 0.95))
-"""Things one can carry are rounded: the corners of their boxes are air."""
+"""Objects that can be picked up are rounded: the corners of their boxes are air."""
 
 _BY_TYPES = {
     "Desk": Family(table, desk),
@@ -214,7 +214,7 @@ _BY_TYPES = {
     "HousePlant": Family(plant, lambda w, h, d, s: plant(w, h, d, s)[:1]),
     "FloorLamp DeskLamp": Family(lamp, nothing),
     "CounterTop": Family(hides=nothing),
-    # Flat on a wall or the floor, glass, frames and the room inside basins.
+    # Objects that lie flat on a wall or the floor, glass, frames, and the space inside basins.
     "Floor Window Curtains Blinds Painting Poster Mirror LightSwitch ShowerGlass ShowerDoor "
     "ShowerHead StoveBurner StoveKnob Faucet TowelHolder HandTowelHolder ToiletPaperHanger "
     "RoomDecor": _SEE_THROUGH,
@@ -225,7 +225,7 @@ _WHOLE = Family()
 
 
 def family(object_type: str, small: bool) -> Family:
-    """The family of a type; ``small``: it can be carried."""
+    """The family of an object type; ``small`` says whether it can be picked up."""
     return _FAMILIES.get(object_type, _SMALL if small else _WHOLE)
 
 
@@ -233,12 +233,13 @@ def family(object_type: str, small: bool) -> Family:
 def parts(
     object_type: str, small: bool, size: tuple[float, float, float], surface: float | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What a thing is made of, and what of it hides what is behind.
+    """The parts of an object, and the boxes that hide what is behind it.
 
     Args:
-        object_type: AI2-THOR's. small: whether it can be carried.
+        object_type: AI2-THOR's object type.
+        small: whether it can be picked up.
         size: (3,) its own width, height and depth, metres.
-        surface: height over its underside at which things stand, metres; None for its family's.
+        surface: height above its underside at which things stand, metres; None for its family's.
 
     Returns:
         (K, 2, 3) and (H, 2, 3) corners of boxes, metres from its left lower back corner; read-only.

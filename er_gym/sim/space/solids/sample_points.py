@@ -1,4 +1,4 @@
-"""What of a thing is looked for when one asks whether it is visible."""
+"""The points of an object that make it visible if the agent sees one of them."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from er_gym.sim.space.solids.surface_points import (
 from er_gym.sim.world_cache import ObjectCacheKey
 
 SEEN_FROM_OUTSIDE = ("Drawer", "Cabinet", "CounterTop", "StoveBurner")
-"""Types that are seen from outside only: their own boxes hide the points on their far sides."""
+"""Types that are seen only from outside: their own boxes hide the points on their far sides."""
 SLABS = (
     "CounterTop", "Desk", "CoffeeTable", "SideTable", "DiningTable", "Dresser", "TVStand", "Sofa",
     "ArmChair", "Bed", "Sink",
 )  # fmt: skip
-"""Types that hide what lies on them from who looks from below or behind.
+"""Types that hide the objects on them from a camera below or behind them.
 
-What lies in other things, a bowl or a bin, is in the midst of their boxes.
+Objects in other receptacles, such as a bowl or a bin, are in the middle of their boxes.
 """
 _ROUND = frozenset(
     {
@@ -44,17 +44,17 @@ _ROUND = frozenset(
         "Toilet",
     }
 )
-"""What is round though it cannot be carried."""
+"""Round types that cannot be picked up."""
 _SQUARE = frozenset(
     {"Book", "Box", "CellPhone", "Cloth", "Laptop", "Newspaper", "Pillow", "TissueBox", "Towel"}
 )
-"""What fills its box though it can be carried."""
+"""Types that can be picked up and fill their boxes."""
 _OUT = 0.01
-"""How far before their faces the points of solid things lie, metres."""
+"""Distance of the points from the faces of types seen only from outside, metres."""
 _BOARD = 0.015
-"""How far below its upper side one looks for the edges of a shelf, metres."""
+"""How far below a shelf's upper side the points on its edges lie, metres."""
 _CLOSE = 0.2
-"""How far apart the points of a front are, metres: one stands close to it."""
+"""Distance between the points of a front, metres: the agent stands close to it."""
 Floats = NDArray[np.float64]
 
 
@@ -82,10 +82,10 @@ def sample_points(world: SceneObjects, i: int) -> Floats:
 
 
 def _make_points(world: SceneObjects, i: int) -> Floats:
-    """(P, 3) points of object i, world frame, metres: as many wherever it is and however it is.
+    """(P, 3) points of object i, world frame, metres.
 
-    Most things are looked for all over their boxes, the oriented ones where recorded; of what is
-    built in one sees the front, of a shelf the board.
+    Most objects have points all over their boxes, which are the oriented ones where recorded. A
+    built-in object has points on its front, a shelf on its board.
     """
     kind = world.types[i]
     if kind == "Floor":
@@ -117,22 +117,23 @@ def _front(box: Floats) -> Floats:
 
 
 def _drawer(box: Floats, is_open: bool) -> Floats:
-    """The front; of one that is open also the upper side, which whoever opened it looks down on."""
+    """The front. An open drawer also has its upper side, which an agent that opened it looks down
+    on."""
     front, top = _front(box), points_on_face(box, 1, 1, _OUT)
     return np.concatenate([front, top if is_open else np.resize(front, top.shape)])
 
 
 def _cabinet(box: Floats, built_in: bool) -> Floats:
-    """The front, and all but the back of one that is not built in."""
+    """The front, and every side but the back of a cabinet that is not built in."""
     if built_in:
         return _front(box)
-    # Every other one: the front is what shows, and each point costs time.
+    # Every other point of the sides will do: each point costs time, and the front is mostly seen.
     sides = [points_on_face(box, axis, sign, _OUT)[::2] for axis in (0, 1) for sign in (-1, 1)]
     return np.concatenate([_front(box), *sides])
 
 
 def _shelf(box: Floats, built_in: bool) -> Floats:
-    """The upper side of the board that the room above it is named after, and its edges."""
+    """The upper side and the edges of the board under the space that the record calls a shelf."""
     board = box.copy()
     board[:, 1] = box[0, 1] - 2 * _BOARD, box[0, 1]
     return _slab(board, 0.005, 0.0)
@@ -142,7 +143,7 @@ _POINTS_FROM_OUTSIDE = {"Cabinet": _cabinet, "Shelf": _shelf}
 
 
 def _slab(box: Floats, above: float = _OUT, out: float = _OUT) -> Floats:
-    """Points on the upper side of something flat, and one row along each of its edges."""
+    """Points on the upper side of a flat box, and one row along each of its edges."""
     top = points_on_face(box, 1, 1, above)
     rows = []
     for axis in (0, 2):

@@ -20,18 +20,18 @@ from er_gym.sim.space.solids.families import family, parts
 from er_gym.sim.world_cache import ObjectCacheKey
 
 _HOB, _UNDER = 0.03, 0.004
-"""How much wider than its burners a stove is at least, and from a burner down to it, metres."""
+"""How much wider than its burners a stove is at least, and how far it is below them, metres."""
 
 
 @dataclass(frozen=True)
 class Solid:
-    """What an object is made of; metres.
+    """The boxes that an object is made of; metres.
 
     Attributes:
-        middle: (3,) of its box, world frame.
+        middle: (3,) middle of its box, world frame.
         yaw: heading of its front, degrees.
         upright: (K, 2, 3) corners of its parts about ``middle``, before the turn by ``yaw``.
-        boxes: (K, 2, 3) the same as axis-aligned boxes of the world (see
+        boxes: (K, 2, 3) the parts as axis-aligned boxes of the world (see
             :func:`er_gym.sim.space.solids.box_transforms.turned`).
         hiding: (H, 2, 3) boxes of the world that hide what is behind them.
     """
@@ -48,12 +48,12 @@ _SOLIDS: ObjectCacheKey[Solid] = ObjectCacheKey("solids", until_moved=True)
 
 @lru_cache(maxsize=128)
 def _recorded_solids(scene: Scene) -> dict[int, Solid]:
-    """The solids of a scene's objects where they are recorded, filled by :func:`solid_of`."""
+    """The solids of a scene's objects at their recorded poses, filled by :func:`solid_of`."""
     return {}
 
 
 def solid_of(world: SceneObjects, i: int) -> Solid:
-    """The solid of object i where it is now; kept until the object moves."""
+    """The solid of object i at its present place; kept until the object moves."""
     recorded = world.is_where_recorded(i)
     kept = _recorded_solids(world.scene) if recorded else world.cache.of_objects(_SOLIDS)
     found = kept.get(i)
@@ -90,7 +90,7 @@ def _of_family(world: SceneObjects, i: int) -> Solid:
 def upright_box(
     world: SceneObjects, i: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Middle (3,), size (3,) and heading of object i's box before it is turned to that heading."""
+    """Middle (3,), size (3,) and heading of object i's box; the size is that before the turn."""
     if np.isnan(world.obb[i, 0, 0]):
         fronts = facings(world.scene.name)
         yaw = float(fronts[i]) if i < len(fronts) else 0.0
@@ -105,9 +105,10 @@ def upright_box(
 
 
 def _with_stove(world: SceneObjects, i: int) -> Solid:
-    """A burner; the first of a kitchen hides things with the stove under them, which is no object.
+    """A burner. The first one of a kitchen also stands for the stove, which is no object.
 
-    What hides: from the floor to just below the burners, over which it is a little wider.
+    The stove hides what is behind it, from the floor to just below the burners. It is a little
+    wider than they are.
     """
     burner, rows = _of_family(world, i), list(world.of_type("StoveBurner"))
     low, high = world.low[rows].min(axis=0), world.high[rows].max(axis=0)
@@ -117,7 +118,7 @@ def _with_stove(world: SceneObjects, i: int) -> Solid:
 
 
 def _counter(world: SceneObjects, i: int) -> Solid:
-    """A counter, less what the agent walks through; its slab and its carcass hide things."""
+    """A counter without the area where the agent walks. Its slab and its carcass hide things."""
     middle = (world.low[i] + world.high[i]) / 2
     tops = rectangles(world.scene.name, i)
     boxes = np.empty((len(tops), 2, 3))

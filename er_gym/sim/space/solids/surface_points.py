@@ -1,4 +1,4 @@
-"""The points of a thing that are looked for when one asks whether it is visible."""
+"""Grids of points on boxes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 _SPACING = 0.5
-"""Big boxes get a point about every so many metres, small ones three along each side."""
+"""Distance between the points of large boxes, metres. Small boxes have three along each side."""
 _MOST = 11
 INSET, ROUND = 0.03, 0.2
-"""How far inside a box's edges the outer points lie, as a fraction of its size: of furniture, and
-of what is round, whose corners are air."""
+"""How far inside a box's edges the outer points lie, as a fraction of its size: for furniture, and
+for round objects, since the corners of their boxes are air."""
 
 
 def surface_fractions(size: NDArray[np.float64], inset: float = INSET) -> NDArray[np.float64]:
@@ -33,7 +33,7 @@ def _surface_grid(inset: float, *counts: int) -> NDArray[np.float64]:
 
 
 def points_on_top(box: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(P, 3) points on the upper face of a (2, 3) box: of a floor one sees nothing else; metres."""
+    """(P, 3) points on the upper face of a (2, 3) box, metres: a floor shows no other face."""
     return points_on_face(box, 1, 1)
 
 
@@ -44,7 +44,7 @@ def points_on_face(
     out: float = 0.0,
     spacing: float = _SPACING,
 ) -> NDArray[np.float64]:
-    """(P, 3) points on one face of a (2, 3) box, or ``out`` metres before it."""
+    """(P, 3) points on one face of a (2, 3) box, or ``out`` metres in front of it."""
     low, high = box
     size = high - low
     along = [k for k in range(3) if k != axis]
