@@ -1,4 +1,4 @@
-"""AI2-THOR's actions, one small file a family. Importing this package registers them all."""
+"""AI2-THOR's actions, one small file for each family. Importing this package registers them."""
 
 from er_gym.sim.actions import (  # noqa: F401  (imported for their registrations)
     arrange_objects,

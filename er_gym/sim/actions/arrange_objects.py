@@ -1,4 +1,4 @@
-"""Arranging a room anew: given poses, or random places by a seed."""
+"""Rearranging a room: by given poses, or at random by a seed."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from er_gym.sim.space.receptacles import receptacles_of
 from er_gym.sim.world import World
 
 _ARRANGEMENTS = 1024
-"""How many arrangements of rooms are remembered in a process, some 0.1 MB each."""
+"""Arrangements that are kept in a process, some 0.1 MB each."""
 _arranged: OrderedDict[tuple[object, ...], World] = OrderedDict()
 
 _SAME = 1e-3
-"""A thing whose coordinates and angles change by less has not been moved; metres and degrees."""
+"""An object whose coordinates and angles change by less has not moved; metres and degrees."""
 
 
 class ObjectPose(BaseModel):
-    """Where ``SetObjectPoses`` wants an object: its ``name`` in the metadata, metres, degrees."""
+    """A pose for ``SetObjectPoses``: the object's ``name`` in the metadata, metres, degrees."""
 
     objectName: str
     position: Vector
@@ -36,7 +36,7 @@ class ObjectPose(BaseModel):
 
 
 class ObjectTypeCount(BaseModel):
-    """How many of a type ``InitialRandomSpawn`` is to make of one."""
+    """How many copies of an object ``InitialRandomSpawn`` makes."""
 
     objectType: str
     count: int
@@ -50,17 +50,17 @@ def set_object_poses(
     placeStationary: bool = True,
     skipMoveable: bool = False,
 ) -> None:
-    """Put what can be carried or pushed exactly where it is wanted, and take the rest away.
+    """Put the named pickupable and moveable objects at given poses, and remove the others.
 
-    As in AI2-THOR, pickupable and moveable objects that are not named leave the scene, one that is
-    named again is copied, nobody asks whether there is room, and what has moved gets the id of its
-    new place. ``placeStationary`` False lets things fall from there; ``skipMoveable`` keeps the
-    moveable objects that are not named. Nothing jitters here, so AI2-THOR's
-    ``enablePhysicsJitter`` and ``forceRigidbodySleep`` make no difference.
+    As in AI2-THOR, pickupable and moveable objects that are not named leave the scene. An object
+    that is named again is copied. No free space is required. A moved object gets the id of its new
+    place. ``placeStationary`` False lets objects fall from their poses. ``skipMoveable`` keeps the
+    moveable objects that are not named. Nothing jitters here, so AI2-THOR's ``enablePhysicsJitter``
+    and ``forceRigidbodySleep`` have no effect.
     """
     if objectPoses is None:
         raise ActionFailed("objectPoses was not initialized correctly: it lists no pose.")
-    # Rooms are mostly arranged right after they are loaded, and the same way again and again.
+    # Programs mostly rearrange a room right after loading it, and often in the same way.
     wanted = (world.scene.name, placeStationary, skipMoveable, *map(_key, objectPoses))
     fresh = world.untouched
     known = _arranged.get(wanted) if fresh else None
@@ -104,7 +104,7 @@ def set_object_poses(
             moved.append(i)
     left_behind = {child for i in moved for child in world.contents[i]}
     size = np.prod(world.high - world.low, axis=1)
-    # The large first: what a plate lies in is also what lies in the things on the plate.
+    # Large objects first: what a plate is in, the things on the plate are in as well.
     for i in sorted({*moved, *left_behind}, key=lambda i: -float(size[i])):
         world.relocate_alone(i, receptacles_of(world, i))
     if not placeStationary:
@@ -124,7 +124,7 @@ def _key(pose: ObjectPose) -> tuple[object, ...]:
 
 
 def _set_pose(world: World, i: int, pose: ObjectPose) -> bool:
-    """Put object i there; returns whether that is somewhere else."""
+    """Put object i at a pose; returns whether it has moved."""
     position = np.array([pose.position.x, pose.position.y, pose.position.z])
     rotation = np.array([pose.rotation.x, pose.rotation.y, pose.rotation.z])
     was_held = world.held == i
@@ -155,12 +155,12 @@ def initial_random_spawn(
     allowFloor: bool = False,
     allowMoveable: bool = False,
 ) -> None:
-    """Put everything that can be carried somewhere else, by a seed.
+    """Move every pickupable object to a random place, by a seed.
 
-    Each thing tries up to ``numPlacementAttempts`` receptacles in random order, of those that take
-    its type and stand there for good, and stays where it is if none has room. ``forceVisible``
-    leaves out those that open. As in AI2-THOR, what has moved gets the id of its new place. Since
-    nothing here rolls, ``placeStationary`` makes no difference.
+    Each object tries up to ``numPlacementAttempts`` receptacles in random order. They must be fixed
+    and accept its type. It stays where it is if none has room. ``forceVisible`` leaves out
+    receptacles that open. As in AI2-THOR, a moved object gets the id of its new place. Nothing
+    rolls here, so ``placeStationary`` has no effect.
     """
     within("numPlacementAttempts", numPlacementAttempts, 1, 10**6)
     for name, wanted in (
@@ -205,9 +205,9 @@ def initial_random_spawn(
 
 
 def _spawn(world: World, i: int, receptacle: int, random: np.random.Generator) -> bool:
-    """Put object i at the free spot nearest to a random point of a receptacle, if it has any.
+    """Put object i at the free spot nearest to a random point of a receptacle, if there is one.
 
-    A receptacle that is nearly full counts as full: there are others.
+    A receptacle that is nearly full counts as full, because others remain.
     """
     point = random.uniform(world.low[receptacle], world.high[receptacle])[[0, 2]]
     for yaw, foot in islice(free_spots(world, i, receptacle, point, squeeze=False), 1):
@@ -217,7 +217,7 @@ def _spawn(world: World, i: int, receptacle: int, random: np.random.Generator) -
 
 
 def _name_after_places(world: World, rows: list[int]) -> None:
-    """Give objects AI2-THOR's ids for where they are: ``Apple|-00.47|+01.15|+00.48``."""
+    """Give objects the ids of their places, as AI2-THOR does: ``Apple|-00.47|+01.15|+00.48``."""
     for i in sorted(rows):
         wanted = id_of_place(world.types[i], world.position[i])
         if world.index.get(wanted, i) == i:

@@ -1,4 +1,4 @@
-"""The agent's lens, and cameras that stand in the room."""
+"""The agent's field of view, and third-party cameras."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from er_gym.sim.world import World
 
 
 class PartialVector(BaseModel):
-    """A point or a direction of which only some coordinates are given."""
+    """A point or a direction with some coordinates left out."""
 
     model_config = ConfigDict(allow_inf_nan=False)
 
@@ -23,7 +23,7 @@ class PartialVector(BaseModel):
 
 @action("ChangeFOV")
 def change_fov(world: World, *, fieldOfView: float) -> None:
-    """Give the agent's camera another vertical field of view, in degrees."""
+    """Set the vertical field of view of the agent's camera, degrees."""
     field_of_view("fov", fieldOfView)
     world.configure(field_of_view=fieldOfView)
 
@@ -42,10 +42,10 @@ def add_third_party_camera(
     farClippingPlane: float | None = None,
     antiAliasing: str = "none",
 ) -> None:
-    """Set up another camera, at a point in metres and a rotation in degrees.
+    """Add a third-party camera at a point in metres, with a rotation in degrees.
 
-    ``skyboxColor``, ``antiAliasing`` and the clipping planes are accepted and change nothing: the
-    room is drawn around every camera, so that no sky is seen, and edges are drawn as they are.
+    ``skyboxColor``, ``antiAliasing`` and the clipping planes have no effect. The room surrounds
+    every camera, so no sky is seen, and edges are not smoothed.
     """
     _no_orthographic(orthographic, orthographicSize)
     _no_farther(position, rotation)
@@ -70,7 +70,7 @@ def update_third_party_camera(
     nearClippingPlane: float | None = None,
     farClippingPlane: float | None = None,
 ) -> None:
-    """Move, turn or zoom a third-party camera; what is not given stays as it is."""
+    """Move, turn or zoom a third-party camera. Arguments that are left out keep their values."""
     _no_orthographic(orthographic, orthographicSize)
     _no_farther(position, rotation)
     if fieldOfView is not None:

@@ -1,4 +1,4 @@
-"""Conditions that several actions share; each says what is wrong."""
+"""Conditions that several actions check. Each failure says what is wrong."""
 
 from __future__ import annotations
 
@@ -8,31 +8,31 @@ from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
 
 FARTHEST = 1000.0
-"""How far from the origin anything may be put along each axis, metres."""
+"""How far from the origin an object may be put along each axis, metres."""
 
 
 def field_of_view(name: str, degrees: float) -> None:
-    """Refuse a vertical field of view that no camera has."""
+    """Refuse a vertical field of view outside 0 to 180 degrees."""
     if not 0.0 < degrees < 180.0:
         raise ActionFailed(f"{name} must be set to (0, 180) noninclusive, not {degrees:g}.")
 
 
 def within(name: str, value: float | None, low: float, high: float) -> None:
-    """Refuse an argument that is given and out of its range."""
+    """Refuse an argument that is given and outside its range."""
     if value is not None and not low <= value <= high:
-        given = quoted(value) if isinstance(value, int) else f"{value:g}"  # no float is that long
+        given = quoted(value) if isinstance(value, int) else f"{value:g}"  # no float is long
         raise ActionFailed(f"{name} must be within {low:g} and {high:g}, not {given}.")
 
 
 _NOT_SEEN = "NullReferenceException: Target object not found within the specified visibility."
-"""AI2-THOR's words, by which programs know this refusal."""
+"""AI2-THOR's message, by which programs recognise this refusal."""
 
 
 def target(world: World, object_id: str | None, force: bool) -> int:
-    """The object that an action names; unless forced it has to be in view and within reach.
+    """The row of the object that an action names. Unless forced, it must be visible.
 
     Raises:
-        ActionFailed: there is no such object, it is shut away, or it cannot be seen from here.
+        ActionFailed: there is no such object, it is inside something closed, or it is not visible.
     """
     i = world.find(object_id)
     if force or visible(world)[i]:

@@ -1,9 +1,9 @@
-"""How the values of a request become arguments, by the rules of AI2-THOR.
+"""The conversion of request values to arguments, by AI2-THOR's rules.
 
-Those are the rules of its JSON library (Newtonsoft's ``JToken.ToObject``): a number may come as
-text or as a bool, a bool as a number, a text as a number, and null is for what may be left out and
-for text. What cannot be converted is a wrong call if it is a single value, and a plain failure if
-it is a point, a list or a record.
+These are the rules of its JSON library (Newtonsoft's ``JToken.ToObject``). Numbers are read from
+text and bools, bools from numbers, and text from numbers. Null is accepted for optional parameters
+and for text. A value that cannot be converted makes the call invalid if it is a single value. If it
+is a point, a list or a record, the action merely fails.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 _INT_MAX = 2**31 - 1
-"""AI2-THOR's whole numbers have 32 bits."""
+"""AI2-THOR's integers have 32 bits."""
 
 
 class Unconvertible(ValueError):
-    """A value that cannot become an argument; the message says why, where that is not plain."""
+    """A value cannot be converted. The message gives the reason unless it is obvious."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What a parameter takes.
+    """The type of a parameter.
 
     Attributes:
-        name: as AI2-THOR's errors call it.
-        convert: a value to the argument; raises :class:`Unconvertible`.
-        single: whether it is a number, a bool or a text, not a point, a list or a record.
+        name: the type's name in AI2-THOR's errors.
+        convert: turns a value into the argument; raises :class:`Unconvertible`.
+        single: whether it is a number, a bool or a text, and not a point, a list or a record.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Kind:
 
 
 def kind_of(annotation: Any) -> Kind:
-    """The kind of a parameter that is annotated with a type, such as ``float | None``."""
+    """The kind of a parameter with a type annotation such as ``float | None``."""
     inner = [part for part in get_args(annotation) if part is not NoneType]
     nullable = NoneType in get_args(annotation)
     kind = _SINGLE.get(inner[0] if nullable and len(inner) == 1 else annotation)
@@ -66,7 +66,7 @@ def _whole(value: Any) -> int:
     if not isinstance(value, (float, int, str)):
         return _whole(_plain(value))
     try:
-        number = int(value) if isinstance(value, str) else round(value)  # half to even, as there
+        number = int(value) if isinstance(value, str) else round(value)  # half to even
     except (ValueError, OverflowError):
         raise Unconvertible from None
     if abs(number) > _INT_MAX:
@@ -94,7 +94,7 @@ def _text(value: Any) -> str | None:
 
 
 def _plain(value: Any) -> Any:
-    """What is NumPy's as Python's own, which is how it comes over the wire."""
+    """A NumPy value as a Python value, which is how it arrives over the wire."""
     if isinstance(value, (np.generic, np.ndarray)):
         return value.tolist()
     raise Unconvertible

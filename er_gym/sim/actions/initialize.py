@@ -1,4 +1,4 @@
-"""What the client says before an episode: settings and resolution."""
+"""Settings of an episode: ``Initialize`` and the resolution."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from er_gym.sim.world import World
 
 _FAR_PLANE = 20.0
 _LARGEST_GRID = 5.0
-"""AI2-THOR takes any gridSize above 0 and up to this, metres."""
+"""AI2-THOR's largest gridSize, metres; it must also be above 0."""
 _SMALLEST_LENGTH = 1e-6
-"""What is shorter counts as nothing, metres."""
+"""A shorter length counts as zero, metres."""
 _SMALLEST_TURN = 1.0
 _FARTHEST_SIGHT = 1000.0
-"""From here on one sees across any room, metres; a larger visibilityDistance means the same."""
+"""A visibilityDistance of this or more covers any room, metres."""
 
 
 def _either(flag: bool | None, old_name: bool | None) -> bool | None:
-    """A flag that may come under its new name, its old one, both or neither."""
+    """The value of a flag that has a new and an old name."""
     return old_name if flag is None else flag
 
 
@@ -45,12 +45,12 @@ def initialize(
     agentMode: str = "default",
     agentCount: int = 1,
 ) -> dict[str, Any]:
-    """Set what the engine goes by; distances in metres, angles in degrees.
+    """Set the engine's settings; distances in metres, angles in degrees.
 
-    What AI2-THOR refuses is refused in its words; 0 stands for its default, and a
-    ``visibilityDistance`` that is not positive is passed over. The embedded engine has neither arm,
-    drone nor crowd, and says so. Everything else that AI2-THOR's ``Initialize`` is told is accepted
-    and has no effect (docs/fidelity.md lists it), and what it does not know it ignores as well.
+    Refusals have AI2-THOR's wording. 0 stands for a default, and a ``visibilityDistance`` that is
+    not positive is ignored. The embedded engine has no arm, no drone and only one agent, and
+    refuses requests for these. All other arguments of AI2-THOR's ``Initialize`` are accepted
+    without effect (docs/fidelity.md lists them), and so are unknown ones.
     """
     if agentMode.lower() not in ("default", ""):
         raise ActionFailed(
@@ -101,4 +101,4 @@ def change_resolution(world: World, *, x: int, y: int) -> None:
 
 @action("ChangeQuality")
 def change_quality(world: World, *, quality: str) -> None:
-    """Accepted for the client's sake: the embedded engine draws in one quality."""
+    """Accepted without effect: the embedded engine has one quality."""

@@ -1,4 +1,4 @@
-"""Moving about: steps on the walkable floor, and teleports."""
+"""Moving: steps on the walkable floor, and teleports."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from er_gym.sim.space.walkable_floor import floor_of, standing_places
 from er_gym.sim.world import World
 
 _FARTHEST = 1000.0
-"""No scene is larger than this, metres."""
+"""Larger than any scene, metres."""
 _WALL = "A wall"
 _HEIGHT_TOLERANCE = 0.05
-"""A position whose height is farther off than this is not on the floor, metres; AI2-THOR's."""
+"""A position that is farther above or below is not on the floor, metres; AI2-THOR's value."""
 _LEVEL = 0.01
-"""Pitch and roll of a teleport have to be less, degrees; AI2-THOR's."""
+"""Pitch and roll of a teleport must be less, degrees; AI2-THOR's value."""
 _FINEST = 0.05
-"""Grids with a smaller step than this are not searched for a free place, metres."""
+"""A grid with a smaller step is not searched for a free position, metres."""
 
 
 def _step(world: World, magnitude: float | None, heading: float) -> None:
@@ -41,10 +41,11 @@ def _step(world: World, magnitude: float | None, heading: float) -> None:
 
 
 def step_end(world: World, size: float, heading: float) -> np.ndarray:
-    """(3,) metres: where a step leads if nothing is in the way, snapped to the grid if that is on.
+    """(3,) metres: the end of a step if nothing is in the way, snapped to the grid if that is on.
 
     Args:
-        size: of the step, metres. heading: degrees clockwise from where the agent looks.
+        size: length of the step, metres.
+        heading: degrees clockwise from the agent's own heading.
     """
     angle = np.radians(world.agent.rotation + heading)
     end = world.agent.position + size * np.array([np.sin(angle), 0.0, np.cos(angle)])
@@ -55,10 +56,11 @@ def step_end(world: World, size: float, heading: float) -> np.ndarray:
 
 
 def snap_to_grid(world: World) -> None:
-    """Bring the agent to a corner of the grid square that it is in, as AI2-THOR's Initialize does.
+    """Move the agent to a corner of the grid square that it is in, as AI2-THOR's Initialize does.
 
-    The corner of lowest x and z that it can walk to is taken. Where it can walk to none, it goes to
-    the nearest free place of the grid, if there is one, so that what follows is on the grid.
+    It takes the corner with the lowest x and z that it can walk to. If it can walk to none, it
+    takes the nearest free position on the grid, if there is one. So all later steps stay on the
+    grid.
     """
     grid = world.settings.grid_size
     here = world.agent.position
@@ -81,9 +83,10 @@ def snap_to_grid(world: World) -> None:
 
 
 def _obstacle(world: World, end: np.ndarray) -> str:
-    """The name of the standing object nearest to where the agent wanted to go, or a wall.
+    """The name of the standing object nearest to a position that the agent cannot reach, or a wall.
 
-    A box in which the agent stands already is a counter's that bends round it: not that one.
+    An object is left out if its box already contains the agent: it is a counter that bends round
+    it.
     """
     here = world.agent.position
     rows = [
@@ -101,7 +104,7 @@ def _obstacle(world: World, end: np.ndarray) -> str:
 
 
 _HEADINGS = {"MoveAhead": 0.0, "MoveRight": 90.0, "MoveBack": 180.0, "MoveLeft": 270.0}
-"""Where the agent goes by an action, clockwise from where it looks, degrees."""
+"""Heading of each action, degrees clockwise from the agent's own."""
 
 
 def _mover(heading: float) -> Callable[..., None]:
@@ -121,8 +124,8 @@ def _mover(heading: float) -> Callable[..., None]:
     ) -> None:
         """Step by moveMagnitude metres (default: gridSize) without turning.
 
-        With ``objectId``, no farther than ``maxAgentsDistance`` metres from that object. All else
-        is accepted and has no effect: what is held runs into nothing here.
+        With ``objectId``, the agent stays within ``maxAgentsDistance`` metres of that object. All
+        other arguments have no effect: the held object collides with nothing here.
         """
         start, carried = world.agent, world.in_hand
         were = [array[carried] for array in (world.position, world.low, world.high)]
@@ -132,7 +135,7 @@ def _mover(heading: float) -> Callable[..., None]:
                 _stay_near(world, objectId, maxAgentsDistance)
             except ActionFailed:
                 world.place_agent(start)
-                # There and back is not to the last bit where it was.
+                # A step forth and back can change the last bits.
                 for array, was in zip((world.position, world.low, world.high), were, strict=True):
                     array[carried] = was
                 raise
@@ -145,7 +148,7 @@ for _name, _heading in _HEADINGS.items():
 
 
 def _stay_near(world: World, object_id: str, most: float) -> None:
-    """Refuse to be farther than so many metres, along the floor, from an object's box."""
+    """Refuse a position that is farther from an object's box than ``most`` metres."""
     i = world.find(object_id)
     here = world.agent.position
     gap = np.clip(here, world.low[i], world.high[i]) - here
@@ -172,7 +175,7 @@ def _in_bounds(world: World, there: np.ndarray) -> None:
     low, high = room_bounds(world.scene.name)
     here = world.agent.position
     inside = (low <= there) & (there <= high)
-    # Two rooms were published with a start outside their walls: there one can stay.
+    # Two rooms were published with a start outside their walls; the agent may stay there.
     if not inside.all() and np.abs(there - here).max() > 1e-3:
         raise ActionFailed(
             f"Teleport position ({there[0]:.6f}, {there[1]:.6f}, {there[2]:.6f}) out of scene "
@@ -194,9 +197,9 @@ def teleport(
     standing: bool | None = None,
     forceAction: bool = False,
 ) -> None:
-    """Put the agent at a pose; what is not given stays as it is.
+    """Put the agent at a pose. Arguments that are left out keep their values.
 
-    ``forceAction`` waives all conditions but that numbers are sane.
+    ``forceAction`` waives all conditions except that numbers are within bounds.
     """
     agent = world.agent
     if position is not None:
@@ -233,7 +236,7 @@ def teleport(
         Agent(
             position=there,
             rotation=agent.rotation if rotation is None else rotation.y % 360.0,
-            # As AI2-THOR tells it; a forced one may be any number.
+            # As AI2-THOR reports it. A forced one may be any number.
             horizon=agent.horizon if horizon is None else remainder(horizon, 360.0),
             standing=agent.standing if standing is None else standing,
         )

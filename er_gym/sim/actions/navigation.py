@@ -1,4 +1,4 @@
-"""The shortest way to a thing or to a point, and the next step of it."""
+"""Shortest paths to objects and points, and the next step along them."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from er_gym.sim.space.walkable_floor import floor_of, standing_places
 from er_gym.sim.world import World
 
 _ALLOWED_ERROR = 0.0001
-"""How far from the floor a start or an end may be, metres; AI2-THOR's."""
+"""How far from the floor a start or an end may be, metres; AI2-THOR's value."""
 _YAWS = tuple(range(0, 360, 30))
 _FLOOR = [0, 2]
 
 
 def _target(world: World, object_type: str | None, object_id: str | None) -> int:
-    """The object that is named by its id, or by its type if it is the only one."""
+    """The row of an object named by its id, or by its type if there is only one of it."""
     if object_id:
         return world.find(object_id)
     if not object_type:
@@ -40,8 +40,8 @@ def _target(world: World, object_type: str | None, object_id: str | None) -> int
 
 
 def _views(world: World, i: int, start: np.ndarray) -> np.ndarray:
-    """(E, 2) places of the agent's grid from which an object can be seen, where one gets to."""
-    step = max(world.settings.grid_size, 0.1)  # finer ones show no more
+    """(E, 2) reachable positions on the agent's grid from which an object is visible."""
+    step = max(world.settings.grid_size, 0.1)  # more positions add nothing
     if floor_of(world.scene.name).contains(start):
         places = reachable_positions(world.scene.name, start, step)
     else:
@@ -85,12 +85,12 @@ def get_shortest_path(
     rotation: Vector | None = None,
     allowedError: float = _ALLOWED_ERROR,
 ) -> dict[str, Any]:
-    """The corners of the shortest way to where an object can be seen, metres.
+    """The corners of the shortest path to a position from which an object is visible, metres.
 
     Args:
-        position: where it begins; where the agent is if not given.
-        rotation: makes no difference.
-        allowedError: how far from the floor it may begin, metres.
+        position: the start; by default the agent's position.
+        rotation: has no effect.
+        allowedError: how far from the floor the start may be, metres.
     """
     i = _target(world, objectType, objectId)
     start = _start(world, position)
@@ -108,7 +108,7 @@ def get_shortest_path_to_point(
     z: float | None = None,
     allowedError: float = _ALLOWED_ERROR,
 ) -> dict[str, Any]:
-    """The corners of the shortest way to a point, ``target`` or ``x, y, z``; metres."""
+    """The corners of the shortest path to a point, ``target`` or ``x, y, z``; metres."""
     if target is not None:
         x, z = target.x, target.z
     if x is None or z is None:
@@ -125,12 +125,12 @@ def object_nav_expert_action(
     objectId: str | None = None,
     position: Vector | None = None,
 ) -> str | None:
-    """What to do next to get to a position, or to where an object can be seen; None once there.
+    """The next action towards a position, or towards a view of an object; None on arrival.
 
-    That is MoveAhead, RotateLeft or RotateRight, along a shortest way over the agent's grid.
+    The action is MoveAhead, RotateLeft or RotateRight, along a shortest path on the agent's grid.
     """
     here = world.agent.position[_FLOOR]
-    step = max(world.settings.grid_size, 0.05)  # a finer grid has more places than one needs
+    step = max(world.settings.grid_size, 0.05)  # more positions add nothing
     places = reachable_positions(world.scene.name, here, step)
     if position is not None:
         point = _point(position.x, position.z)
@@ -149,11 +149,11 @@ def object_nav_expert_action(
 
 
 def _towards(world: World, here: np.ndarray, corner: np.ndarray, step: float) -> str:
-    """The step along the grid that brings one nearest to a corner, or the turn before it."""
+    """The action that brings the agent nearest to a corner: a step, or a turn before it."""
     floor, turn = floor_of(world.scene.name), world.settings.rotate_step
     turns = range(int(360.0 // turn)) if turn < 360.0 else range(1)
     gaps = {}
-    for k in sorted(turns, key=lambda k: min(k, len(turns) - k)):  # the least turn first
+    for k in sorted(turns, key=lambda k: min(k, len(turns) - k)):  # the smallest turn first
         end = step_end(world, step, k * turn)[_FLOOR]
         if floor.path_is_clear(here, end) and np.abs(end - here).max() > step / 4:
             gaps[k] = round(float(np.linalg.norm(corner - end)), 6)

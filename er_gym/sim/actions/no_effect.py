@@ -1,4 +1,4 @@
-"""Actions that change nothing here; docs/fidelity.md says so. What they refuse, they refuse."""
+"""Actions that have no effect here, see docs/fidelity.md. They still refuse bad arguments."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LAST_OF_TRAINING, _LAST_OF_VALIDATION = 20, 25
 
 @action("SetRandomSeed")
 def set_random_seed(world: World, *, seed: int) -> None:
-    """Accepted: nothing here is random but by a seed of its own."""
+    """Accepted: everything random here takes a seed of its own."""
 
 
 @action("RandomizeColors", "ChangeColorOfMaterials", "ResetMaterials", "ResetColors")
@@ -40,10 +40,10 @@ def randomize_materials(
     useExternalMaterials: bool | None = None,
     inRoomTypes: list[str] | None = None,
 ) -> dict[str, Any]:
-    """Accepted: materials stay as they are. Answers with the splits that AI2-THOR would draw from.
+    """Accepted: materials do not change. The answer names the splits that AI2-THOR would draw from.
 
-    A scene's own split is the default: of each kind of room, 20 are for training, 5 for validation
-    and 5 for testing.
+    The default is the scene's own split. Of each kind of room, 20 are for training, 5 for
+    validation and 5 for testing.
     """
     number = int(world.scene.name.removeprefix("FloorPlan"))
     if inRoomTypes is not None:
@@ -88,7 +88,7 @@ def randomize_lighting(
     saturation: list[float] | None = None,
     synchronized: bool = False,
 ) -> None:
-    """Accepted: light comes from nowhere in particular here. Ranges are of two numbers."""
+    """Accepted: the light is always the same here. Each range has two numbers."""
     for name, span, most in (
         ("brightness", brightness, 1e6),
         ("hue", hue, 1.0),
@@ -104,12 +104,12 @@ def randomize_lighting(
 
 @action("SetDecayTemperatureBool")
 def set_decay_temperature(world: World, *, allowDecayTemperature: bool) -> None:
-    """Accepted: temperature does not wear off here."""
+    """Accepted: temperatures do not decay here."""
 
 
 @action("SetGlobalRoomTempDecayTime")
 def set_global_decay_time(world: World, *, TimeUntilRoomTemp: float = 0.0) -> None:
-    """Accepted: temperature does not wear off here; seconds, 0 or more."""
+    """Accepted: temperatures do not decay here; seconds, 0 or more."""
     within("TimeUntilRoomTemp", TimeUntilRoomTemp, 0.0, 1e9)
 
 
@@ -117,13 +117,13 @@ def set_global_decay_time(world: World, *, TimeUntilRoomTemp: float = 0.0) -> No
 def set_decay_time_of_type(
     world: World, *, objectType: str, TimeUntilRoomTemp: float = 0.0
 ) -> None:
-    """Accepted: temperature does not wear off here; seconds, 0 or more."""
+    """Accepted: temperatures do not decay here; seconds, 0 or more."""
     within("TimeUntilRoomTemp", TimeUntilRoomTemp, 0.0, 1e9)
 
 
 @action("MakeObjectBreakable", "MakeObjectUnbreakable")
 def make_object_breakable(world: World, *, objectId: str) -> None:
-    """Accepted: nothing breaks here but by BreakObject, which breaks all that can be broken."""
+    """Accepted: only BreakObject breaks objects here, and it breaks every breakable one."""
     require(world, world.find(objectId), "breakable", "something that can be broken")
 
 
@@ -131,7 +131,7 @@ def make_object_breakable(world: World, *, objectId: str) -> None:
 def set_mass_properties(
     world: World, *, objectId: str, mass: float, drag: float, angularDrag: float
 ) -> None:
-    """Give what can be carried or pushed another mass, kilograms; drag has no effect."""
+    """Set the mass of a pickupable or moveable object, kilograms; drag has no effect."""
     i = world.find(objectId)
     if not world.has(i, "moveable"):
         require(world, i, "pickupable", "Moveable or Pickupable, and its mass cannot be changed")

@@ -1,4 +1,4 @@
-"""Actions on an object, which is named by its id or by a point of the agent's picture."""
+"""Actions on an object that is named by its id or by a point of the agent's picture."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def pointed_at(world: World, x: float, y: float) -> str:
         x, y: 0 to 1, from the left and from the top.
 
     Raises:
-        ActionFailed: the point is outside the picture, or shows the room.
+        ActionFailed: the point is outside the picture, or shows the room and no object.
     """
     if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
         raise ActionFailed(f"x/y must be in [0:1], from the upper left corner, not ({x:g}, {y:g}).")
@@ -36,7 +36,7 @@ def pointed_at(world: World, x: float, y: float) -> str:
 
 
 def shown_at(world: World, x: float, y: float) -> NDArray[np.float64]:
-    """(3,) metres: the point in the room that is seen at a point of the agent's picture.
+    """(3,) metres: the point of the room at a point of the agent's picture.
 
     Args:
         x, y: 0 to 1, from the left and from the top.
@@ -47,7 +47,7 @@ def shown_at(world: World, x: float, y: float) -> NDArray[np.float64]:
         depth = draw(world).depth
     finally:
         world.settings, world.cameras = settings, cameras
-    assert depth is not None  # it was asked for
+    assert depth is not None  # depth was requested
     column = min(int(x * settings.width), settings.width - 1)
     row = min(int(y * settings.height), settings.height - 1)
     half = tan(radians(settings.field_of_view / 2))
@@ -58,11 +58,11 @@ def shown_at(world: World, x: float, y: float) -> NDArray[np.float64]:
 
 
 def object_action(*names: str, server_action: bool = False) -> Callable[[Run], Run]:
-    """Register a handler that takes ``objectId``, so that it is also called with ``x, y`` instead.
+    """Register a handler with ``objectId`` so that it can also be called with ``x, y`` instead.
 
-    With named parameters these are two ways to call the action, and both at once is a wrong call.
-    An action that takes a server action looks at the point, the upper left corner if none is given,
-    when it is not told an ``objectId``.
+    With named parameters the action gets two signatures, and a call with both is invalid. An action
+    that takes a server action uses the point if the request has no ``objectId``; the default point
+    is the upper left corner.
     """
 
     def register(run: Run) -> Run:

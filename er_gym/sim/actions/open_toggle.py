@@ -12,11 +12,11 @@ from er_gym.sim.space.solids import solid_of
 from er_gym.sim.world import World, reversible_offset
 
 _ONLY_SHUT = frozenset({"Microwave"})
-"""Types that run only when shut, and open only when off."""
+"""Types that switch on only while closed and open only while off."""
 
 
 def _slide(world: World, i: int, openness: float) -> None:
-    """Slide a drawer, with what lies in it, to an openness: by its depth at 1."""
+    """Slide a drawer and its contents to an openness; at 1 it is out by its depth."""
     if world.types[i] != "Drawer":
         return
     solid = solid_of(world, i)
@@ -38,9 +38,9 @@ def open_object(
     forceAction: bool = False,
     moveMagnitude: float | None = None,
 ) -> None:
-    """Open an object, to a share of its full opening in (0, 1].
+    """Open an object by a fraction of its full opening, in (0, 1].
 
-    ``moveMagnitude`` is the old name of ``openness``, of which 0 meant the full opening.
+    ``moveMagnitude`` is the old name of ``openness``; with that name 0 means the full opening.
     """
     if moveMagnitude is not None:
         openness = moveMagnitude or 1.0

@@ -1,4 +1,4 @@
-"""Taking things into the hand and putting them down."""
+"""Picking objects up and putting them down."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _held(world: World) -> int:
 def pickup_object(
     world: World, *, objectId: str, forceAction: bool = False, manualInteract: bool = False
 ) -> None:
-    """Take an object, with all that lies in it, into the empty hand."""
+    """Take an object and all its contents into the empty hand."""
     i = target(world, objectId, forceAction)
     require(world, i, "pickupable", "something that can be picked up")
     if world.held >= 0:
@@ -43,7 +43,7 @@ def pickup_object(
 
 
 def put_down(world: World, i: int, yaw: float, foot: np.ndarray, parents: list[int]) -> None:
-    """Stand object i at a heading with the middle of its underside at a (3,) point."""
+    """Put object i at a heading, with the middle of its underside at a (3,) point."""
     world.turn(i, yaw)
     underside = (world.low[i] + world.high[i]) / 2
     underside[1] = world.low[i, 1]
@@ -55,9 +55,9 @@ def put_down(world: World, i: int, yaw: float, foot: np.ndarray, parents: list[i
 
 
 def shift(world: World, i: int, offset: np.ndarray) -> None:
-    """Shift object i by (3,) metres with what can be carried in it; the rest is in it no more.
+    """Shift object i by (3,) metres with its pickupable contents; all other contents leave it.
 
-    By the record a table may lie in the chairs around it: it stays.
+    In the record a table may be inside the chairs around it. It stays where it is.
     """
     inside = world.inside(i)
     loose = [k for k in inside if world.has(k, "pickupable")]
@@ -77,10 +77,10 @@ def put_object(
     randomSeed: int = 0,
     putNearXY: bool = False,
 ) -> None:
-    """Put what is held in or on a receptacle, where it is seen and nearest to the agent.
+    """Put the held object in or on a receptacle, at a visible spot near the agent.
 
-    ``forceAction`` waives the receptacle's restrictions on types, as in AI2-THOR, besides
-    visibility. ``placeStationary``, ``randomSeed`` and ``putNearXY`` change nothing.
+    As in AI2-THOR, ``forceAction`` waives visibility and the placement restrictions.
+    ``placeStationary``, ``randomSeed`` and ``putNearXY`` have no effect.
     """
     i = _held(world)
     receptacle = target(world, objectId, forceAction)
@@ -100,7 +100,7 @@ def put_object(
     if spot is None:
         raise ActionFailed(f"No valid positions to place {held}: {objectId} has no free space.")
     yaw, foot = spot
-    # What is on a plate on a table is on the table too; what is in the fridge is not on the floor.
+    # An object on a plate on a table is on the table too, but one in a fridge is not on the floor.
     around = world.parents[receptacle] if world.has(receptacle, "pickupable") else ()
     put_down(world, i, yaw, foot, [receptacle, *around])
 
@@ -109,7 +109,7 @@ def put_object(
 def drop_hand_object(
     world: World, *, forceAction: bool = False, autoSimulation: bool = True
 ) -> None:
-    """Let go of what is held: it falls onto whatever is under the hand."""
+    """Drop the held object: it falls onto the surface below the hand."""
     i = _held(world)
     fall(world, i, (world.low[i] + world.high[i]) / 2)
 
@@ -122,9 +122,9 @@ def throw_object(
     forceAction: bool = False,
     autoSimulation: bool = True,
 ) -> None:
-    """Throw what is held: it falls ahead of the hand, a metre for every 100 N, two at most.
+    """Throw the held object. It falls ahead of the hand: 1 m for every 100 N, at most 2 m.
 
-    It flies level until something is in its way, and neither breaks nor rolls.
+    It flies level until something is in its way. It neither breaks nor rolls.
     """
     within("moveMagnitude", moveMagnitude, 0.0, 1e6)
     i = _held(world)
@@ -141,7 +141,7 @@ def throw_object(
 
 
 def fall(world: World, i: int, centre: np.ndarray) -> None:
-    """Let object i fall from where its middle is at a (3,) point; inside a wall, at the feet."""
+    """Let object i fall from a (3,) position of its middle; inside a wall, to the agent's feet."""
     found = landing(world, i, centre)
     if found is None:
         agent = world.agent.position

@@ -1,4 +1,4 @@
-"""Putting a thing at a point, wherever the agent is."""
+"""Placing an object at a point, wherever the agent is."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from er_gym.sim.space.receptacles import receptacles_of
 from er_gym.sim.world import World
 
 _LIFT = 0.01
-"""How far over a surface the points lie that GetSpawnCoordinatesAboveReceptacle tells, metres."""
+"""Height of GetSpawnCoordinatesAboveReceptacle's points above the surface, metres."""
 
 
 @action("GetSpawnCoordinatesAboveReceptacle")
 def get_spawn_coordinates(
     world: World, *, objectId: str, anywhere: bool = True
 ) -> list[dict[str, float]]:
-    """Points a little over the surface of a receptacle, 5 cm apart, metres.
+    """Points a little above the surface of a receptacle, 5 cm apart, metres.
 
     Args:
-        anywhere: else only those in the agent's picture.
+        anywhere: False for only those in the agent's picture.
     """
     i = world.find(objectId)
     if not world.has(i, "receptacle"):
@@ -52,7 +52,7 @@ def _array(vector: Vector) -> np.ndarray:
 
 
 def _settle(world: World, i: int, stays: bool) -> None:
-    """Say in what object i lies now; unless it stays where it is, it falls if in nothing."""
+    """Update the receptacles of object i. If it is in none, it falls, unless it ``stays``."""
     if i == world.held:
         world.held = -1
     parents = receptacles_of(world, i)
@@ -64,7 +64,7 @@ def _settle(world: World, i: int, stays: bool) -> None:
 
 
 def _around(world: World, point: np.ndarray) -> tuple[int, ...]:
-    """The furniture whose box a (3,) point is in: that box has air in it, as a cabinet's has."""
+    """The furniture whose box contains a (3,) point: the box has air in it, like a cabinet's."""
     within = ((world.low <= point) & (point <= world.high)).all(axis=1)
     return tuple(
         k
@@ -81,10 +81,13 @@ def _moved(
     forced: bool,
     standing: bool = False,
 ) -> str | None:
-    """Put object i somewhere; what is in the way there, if it is not forced and then not done.
+    """Put object i at a position. If something is in the way and this is not forced, nothing moves.
 
     Args:
-        standing: the position is where the middle of its underside goes.
+        standing: the position is for the middle of its underside.
+
+    Returns:
+        The obstacle, None if the object has moved.
     """
     rows = [i, *world.inside(i)]
     arrays = (world.position, world.rotation, world.low, world.high)
@@ -118,9 +121,9 @@ def place_object_at_point(
     rotation: Vector | None = None,
     forceKinematic: bool = False,
 ) -> None:
-    """Stand an object with its underside on a point, if nothing is in the way there; metres.
+    """Put an object with its underside on a point, if the place is free; metres.
 
-    What then lies in nothing falls, unless ``forceKinematic`` holds it.
+    If it is then in no receptacle, it falls, unless ``forceKinematic`` holds it.
     """
     _sane(position, rotation)
     i = _loose(world, objectId)
@@ -147,10 +150,10 @@ def teleport_object(
     makeUnbreakable: bool = False,
     includeErrorMessage: bool = False,
 ) -> None:
-    """Put an object's position at a point, or at the first of several that is free; metres.
+    """Move an object to a point, or to the first free one of several; metres.
 
-    ``forceAction`` asks for no room. What then lies in nothing falls, unless ``forceKinematic``
-    holds it. ``makeUnbreakable`` and ``includeErrorMessage`` have no effect.
+    ``forceAction`` requires no free space. If the object is then in no receptacle, it falls, unless
+    ``forceKinematic`` holds it. ``makeUnbreakable`` and ``includeErrorMessage`` have no effect.
     """
     if x is not None and y is not None and z is not None:
         position = Vector(x=x, y=y, z=z)

@@ -1,4 +1,4 @@
-"""Taking things out of the scene, bringing them back, and naming those that metadata list."""
+"""Removing and disabling objects, and choosing those that the metadata list."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ def _to_go(world: World, object_id: str) -> int:
 
 @action("RemoveFromScene")
 def remove_from_scene(world: World, *, objectId: str) -> None:
-    """Take an object out of the scene for good; what lies in it stays where it is."""
+    """Remove an object from the scene for good; its contents stay where they are."""
     world.remove(_to_go(world, objectId))
 
 
 @action("RemoveFromScene", "RemoveObjsFromScene")
 def remove_several_from_scene(world: World, *, objectIds: list[str]) -> None:
-    """Take objects out of the scene for good, or none of them if one is not there."""
+    """Remove objects from the scene for good; if one does not exist, none is removed."""
     if not objectIds:
         raise ActionFailed("objectIds must not be empty!")
     for i in [_to_go(world, object_id) for object_id in objectIds]:
-        if world.exists[i]:  # one may be named twice
+        if world.exists[i]:  # the list may name an object twice
             world.remove(i)
 
 
 @action("DisableObject")
 def disable_object(world: World, *, objectId: str) -> None:
-    """Take an object out of the scene until EnableObject brings it back."""
+    """Disable an object: it leaves the scene until EnableObject brings it back."""
     world.disable(_to_go(world, objectId))
 
 
 @action("DisableAllObjectsOfType", server_action=True)
 def disable_all_of_type(world: World, *, objectType: str = "", objectId: str = "") -> None:
-    """Do so with all objects of a type; AI2-THOR takes the type as ``objectId`` as well."""
+    """Disable all objects of a type. As in AI2-THOR, ``objectId`` may hold the type."""
     rows = [_to_go(world, world.object_ids[i]) for i in world.of_type(objectType or objectId)]
     for i in rows:
         world.disable(i)
@@ -49,14 +49,14 @@ def disable_all_of_type(world: World, *, objectType: str = "", objectId: str = "
 
 @action("EnableObject")
 def enable_object(world: World, *, objectId: str) -> None:
-    """Bring a disabled object back to where it was; what is there already stays as it is."""
+    """Bring a disabled object back to its place. Objects that are there now stay."""
     i = None if objectId is None else world.index.get(objectId)
     if i is None or i not in world.disabled:
         world.find(objectId)
         return
     lay_in_it = world.enable(i)
     back = [k for k in lay_in_it if world.exists[k] and k not in world.in_hand]
-    # The large first: what a plate lies in is also what lies in the things on the plate.
+    # Large objects first: what a plate is in, the things on the plate are in as well.
     size = np.prod(world.high - world.low, axis=1)
     for k in sorted({i, *back}, key=lambda k: -float(size[k])):
         world.relocate_alone(k, receptacles_of(world, k))
@@ -64,14 +64,14 @@ def enable_object(world: World, *, objectId: str) -> None:
 
 @action("SetObjectFilter")
 def set_object_filter(world: World, *, objectIds: list[str]) -> None:
-    """Let the metadata list these objects only, until ResetObjectFilter; unknown ids are ignored.
+    """List only these objects in the metadata until ResetObjectFilter; unknown ids are ignored.
 
-    Nothing else changes: what is not listed is there, and can be acted on.
+    Nothing else changes: objects that are not listed exist and can be acted on.
     """
     world.listed = frozenset(world.index[each] for each in objectIds if each in world.index)
 
 
 @action("ResetObjectFilter")
 def reset_object_filter(world: World) -> None:
-    """Let the metadata list all objects again."""
+    """List all objects in the metadata again."""
     world.listed = None

@@ -1,4 +1,4 @@
-"""Pushing and pulling: things slide along what they stand on."""
+"""Pushing and pulling: objects slide along the surface that they stand on."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ from er_gym.sim.world import World
 
 _NEWTONS_PER_METRE = 100.0
 _FARTHEST = 2.0
-"""A thing slides a metre for every 100 N, and no farther than this; metres."""
+"""An object slides 1 m for every 100 N, and at most this far, metres."""
 _MOST_NEWTONS = 1e6
 _FLOOR = [0, 2]
 
 
 def _slide(world: World, i: int, heading: float, newtons: float) -> None:
-    """Slide object i level until something is in its way; over an edge it falls.
+    """Slide object i on its level until something is in its way. Beyond an edge it falls.
 
     Args:
         heading: degrees clockwise from +z.
+        newtons: the force.
     """
     if i == world.held:
         raise ActionFailed("Please use Throw for an item in the Agent's Hand.")
@@ -67,7 +68,7 @@ def directional_push(
     pushAngle: float,
     forceAction: bool = False,
 ) -> None:
-    """Push an object with a force in newtons, at an angle clockwise from where the agent looks."""
+    """Push an object with a force in newtons, at an angle clockwise from the agent's heading."""
     i = target(world, objectId, forceAction)
     _slide(world, i, world.agent.rotation + pushAngle, _newtons(moveMagnitude))
 
@@ -100,15 +101,15 @@ def touch_then_apply_force(
     handDistance: float,
     moveMagnitude: float = 0.0,
 ) -> dict[str, Any]:
-    """Reach out to a point of the picture and push what is there.
+    """Reach for a point of the picture and push the object there.
 
     Args:
-        direction: in the agent's frame; what is upward in it has no effect.
+        direction: of the push, in the agent's frame; its upward part has no effect.
         handDistance: how far the hand reaches, metres.
-        moveMagnitude: newtons.
+        moveMagnitude: the force, newtons.
 
     Returns:
-        Whether the hand touched an object, which one, and how far the hand went, metres.
+        Whether the hand touched an object, its id, and how far the hand went, metres.
     """
     newtons = _newtons(moveMagnitude)
     try:

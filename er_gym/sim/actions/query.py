@@ -1,4 +1,4 @@
-"""Questions about the scene that change nothing."""
+"""Queries, which change nothing."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from er_gym.sim.space.walkable_floor import floor_of, standing_places
 from er_gym.sim.world import World
 
 _SMALLEST_STEP = 0.01
-"""Of a grid of positions, metres; finer ones would fill the memory."""
+"""The smallest step of a grid of positions, metres; a smaller one would fill the memory."""
 
 
 @action("Pass", "Done", "PausePhysicsAutoSim", "UnpausePhysicsAutoSim")
 def do_nothing(world: World) -> None:
-    """Answer with the state of the world as it is."""
+    """Do nothing and return the event."""
 
 
 @action("AdvancePhysicsStep")
@@ -34,20 +34,20 @@ def advance_physics_step(
     simSeconds: float | None = None,
     allowAutoSimulation: bool = True,
 ) -> None:
-    """Nothing moves by itself here, so that however long one waits nothing changes."""
+    """Do nothing: nothing moves by itself here, however long a program waits."""
 
 
 @action("GetScenesInBuild")
 def get_scenes_in_build(world: World) -> list[str]:
-    """Names of the scenes, as the Unity build spells them."""
+    """The names of the scenes, as the Unity build spells them."""
     return [f"{name}_physics" for name in SCENE_NAMES]
 
 
 def _grid(world: World, step: float | None, ahead: bool = False) -> np.ndarray:
-    """(P, 2) where the agent gets to by steps; the whole floor if it stands nowhere free.
+    """(P, 2) positions that the agent reaches by steps; the whole floor if it does not stand on it.
 
     Args:
-        ahead: lay the steps along its heading and across, not along the axes.
+        ahead: take the steps along the agent's heading, not along the world's axes.
     """
     size = world.settings.grid_size if step is None else step
     if size < _SMALLEST_STEP:
@@ -58,7 +58,7 @@ def _grid(world: World, step: float | None, ahead: bool = False) -> np.ndarray:
     if floor_of(world.scene.name).contains(here):
         yaw = world.agent.rotation if ahead else 0.0
         return reachable_positions(world.scene.name, here, float(size), yaw)
-    offset = (here % size).round(5) % size  # of the grid that the agent stands on
+    offset = (here % size).round(5) % size  # any node of the grid that the agent is on
     return standing_places(world.scene.name, float(size), (float(offset[0]), float(offset[1])))
 
 
@@ -66,7 +66,7 @@ def _grid(world: World, step: float | None, ahead: bool = False) -> np.ndarray:
 def get_object_in_frame(world: World, *, x: float, y: float, checkVisible: bool = False) -> str:
     """The id of the object at a point of the agent's picture, 0 to 1 from its upper left corner.
 
-    When there is none, the words of the refusal are the answer as well, as AI2-THOR has it.
+    If there is none, the error message is also the answer, as in AI2-THOR.
     """
     try:
         object_id = pointed_at(world, x, y)
@@ -79,7 +79,7 @@ def get_object_in_frame(world: World, *, x: float, y: float, checkVisible: bool 
 
 @action("GetCoordinateFromRaycast")
 def get_coordinate_from_raycast(world: World, *, x: float, y: float) -> dict[str, float]:
-    """The point in the room that a point of the agent's picture shows, metres.
+    """The point of the room at a point of the agent's picture, metres.
 
     Args:
         x, y: 0 to 1, from the left and from the top.
@@ -97,13 +97,13 @@ def get_reachable_positions(
     directionsRelativeAgent: bool = False,
     gridSize: float | None = None,
 ) -> list[dict[str, float]]:
-    """Every position that the agent gets to by steps of the grid, and its own; metres.
+    """Every position that the agent reaches by steps of the grid, and its own; metres.
 
-    Whoever stands nowhere free, being forced into furniture, is told all of the floor.
+    If the agent was forced into furniture, the answer is the whole floor.
 
     Args:
-        maxStepCount: fail if the grid has more positions than this over the square of its step.
-        directionsRelativeAgent: lay the grid out from the agent, along its heading.
+        maxStepCount: fail if the grid has more positions than this divided by its squared step.
+        directionsRelativeAgent: take the steps along the agent's heading.
     """
     places = _grid(world, gridSize, directionsRelativeAgent)
     step = world.settings.grid_size if gridSize is None else gridSize
@@ -114,7 +114,7 @@ def get_reachable_positions(
 
 
 def _is_near(point: Vector) -> bool:
-    """Whether a point may be in a room at all: of numbers much larger nothing can be worked out."""
+    """Whether coordinates can be in a room; computing with much larger numbers would fail."""
     return max(abs(point.x), abs(point.z)) <= FARTHEST
 
 
@@ -130,9 +130,9 @@ def get_interactable_poses(
     maxDistance: float | None = None,
     maxPoses: int | None = None,
 ) -> list[dict[str, Any]]:
-    """Every pose from which an object can be interacted with; each filter narrows the search.
+    """Every pose from which the agent can interact with an object; each filter narrows the search.
 
-    ``maxDistance``, in metres, takes the place of the visibility distance.
+    ``maxDistance``, in metres, replaces the visibility distance.
     """
     if maxPoses is not None and maxPoses <= 0:
         raise ActionFailed(f"maxPoses must be > 0, not {maxPoses}.")

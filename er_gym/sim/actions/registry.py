@@ -1,16 +1,16 @@
-"""The table of actions: AI2-THOR's name, the functions that do it, and what they take.
+"""The table of actions: their AI2-THOR names, their handlers and their parameters.
 
-A handler is a plain function ``handler(world, *, objectId: str, …)`` whose annotations are the
+A handler is a plain function ``handler(world, *, objectId: str, …)``. Its annotations declare the
 action's parameters. It returns the event's ``actionReturn`` or raises
-:class:`~er_gym.sim.errors.ActionFailed`. As in AI2-THOR, an action is of one of two sorts:
+:class:`~er_gym.sim.errors.ActionFailed`. As in AI2-THOR, there are two kinds of actions:
 
-- It has *named parameters*: an argument that is none of them, a required one that is missing and
-  one that cannot be converted are wrong calls, at which the official client raises ValueError. It
-  may have several ways to be called, such as by ``objectId`` and by ``x, y``; that one is taken
-  which knows most of the arguments, and of those the one that requires least.
-- It takes a *server action*, a record of everything that any action may be told: what the action
-  does not read is ignored, whatever it is, the case of names does not matter, and null stands for
-  nothing given.
+- An action with *named parameters* is strict. A call is invalid, and the official client raises
+  ValueError, if an argument is unknown, missing or cannot be converted. The action may have several
+  signatures, such as ``objectId`` and ``x, y``. The signature that knows most of the arguments is
+  used, and of several such the one with the fewest required parameters.
+- An action that takes a *server action* gets a record of everything that any action may be told. It
+  ignores keys that it does not read. The case of keys does not matter, and null means that nothing
+  was given.
 """
 
 from __future__ import annotations
@@ -46,19 +46,19 @@ EXEMPT = frozenset(
 REFUSED = {
     "CreateHouse": "it has the recorded iTHOR rooms and no procedural houses; backend='unity' has"
 }
-"""Actions of AI2-THOR that are known, not there, and worth a reason."""
+"""Actions of AI2-THOR that the embedded engine lacks, with the reason."""
 REQUIRED: Any = inspect.Parameter.empty
-"""The default of a parameter that has none."""
+"""The default of a required parameter."""
 _LONGEST_QUOTE = 200
-"""Characters of what was given that an error message repeats."""
+"""Characters of a given value that an error message repeats."""
 _MOST_NAMES = 8
-"""Names of arguments that an error message repeats."""
+"""Argument names that an error message repeats."""
 
 Run = Callable[..., Any]
 
 
 class Vector(BaseModel):
-    """A point or a direction as AI2-THOR writes it; further keys are ignored."""
+    """A point or a direction as AI2-THOR writes it; other keys are ignored."""
 
     model_config = ConfigDict(allow_inf_nan=False)
 
@@ -69,11 +69,11 @@ class Vector(BaseModel):
 
 @dataclass(frozen=True)
 class Parameter:
-    """What an action takes under a name.
+    """A parameter of an action.
 
     Attributes:
         annotation: the type that the handler declares.
-        default: :data:`REQUIRED` where there is none.
+        default: :data:`REQUIRED` if there is none.
     """
 
     name: str
@@ -92,12 +92,12 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Signature:
-    """A way to call an action: a handler and what it takes.
+    """A signature of an action: a handler and its parameters.
 
     Attributes:
         run: the handler.
         parameters: by name, in the handler's order.
-        server_action: whether it takes a server action, not named parameters.
+        server_action: whether it takes a server action and not named parameters.
     """
 
     action: str
@@ -110,23 +110,23 @@ class Signature:
 
     @property
     def cost(self) -> tuple[int, int]:
-        """How many parameters it requires, and how many it has."""
+        """The numbers of its required parameters and of all its parameters."""
         return sum(p.required for p in self.parameters.values()), len(self.parameters)
 
     def knows(self, request: Mapping[str, Any]) -> int:
-        """How many of the arguments it has parameters for."""
+        """How many of the request's arguments it has parameters for."""
         return sum(name in self.parameters for name in request)
 
     def arguments(
         self, request: Mapping[str, Any], signatures: tuple[Signature, ...]
     ) -> dict[str, Any]:
-        """The handler's arguments out of a request.
+        """The handler's arguments from a request.
 
         Args:
-            ways: all the ways to call this action, for the error message.
+            signatures: all signatures of this action, for the error message.
 
         Raises:
-            WrongCall, ActionFailed: something is missing, or is not to be converted or not known.
+            WrongCall, ActionFailed: an argument is missing, unknown or cannot be converted.
         """
         if self.server_action:
             return self._read(request)
@@ -180,16 +180,16 @@ class Signature:
 
 
 ACTIONS: dict[str, tuple[Signature, ...]] = {}
-"""Every action there is, and the ways to call it, those that require least first."""
+"""All actions with their signatures; those with fewer required parameters come first."""
 
 
 def action(*names: str, server_action: bool = False) -> Callable[[Run], Run]:
     """Register a handler under one or several AI2-THOR action names.
 
-    Registering another one under the same name adds a way to call the action.
+    A second handler under the same name adds a signature to the action.
 
     Args:
-        server_action: whether AI2-THOR's method takes its record of a server action.
+        server_action: whether AI2-THOR's method takes a server action.
     """
 
     def register(run: Run) -> Run:
@@ -201,7 +201,7 @@ def action(*names: str, server_action: bool = False) -> Callable[[Run], Run]:
 
 
 def parameters_of(run: Run) -> dict[str, Parameter]:
-    """What a handler takes: its keyword-only parameters."""
+    """The parameters of a handler, which are keyword-only."""
     hints = get_type_hints(run)
     return {
         each.name: Parameter(each.name, hints[each.name], kind_of(hints[each.name]), each.default)
@@ -211,17 +211,17 @@ def parameters_of(run: Run) -> dict[str, Parameter]:
 
 
 def add_signature(signature: Signature) -> None:
-    """Enter a way to call an action into the table."""
+    """Add a signature to the table."""
     signatures = sorted((*ACTIONS.get(signature.action, ()), signature), key=lambda each: each.cost)
     ACTIONS[signature.action] = tuple(signatures)
 
 
 def perform(world: World, request: Mapping[str, Any]) -> Any:
-    """Do an action; returns its ``actionReturn``.
+    """Do an action and return its ``actionReturn``.
 
     Raises:
-        WrongCall: there is no such action, or it is wrongly called.
-        ActionFailed: it cannot be done in this state of the world.
+        WrongCall: there is no such action, or the call is invalid.
+        ActionFailed: the action is not possible in this state of the world.
     """
     name = request.get("action")
     signatures = ACTIONS.get(name) if isinstance(name, str) else None
@@ -236,13 +236,13 @@ def perform(world: World, request: Mapping[str, Any]) -> Any:
 
 
 def quoted(value: object) -> str:
-    """What was given, as an error message repeats it: on one line, and only its beginning."""
+    """A given value for an error message: on one line, and only its beginning."""
     text = repr(value)
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
 
 
 def _shown(value: object) -> str:
-    """The same without quotation marks, where that is readable; as AI2-THOR does."""
+    """The same without quotation marks if it is readable so, as in AI2-THOR."""
     plain = isinstance(value, str) and value.isprintable() and len(value) <= _LONGEST_QUOTE
     return str(value) if plain else quoted(value)
 

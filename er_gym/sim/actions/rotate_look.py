@@ -1,4 +1,4 @@
-"""Turning, tilting the camera, standing and crouching."""
+"""Rotating, tilting the camera, standing and crouching."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from er_gym.sim.world import World
 LOOK_STEP = 30.0
 """Default tilt of LookUp and LookDown, degrees."""
 BEYOND_THE_LIMIT = "LookDownCantExceedMin"
-"""AI2-THOR's ``errorCode`` of a tilt too far, up or down."""
+"""AI2-THOR's ``errorCode`` if the camera would tilt too far up or down."""
 LOOK_LIMITS = (-30.0, 60.0)
 """The camera tilts from 30 degrees up to 60 degrees down."""
 LOOK_TOLERANCE = 1e-3
-"""By so much may an angle exceed them: AI2-THOR itself tells 60.00002 degrees."""
+"""Tolerance of these limits, degrees: AI2-THOR itself reports 60.00002."""
 
 
 def _turn(world: World, degrees: float) -> None:
@@ -57,7 +57,7 @@ def rotate_right(
 ) -> None:
     """Turn clockwise by some degrees (default: rotateStepDegrees).
 
-    All else is accepted and has no effect: what is held runs into nothing here.
+    All other arguments have no effect: the held object collides with nothing here.
     """
     _turn(world, world.settings.rotate_step if degrees is None else degrees)
 
@@ -93,7 +93,7 @@ def look_down(world: World, *, degrees: float = 0.0) -> None:
 
 @action("RotateLook", server_action=True)
 def rotate_look(world: World, *, rotation: Vector | None = None, horizon: float = 0.0) -> None:
-    """Turn to a heading and tilt the camera to an angle; what is not given is 0."""
+    """Turn to a heading and tilt the camera to an angle; both are 0 if not given."""
     if abs(horizon) > 90.0:
         raise ActionFailed(f"horizon must be within -90 and 90 degrees, not {horizon:g}.")
     yaw = 0.0 if rotation is None else rotation.y % 360.0

@@ -1,4 +1,4 @@
-"""What can be done to a thing besides moving it: slice, cook, clean, fill, break, use up."""
+"""Changes of an object's state: slice, break, cook, clean, fill, use up."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from er_gym.sim.world import World
 
 LIQUIDS = ("coffee", "water", "wine")
 _SLICES = {"Apple": 6, "Bread": 6, "Lettuce": 6, "Potato": 6, "Tomato": 6}
-"""How many slices a whole thing gives (an egg cracks into one)."""
+"""The number of slices of a whole object (an egg cracks into one part)."""
 _COOKABLE_PARTS = frozenset({"BreadSliced", "PotatoSliced", "EggCracked"})
 
 
 def parts_of(kind: str) -> tuple[str, bool]:
-    """What slicing a type gives: the type of the parts, and whether they can be cooked."""
+    """The type of an object's parts, and whether they can be cooked."""
     part = "EggCracked" if kind == "Egg" else f"{kind}Sliced"
     return part, part in _COOKABLE_PARTS
 
 
 @object_action("SliceObject", server_action=True)
 def slice_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
-    """Cut an object up: its slices take its place. An egg cracks open."""
+    """Slice an object: its slices replace it. An egg cracks open."""
     i = target(world, objectId, forceAction)
     require(world, i, "sliceable", "something that can be sliced")
     if i == world.held:
@@ -34,10 +34,10 @@ def slice_object(world: World, *, objectId: str, forceAction: bool = False) -> N
 
 
 def _cut_up(world: World, i: int, state: str) -> None:
-    """Put the parts of object i, side by side along its longer side, where it was.
+    """Replace object i by its parts, side by side along its longer side.
 
     Args:
-        state: what the whole is from now on.
+        state: the new state of the whole.
     """
     kind, cookable = parts_of(world.types[i])
     whole = world.object_ids[i]
@@ -52,7 +52,7 @@ def _cut_up(world: World, i: int, state: str) -> None:
         world.set_property(part, "sliceable", False)
         world.set_property(part, "cookable", cookable)
         if count > 1:
-            # The oriented box no longer tells the part's shape: an axis-aligned one stands in.
+            # The oriented box no longer fits the part, so an axis-aligned one replaces it.
             low, extent = world.low[part], world.high[part] - world.low[part]
             corner = low - world.position[part]
             corner[axis] += k * extent[axis] / count
@@ -85,7 +85,7 @@ def break_object(world: World, *, objectId: str, forceAction: bool = False) -> N
 
 @object_action("CookObject", server_action=True)
 def cook_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
-    """Cook an object as if by magic, without a source of heat."""
+    """Cook an object at once, without a source of heat."""
     i = target(world, objectId, forceAction)
     require(world, i, "cookable", "something that can be cooked")
     if world.state(i, "isCooked"):
@@ -118,7 +118,7 @@ def clean_object(world: World, *, objectId: str, forceAction: bool = False) -> N
 def fill_object(
     world: World, *, objectId: str, fillLiquid: str = "water", forceAction: bool = False
 ) -> None:
-    """Fill an object with one of :data:`LIQUIDS`; capital letters will do."""
+    """Fill an object with one of :data:`LIQUIDS`; case does not matter."""
     if fillLiquid.lower() not in LIQUIDS:
         raise ActionFailed(
             f"{quoted(fillLiquid)} is not a valid Liquid Type; fillLiquid is one of "
@@ -133,7 +133,7 @@ def fill_object(
 
 @object_action("EmptyLiquidFromObject", server_action=True)
 def empty_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
-    """Pour out what an object is filled with."""
+    """Empty an object."""
     i = target(world, objectId, forceAction)
     require(world, i, "canFillWithLiquid", "something that can be filled")
     if not world.state(i, "isFilledWithLiquid"):

@@ -15,7 +15,7 @@ OUTPUT = Path(__file__).parent / "object_types.json"
 
 
 def object_types() -> dict[str, list[str]]:
-    """Type name to the properties that any of its instances has, both in a fixed order."""
+    """For each object type the properties that any of its instances has, both in a fixed order."""
     found: dict[str, set[str]] = {}
     for name in SCENE_NAMES:
         scene = load_scene(name)

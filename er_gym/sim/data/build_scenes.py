@@ -1,10 +1,10 @@
-"""Build the packaged scene tables from the two published packages that hold the figures.
+"""Build the packaged scene tables from two published packages.
 
-``procthor`` (Apache-2.0) holds the AI2-THOR object metadata of all iTHOR scenes; ``alfworld`` (MIT)
-holds where the agent can stand in them and from where it can open things. Neither is a run-time
-dependency: this script reads the wheels as the zip files they are.
+``procthor`` (Apache-2.0) holds the AI2-THOR object metadata of all iTHOR scenes. ``alfworld`` (MIT)
+holds the positions where the agent can stand, and poses from which it can open objects. Neither is
+a run-time dependency: this script reads their wheels as zip files.
 
-    python -m er_gym.sim.data.build_scenes            # download both, rewrite the packaged tables
+    python -m er_gym.sim.data.build_scenes  # download both, rewrite the packaged tables
     python -m er_gym.sim.data.build_scenes --procthor WHEEL --alfworld WHEEL --out FOLDER
 """
 
@@ -52,11 +52,11 @@ LAYOUTS = "alfworld/gen/layouts"
 
 # AI2-THOR's corner order: from corner 0 the x axis leads to corner 1, y to 4, z to 3.
 _CORNERS_ALONG_AXES = [1, 4, 3]
-# Which of the edges along x, y and z lead from corner 0 to each of the eight.
+# Which of the edges along x, y and z lead from corner 0 to each of the eight corners.
 _CORNER_EDGES = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1], [0, 1, 0], [1, 1, 0], [1, 1, 1], [0, 1, 1]]
 )
-# alfworld recorded another AI2-THOR build, in which some furniture stands centimetres elsewhere.
+# alfworld used another AI2-THOR build, in which some furniture stands centimetres elsewhere.
 _SAME_OBJECT = 0.05
 
 Record = Mapping[str, Any]
@@ -64,7 +64,7 @@ Source = Path | ZipPath
 
 
 def open_source(path: Path) -> Source:
-    """A wheel, or the folder it was unpacked into, as something to read files from."""
+    """A wheel, or the folder that it was unpacked into, to read files from."""
     return path if path.is_dir() else ZipPath(path)
 
 
@@ -95,10 +95,10 @@ def read_records(procthor: Source) -> dict[str, list[Record]]:
 
 
 def build_scene(name: str, records: Sequence[Record], alfworld: Source) -> tuple[Scene, list[str]]:
-    """Put one scene together.
+    """Build one scene.
 
     Returns:
-        The scene, and the ids in alfworld's list of poses that name no object of it.
+        The scene, and the ids in alfworld's poses that name none of its objects.
     """
     layouts = alfworld / LAYOUTS
     reachable = np.load(io.BytesIO((layouts / f"{name}-layout.npy").read_bytes()))
@@ -156,20 +156,21 @@ def oriented_box(record: Record) -> NDArray[np.float64]:
         raise ValueError(f"the corners of {record['objectId']} are not those of a box: {corners}")
     (pivot,) = _vectors([record], "position")
     (angles,) = _vectors([record], "rotation")
-    # A row vector times R is R's inverse times it: from the world's frame to the object's.
+    # A row vector times R equals R's inverse times the vector: from the world's frame to the
+    # object's.
     return np.stack([corners[0] - pivot, *edges]) @ unity_rotation(angles)
 
 
 def match_ids(keys: Sequence[str], object_ids: Sequence[str]) -> dict[str, int]:
-    """Find the object that each id of another AI2-THOR build means.
+    """Match the ids of another AI2-THOR build to objects.
 
-    Ids spell coordinates, so an object that stands centimetres elsewhere in the other build has
-    another id there, and zero may be ``+00.00``, ``-00.00`` or ``00.00``. An id means the object
-    of its type that is nearest to its coordinates and at most 5 cm off along each axis; each
-    object is taken once, closest pairs first.
+    Ids contain coordinates. An object that stands centimetres elsewhere in the other build has
+    another id there, and zero may be ``+00.00``, ``-00.00`` or ``00.00``. An id matches the nearest
+    object of its type that is at most 5 cm off along each axis. Each object is matched once,
+    closest pairs first.
 
     Returns:
-        The index in ``object_ids`` for each key that means one, in the order of the keys.
+        The index in ``object_ids`` of each matched key, in the order of the keys.
     """
     pairs = sorted(
         (distance, k, i)
@@ -187,12 +188,12 @@ def match_ids(keys: Sequence[str], object_ids: Sequence[str]) -> dict[str, int]:
 
 
 def _id_distance(a: str, b: str) -> float:
-    """How far apart two ids of one type are along the worst axis, infinite for other types."""
+    """The distance of two ids of one type along the worst axis, infinite for other types."""
     kind_a, *rest_a = a.split("|")
     kind_b, *rest_b = b.split("|")
     if (kind_a, rest_a[3:]) != (kind_b, rest_b[3:]):
         return np.inf
-    # Ids count centimetres: rounding takes away what the subtraction adds.
+    # Ids count centimetres: rounding removes the error of the subtraction.
     return max(round(abs(float(p) - float(q)), 2) for p, q in zip(rest_a[:3], rest_b, strict=False))
 
 
@@ -206,7 +207,7 @@ def _vectors(records: Sequence[Record], key: str) -> NDArray[np.float64]:
 
 
 def build(procthor: Path, alfworld: Path, out: Path, names: Sequence[str] = SCENE_NAMES) -> str:
-    """Build and write the tables of the scenes named; what was done, in a line."""
+    """Build and write the tables of some scenes; returns a line that says what was done."""
     records = read_records(open_source(procthor))
     layouts = open_source(alfworld)
     out.mkdir(parents=True, exist_ok=True)

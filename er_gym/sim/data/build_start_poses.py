@@ -4,8 +4,8 @@ The input is a JSON file with AI2-THOR 5's pose for scenes by name, at gridSize 
 
     {"poses": {"FloorPlan1": {"x": -1.0, "y": 0.901, "z": 1.0, "rotation": 270.0, "horizon": 0.0}}}
 
-The poses come from the metadata published with Embodied-Reasoner (see NOTICE). It has none for
-FloorPlan30, and for two rooms that of another room: see ``_OUR_OWN``. Run after
+The poses come from the metadata published with Embodied-Reasoner (see NOTICE). These lack
+FloorPlan30, and two rooms have the pose of another room: see ``_OUR_OWN``. Run this after
 :mod:`er_gym.sim.data.build_scenes`::
 
     python -m er_gym.sim.data.build_start_poses POSES.json
@@ -27,11 +27,11 @@ _OUR_OWN = {
     "FloorPlan410": StartPose(-2.25, 3.25, 180.0),  # before the mirror
     "FloorPlan411": StartPose(-0.75, 2.0, 90.0),  # published for FloorPlan410
 }
-"""What was published for FloorPlan410 and 411 belongs to the rooms after them: all that was seen
-from the first pose is in FloorPlan411, and the second is FloorPlan412's. In the rooms of these
-numbers both are outside the walls."""
+"""The poses published for FloorPlan410 and 411 belong to the rooms after them. All objects seen
+from the first pose are in FloorPlan411, and the second pose is FloorPlan412's. Both are outside the
+walls of the rooms that they were published for."""
 _ROUNDING = 1e-4
-"""The poses are given to a tenth of a millimetre."""
+"""The poses are rounded to a tenth of a millimetre."""
 
 Pose = Mapping[str, float]
 
