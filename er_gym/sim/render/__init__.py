@@ -1,1 +1,1 @@
-"""Pictures of the embedded engine's world, drawn on the CPU."""
+"""Renders the embedded engine's world on the CPU."""

@@ -1,4 +1,4 @@
-"""What a shape may know of the thing that it draws."""
+"""The appearance of an object: everything that its drawn shape depends on."""
 
 from __future__ import annotations
 
@@ -22,23 +22,26 @@ from er_gym.sim.world_cache import ObjectCacheKey
 
 @dataclass(frozen=True)
 class Appearance:
-    """How one thing looks: hashable, so that what was made for it is kept.
+    """The appearance of one object. It is hashable, so that its mesh can be cached.
 
     Attributes:
-        kind: AI2-THOR's object type. asset: its asset id, "" where there is none.
-        scene: the scene's name. room: "kitchens", "living_rooms", "bedrooms" or "bathrooms".
+        kind: AI2-THOR's object type.
+        asset: its asset id, "" where there is none.
+        scene: the scene's name.
+        room: "kitchens", "living_rooms", "bedrooms" or "bathrooms".
         size: width (x), height (y) and depth (z) of its upright box, metres.
-        height: of its underside above the floor, metres: what hangs on a wall is high up.
-        openness: 0 shut to 1 open. on: switched on.
-        filled: what it is filled with ("water", "coffee", "wine"), "" if nothing.
-        dirty, cooked, sliced, broken, used_up: its states.
-        parts: boxes that the engine takes it to be made of, in the mesh's frame: low and high
-            corners, metres. For counters the rectangles of the top.
-        surface: how high over its underside things stand on it, metres; None where not known.
-        boards: how high over its underside there are shelves, metres.
-        built_in: type and box, in the mesh's frame, of what is let into it or built in under it.
+        height: of its underside above the floor, metres.
         palette: the scene's colours.
-        face: which way the face of a knob points, in the mesh's frame; None where not known.
+        openness: 0 closed to 1 open.
+        on: whether it is switched on.
+        filled: its liquid ("water", "coffee", "wine"), "" if it is empty.
+        dirty, cooked, sliced, broken, used_up: its states.
+        parts: the boxes of its solid in the mesh's frame, low and high corners, metres. Those of a
+            counter are the rectangles of its top.
+        surface: height above its underside at which things stand on it, metres; None if unknown.
+        boards: heights of shelves above its underside, metres.
+        built_in: type and box, in the mesh's frame, of the objects that are built into it.
+        face: direction of a knob's face in the mesh's frame; None if unknown.
     """
 
     kind: str
@@ -63,33 +66,33 @@ class Appearance:
     face: tuple[float, float, float] | None = None
 
     def random(self) -> np.random.Generator:
-        """Chance that is the same for a thing in every run, whatever state it is in."""
+        """A random generator that is the same for an object in every run and in every state."""
         key = f"{self.kind}|{self.asset or self.scene}"
         return np.random.default_rng(
             int.from_bytes(blake2b(key.encode(), digest_size=8).digest(), "big")
         )
 
     def pick(self, *colours: Colour) -> Colour:
-        """One of several colours, always the same for this thing."""
+        """One of several colours, always the same for this object."""
         return colours[int(self.random().integers(len(colours)))]
 
 
 _APPEARANCES: ObjectCacheKey[Appearance] = ObjectCacheKey("appearance", in_snapshots=False)
 _ON_THE_FLOOR = 0.1
 _ALWAYS = 0.004
-"""Nothing is thinner than this, metres."""
+"""The least thickness of a drawn object, metres."""
 _LEVEL = 0.05
-"""An axle that rises less, of its length, is level."""
+"""An axle is level if it rises less than this share of its length."""
 
 
 @lru_cache(maxsize=128)
 def _recorded(scene: Scene) -> dict[int, Appearance]:
-    """The looks of what nothing has happened to yet, filled by :func:`appearance_of`."""
+    """The appearances of objects that have not changed yet, filled by :func:`appearance_of`."""
     return {}
 
 
 def appearance_of(world: World, i: int) -> Appearance:
-    """What object i looks like in its present state: worked out once, until it changes."""
+    """The appearance of object i in its present state; kept until the object changes."""
     changed = i in world.touched or i >= len(world.scene)
     kept = world.cache.of_objects(_APPEARANCES) if changed else _recorded(world.scene)
     found = kept.get(i)
@@ -99,7 +102,7 @@ def appearance_of(world: World, i: int) -> Appearance:
 
 
 def compute_appearance(world: World, i: int) -> Appearance:
-    """The same, worked out anew."""
+    """The appearance of object i, without the cache."""
     scene, solid = world.scene.name, solid_of(world, i)
     size = np.maximum(np.ptp(solid.upright.reshape(-1, 3), axis=0), _ALWAYS)
     underside = solid.upright[:, 0, 1].min()
@@ -129,7 +132,7 @@ def compute_appearance(world: World, i: int) -> Appearance:
 
 
 def _height(world: World, i: int, height: float) -> float:
-    """Over the floor, metres; what can be carried looks the same everywhere but on the floor."""
+    """Height above the floor, metres. A pickupable object looks the same anywhere off the floor."""
     if world.has(i, "pickupable"):
         return 0.0 if height < _ON_THE_FLOOR else 1.0
     return round(height, 2)
@@ -144,10 +147,10 @@ def _is_on(world: World, i: int) -> bool:
 
 
 def _face(world: World, i: int, yaw: float) -> tuple[float, float, float]:
-    """Where the face of knob i points, before the turn by ``yaw``.
+    """The direction of the face of knob i, before the turn by ``yaw``.
 
-    A knob is recorded with its y along its axle, either way: its face is up or, if the axle is
-    level, to where one can stand.
+    A knob is recorded with its y along its axle, in either direction. Its face points up or, if the
+    axle is level, to where the agent can stand.
     """
     axle = unity_rotation(world.rotation[i]) @ (0.0, 1.0, 0.0)
     towards = np.array([0.0, 1.0, 0.0])
@@ -164,7 +167,7 @@ def _triple(values: NDArray[np.float64]) -> tuple[float, float, float]:
 
 
 def _parts(upright: NDArray[np.float64], underside: float) -> tuple[Box, ...]:
-    """The engine's parts, from the middle of the underside."""
+    """The parts of the solid, counted from the middle of the underside."""
     lifted = upright - np.array([0.0, underside, 0.0])
     return tuple((_triple(low), _triple(high)) for low, high in lifted)
 
@@ -175,7 +178,7 @@ def _surface(world: World, i: int) -> float | None:
 
 
 def _boards(world: World, i: int, underside: float) -> tuple[float, ...]:
-    """Where shelves that are objects of their own lie within object i, over its underside."""
+    """Heights of the Shelf objects inside object i, above its underside."""
     if world.types[i] not in _CASES_OF_SHELVES:
         return ()
     low, high = world.low[i] - 0.05, world.high[i] + 0.05

@@ -1,4 +1,4 @@
-"""The faces of boxes, worked out once: whole ones, and ones with their edges cut off."""
+"""The faces of boxes with sharp edges and with cut edges, computed once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 def fans(counts: Sequence[int]) -> NDArray[np.int32]:
-    """(F, 3) triangles of convex polygons whose corners lie one after the other."""
+    """(F, 3) triangles of convex polygons whose corners follow one another."""
     found, first = [], 0
     for count in counts:
         found += [(first, first + k, first + k + 1) for k in range(1, count - 1)]
@@ -18,12 +18,12 @@ def fans(counts: Sequence[int]) -> NDArray[np.int32]:
 
 
 FACES = "xXyYzZ"
-"""Letters for the faces of a box; capitals: on the positive side."""
+"""Letters for the faces of a box; capital letters are on the positive side."""
 SQUARE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 
 
 def _box_faces() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Of a box of half-size 1: (6, 4, 3) corners, (6, 3) normals, (6, 2, 3) what its sides span."""
+    """For a box of half-size 1: (6, 4, 3) corners, (6, 3) normals, (6, 2, 3) spans of its faces."""
     corners, normals, spread = np.zeros((6, 4, 3)), np.zeros((6, 3)), np.zeros((6, 2, 3))
     for k, face in enumerate(FACES):
         axis = "xyz".index(face.lower())
@@ -39,12 +39,12 @@ SIGNS = np.array([(a, b, c) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
 
 
 def _cut_box() -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.intp], list[int]]:
-    """The polygons of a box with its edges cut off.
+    """The polygons of a box with cut edges.
 
     Returns:
-        (V, 2) the corner of the box, and the axis of the face, that each vertex is nearest to;
-        (V, 3) normals; (V, 2) the two axes along which each polygon lies flattest; and how many
-        vertices each polygon has.
+        (V, 2) for each vertex the nearest corner of the box and the axis of the nearest face; (V,
+        3) normals; (V, 2) the two axes along which each polygon is flattest; and the number of
+        vertices of each polygon.
     """
     corners: list[tuple[int, int]] = []
     normals: list[NDArray[np.float64]] = []

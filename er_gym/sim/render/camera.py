@@ -13,14 +13,14 @@ from er_gym.sim.space.rotation import unity_rotation
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """Where a camera stands, where it looks and how large its picture is.
+    """A camera's pose, field of view and picture size.
 
     Attributes:
         position: x, y and z of the eye.
         yaw: clockwise seen from above; 0 looks along +z, 90 along +x.
-        horizon: downwards is positive, as AI2-THOR's ``cameraHorizon``.
-        fov: the vertical field of view, over 0 and under 180.
-        width, height: of the picture, in pixels.
+        horizon: positive looking down, as AI2-THOR's ``cameraHorizon``.
+        fov: the vertical field of view, above 0 and below 180.
+        width, height: of the picture, pixels.
         roll: about the view axis, Unity's angle about z.
     """
 
@@ -51,8 +51,8 @@ class Camera:
         """Points (..., 3) of the camera's frame as pixel x, pixel y and depth.
 
         Pixel (0, 0) is the upper left corner of the picture, and (0.5, 0.5) the centre of its first
-        pixel. Depth is measured along the view axis, in metres; the pixel of a point that is not in
-        front of the camera (depth <= 0) means nothing.
+        pixel. Depth is measured along the view axis, in metres. The pixel of a point that is not in
+        front of the camera (depth <= 0) has no meaning.
         """
         right, up, depth = np.moveaxis(view, -1, 0)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -65,11 +65,11 @@ class Camera:
         return self.to_pixels(self.to_view(points))
 
     def rays(self) -> NDArray[np.float32]:
-        """The line of sight through each pixel's centre.
+        """The ray through each pixel's centre.
 
         Returns:
-            (3, height, width) float32: x, y and z of the world vector that leads 1 m along the view
-            axis. What lies at depth z in a pixel is at ``position + z * ray``.
+            (3, height, width) float32: x, y and z of the world vector that advances 1 m along the
+                view axis. A surface at depth z in a pixel is at ``position + z * ray``.
         """
         x = (np.arange(self.width, dtype=np.float32) + 0.5 - self.width / 2) / self.focal
         y = (self.height / 2 - 0.5 - np.arange(self.height, dtype=np.float32)) / self.focal

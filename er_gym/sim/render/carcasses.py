@@ -1,4 +1,4 @@
-"""What counters rest on, between and behind the cabinets under them: no object, but seen."""
+"""Carcasses of counters, between and behind their cabinets: drawn, but no objects."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from er_gym.sim.space.solids.carcass import carcass
 
 @lru_cache(maxsize=128)
 def carcasses(scene_name: str) -> dict[str, Patch]:
-    """Triangles by material, in the world's frame, with the light in their colours."""
+    """Lit triangles by material, in the world's frame."""
     scene, mesh, floor, tall = load_scene(scene_name), Mesh(), 0.0, 1.0
     for i, kind in enumerate(scene.types):
         if kind != "CounterTop":
@@ -27,7 +27,7 @@ def carcasses(scene_name: str) -> dict[str, Patch]:
         if found.own:
             continue
         floor, tall = found.floor, found.under - found.floor
-        # Made on the floor: light depends on the height above it.
+        # The panels are made on the floor, because light depends on the height above it.
         fitted: list[Box] = [
             ((low[0], low[1] - floor, low[2]), (high[0], high[1] - floor, high[2]))
             for low, high in found.fitted.tolist()

@@ -1,4 +1,4 @@
-"""A door in a wall: where there is room for one, and what it looks like."""
+"""The door of a room: its place in a wall, and its mesh."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from er_gym.sim.render.patch import Colour
 from er_gym.sim.scene import Scene, load_scene
 
 WIDTH, HEIGHT = 0.98, 2.1
-"""With its frame, metres."""
+"""Size of the door with its frame, metres."""
 _FRAME, _CLEAR, _DEEP, _NEAR = 0.08, 0.06, 0.5, 0.95
-"""Metres: width of the frame; free beside the door and before it; from the wall to who goes in."""
+"""Width of the frame; free space beside and in front of the door; distance to a walker, metres."""
 _STEP = 0.1
 _WHITE: Colour = (0.94, 0.93, 0.90)
 _BRASS: Colour = (0.80, 0.66, 0.36)
@@ -24,10 +24,13 @@ _BRASS: Colour = (0.80, 0.66, 0.36)
 
 @dataclass(frozen=True)
 class Doorway:
-    """A place for a door.
+    """The place of a door.
 
     Attributes:
-        along: its middle, along the wall. at: the same as (x, z). yaw: which way it faces, degrees.
+        wall: the wall that it is in.
+        along: coordinate of its middle along the wall.
+        at: (x, z) of its middle.
+        yaw: the direction that it faces, degrees.
     """
 
     wall: Wall
@@ -37,7 +40,7 @@ class Doorway:
 
 
 def doorway(scene_name: str) -> Doorway | None:
-    """Where the door is: at a free stretch of wall that one can walk to, by a light switch."""
+    """The door's place: a free stretch of wall near a light switch that the agent can walk to."""
     scene, plan = load_scene(scene_name), floor_plan(scene_name)
     if plan.ceiling - plan.ground < HEIGHT + 0.05:
         return None
@@ -55,7 +58,7 @@ def doorway(scene_name: str) -> Doorway | None:
 
 
 def _free(scene: Scene, plan: FloorPlan, wall: Wall) -> Iterator[Doorway]:
-    """Places at a wall with nothing before it, where one can stand."""
+    """Places at a wall with nothing in front of them, where the agent can stand."""
     axis, side = 2 * wall.axis, 2 - 2 * wall.axis
     low, high = scene.aabb_center - scene.aabb_size / 2, scene.aabb_center + scene.aabb_size / 2
     near = np.sort(wall.sign * (np.stack([low, high])[:, :, axis] - wall.at), axis=0)
@@ -73,7 +76,7 @@ def _free(scene: Scene, plan: FloorPlan, wall: Wall) -> Iterator[Doorway]:
 
 
 def door(colours: Palette, scene_name: str) -> Mesh:
-    """A panel with two fields in a frame, and a knob; its back at z = 0, facing z."""
+    """A panel with two fields in a frame, and a knob. Its back is at z = 0, and it faces z."""
     mesh, number = Mesh(), int(scene_name.removeprefix("FloorPlan"))
     material, panel = (
         ("plain", _WHITE) if number % 2 else ("wood", mixed(colours.wood, _WHITE, 0.15))

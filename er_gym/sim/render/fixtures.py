@@ -1,10 +1,10 @@
-"""What stands in a room and is no object: the stove that burners and knobs belong to.
+"""The stoves of kitchens, which are no objects: only their burners and knobs are.
 
-AI2-THOR records burners and knobs, but not what they are on. Here they get a cooktop and, where
-nothing else is built in below, an oven; knobs get a panel behind them: a slope at the front, a
-strip on the cooktop, or a guard that stands up behind it.
+AI2-THOR records burners and knobs, but not the stove. Here the burners get a cooktop and, unless
+something else is built in below, an oven. The knobs get a panel behind them: a slope at the front,
+a strip on the cooktop, or a guard behind it.
 
-A stove's frame: x to its right, y up from the floor, z to its front; its origin is on the floor
+A stove's frame: x to its right, y up from the floor, z to its front. Its origin is on the floor
 under the middle of its burners.
 """
 
@@ -42,15 +42,15 @@ _GLINT: Colour = (0.24, 0.26, 0.30)
 _PLINTH: Colour = (0.12, 0.12, 0.13)
 
 _PLATE, _DOOR, _FOOT, _GUARD = 0.025, 0.025, 0.08, 0.06
-"""How thick cooktops, doors and guards are, and how high plinths, metres."""
+"""Thickness of cooktops, doors and guards, and height of plinths, metres."""
 _BASE, _SLAB = 0.03, 0.035
-"""How far a counter's base stands back from its edge, and how thick its slab is, metres."""
+"""How far a counter's base stands back from its edge, and thickness of its slab, metres."""
 _UP: Triple = (0.0, 1.0, 0.0)
 
 
 @lru_cache(maxsize=128)
 def fixtures(scene_name: str) -> dict[str, Patch]:
-    """Triangles by material, in the world's frame, with the light in their colours."""
+    """Lit triangles by material, in the world's frame."""
     world = World.load(load_scene(scene_name), Settings())
     if not any(world.of_type("StoveBurner")):
         return {}
@@ -61,7 +61,7 @@ def fixtures(scene_name: str) -> dict[str, Patch]:
 
 
 def _in_world(material: str, patch: Patch, frame: StoveFrame, tall: float) -> Patch:
-    """A patch of a stove in the world's frame and in its light."""
+    """A patch of a stove, lit and in the world's frame."""
     turn = frame.turn.T
     return Patch(
         np.asarray(patch.vertices @ turn + frame.origin, np.float32),
@@ -81,7 +81,7 @@ def _finish(scene_name: str) -> tuple[Colour, Colour]:
 
 
 def _stove(place: StoveLayout, colour: Colour, stone: Colour) -> Mesh:
-    """A cooktop and what bears the knobs, and an oven if there is room for one."""
+    """A cooktop, a panel for the knobs, and an oven if there is room for one."""
     mesh, grates = Mesh(), place.fire.high[1] - place.fire.low[1] > 0.015
     hob = colour
     if grates and colour == _BLACK:  # black grates would not show on black
@@ -108,7 +108,7 @@ def _stove(place: StoveLayout, colour: Colour, stone: Colour) -> Mesh:
 
 
 def _box(mesh: Mesh, x: Ends, y: Ends, z: Ends, colour: Colour, faces: str = "xXyYzZ") -> None:
-    """A box from end to end along each axis."""
+    """A box between two coordinates along each axis."""
     (x0, x1), (y0, y1), (z0, z1) = x, y, z
     at, size = ((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2), (x1 - x0, y1 - y0, z1 - z0)
     mesh.box(at, size, colour, faces=faces)
@@ -146,7 +146,7 @@ def _cooktop(mesh: Mesh, place: StoveLayout, front: float, colour: Colour) -> No
 
 
 def _ring(mesh: Mesh, hole: Box, top: float, colour: Colour) -> None:
-    """What a round hole leaves of a square."""
+    """The rest of a square around a round hole."""
     (x, _, z), (w, _, d) = (hole.low + hole.high) / 2, (hole.high - hole.low) / 2
     for quarter in range(4):
         a = np.radians(90.0 * quarter + np.linspace(0.0, 90.0, 6))
@@ -165,7 +165,7 @@ def _fill(mesh: Mesh, place: StoveLayout, stone: Colour) -> None:
 
 
 def _leaning(mesh: Mesh, place: StoveLayout, colour: Colour) -> tuple[float, float]:
-    """A panel that leans back; where the cooktop ends before it, and how low it reaches."""
+    """A panel that leans back. Returns the cooktop's front end and the panel's lowest height."""
     y, z = slope(place.row)
     low = y - LEAN
     start = max(y + z - place.top, float(place.fire.high[2]) + 0.008)
@@ -180,7 +180,7 @@ def _leaning(mesh: Mesh, place: StoveLayout, colour: Colour) -> tuple[float, flo
 
 
 def _strip(mesh: Mesh, place: StoveLayout, colour: Colour) -> None:
-    """What lifts knobs to where they are on the cooktop: along its front if they are there."""
+    """A strip under knobs on the cooktop: along its front if they are there."""
     row, top = place.row, float(place.row.low[1]) - 0.003
     if top - place.top < 0.004:
         return
@@ -191,7 +191,7 @@ def _strip(mesh: Mesh, place: StoveLayout, colour: Colour) -> None:
 
 
 def _guard(mesh: Mesh, place: StoveLayout, colour: Colour) -> None:
-    """A panel that stands up behind the cooktop, with a clock where knobs leave room for one."""
+    """A panel that stands behind the cooktop, with a clock if the knobs leave room for one."""
     face, high = place.back, float(place.row.high[1]) + 0.035
     x, z = (place.left, place.right), (face - _GUARD, face)
     _box(mesh, x, (place.top - _PLATE, high), z, colour, "xXYzZ")
@@ -209,7 +209,7 @@ def _guard(mesh: Mesh, place: StoveLayout, colour: Colour) -> None:
 def _case(
     mesh: Mesh, place: StoveLayout, x: Ends, start: float, low: float, colour: Colour
 ) -> None:
-    """What a stove stands on: a strip under the edge of the cooktop, and the oven below it."""
+    """The case of a stove: a strip under the edge of the cooktop, and the oven below it."""
     face = place.front - 0.004
     under = place.top - _PLATE + 0.005
     _box(mesh, x, (low, under), (place.back, start - 0.03), shaded(colour, 0.9), "xXz")
@@ -225,7 +225,7 @@ def _let_in(mesh: Mesh, place: StoveLayout, counter: Box, colour: Colour) -> Non
 
 
 def _oven(mesh: Mesh, x: Ends, high: float, z: Ends, colour: Colour) -> None:
-    """A case on a plinth with a drawer, and a door with a window and a bar to pull it by."""
+    """A case on a plinth with a drawer, and a door with a window and a handle."""
     back, face = z
     _box(mesh, x, (_FOOT, high), (back, face - _DOOR), shaded(colour, 0.9), "xXzZ")
     _box(mesh, x, (0.0, _FOOT), (back, face - 0.07), _PLINTH, "xXzZ")

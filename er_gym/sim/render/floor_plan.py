@@ -1,9 +1,9 @@
-"""Where a room's walls are, seen from above: a rectangle less what nobody can get to.
+"""The walls of a room seen from above: a rectangle without the areas that nobody can reach.
 
-Walls are not objects; no record holds them. A side of the rectangle is just behind the outermost
-thing on that side. Out of it are cut the parts where there is nothing and where nobody can stand:
-behind pictures, light switches and windows that hang further inside, and in empty corners. A cut
-that would hide something from where one can stand is not made.
+Walls are not objects, and no record holds them. Each side of the rectangle is just behind the
+outermost object on that side. Empty areas where nobody can stand are cut from it: behind pictures,
+light switches and windows that hang further inside, and in empty corners. An area is not cut if its
+wall would hide an object from where the agent can stand.
 
 Points are (x, z), metres, AI2-THOR's frame.
 """
@@ -23,29 +23,30 @@ from er_gym.sim.space.room_bounds import room_bounds
 
 Floats = NDArray[np.float64]
 _BEHIND = 0.01
-"""From a thing to the wall behind it, metres."""
+"""Distance from an object to the wall behind it, metres."""
 _BODY, _ROOM = 0.22, 0.3
-"""From where one can stand to the nearest wall, metres: with something on it, and without."""
+"""Least distance from where the agent can stand to a wall with something on it, and to a bare wall,
+metres."""
 _GAP = 0.6
-"""What is farther than this from all else is not in the room, metres."""
+"""An object farther than this from all others is not in the room, metres."""
 _IN_LINE = 0.12
-"""What hangs that far before or behind another, metres, hangs on the same wall."""
+"""Two objects hang on the same wall if their distances to it differ by less, metres."""
 _THIN = 0.35
-"""A window may be that thick, metres, and goes into the wall that far."""
+"""Thickness of a window up to which it goes into the wall, metres."""
 _STEP = 0.2
-"""Shallower recesses are not worth a wall, metres."""
+"""Shallower recesses get no wall, metres."""
 _SHORT = 0.4
-"""Narrower ones neither, metres."""
+"""Narrower recesses get no wall, metres."""
 _OVERHANG = 0.25
-"""How much farther out than a picture what stands beside it may be, metres."""
+"""How much farther out than a picture an object beside it may be, metres."""
 _CORNER = 0.9
-"""Smaller empty corners are left alone, metres."""
+"""Smaller empty corners are not cut, metres."""
 _SEEN = 1.7
-"""Things nearer than this must not be hidden, metres."""
+"""Objects nearer than this must stay visible, metres."""
 _HIDDEN = 0.34
-"""Of a thing that is near, the share that a wall may hide."""
+"""Share of such an object that a wall may hide."""
 _CEILING = 0.1
-"""From the top of the scene's bounds down to the ceiling, metres."""
+"""Distance from the top of the scene's bounds down to the ceiling, metres."""
 _STOREY = 2.4
 """The least height of a room, metres."""
 _HANGERS = frozenset(
@@ -54,18 +55,18 @@ _HANGERS = frozenset(
         "ToiletPaperHanger", "Blinds", "Curtains",
     }
 )  # fmt: skip
-"""What hangs on walls, flat."""
+"""Types that hang flat on walls."""
 _NOT_BEFORE_WALLS = frozenset({"Floor", "Faucet"})
-"""The boxes of faucets end in the wall."""
+"""Types that say nothing about walls: the boxes of faucets end inside the wall."""
 _INTO_WALLS = {"CounterTop": 0.3, "Fridge": 0.2, "Toilet": 0.08, "Cabinet": 0.06, "Sink": 0.06}
-"""The boxes of these may end in the wall: by how many metres."""
+"""How far the boxes of these types may extend into a wall, metres."""
 _SHOWERS = frozenset({"ShowerDoor", "ShowerGlass"})
-"""What towels hang on too; behind it there is room, where nobody can stand."""
+"""Types that towels hang on as well. Behind them is a part of the room where nobody can stand."""
 
 
 @dataclass(frozen=True)
 class Rectangle:
-    """From a lower to an upper corner."""
+    """A rectangle between a lower and an upper corner."""
 
     low: tuple[float, float]
     high: tuple[float, float]
@@ -76,8 +77,9 @@ class Wall:
     """A straight stretch of wall.
 
     Attributes:
-        axis: 0 where it is at one x, 1 where it is at one z. at: that coordinate.
-        sign: 1 or -1, which way along the axis it faces.
+        axis: 0 if it is at one x, 1 if it is at one z.
+        at: that coordinate.
+        sign: 1 or -1, the direction along the axis that it faces.
         low, high: its ends along the other axis.
     """
 
@@ -90,12 +92,13 @@ class Wall:
 
 @dataclass(frozen=True, eq=False)
 class FloorPlan:
-    """A room from above.
+    """The floor plan of a room.
 
     Attributes:
-        xs (X,), zs (Z,): the lines between which the room is cut up. inside: (X - 1, Z - 1) which
-            of the fields belong to it.
-        walls: around it. holes: boxes ((3,), (3,)) of the windows, where walls are open.
+        xs (X,), zs (Z,): the lines that divide the room into fields.
+        inside: (X - 1, Z - 1) whether each field belongs to the room.
+        walls: the walls around it.
+        holes: boxes ((3,), (3,)) of the windows, where walls are open.
         ground, ceiling: heights.
     """
 
@@ -117,7 +120,7 @@ class FloorPlan:
 
 @lru_cache(maxsize=128)
 def floor_plan(scene_name: str) -> FloorPlan:
-    """The plan of a recorded scene."""
+    """The floor plan of a recorded scene."""
     scene = load_scene(scene_name)
     half = scene.aabb_size / 2
     low, high = scene.aabb_center - half, scene.aabb_center + half
@@ -139,13 +142,14 @@ def floor_plan(scene_name: str) -> FloorPlan:
 
 @dataclass(frozen=True, eq=False)
 class _Plot:
-    """What is known of a room.
+    """The data that a floor plan is made from.
 
     Attributes:
-        places: (P, 2) where one can stand. low, high: (N, 2) boxes of the objects, without Floor.
-        windows, hangers: (N,) which of them are.
-        bathroom: there are showers and recesses that are neither reachable nor objects.
-        outer: the rectangle within which all is.
+        places: (P, 2) where the agent can stand.
+        low, high: (N, 2) boxes of the objects, without the Floor.
+        windows, hangers: (N,) whether each object is one.
+        bathroom: has showers and recesses that are neither reachable nor objects.
+        outer: the rectangle around everything.
     """
 
     places: Floats
@@ -187,7 +191,7 @@ class _Plot:
         )
 
     def cuts(self) -> list[Rectangle]:
-        """What does not belong to the room."""
+        """The areas that do not belong to the room."""
         found: list[Rectangle] = []
         corners = () if self.bathroom else self._corners()
         for choices in itertools.chain(self._behind_hangers(), corners):
@@ -205,11 +209,11 @@ class _Plot:
                 yield self._behind(i, axis, 1)
 
     def _behind(self, i: int, axis: int, sign: int) -> Iterator[Rectangle]:
-        """What is behind hanger i if the wall is on the side ``sign`` of it, the largest first."""
+        """The areas behind hanger i, the largest first, if its wall is on the side ``sign``."""
         along, end = 1 - axis, sign * (self.outer.high if sign > 0 else self.outer.low)[axis]
         left, right = float(self.low[i, along]), float(self.high[i, along])
         near, far, low, high = self._blocking(axis, sign)
-        # Things beside it may stick out a little more than it does.
+        # Objects beside it may stick out a little more.
         start, beside = self._plane(i, axis, sign), (low < right - 0.02) & (high > left + 0.02)
         for reach in np.sort(far[beside & (near < start)]):
             if start < reach < start + _OVERHANG:
@@ -225,7 +229,8 @@ class _Plot:
                 yield _rectangle(axis, across, (a, b))
 
     def _blocking(self, axis: int, sign: int) -> tuple[Floats, Floats, Floats, Floats]:
-        """What cannot be cut away: how near and far it is, and its ends along the other axis."""
+        """The boxes that limit a cut: their near and far sides, and their ends along the other
+        axis."""
         low = np.concatenate([self.low - _BEHIND, self.places - _BODY])
         high = np.concatenate([self.high + _BEHIND, self.places + _BODY])
         near, far = (low, high) if sign > 0 else (-high, -low)
@@ -235,13 +240,14 @@ class _Plot:
         return near[:, axis], ends, low[:, 1 - axis], high[:, 1 - axis]
 
     def _plane(self, i: int, axis: int, sign: int) -> float:
-        """How far out the wall behind hanger i is: of several almost in line, the outermost."""
+        """How far out the wall behind hanger i is: of several hangers almost in line, the
+        outermost."""
         faces = self._faces(axis, sign)
         near = self.hangers & (np.abs(faces - faces[i]) < _IN_LINE)
         return float(faces[near].max()) + _BEHIND
 
     def _faces(self, axis: int, sign: int) -> Floats:
-        """(N,) how far out the back of each is; of windows the front."""
+        """(N,) how far out the back of each object is; of windows the front."""
         return _faces(
             *((self.low, self.high) if sign > 0 else (-self.high, -self.low)), self.windows, axis
         )
@@ -259,7 +265,7 @@ class _Plot:
             yield (_between(corner, corner - sign * size) for size in sizes if min(size) > _CORNER)
 
     def _hides(self, cut: Rectangle) -> bool:
-        """Whether a cut stands between a thing and a place near it."""
+        """Whether a cut would hide an object from a position near it."""
         low, high = np.array(cut.low) + 0.02, np.array(cut.high) - 0.02
         beside = np.linalg.norm(self.places - np.clip(self.places, low, high), axis=1) < _SEEN
         places = self.places[beside]
@@ -288,9 +294,10 @@ def _side(
     hung: NDArray[np.bool_],
     axis: int,
 ) -> float:
-    """Where the wall is on the side of the higher coordinates.
+    """The wall's coordinate on the side of higher coordinates.
 
-    Just behind all there; or where something hangs, if nothing sticks out but what may.
+    The wall is just behind all objects. If something hangs there and no object extends behind it
+    too far, the wall is behind the hanging object.
     """
     standing = float(places[:, axis].max()) + _ROOM
     starts, ends = low[:, axis], _faces(low, high, windows, axis) + _BEHIND
@@ -300,7 +307,7 @@ def _side(
 
 
 def _outermost(found: float, starts: Floats, ends: Floats) -> float:
-    """The end of what there is, one thing behind the other without large gaps."""
+    """The far end of the objects that follow one another without large gaps."""
     for start, end in sorted(zip(starts.tolist(), ends.tolist(), strict=True)):
         if start < found + _GAP:
             found = max(found, end)
@@ -318,7 +325,7 @@ def _rectangle(axis: int, across: tuple[float, float], along: tuple[float, float
 
 
 def _empty(away: Floats, most: Floats) -> list[tuple[float, float]]:
-    """Sizes from (0, 0) that have none of the points (K, 2) within; the largest area first."""
+    """Sizes of rectangles at (0, 0) without any of the points (K, 2); the largest area first."""
     found, width = [], float(most[0])
     for x, z in sorted(away.tolist(), key=lambda point: float(point[1])):
         if x < width:
@@ -329,7 +336,7 @@ def _empty(away: Floats, most: Floats) -> list[tuple[float, float]]:
 
 
 def _crosses(start: Floats, end: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
-    """(K,) which of the lines between (K, 2) points go through a rectangle."""
+    """(K,) whether each line between (K, 2) points crosses a rectangle."""
     step = end - start
     step = np.where(np.abs(step) < 1e-9, 1e-9, step)
     one, two = (low - start) / step, (high - start) / step
@@ -340,7 +347,7 @@ def _crosses(start: Floats, end: Floats, low: Floats, high: Floats) -> NDArray[n
 def _fields(
     outer: Rectangle, cuts: Iterable[Rectangle]
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """The lines along x and z that bound the room, and which fields between them are in it."""
+    """The lines along x and z that divide the room into fields, and whether each field is in it."""
     kept = list(cuts)
     lines = []
     for axis in (0, 1):
@@ -358,7 +365,7 @@ def _fields(
 
 
 def _walls(xs: Floats, zs: Floats, inside: NDArray[np.bool_]) -> Iterator[Wall]:
-    """The walls around the fields that are inside, as long as they go straight on."""
+    """The straight walls around the fields that are inside."""
     for axis, (lines, across) in enumerate(((xs, zs), (zs, xs))):
         fields = np.pad(inside if axis == 0 else inside.T, ((1, 1), (0, 0)))
         for k, at in enumerate(lines.tolist()):

@@ -1,9 +1,9 @@
-"""A stand-in for libX11 where there is none.
+"""A stand-in for libX11 on machines without it.
 
-Panda3D's wheel for Linux says that its software rasteriser needs libX11.so.6, and does not bring
-it. Nothing calls it when one draws without a window, but the loader insists. Where it is not
-installed, as in slim containers, a library of that name is written whose functions all return 0,
-loaded, and deleted again; the loader then takes the name as found.
+Panda3D's wheel for Linux declares that its software rasteriser needs libX11.so.6, but does not
+contain it. Nothing calls the library when there is no window, but the loader requires it. If it is
+not installed, as in slim containers, this module writes a library of that name whose functions all
+return 0, loads it and deletes it again. The loader then considers the name as loaded.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ _RETURN_0 = {
     _X86_64: bytes.fromhex("31c0c3"),  # xor eax, eax; ret
     _AARCH64: bytes.fromhex("000080d2c0035fd6"),  # mov x0, 0; ret
 }
-"""Machine code by ELF's number of the machine."""
+"""Machine code for each machine number of ELF."""
 _PAGE = 0x10000
-"""The largest page that either machine has."""
+"""The largest page size of both machines, bytes."""
 _READ, _WRITE, _EXECUTE = 4, 2, 1
 _LOAD, _DYNAMIC, _STACK = 1, 2, 0x6474E551
 _ADVICE = (
@@ -37,16 +37,16 @@ _ADVICE = (
 
 
 def provide_libx11() -> None:
-    """See to it that the rasteriser can be loaded; on systems other than Linux it can.
+    """Make sure that the rasteriser can be loaded. On systems other than Linux it always can.
 
     Raises:
-        ImportError: there is no libX11, and the system lets no stand-in be loaded.
+        ImportError: there is no libX11, and the system does not load a stand-in.
     """
     if sys.platform != "linux" or _loads(_SONAME):
         return
     rasteriser = _rasteriser()
     if rasteriser is None:
-        return  # not the wheel: whoever built it knows what it needs
+        return  # not the wheel, but a build with its own libraries
     machine, names = wanted_symbols(rasteriser)
     if machine not in _RETURN_0:
         raise ImportError(_ADVICE)
@@ -67,7 +67,7 @@ def _rasteriser() -> Path | None:
 
 def _loads(path: str) -> bool:
     try:
-        # Not for all to see: another library may bring an X11 of its own.
+        # Local, because another library may bring its own X11.
         ctypes.CDLL(path, mode=ctypes.RTLD_LOCAL)
     except OSError:
         return False
@@ -85,7 +85,7 @@ def _loads_from_file(content: bytes) -> bool:
 
 
 def _loads_from_memory(content: bytes) -> bool:
-    """For where no folder can be written to, or nothing in it executed."""
+    """Load from memory, for machines that let no file be written or executed."""
     try:
         handle = os.memfd_create(_SONAME)
     except (AttributeError, OSError):
@@ -99,7 +99,7 @@ def _loads_from_memory(content: bytes) -> bool:
 
 
 class _Section(NamedTuple):
-    """A row of ELF's table of sections, as far as it is needed."""
+    """The needed part of a row of ELF's section table."""
 
     kind: int
     offset: int
@@ -111,10 +111,10 @@ _DYNAMIC_SYMBOLS = 11
 
 
 def wanted_symbols(library: Path) -> tuple[int, list[str]]:
-    """The machine that a library is for, and the functions of X that it does not define itself.
+    """The machine of a library, and the functions of X that it needs.
 
     Raises:
-        ImportError: it is no 64-bit little-endian ELF file with a table of dynamic symbols.
+        ImportError: it is not a 64-bit little-endian ELF file with dynamic symbols.
     """
     content = library.read_bytes()
     if content[:6] != b"\x7fELF\x02\x01":
@@ -137,7 +137,7 @@ def _sections(content: bytes) -> Iterator[_Section]:
 
 
 def _undefined(content: bytes, table: _Section, strings: _Section) -> Iterator[str]:
-    """The names of the symbols that are looked for elsewhere."""
+    """The names of undefined symbols."""
     rows = content[table.offset : table.offset + table.size]
     for name, _, _, section, _, _ in struct.iter_unpack("<IBBHQQ", rows):
         if section == 0:
@@ -151,8 +151,8 @@ def _undefined(content: bytes, table: _Section, strings: _Section) -> Iterator[s
 def stand_in(soname: str, names: Sequence[str], machine: int) -> bytes:
     """A shared library with functions of some names that all return 0.
 
-    Two segments are loaded: what is read and executed, and what the loader writes to. The stack is
-    not to be executed.
+    Two segments are loaded: one to be read and executed, and one that the loader writes to. The
+    stack is not executable.
     """
     strings, offsets = _strings([soname, *names])
     headers = 64 + 4 * 56
@@ -177,7 +177,7 @@ def stand_in(soname: str, names: Sequence[str], machine: int) -> bytes:
             (0, 0),
         )
     )
-    written = at_dynamic + _PAGE  # in memory a page later, so that both have pages of their own
+    written = at_dynamic + _PAGE  # a page later in memory, so that both have pages of their own
     segments = (
         _segment(_LOAD, _READ | _EXECUTE, 0, 0, at_dynamic, _PAGE),
         _segment(_LOAD, _READ | _WRITE, at_dynamic, written, len(dynamic), _PAGE),
@@ -198,7 +198,7 @@ def _segment(kind: int, flags: int, offset: int, address: int, size: int, align:
 
 
 def _strings(texts: Sequence[str]) -> tuple[bytes, list[int]]:
-    """A table of strings, and where each of them starts in it."""
+    """A string table, and the offset of each string in it."""
     table, offsets = b"\0", []
     for text in texts:
         offsets.append(len(table))
@@ -207,14 +207,14 @@ def _strings(texts: Sequence[str]) -> tuple[bytes, list[int]]:
 
 
 def _symbols(names: Sequence[int], address: int, size: int) -> bytes:
-    """Global functions, all at one address; the first symbol of a table is none."""
+    """Global functions at one address; the first symbol of a table is always empty."""
     function = 0x12
     rows = (struct.pack("<IBBHQQ", name, function, 0, 1, address, size) for name in names)
     return bytes(24) + b"".join(rows)
 
 
 def _hashes(symbols: int) -> bytes:
-    """A table of hashes with a single bucket: from each symbol to the next."""
+    """A hash table with a single bucket that links each symbol to the next."""
     chain = [0, *range(2, symbols), 0][:symbols]
     found = struct.pack(f"<{3 + symbols}I", 1, symbols, min(1, symbols - 1), *chain)
     return found.ljust(-(-len(found) // 8) * 8, b"\0")

@@ -1,6 +1,6 @@
-"""Light, worked out once for each vertex: there are no lamps at run time.
+"""Light, computed once for each vertex: there are no lamps at run time.
 
-A sky of light from above, a key light, a weak fill, and darkness where things stand on the floor.
+It consists of light from above, a key light and a weak fill light, and of darkness near the floor.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from er_gym.sim.render.patch import Patch, rotation
 _KEY = np.array([0.35, 0.82, 0.45]) / np.linalg.norm([0.35, 0.82, 0.45])
 _FILL = np.array([-0.7, 0.2, -0.5]) / np.linalg.norm([-0.7, 0.2, -0.5])
 _REACH = 0.45
-"""How far up the darkness of the floor reaches, metres."""
+"""Height up to which it is darker near the floor, metres."""
 
 
 def light(normals: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(V,) how much light falls on surfaces with world normals (V, 3)."""
+    """(V,) brightness of surfaces with world normals (V, 3)."""
     hemisphere = 0.5 + 0.16 * normals[:, 1]
     key = 0.42 * np.clip(normals @ _KEY, 0.0, 1.0)
     return np.asarray(hemisphere + key + 0.14 * np.clip(normals @ _FILL, 0.0, 1.0), np.float32)
@@ -30,7 +30,8 @@ def lit_colours(
     """(V, 3) the colours of a patch in the light of the room.
 
     Args:
-        yaw: heading of the thing, degrees. tall: its height, metres.
+        yaw: heading of the object, degrees.
+        tall: its height, metres.
         height: of its underside above the floor, metres.
     """
     if MATERIALS[material].glows:

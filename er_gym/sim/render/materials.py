@@ -1,4 +1,4 @@
-"""Surfaces by name: what texture they carry, and how light treats them."""
+"""Materials by name: their texture, and how light affects them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Material:
-    """A surface.
+    """A material.
 
     Attributes:
         texture: a name of :data:`er_gym.sim.render.textures.TEXTURES`, None for none.
-        glows: it is not shaded: screens, lamps, windows.
-        glass: one sees through it; it hides nothing and has no instance.
+        glows: whether it is drawn without shading, as screens, lamps and windows are.
+        glass: whether it is transparent; it hides nothing and belongs to no instance.
     """
 
     texture: str | None = None

@@ -1,9 +1,9 @@
-"""Triangles, put together from simple solids.
+"""Meshes, put together from simple solids.
 
-A thing's own frame: x to its right, y up, z to its front, as AI2-THOR has it; the origin is in the
-middle of its underside. Lengths are metres, angles degrees, colours red, green and blue within 0
-and 1 (more than 1 glows). Which way round corners go does not matter but for :meth:`Mesh.quad`:
-triangles are turned to where their normals point.
+An object's own frame is AI2-THOR's: x to its right, y up, z to its front. The origin is in the
+middle of its underside. Lengths are metres, angles degrees. Colours are red, green and blue from 0
+to 1; more than 1 glows. The order of corners matters only for :meth:`Mesh.quad`: triangles are
+turned to face along their normals.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from er_gym.sim.render.box_faces import (
 from er_gym.sim.render.patch import PLAIN, Axis, Patch, Triple, merged, rotation
 
 _AXES: Mapping[str, tuple[int, int, int]] = {"x": (1, 2, 0), "y": (0, 1, 2), "z": (0, 2, 1)}
-"""For a solid of revolution made about y: where each of its axes comes from."""
+"""For each axis, which axes of a solid made about y its x, y and z come from."""
 
 
 class Mesh:
-    """Solids of one thing, by material."""
+    """The solids of one object, by material."""
 
     def __init__(self) -> None:
         self._parts: dict[str, list[Patch]] = {}
@@ -103,7 +103,8 @@ class Mesh:
         uv: ArrayLike = ((0, 0), (1, 0), (1, 1), (0, 1)),
         both: bool = False,
     ) -> None:
-        """Four corners, anticlockwise as one looks at the front; ``both``: it has two fronts."""
+        """A quadrangle; its corners go anticlockwise seen from the front. ``both``: it has two
+        fronts."""
         points = np.asarray(corners, dtype=np.float64)
         normal = np.cross(points[2] - points[0], points[1] - points[0])
         for out in (normal, -normal) if both else (normal,):
@@ -121,10 +122,13 @@ class Mesh:
         facing: Literal["x", "X", "y", "Y", "z", "Z"] = "Z",
         turns: float | None = None,
     ) -> None:
-        """An upright or level rectangle (width, height) about a middle; capital letters: positive.
+        """An upright or level rectangle (width, height) about a middle point.
 
-        A picture on it is upright for who looks at it. ``turns``: metres a turn of the texture;
-        None: the texture once over the whole.
+        A picture on it is upright for a viewer in front of it.
+
+        Args:
+            facing: the axis that it faces; a capital letter is the positive direction.
+            turns: metres of one repeat of the texture; None for the texture once over the whole.
         """
         w, h = size[0] / 2, size[1] / 2
         right, up = {
@@ -157,9 +161,12 @@ class Mesh:
         taper: float = 1.0,
         turns: float = 1.0,
     ) -> None:
-        """A box about a middle; ``faces``: those that can be seen; ``taper``: its top's share.
+        """A box about a middle point.
 
-        ``turns``: metres a turn of the texture.
+        Args:
+            faces: the visible faces.
+            taper: width of its top as a share of its bottom's.
+            turns: metres of one repeat of the texture.
         """
         half = np.abs(np.asarray(size, dtype=np.float64)) / 2
         kept = [FACES.index(face) for face in faces]
@@ -186,10 +193,10 @@ class Mesh:
         *,
         turns: float = 1.0,
     ) -> None:
-        """A box whose edges and corners are cut off at ``radius``, which catches the light."""
+        """A box whose edges and corners are cut off at ``radius``, so that they catch the light."""
         half = np.abs(np.asarray(size, dtype=np.float64)) / 2
         cut = min(radius, *(0.9 * half))
-        # Three points a corner, one on each of its faces.
+        # Each corner has three points, one on each of its faces.
         points = np.repeat((SIGNS * (half - cut))[:, None], 3, axis=1)
         for axis in range(3):
             points[:, axis, axis] = SIGNS[:, axis] * half[axis]
@@ -211,21 +218,23 @@ class Mesh:
         smooth: bool = True,
         turns: tuple[float, float] = (1.0, 1.0),
     ) -> None:
-        """What a profile of (radius, height) sweeps about an axis; its left side is outside.
+        """A surface of revolution: a profile of (radius, height) swept about an axis.
 
-        Going up a profile at the outside, in over the top and down at the inside makes a vessel.
+        The outside is on the left of the profile. A profile that goes up at the outside, in over
+        the top and down at the inside makes a vessel.
 
         Args:
-            colour: one; or (2 * (segments + 1), 3), for the lower and the upper end of every band.
+            colour: one colour, or (2 * (segments + 1), 3) for the lower and the upper end of every
+                band.
             squash: factors of the radius along the two other axes.
-            turns: times that the texture goes round, and metres of height that it takes.
+            turns: repeats of the texture around, and metres of height of one repeat.
         """
         line = np.asarray(list(profile), dtype=np.float64)
         step = np.diff(line, axis=0)
         out = np.stack([step[:, 1], -step[:, 0]], axis=1)
         out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
         below, above = out.copy(), out.copy()
-        if smooth:  # where the profile bends but little, both sides of the bend shine alike
+        if smooth:  # smooth shading where the profile bends only a little
             bends = (out[:-1] * out[1:]).sum(axis=1) > 0.5
             below[1:][bends] += out[:-1][bends]
             above[:-1][bends] += out[1:][bends]
@@ -271,7 +280,7 @@ class Mesh:
         axis: Axis = "y",
         segments: int = 12,
     ) -> None:
-        """A cylinder about a middle; ``top``: the radius at its upper end, for cones."""
+        """A cylinder about a middle point; ``top`` is the radius at its upper end, for cones."""
         upper, half = radius if top is None else top, height / 2
         profile = [(0.0, -half), (radius, -half), (upper, half), (0.0, half)]
         self.lathe(profile, colour, material, at=at, axis=axis, segments=segments)
@@ -286,7 +295,7 @@ class Mesh:
         segments: int = 12,
         rings: int = 8,
     ) -> None:
-        """An ellipsoid about a middle."""
+        """An ellipsoid about a middle point."""
         t = np.linspace(-pi / 2, pi / 2, rings + 1)
         radius = np.cos(t) / 2 * size[0]
         radius[[0, -1]] = 0.0
@@ -305,7 +314,7 @@ class Mesh:
         axis: Axis = "y",
         turns: float = 1.0,
     ) -> None:
-        """A convex outline (K, 2) pulled along an axis from ``low`` to ``high``.
+        """A prism: a convex outline (K, 2), extended along an axis from ``low`` to ``high``.
 
         The outline is in (x, z) for y, in (z, y) for x, in (x, y) for z.
         """
@@ -391,17 +400,17 @@ class Mesh:
         both: bool = False,
         turns: tuple[float, float] = (1.0, 1.0),
     ) -> None:
-        """Rings of points (R, K, 3) joined by faces: a lathe whose cross-section is free.
+        """A surface through rings of points (R, K, 3): a lathe with a free cross-section.
 
-        As there, rings that go up at the outside, in over the top and down at the inside make a
-        vessel, if each goes round as the sine and cosine of x and z do.
+        Rings that go up at the outside, in over the top and down at the inside make a vessel. Each
+        ring must go round in the direction from +x to +z.
 
         Args:
             colour: one for all, or (R, K, 3).
-            closed: rings come round to where they began; if not, it is a sheet.
-            smooth: along a ring, where it bends by less than 60 degrees.
-            both: it has two fronts.
-            turns: of the texture, along a ring and from the first ring to the last.
+            closed: whether rings return to their first point; if not, the surface is a sheet.
+            smooth: whether a ring is shaded smoothly where it bends by less than 60 degrees.
+            both: whether the surface has two fronts.
+            turns: repeats of the texture along a ring, and from the first ring to the last.
         """
         points = np.asarray(rings, dtype=np.float64)
         tints = np.broadcast_to(np.asarray(colour, dtype=np.float64), points.shape)

@@ -1,4 +1,4 @@
-"""The colours of a scene: the same for all that is in it, other in the next."""
+"""The colours of scenes, and functions that change colours."""
 
 from __future__ import annotations
 
@@ -63,12 +63,12 @@ _FLOORS: dict[str, tuple[tuple[str, Colour], ...]] = {
     ),
 }
 _FLOOR_TURNS = {"tiles": 1.5, "planks": 1.5, "carpet": 1.0}
-"""Metres that a turn of the texture takes."""
+"""Metres of one repeat of the texture."""
 
 
 @dataclass(frozen=True)
 class Palette:
-    """The colours of a scene, the same for all that is in it."""
+    """The colours of a scene, which all its objects share."""
 
     wood: Colour
     cabinet: Colour
@@ -81,19 +81,19 @@ class Palette:
 
 
 def shaded(colour: Colour, factor: float) -> Colour:
-    """A colour made darker (below 1) or lighter."""
+    """A colour made darker (factor below 1) or lighter."""
     r, g, b = (min(1.0, channel * factor) for channel in colour)
     return r, g, b
 
 
 def mixed(one: Colour, other: Colour, share: float) -> Colour:
-    """A colour between two: ``share`` of the other."""
+    """A mixture of two colours; ``share`` is that of the other one."""
     r, g, b = (a + (c - a) * share for a, c in zip(one, other, strict=True))
     return r, g, b
 
 
 def flooring(scene: str) -> tuple[str, float]:
-    """What the floor of a recorded scene is of: the material, and metres a turn of its texture."""
+    """The floor of a recorded scene: its material, and the metres of one repeat of its texture."""
     material, _ = _floor(scene)
     return material, _FLOOR_TURNS[material]
 

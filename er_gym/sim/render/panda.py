@@ -1,13 +1,13 @@
-"""Panda3D without a window: triangles in, colour, instance and depth out.
+"""Panda3D without a window: draws triangles into colour, instance and depth images.
 
-On the CPU by its software rasteriser; where there is a GPU with EGL and :func:`use_device` has
-asked for it, by OpenGL, from the same scene graph.
+It draws on the CPU with Panda3D's software rasteriser. On a GPU with EGL it can use OpenGL with the
+same scene graph, if :func:`use_device` asks for it.
 
-One engine and one buffer a process; whoever changes a scene graph or draws one holds
-:data:`DRAWING`. A picture depends on the scene graph alone: of surfaces at the same depth the one
-drawn first is seen, so everything is drawn in an order that the graph itself says. Instances come
-with the colours, as the pictures' alpha, which is why there are at most :data:`MOST_INSTANCES` of
-them. Panda's frame is right-handed with z up: x, y and z here are its x, z and y.
+A process has one engine and one buffer. Code that changes or draws a scene graph holds
+:data:`DRAWING`. A picture depends on the scene graph alone. Of surfaces at the same depth the one
+drawn first is seen, so the graph itself defines the order of drawing. The instance ids are drawn
+together with the colours, as the alpha channel, so there are at most :data:`MOST_INSTANCES` of
+them. Panda's frame is right-handed with z up: our x, y and z are its x, z and y.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from er_gym.sim.render.materials import MATERIALS
 from er_gym.sim.render.textures import texture
 
 NEAR, FAR = 0.1, 40.0
-"""Metres from the camera between which things are drawn."""
+"""The near and the far plane, metres from the camera."""
 MOST_INSTANCES = 254
 DEVICES = {
     "cpu": ("p3tinydisplay", "TinyOffscreenGraphicsPipe"),
     "gpu": ("p3headlessgl", "eglGraphicsPipe"),
 }
-"""What can draw: Panda3D's module, and the pipe in it."""
+"""The devices that can draw: Panda3D's module, and the pipe in it."""
 _CONFIGURATION = """
 load-display {module}
 audio-library-name null
@@ -45,21 +45,21 @@ garbage-collect-states 0
 uniquify-transforms 0
 transform-cache 0
 """
-"""Of transforms that are nearly the same Panda would make one, whichever was there first."""
+"""Panda would otherwise merge transforms that are nearly equal and keep the older one."""
 DRAWING = RLock()
-"""Held while a scene graph is made, changed or drawn: Panda's objects are shared by all threads."""
+"""The lock for making, changing or drawing a scene graph: all threads share Panda's objects."""
 _DEPTH_STEPS = float(1 << 20)
 _VERTEX = np.dtype([("at", "<f4", 3), ("colour", "u1", 4), ("uv", "<f4", 2)])
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """What a camera sees, top row first.
+    """The images of a camera, top row first.
 
     Attributes:
         rgb: (H, W, 3) uint8.
         ids: (H, W) uint8 number of the instance, 0 for none.
-        depth: (H, W) float32 metres along the line of view, None unless asked for.
+        depth: (H, W) float32 metres along the view axis, None unless asked for.
     """
 
     rgb: NDArray[np.uint8]
@@ -68,18 +68,18 @@ class Frames:
 
 
 class RenderDeviceError(RuntimeError):
-    """What is to draw cannot; the message says why and what to do."""
+    """The device cannot draw. The message says why and what to do."""
 
 
 _chosen: list[str] = []
 
 
 def use_device(name: str) -> None:
-    """Choose what draws in this process, before anything is drawn: "cpu" (the default) or "gpu".
+    """Choose the device of this process, "cpu" (the default) or "gpu", before anything is drawn.
 
     Raises:
         ValueError: there is no such device.
-        RenderDeviceError: this process draws with another already.
+        RenderDeviceError: this process already draws with another one.
     """
     if name not in DEVICES:
         raise ValueError(f"unknown render_device {name!r}; choose one of: {', '.join(DEVICES)}")
@@ -97,14 +97,14 @@ def _device() -> str:
 
 @cache
 def core() -> Any:
-    """The module ``panda3d.core``, set up to need neither a window nor a file of settings."""
+    """The module ``panda3d.core``, configured to need neither a window nor a settings file."""
     use_device(_device())
     if _device() == "cpu":
         provide_libx11()
     from panda3d import core as module
 
     module.loadPrcFileData("er-gym", _CONFIGURATION.format(module=DEVICES[_device()][0]))
-    # Panda would sort what is opaque by the addresses of its states.
+    # Panda would sort opaque nodes by the addresses of their states.
     bins = module.CullBinManager.getGlobalPtr()
     bins.setBinType(bins.findBin("opaque"), module.CullBinManager.BTFixed)
     return module
@@ -123,7 +123,7 @@ def _pipe() -> Any:
 
 
 class Rasteriser:
-    """A buffer to draw into; use :func:`rasteriser`. Sizes may change from picture to picture."""
+    """A buffer to draw into; use :func:`rasteriser`. Each picture may have another size."""
 
     def __init__(self) -> None:
         p3d, pipe = core(), _pipe()
@@ -132,7 +132,7 @@ class Rasteriser:
         wanted.setRgbColor(True)
         wanted.setRgbaBits(8, 8, 8, 8)
         wanted.setDepthBits(24)
-        # Resizeable: the rasteriser never frees the memory of a buffer.
+        # Resizeable, because the software rasteriser never frees the memory of a buffer.
         flags = p3d.GraphicsPipe.BFRefuseWindow | p3d.GraphicsPipe.BFResizeable
         size = p3d.WindowProperties.size(300, 300)
         self._buffer = self._engine.makeOutput(pipe, "frames", 0, wanted, size, flags)
@@ -143,7 +143,7 @@ class Rasteriser:
         self._buffer.addRenderTexture(
             self._picture, p3d.GraphicsOutput.RTMCopyRam, p3d.GraphicsOutput.RTPColor
         )
-        self._steps = None  # where depth comes to; the software rasteriser has another way
+        self._steps = None  # the depth image; the software rasteriser has another way
         if _device() == "gpu":
             self._steps = p3d.Texture()
             self._steps.setFormat(p3d.Texture.FDepthComponent)
@@ -160,11 +160,11 @@ class Rasteriser:
         self._show_depth = p3d.ConfigVariableBool("td-show-zbuffer", False)
 
     def draw(self, root: Any, camera: Camera, depth: bool = False) -> Frames:
-        """What a camera sees of a scene graph; the arrays are the caller's own."""
+        """The images of a camera in a scene graph; the caller owns the arrays."""
         with DRAWING:
             width, height = camera.width, camera.height
             if (width, height) != self._size:
-                self._size = (0, 0)  # if it is interrupted now, nobody knows
+                self._size = (0, 0)  # the size is unknown if the next line is interrupted
                 self._buffer.setSize(width, height)
                 self._size = (width, height)
             half = tan(radians(camera.fov) / 2)
@@ -178,16 +178,16 @@ class Rasteriser:
             pixels = np.frombuffer(self._picture.getRamImage(), np.uint8)
             pixels = pixels.reshape(height, width, 4)[::-1]
             ids, rgb = pixels[..., 3].copy(), np.empty((height, width, 3), dtype=np.uint8)
-            for channel in range(3):  # one by one is faster than all at once
+            for channel in range(3):  # faster than all channels at once
                 rgb[..., channel] = pixels[..., 2 - channel]
             return Frames(rgb, ids, self._depth(width, height) if depth else None)
 
     def _depth(self, width: int, height: int) -> NDArray[np.float32]:
-        if self._steps is None:  # 0 is far away, and 2**20 near
+        if self._steps is None:  # 0 is far, 2**20 is near
             raw = np.frombuffer(self._buffer.getScreenshot().getRamImage(), np.uint32)
             found = raw.astype(np.float32)
             found *= np.float32((FAR - NEAR) / _DEPTH_STEPS)
-        else:  # 0 is near, and 1 far away
+        else:  # 0 is near, 1 is far
             found = 1.0 - np.frombuffer(self._steps.getRamImage(), np.float32)
             found *= np.float32(FAR - NEAR)
         found += np.float32(NEAR)
@@ -197,7 +197,7 @@ class Rasteriser:
 
 @cache
 def rasteriser() -> Rasteriser:
-    """The process's own."""
+    """The rasteriser of this process."""
     return Rasteriser()
 
 
@@ -221,12 +221,12 @@ def state(material: str) -> Any:
     if surface.glass:
         return p3d.RenderState.make(
             p3d.TransparencyAttrib.make(p3d.TransparencyAttrib.MAlpha),
-            p3d.ColorWriteAttrib.make(7),  # colours alone: what is behind keeps its instance
+            p3d.ColorWriteAttrib.make(7),  # colours only: the instance behind stays
             p3d.DepthWriteAttrib.make(p3d.DepthWriteAttrib.MOff),
             p3d.ColorAttrib.makeFlat(p3d.LColor(0.75, 0.9, 0.95, 0.22)),
         )
     colours = p3d.ColorAttrib.makeVertex()
-    # One material after the other, and within each in the order of the graph.
+    # Draw one material after another, and within each in the order of the graph.
     order = p3d.CullBinAttrib.make("opaque", list(MATERIALS).index(material))
     if surface.texture is None:
         return p3d.RenderState.make(colours, order)
@@ -240,10 +240,10 @@ def geometry(
     number: int,
     name: str,
 ) -> Any:
-    """A node that draws some triangles as instance ``number`` (0: none).
+    """A node that draws triangles as instance ``number`` (0: none).
 
     Args:
-        parts: of each material its name, vertices (V, 3), colours (V, 3), uv (V, 2) and triangles
+        parts: for each material its name, vertices (V, 3), colours (V, 3), uv (V, 2) and triangles
             (F, 3).
     """
     if number > MOST_INSTANCES:
@@ -251,7 +251,7 @@ def geometry(
     p3d = core()
     node = p3d.GeomNode(name)
     for material, at, colours, uv, triangles in parts:
-        # Where there is a texture, the software rasteriser makes 1 less of each alpha.
+        # With a texture, the software rasteriser lowers each alpha by 1.
         textured = MATERIALS[material].texture is not None and _device() == "cpu"
         rows = np.empty(len(at), dtype=_VERTEX)
         rows["at"] = at[:, [0, 2, 1]]
@@ -264,7 +264,7 @@ def geometry(
         wide = len(rows) >= 65536
         primitive = p3d.GeomTriangles(p3d.Geom.UHStatic)
         primitive.setIndexType(p3d.Geom.NTUint32 if wide else p3d.Geom.NTUint16)
-        # Panda's frame is right-handed: mirrored, triangles go round the other way.
+        # Panda's frame is right-handed, so mirrored triangles go round the other way.
         index = np.ascontiguousarray(triangles, dtype=np.uint32 if wide else np.uint16)
         array = primitive.modifyVertices()
         array.uncleanSetNumRows(index.size)

@@ -37,14 +37,14 @@ class Patch:
 
 
 def merged(patches: Sequence[Patch]) -> Patch:
-    """Several patches as one, with normals of length 1 and triangles turned to where they point."""
+    """Patches merged into one, with unit normals and triangles that face along them."""
     starts = np.cumsum([0, *(len(p.vertices) for p in patches[:-1])])
     vertices = np.concatenate([p.vertices for p in patches])
     normals = np.concatenate([p.normals for p in patches])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     faces = np.concatenate([p.triangles + s for p, s in zip(patches, starts, strict=True)])
     a, b, c = (vertices[faces[:, k]] for k in range(3))
-    # The frame is left-handed, so that the cross product points the other way.
+    # The frame is left-handed, so the cross product points inwards.
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), normals[faces].sum(axis=1)) > 0
     faces[inward] = faces[inward][:, [0, 2, 1]]
     return Patch(

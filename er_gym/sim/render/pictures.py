@@ -1,4 +1,4 @@
-"""Textures with colours of their own: paintings, screens, what a window shows."""
+"""Textures with their own colours: paintings, screens, the view from a window."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _SEGMENTS = (
     "abcdefg",
     "abcdfg",
 )
-"""Which of seven segments are lit for the digits 0 to 9."""
+"""The lit segments of a seven-segment display for the digits 0 to 9."""
 
 
 def _picture(function: Painter) -> Painter:
@@ -49,7 +49,7 @@ def _picture(function: Painter) -> Painter:
 
 
 def _digit(value: int, x: float, y: float, width: float, height: float) -> Picture:
-    """The mask of a digit of seven segments; x, y: its upper left corner."""
+    """The mask of a seven-segment digit; x, y is its upper left corner."""
     left, right, top, low = x, x + width, y, y + height
     middle, pen = y + height / 2, width / 3.2
     ends = {
@@ -64,7 +64,7 @@ def _digit(value: int, x: float, y: float, width: float, height: float) -> Pictu
 def _print(
     picture: Picture, box: tuple[float, float, float, float], lines: int, colour: float = 0.4
 ) -> None:
-    """Lines of print within (left, top, right, bottom), the last one short."""
+    """Lines of print within (left, top, right, bottom); the last line is short."""
     left, top, right, bottom = box
     step = (bottom - top) / lines
     for k in range(lines):

@@ -1,7 +1,7 @@
-"""What is around a room and is no object: floor, walls, ceiling, skirting boards, a door.
+"""The shell of a room: floor, walls, ceiling, skirting boards and a door, which are no objects.
 
-All of it is lit already, darker towards its edges. Walls have one side, that towards the room: who
-looks in from outside or from above looks through them. Windows stand in holes of the walls.
+Its colours include the light, which is darker towards edges. Walls have one side, towards the room,
+so a camera outside or above looks through them. Windows stand in holes of the walls.
 """
 
 from __future__ import annotations
@@ -27,23 +27,24 @@ _SKIRTING: Colour = (0.93, 0.92, 0.89)
 _BOARD, _BOARD_DEPTH = 0.09, 0.015
 """Height and thickness of the skirting board, metres."""
 _TILED = 1.3
-"""How high up a bathroom's walls are tiled, metres."""
+"""Height up to which a bathroom's walls are tiled, metres."""
 _SEAM = 0.02
-"""How far surfaces go on behind each other, metres."""
+"""How far surfaces overlap at edges, metres."""
 _STRIDE = 1.1
-"""Between vertices in the middle of a surface, metres."""
+"""Distance between vertices in the middle of a surface, metres."""
 _NEAR_EDGES = (0.13, 0.4)
-"""Where there are more of them, metres from an edge."""
+"""Distances from an edge with additional vertices, metres."""
 _DARK, _FADES = 0.26, 0.24
-"""How much darker it is in a corner, and within how many metres that fades."""
+"""How much darker a corner is, and the distance within which that fades, metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class RoomShell:
-    """Triangles by material, in the world's frame, with the light in their colours.
+    """Lit triangles by material, in the world's frame.
 
     Attributes:
-        floor: the object of type Floor. rest: all that is no object.
+        floor: the object of type Floor.
+        rest: everything else.
     """
 
     floor: dict[str, Patch]
@@ -52,7 +53,7 @@ class RoomShell:
 
 @dataclass(frozen=True)
 class _Band:
-    """What a wall is covered with between two heights over the floor."""
+    """The covering of a wall between two heights above the floor."""
 
     low: float
     high: float
@@ -63,7 +64,7 @@ class _Band:
 
 @lru_cache(maxsize=128)
 def room_shell(scene_name: str) -> RoomShell:
-    """What surrounds a recorded scene."""
+    """The shell of a recorded scene."""
     plan, colours = floor_plan(scene_name), palette(scene_name)
     floor, rest = Mesh(), Mesh()
     material, turns = flooring(scene_name)
@@ -97,7 +98,7 @@ def _bands(kind: str, colours: Palette, height: float) -> Iterator[_Band]:
 
 
 def _ticks(low: float, high: float, more: tuple[float, ...] = ()) -> Floats:
-    """Where there are vertices from an edge to another: more of them near both."""
+    """The coordinates of vertices between two edges, closer to each other near the edges."""
     length = high - low
     found = [low, high, *(at for at in more if low < at < high)]
     if length > 3 * _NEAR_EDGES[1]:
@@ -118,7 +119,7 @@ def _level(
     material: str,
     turns: float,
 ) -> None:
-    """A floor or a ceiling, of as many rectangles as the room."""
+    """A floor or a ceiling, made of the room's fields."""
     xs, zs = (
         np.unique(np.concatenate([_ticks(a, b) for a, b in itertools.pairwise(lines.tolist())]))
         for lines in (plan.xs, plan.zs)
@@ -129,7 +130,7 @@ def _level(
     ]  # fmt: skip
     points = np.stack(np.meshgrid(xs, [height], zs, indexing="ij"), axis=-1).reshape(-1, 3)
     uv = points[:, ::2] / turns
-    if np.ptp(plan.zs) > np.ptp(plan.xs):  # boards run along the room
+    if np.ptp(plan.zs) > np.ptp(plan.xs):  # boards run along the longer side
         uv = uv[:, ::-1]
     _grid(mesh, points, uv, (0.0, up, 0.0), colour, material, kept)
 
@@ -143,7 +144,7 @@ def _grid(
     material: str,
     kept: NDArray[np.bool_],
 ) -> None:
-    """The fields (A - 1, B - 1) of a grid of points (A * B, 3) that are kept."""
+    """The fields (A - 1, B - 1) of a grid of points (A * B, 3) for which ``kept`` is true."""
     rows, columns = kept.shape
     corner = np.add.outer(np.arange(rows) * (columns + 1), np.arange(columns))[kept]
     a, b, c, d = corner, corner + 1, corner + columns + 2, corner + columns + 1
@@ -155,7 +156,8 @@ def _grid(
 
 
 def _world(wall: Wall, along: Floats, heights: Floats, depth: float = 0.0) -> Floats:
-    """(K, 3) points by how far along a wall, how high, and how far behind it they are."""
+    """(K, 3) points from their distance along a wall, their height, and their depth behind the
+    wall."""
     points = np.empty((len(along), 3))
     points[:, 2 * wall.axis] = wall.at - wall.sign * depth
     points[:, 2 - 2 * wall.axis] = along
@@ -208,7 +210,7 @@ def _ends(plan: FloorPlan, wall: Wall) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Hole:
-    """Where a wall is open: from ``left`` to ``right`` along it, ``low`` to ``high``, metres."""
+    """A hole in a wall: from ``left`` to ``right`` along it, from ``low`` to ``high``, metres."""
 
     left: float
     right: float
@@ -218,7 +220,7 @@ class _Hole:
 
 
 def _holes(plan: FloorPlan, wall: Wall) -> Iterator[_Hole]:
-    """The windows that go through a wall."""
+    """The holes for windows that go through a wall."""
     axis, along, rim = 2 * wall.axis, 2 - 2 * wall.axis, 0.004
     for low, high in plan.holes:
         front, back = (low, high) if wall.sign < 0 else (-high, -low)
@@ -236,7 +238,7 @@ def _holes(plan: FloorPlan, wall: Wall) -> Iterator[_Hole]:
 
 
 def _reveal(mesh: Mesh, wall: Wall, hole: _Hole, colour: Colour) -> None:
-    """The thickness of the wall around a hole."""
+    """The inside of a hole, as deep as the wall is thick."""
     corners = ((hole.left, hole.low), (hole.right, hole.low), (hole.right, hole.high),
                (hole.left, hole.high))  # fmt: skip
     along, height = np.mean(corners, axis=0)
@@ -256,7 +258,7 @@ def _reveal(mesh: Mesh, wall: Wall, hole: _Hole, colour: Colour) -> None:
 def _skirt(
     mesh: Mesh, plan: FloorPlan, wall: Wall, holes: tuple[_Hole, ...], entry: Doorway | None
 ) -> None:
-    """A board along the foot of a wall, but not before what reaches down to the floor."""
+    """A skirting board along a wall, with gaps at windows and doors that reach the floor."""
     gaps = [(h.left, h.right) for h in holes if h.low < plan.ground + _BOARD]
     if entry is not None and entry.wall == wall:
         gaps.append((entry.along - WIDTH / 2, entry.along + WIDTH / 2))
@@ -298,7 +300,7 @@ def _lit(mesh: Mesh, plan: FloorPlan) -> dict[str, Patch]:
 
 
 def _level_of_light(plan: FloorPlan, patch: Patch) -> NDArray[np.float32]:
-    """(V,) how light it is: as everywhere, more evenly on walls, and darker towards the edges."""
+    """(V,) brightness: more even on walls than on objects, and darker towards edges."""
     up = patch.normals[:, 1]
     level = np.where(np.abs(up) < 0.5, 0.62 + 0.5 * light(patch.normals), light(patch.normals))
     level = np.where(up < -0.5, 0.95, level)
@@ -311,9 +313,10 @@ def _level_of_light(plan: FloorPlan, patch: Patch) -> NDArray[np.float32]:
 def _distances(
     plan: FloorPlan, points: NDArray[np.float32], normals: NDArray[np.float32]
 ) -> Iterator[NDArray[np.float32]]:
-    """(V,) of points to the floor, the ceiling and each wall that they are before.
+    """(V,) distances of points to the floor, the ceiling and each wall.
 
-    Infinite where they are not, and where a surface lies along the other: it leaves it light.
+    The distance is infinite if the point is not in front of the wall, or if its surface lies along
+    the wall: that wall does not darken it.
     """
     lies_along = np.abs(normals) > 0.7
     for away in (points[:, 1] - plan.ground, plan.ceiling - points[:, 1]):

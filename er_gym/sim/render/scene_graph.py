@@ -1,10 +1,11 @@
-"""The scene graph of a room: what of it is drawn, and where.
+"""The scene graph of a room: what is drawn, and where.
 
-Nothing is drawn anew that looks as it did: a thing's triangles are kept by its look, its node by
-its look, heading and number, and of a world's objects only those are looked at that have changed.
+What looks the same as before is not made again. Triangles are cached by appearance, nodes by
+appearance, heading and number. Only objects that have changed are updated.
 
-Yet a picture depends on the world alone, whatever was drawn before. Of surfaces at the same depth
-the one drawn first is seen: the room's, then the objects', in an order that they themselves say.
+Even so, a picture depends on the world alone and not on what was drawn before. Of surfaces at the
+same depth the one drawn first is seen. So the order of drawing is fixed: first the room, then the
+objects in an order of their own.
 """
 
 from __future__ import annotations
@@ -34,18 +35,18 @@ from er_gym.sim.world import World
 from er_gym.sim.world_cache import CacheKey
 
 _SCENES = 64
-"""Rooms whose graphs are kept."""
+"""Rooms whose scene graphs are kept."""
 _SHOWN: CacheKey[object] = CacheKey("state that a scene graph shows")
 _NODES = 2048
 _BEFORE = 8
-"""What is no object is drawn before what is: the order of that begins here, below zero."""
+"""Everything that is no object is drawn first: its numbers in the order begin this far below 0."""
 _HEADING = 1.0
-"""Things are lit as if they stood at a multiple of so many degrees."""
+"""Headings are rounded to a multiple of this for lighting, degrees."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """An object in the graph, and what it was placed by."""
+    """An object in the graph, and the state that it was drawn in."""
 
     appearance: Appearance
     solid: Solid
@@ -54,24 +55,24 @@ class _Placed:
 
 
 class SceneGraph:
-    """The graph of one scene; use :func:`scene_graph_of`."""
+    """The scene graph of one scene; use :func:`scene_graph_of`."""
 
     def __init__(self, scene_name: str) -> None:
         self._name = scene_name
         self._build()
-        self._state: object | None = object()  # whose world it shows; None while it changes
+        self._state: object | None = object()  # the state that it shows; None while it changes
 
     def draw(self, world: World, camera: Camera, depth: bool = False) -> Frames:
-        """What a camera sees of a world of this scene; object i is instance i + 1.
+        """The images of a camera in a world of this scene; object i is instance i + 1.
 
-        Several threads may draw at once; they take turns.
+        Several threads may call this at once; they take turns.
         """
         with DRAWING:
             self._follow(world)
             return rasteriser().draw(self._root, camera, depth)
 
     def _build(self) -> None:
-        """The room without its objects."""
+        """Build the room without its objects."""
         self._root = core().NodePath(self._name)
         self._placed: dict[int, _Placed] = {}
         shell = room_shell(self._name)
@@ -81,12 +82,12 @@ class SceneGraph:
         self._floor, self._floor_number = shell.floor, -1
 
     def _follow(self, world: World) -> None:
-        """Change what has changed in the world."""
+        """Update everything that has changed in the world."""
         before, self._state = self._state, None
-        if before is None:  # an exception left it half changed
+        if before is None:  # an exception left it half updated
             self._build()
         elif world.cache.state.get(_SHOWN) is before:
-            for i in world.in_hand:  # nothing has changed, but where the hand is
+            for i in world.in_hand:  # nothing but the hand has moved
                 if i in self._placed:
                     self._place(world, i, self._placed[i].order)
             self._state = before
@@ -121,8 +122,8 @@ class SceneGraph:
             path = before.path
         else:
             self._remove(i)
-            number = i + 1 if i < MOST_INSTANCES else 0  # copies without end have no instance
-            # A copy, with the same triangles: where it stands is a property of the node.
+            number = i + 1 if i < MOST_INSTANCES else 0  # there may be more copies than instances
+            # A copy shares the triangles, and its place is a property of the node.
             path = self._root.attachNewNode(_node(seen, heading, number).makeCopy(), order)
         x, y, z = solid.middle.tolist()
         path.setPosHpr(x, z, y + float(solid.upright[:, 0, 1].min()), -solid.yaw, 0.0, 0.0)
@@ -130,9 +131,9 @@ class SceneGraph:
 
 
 def _order(world: World) -> list[int]:
-    """Which objects are drawn first: the recorded ones by row, then the others by name.
+    """The order of drawing: recorded objects by row, then the others by name.
 
-    In which rows slices and copies are depends on what was made first.
+    The rows of slices and copies depend on which were made first.
     """
     recorded = len(world.scene)
     others = sorted(range(recorded, len(world)), key=lambda i: world.names[i])
@@ -145,7 +146,7 @@ def _heading(solid: Solid) -> float:
 
 
 def _drawn(patches: dict[str, Patch], number: int, name: str) -> Any:
-    """A node of triangles that are lit already."""
+    """A node of lit triangles."""
     parts = [(m, p.vertices, p.colours, p.uv, p.triangles) for m, p in patches.items()]
     return geometry(parts, number, name)
 
@@ -165,6 +166,6 @@ def _scene_graph(scene_name: str) -> SceneGraph:
 
 
 def scene_graph_of(scene_name: str) -> SceneGraph:
-    """The graph of a scene; those of the scenes last drawn are kept."""
-    with DRAWING:  # or two threads would make two
+    """The scene graph of a scene; those of recently drawn scenes are kept."""
+    with DRAWING:  # otherwise two threads could make two
         return _scene_graph(scene_name)

@@ -1,6 +1,6 @@
-"""Where a kitchen's stove stands: worked out from its burners, its knobs and what is beside them.
+"""The layout of a kitchen's stove, from its burners, its knobs and the objects beside it.
 
-A stove's frame: x to its right, y up from the floor, z to its front; its origin is on the floor
+A stove's frame: x to its right, y up from the floor, z to its front. Its origin is on the floor
 under the middle of its burners.
 """
 
@@ -25,42 +25,42 @@ Floats = NDArray[np.float64]
 Ends = tuple[float, float]
 
 _UNDER = 0.004
-"""From a burner down to the cooktop, and from a knob back to its panel, metres."""
+"""Distance from a burner down to the cooktop, and from a knob back to its panel, metres."""
 _MARGIN = 0.05
 """How much larger than its burners a cooktop is, metres."""
 _SNUG = 0.012
-"""The least that it is larger, whatever stands beside it, metres."""
+"""The same, at least, if something stands beside it, metres."""
 _JOIN = 0.17
-"""A counter that is nearer to the burners stands right beside the stove, metres."""
+"""A counter that is nearer to the burners than this touches the stove, metres."""
 _TO_WALL = 0.3
-"""So near to a wall, it stands at the wall, metres."""
+"""A stove that is nearer to a wall than this touches the wall, metres."""
 _CLEAR = 0.22
-"""From where one can stand to its door, metres."""
+"""Distance from the stove's door to where the agent can stand, metres."""
 _LOW = 0.5
-"""There is no oven under a lower cooktop, metres."""
+"""A lower cooktop has no oven, metres."""
 LEAN = 0.045
-"""How far down and forward a slope reaches from its middle, metres."""
+"""How far a sloping panel extends down and forward from its middle, metres."""
 _BESIDE = frozenset({"CounterTop", "Cabinet", "Drawer", "Fridge"})
 _BELOW = frozenset({"Cabinet", "Drawer"})
 
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """Low and high corners (3,) of something, in the frame of the stove."""
+    """Low and high corners (3,) of a box in the stove's frame."""
 
     low: Floats
     high: Floats
     kind: str = ""
     surface: float = 0.0
-    """How high it is drawn, if it is a counter."""
+    """Height at which a counter is drawn."""
 
     def share_over(self, other: Box, least: float = 0.0) -> float:
-        """Seen from above, the share of this box that is over another and ``least`` inside it."""
+        """Seen from above, the share of this box over another one and ``least`` inside it."""
         span = np.minimum(self.high, other.high) - np.maximum(self.low, other.low) - least
         return float(np.prod(np.maximum(span, 0.0)[::2] / (self.high - self.low)[::2]))
 
     def with_front(self, z: float) -> Box:
-        """The box that reaches farther or less far to the front."""
+        """The same box with its front at another z."""
         return Box(self.low, np.array([*self.high[:2], z]), self.kind)
 
 
@@ -78,7 +78,7 @@ class StoveFrame:
 
     @property
     def across(self) -> bool:
-        """Whether it stands across a corner."""
+        """Whether the stove stands across a corner."""
         return self.yaw % 90.0 != 0.0
 
     def local(self, points: Floats) -> Floats:
@@ -87,7 +87,7 @@ class StoveFrame:
         return found
 
     def box(self, low: Floats, high: Floats, kind: str = "", surface: float = 0.0) -> Box:
-        """A box of the world; what is of the stove itself is turned as it is."""
+        """A box of the world in this frame. Burners and knobs are turned as the stove is."""
         half = (high - low) / 2 @ np.abs(self.turn)
         half[::2] *= 0.5 if self.across and not kind else 1.0
         middle = self.local((low + high) / 2)
@@ -95,7 +95,10 @@ class StoveFrame:
 
     @staticmethod
     def of(world: World) -> StoveFrame:
-        """The front is where one can stand nearest; the row of the knobs runs along it."""
+        """The frame of a kitchen's stove.
+
+        Its front faces the nearest position of the agent, and the row of knobs runs along it.
+        """
         burners, knobs = list(world.of_type("StoveBurner")), list(world.of_type("StoveKnob"))
         origin = (world.low[burners].min(axis=0) + world.high[burners].max(axis=0)) / 2
         origin[1] = world.high[next(world.of_type("Floor")), 1]
@@ -112,15 +115,18 @@ class StoveFrame:
 
 @dataclass(frozen=True, eq=False)
 class StoveLayout:
-    """Where a stove is, and what is about it, in its frame.
+    """A stove and its surroundings, in its frame.
 
     Attributes:
-        burners, knobs: of each its box. fire, row: the boxes around them.
-        bearing: which part bears the knobs; "slope" is a front that leans back.
-        top: height of the cooktop. left, right, back, front: its ends.
-        pierced: it has holes for the burners, which lie deeper.
-        inner: left and right ends of the case under it, None if there is no room for one.
-        counter: what it is let into. gap: (K, 2) x and z of what is empty in the corner behind.
+        burners, knobs: their boxes.
+        fire, row: the boxes around all burners and all knobs.
+        bearing: the part that carries the knobs; "slope" is a front that leans back.
+        top: height of the cooktop.
+        pierced: whether the cooktop has holes for burners that lie deeper.
+        left, right, back, front: ends of the cooktop.
+        inner: left and right end of the case under it, None if there is no room for one.
+        counter: the counter that it is let into, None if it stands alone.
+        gap: (K, 2) x and z of the empty corner behind it.
     """
 
     burners: list[Box]
@@ -140,7 +146,7 @@ class StoveLayout:
 
 
 def stove_layout(world: World, frame: StoveFrame) -> StoveLayout:
-    """The stove of a kitchen, between what stands beside it."""
+    """The layout of a kitchen's stove between the objects beside it."""
     burners, knobs = (
         [frame.box(world.low[i], world.high[i]) for i in world.of_type(kind)]
         for kind in ("StoveBurner", "StoveKnob")
@@ -164,10 +170,10 @@ def stove_layout(world: World, frame: StoveFrame) -> StoveLayout:
     places = frame.local(np.insert(world.scene.reachable, 1, 0.0, axis=1))
     near = places[(np.abs(places[:, 0]) < 0.6) & (places[:, 2] > fire.high[2]), 2]
     limit = float(near.min(initial=9.0)) - _CLEAR
-    # Who stands across a corner has drawers to both sides, just below the cooktop.
+    # A stove across a corner has drawers on both sides, just below the cooktop.
     inner = _SNUG if frame.across else _MARGIN
     ends = [_end(fire, row, [] if counter else beside, sign, inner) for sign in (-1, 1)]
-    # An oven reaches to the front of the counter that the cooktop is let into.
+    # An oven extends to the front of the counter that the cooktop is let into.
     deep = fire if counter is None else fire.with_front(float(counter.high[2]))
     taken = any(b.kind in _BELOW and b.low[1] < top and deep.share_over(b, 0.02) for b in about)
     return StoveLayout(
@@ -195,7 +201,7 @@ def _around(boxes: list[Box]) -> Box:
 
 
 def _about(world: World, frame: StoveFrame) -> Iterator[Box]:
-    """What stands near and is no part of the stove."""
+    """The boxes of fixed objects that are not part of the stove."""
     for i, kind in enumerate(world.types):
         if kind in ("StoveBurner", "StoveKnob", "Floor") or world.has(i, "pickupable"):
             continue
@@ -212,7 +218,7 @@ def _about(world: World, frame: StoveFrame) -> Iterator[Box]:
 
 
 def _bearing(world: World, fire: Box, row: Box) -> Literal["top", "slope", "front", "back"]:
-    """Which part of the stove bears the knobs, by how they are turned."""
+    """The part of the stove that carries the knobs, from how they are turned."""
     first = next(world.of_type("StoveKnob"))
     rise = abs(float((unity_rotation(world.rotation[first]) @ (0.0, 1.0, 0.0))[1]))
     if rise > 0.9:
@@ -223,7 +229,7 @@ def _bearing(world: World, fire: Box, row: Box) -> Literal["top", "slope", "fron
 
 
 def _front(fire: Box, row: Box, bearing: str, edges: list[float]) -> float:
-    """How far to its front a stove reaches: as far as the counters beside it, if it can."""
+    """The z of a stove's front: that of the counters beside it, if possible."""
     if bearing == "slope":
         return slope(row)[1] + LEAN
     if bearing == "front":
@@ -233,14 +239,14 @@ def _front(fire: Box, row: Box, bearing: str, edges: list[float]) -> float:
 
 
 def slope(row: Box) -> tuple[float, float]:
-    """Height and z of a point of the panel that knobs which lean back are on."""
+    """Height and z of a point on a sloping panel, from the row of knobs on it."""
     y, z = ((row.low + row.high)[1:] / 2).tolist()
     behind = (0.25 * float(row.high[1] - row.low[1]) + _UNDER) * 0.5**0.5
     return y - behind, z - behind
 
 
 def _back(wall: float, fire: Box, row: Box, bearing: str, counter: Box | None) -> float:
-    """How far back a cooktop reaches: to the wall if one is near, to the guard if there is one."""
+    """The z of a cooktop's back: at a near wall, or at the guard if there is one."""
     if bearing == "back":
         return float(row.low[2]) - _UNDER
     if counter is None and fire.low[2] - _TO_WALL < wall < fire.low[2]:
@@ -262,9 +268,9 @@ def _wall(scene_name: str, frame: StoveFrame) -> float:
 
 
 def _end(fire: Box, row: Box, beside: list[Box], sign: int, inner: float) -> tuple[float, float]:
-    """The ends to one side of the cooktop and of the case under it.
+    """The ends on one side, of the cooktop and of the case under it.
 
-    They reach to what stands beside them, or a little over the burners if nothing does.
+    They touch the objects beside them, or extend a little beyond the burners if there are none.
     """
 
     def out(box: Box, side: int) -> float:
@@ -284,7 +290,7 @@ def _end(fire: Box, row: Box, beside: list[Box], sign: int, inner: float) -> tup
 
 
 def _gap(world: World, frame: StoveFrame) -> Floats:
-    """(3, 2) the corner of the room behind a stove that stands across it, and along its walls."""
+    """(3, 2) the corner of the room behind a stove across it, and points on its two walls."""
     plan = floor_plan(world.scene.name)
     behind = frame.turn[[0, 2], 2] < 0.0
     corner = np.where(behind, (plan.xs[-1], plan.zs[-1]), (plan.xs[0], plan.zs[0]))

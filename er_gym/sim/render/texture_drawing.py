@@ -1,7 +1,7 @@
-"""What textures are drawn with: noise that tiles, and soft shapes on a square.
+"""The tools that textures are drawn with: noise that tiles, and soft shapes on a square.
 
-A square is (SIDE, SIDE); x goes from 0 at its left to 1 at its right, y from 0 at its top to 1 at
-its bottom. A mask is 1 within a shape, 0 outside, and in between on its edge.
+A square is (SIDE, SIDE). x goes from 0 at its left to 1 at its right, y from 0 at its top to 1 at
+its bottom. A mask is 1 inside a shape, 0 outside, and in between on its edge.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ def noise(random: np.random.Generator, cells: int, octaves: int = 1) -> Picture:
 
 
 def between(low: float, high: float, picture: Picture) -> Picture:
-    """What goes from 0 to 1 made to go from ``low`` to ``high``."""
+    """Values from 0 to 1, scaled to the range from ``low`` to ``high``."""
     return low + (high - low) * picture
 
 
 def stretched(picture: Picture) -> Picture:
-    """Any numbers made to go from 0 to 1."""
+    """Any values, scaled to the range from 0 to 1."""
     return np.asarray((picture - picture.min()) / (np.ptp(picture) or 1.0))
 
 
@@ -48,17 +48,17 @@ def stretched(picture: Picture) -> Picture:
 
 
 def soft(inside: Picture) -> Picture:
-    """The mask of where a distance is above 0."""
+    """The mask of the area where a signed distance is positive."""
     return np.asarray(np.clip(inside * SIDE + 0.5, 0.0, 1.0))
 
 
 def oval(x: float, y: float, radius: float, tall: float = 1.0) -> Picture:
-    """An ellipse; ``tall``: its height for its width."""
+    """An ellipse; ``tall`` is its height divided by its width."""
     return soft(radius - np.hypot(X - x, (Y - y) / tall))
 
 
 def ring(x: float, y: float, radius: float, width: float) -> Picture:
-    """A circle drawn with a pen."""
+    """A circle line."""
     return soft(width / 2 - np.abs(np.hypot(X - x, Y - y) - radius))
 
 
@@ -68,7 +68,7 @@ def rectangle(left: float, top: float, right: float, bottom: float) -> Picture:
 
 
 def line(ends: Iterable[float], width: float) -> Picture:
-    """A stroke from (x, y) to (x, y), round at its ends."""
+    """A line from (x, y) to (x, y) with round ends."""
     x0, y0, x1, y1 = ends
     dx, dy = x1 - x0, y1 - y0
     along = np.clip(((X - x0) * dx + (Y - y0) * dy) / max(dx * dx + dy * dy, 1e-9), 0.0, 1.0)
@@ -76,14 +76,14 @@ def line(ends: Iterable[float], width: float) -> Picture:
 
 
 def leaf(x: float, y: float, size: tuple[float, float], turn: float) -> Picture:
-    """An ellipse of a length and width, turned by some radians."""
+    """An ellipse with a length and a width, turned by an angle in radians."""
     c, s = np.cos(turn), np.sin(turn)
     along, aside = (X - x) * c + (Y - y) * s, (Y - y) * c - (X - x) * s
     return soft((1 - np.hypot(along / size[0], aside / size[1])) * min(size))
 
 
 def polygon(*corners: tuple[float, float]) -> Picture:
-    """A convex polygon; its corners clockwise as one looks at it."""
+    """A convex polygon; its corners go clockwise as seen."""
     inside = np.full((SIDE, SIDE), np.inf)
     for (x0, y0), (x1, y1) in zip(corners, (*corners[1:], corners[0]), strict=True):
         length = max(float(np.hypot(x1 - x0, y1 - y0)), 1e-9)
@@ -92,7 +92,7 @@ def polygon(*corners: tuple[float, float]) -> Picture:
 
 
 def below(curve: ArrayLike) -> Picture:
-    """What lies under a height (a number, (S,) or (S, S))."""
+    """The area below a height (a number, (S,) or (S, S))."""
     return soft(Y - np.asarray(curve))
 
 
@@ -120,5 +120,5 @@ def fade(top: ArrayLike, bottom: ArrayLike) -> Picture:
 
 
 def paint(picture: Picture, mask: Picture, colour: ArrayLike, strength: float = 1.0) -> None:
-    """Lay a colour (or another picture) on a picture where a mask says."""
+    """Paint a colour, or another picture, onto a picture where a mask is set."""
     picture += strength * mask[..., None] * (np.asarray(colour) - picture)

@@ -1,7 +1,7 @@
-"""Textures, made of noise and arithmetic: (128, 128, 3) uint8, multiplied with a colour.
+"""Textures made of noise and arithmetic: (128, 128, 3) uint8, multiplied with a colour.
 
-Those of surfaces are nearly white and tile; those of :mod:`er_gym.sim.render.pictures` have colours
-of their own, to be drawn in white.
+Textures of surfaces are nearly white and tile. Those of :mod:`er_gym.sim.render.pictures` have
+their own colours and are drawn on white.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from er_gym.sim.render.texture_drawing import (
 )
 
 SURFACES: dict[str, Painter] = {}
-"""Nearly white; they tile."""
+"""Textures of surfaces: they are nearly white, and they tile."""
 
 
 def _surface(function: Painter) -> Painter:
@@ -47,7 +47,7 @@ def texture(name: str) -> NDArray[np.uint8]:
 
 
 def _rows(values: NDArray[np.float64], count: int) -> Picture:
-    """(S, 1) each of some values on as many rows."""
+    """(S, 1) values, each repeated on the same number of rows."""
     return np.repeat(values, SIDE // count)[:, None]
 
 
@@ -168,14 +168,14 @@ def metal(random: np.random.Generator) -> Picture:
 
 @_surface
 def cardboard(random: np.random.Generator) -> Picture:
-    """Fibres, and the ridges of what is pasted in between."""
+    """Fibres, and the ridges of a corrugated layer."""
     ridges = 0.5 + 0.5 * np.sin(32 * np.pi * X)
     return between(0.86, 1.0, stretched(0.35 * ridges + noise(random, 8, 4)))
 
 
 @_surface
 def wicker(random: np.random.Generator) -> Picture:
-    """Withes over and under upright stakes."""
+    """Wicker rods over and under upright stakes."""
     column, row = np.floor(X * 8), np.floor(Y * 16)
     over = (column + row) % 2 == 0
     bulge = np.where(over, np.abs(np.sin(np.pi * X * 8)) ** 0.7, 0.55)

@@ -1,4 +1,4 @@
-"""What the cameras show, as an AI2-THOR event has it."""
+"""The images of all cameras, as an AI2-THOR event has them."""
 
 from __future__ import annotations
 
@@ -23,19 +23,20 @@ _FLAGS = {
     "renderInstanceSegmentation": "render_instances",
     "renderSemanticSegmentation": "render_classes",
 }
-"""Arguments that any action may carry, and the settings that they switch on for that one step."""
+"""Arguments of any action that switch on a setting for this one step."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Pictures from a camera, top row first; read-only, for they may be handed out again.
+    """The images of a camera, top row first. They are read-only, because they may be returned
+    again.
 
     Attributes:
         rgb: (H, W, 3) uint8.
-        depth: (H, W) float32 metres along the line of view, None unless asked for.
+        depth: (H, W) float32 metres along the view axis, None unless asked for.
         instances: (H, W, 3) uint8 colours as in the metadata's ``colors``, None unless asked for.
         classes: the same with one colour for each object type.
-        third_party: what the cameras show that are not the agent's, in the order of their numbers.
+        third_party: the views of the third-party cameras, in the order of their numbers.
     """
 
     rgb: NDArray[np.uint8]
@@ -47,7 +48,7 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """A view, and what it was drawn from besides what ``World.changed`` speaks of."""
+    """A view and the parts of the world that it shows, besides the state of the objects."""
 
     agent: Agent
     settings: Settings
@@ -55,7 +56,7 @@ class _Kept:
     view: View
 
     def shows(self, world: World) -> bool:
-        # An agent is replaced as a whole when it moves, and what it holds moves only with it.
+        # A moving agent is replaced as a whole, and the held object moves only with it.
         same = self.agent is world.agent and self.settings == world.settings
         return same and self.cameras == world.cameras
 
@@ -64,7 +65,8 @@ _VIEW: CacheKey[_Kept] = CacheKey("view")
 
 
 def with_flags(settings: Settings, request: Mapping[str, Any]) -> Settings:
-    """The settings, with the pictures that one action asks for besides those of ``Initialize``."""
+    """The settings, with the images that one action asks for in addition to those of
+    ``Initialize``."""
     wanted = {name: True for flag, name in _FLAGS.items() if request.get(flag) is True}
     return replace(settings, **wanted) if wanted else settings
 
@@ -72,7 +74,7 @@ def with_flags(settings: Settings, request: Mapping[str, Any]) -> Settings:
 def draw(world: World) -> View:
     """Draw the world as the agent and the third-party cameras see it now.
 
-    What was drawn last is handed out again while nothing has changed.
+    The last view is returned again as long as nothing has changed.
     """
     kept = world.cache.state.get(_VIEW)
     if kept is not None and kept.shows(world):
@@ -84,7 +86,7 @@ def draw(world: World) -> View:
 
 
 def object_at(world: World, x: float, y: float) -> str | None:
-    """The id of the object that the agent sees at a point of its picture, None for the room.
+    """The id of the object at a point of the agent's picture, None for the room.
 
     Args:
         x, y: 0 to 1, from the left and from the top.
@@ -112,7 +114,7 @@ def _draw(world: World, camera: Camera) -> View:
     view = View(
         frames.rgb,
         frames.depth,
-        # As in AI2-THOR: the client cuts the masks of classes out of this one.
+        # As in AI2-THOR, the client cuts the masks of classes from the instance image.
         _colored(frames, world.object_ids) if settings.draws_colors else None,
         _colored(frames, world.types) if settings.render_classes else None,
     )
@@ -123,12 +125,14 @@ def _draw(world: World, camera: Camera) -> View:
 
 
 def _frames(world: World, camera: Camera, depth: bool = False) -> Frames:
-    from er_gym.sim.render.scene_graph import scene_graph_of  # late: most worlds are never drawn
+    from er_gym.sim.render.scene_graph import (
+        scene_graph_of,
+    )  # most worlds are never drawn
 
     return scene_graph_of(world.scene.name).draw(world, camera, depth)
 
 
 def _colored(frames: Frames, names: Sequence[str]) -> NDArray[np.uint8]:
-    """(H, W, 3) the colour that stands for the name of what is seen, black for the room."""
+    """(H, W, 3) the colour of each pixel's object or type, black for the room."""
     palette = np.array([(0, 0, 0), *map(instance_color, names)], dtype=np.uint8)
     return palette[frames.ids]

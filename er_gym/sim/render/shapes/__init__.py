@@ -1,8 +1,8 @@
-"""What things look like: one file a family, one short function a shape.
+"""The shapes of objects: one file for each family, one short function for each shape.
 
-A shape is a function from a :class:`~er_gym.sim.render.appearance.Appearance` to a
-:class:`~er_gym.sim.render.mesh.Mesh` that fills the look's size, registered for one object type or
-several. :data:`SHAPES` is the table.
+A shape is a function from an :class:`~er_gym.sim.render.appearance.Appearance` to a
+:class:`~er_gym.sim.render.mesh.Mesh` of the appearance's size. It is registered for one or several
+object types in the table :data:`SHAPES`.
 """
 
 from er_gym.sim.render.shapes import (  # noqa: F401  (each registers its shapes)

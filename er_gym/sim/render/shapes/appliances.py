@@ -1,4 +1,4 @@
-"""Kitchen machines and the stove."""
+"""Kitchen appliances and the burners and knobs of stoves."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _COFFEE, _JUG, _IRON, _COIL = (
 )
 _WATER = (0.30, 0.58, 0.88)
 _OPEN = 100.0
-"""How far a door opens, degrees."""
+"""Angle of an open door, degrees."""
 
 
 def _hollow(
@@ -67,7 +67,7 @@ def _hollow(
 
 @shape("Fridge")
 def fridge(appearance: Appearance) -> Mesh:
-    """Tall and pale: a small door above a big one, each with a bar; white, with shelves, inside."""
+    """Tall and pale: a small door above a big one, with handles; white with shelves inside."""
     w, h, d = appearance.size
     mesh, colour = Mesh(), appearance.pick(*_FRIDGES)
     door, bar = 0.07, 0.05
@@ -91,7 +91,7 @@ def fridge(appearance: Appearance) -> Mesh:
 
 
 def _seam(appearance: Appearance) -> float:
-    """Where the freezer begins: not where the record shows things standing."""
+    """Height at which the freezer begins, away from recorded objects."""
     h, standing = appearance.size[1], appearance.surface
     seam = 0.67 * h
     if standing is None or standing < seam - 0.3:
@@ -100,7 +100,7 @@ def _seam(appearance: Appearance) -> float:
 
 
 def _shelves(mesh: Mesh, appearance: Appearance, front: float, seam: float) -> None:
-    """Boards below the freezer, one where the record shows things standing."""
+    """Boards below the freezer, one of them where the record shows objects."""
     w, _, d = appearance.size
     levels, standing = [seam * share for share in (0.28, 0.52, 0.76)], appearance.surface or 0.0
     if 0.1 < standing < seam - 0.05:
@@ -113,7 +113,7 @@ def _shelves(mesh: Mesh, appearance: Appearance, front: float, seam: float) -> N
 def _fridge_door(
     w: float, span: tuple[float, float], depths: tuple[float, float, float], colour: Colour, k: int
 ) -> Mesh:
-    """A door with its bar at the left; its lining has racks."""
+    """A door with a handle at the left; its lining has racks."""
     (low, high), (front, door, bar) = span, depths
     leaf, tall = Mesh(), span[1] - span[0]
     middle = (low + high) / 2
@@ -142,7 +142,7 @@ def microwave(appearance: Appearance) -> Mesh:
     mesh, colour = Mesh(), appearance.pick(*_CASES)
     dark = sum(colour) < 1.2
     front, door = d / 2 - 0.05, 0.03
-    split = -0.22 * w  # between the door and the keys
+    split = -0.22 * w  # gap between the door and the keys
     if appearance.openness > 0:
         inside = _LIT if appearance.on else (0.86, 0.84, 0.78)
         _hollow(mesh, (split, 0.0, -d / 2), (w / 2, h, front), colour, inside, 0.03)
@@ -167,7 +167,7 @@ def _window(
     door: float,
     colour: Colour,
 ) -> None:
-    """The door of the microwave with its handle; lit from behind while it works."""
+    """The door of the microwave with its handle; lit from behind while it is on."""
     h, (low, high) = appearance.size[1], span
     x, wide = (low + high) / 2, high - low
     leaf.box((x, h / 2, front + door / 2), (wide - 0.004, 0.98 * h, door), colour)
@@ -202,7 +202,7 @@ def _keys(
 
 @shape("Toaster")
 def toaster(appearance: Appearance) -> Mesh:
-    """A rounded long case with two slots on top and a lever at its end; on: they glow."""
+    """A long rounded case with two slots on top and a lever; the slots glow while it is on."""
     length, h, breadth = max(appearance.size[::2]), appearance.size[1], min(appearance.size[::2])
     mesh, colour = Mesh(), appearance.pick(*_TOASTERS)
     body, foot = length - 0.035, 0.10 * h
@@ -228,7 +228,7 @@ def toaster(appearance: Appearance) -> Mesh:
 
 @shape("CoffeeMachine")
 def coffee_machine(appearance: Appearance) -> Mesh:
-    """A dark bracket with a jug at its left and room for a mug; on: a red lamp and coffee."""
+    """A dark frame with a jug and room for a mug; a red lamp and coffee while it is on."""
     w, h, d = appearance.size
     mesh, colour = Mesh(), appearance.pick(_DARK, (0.20, 0.19, 0.20), (0.24, 0.14, 0.13))
     base = max(0.02, (appearance.surface or 0.02) - 0.004)
@@ -279,7 +279,7 @@ def _jug(mesh: Mesh, appearance: Appearance, r: float, h: float) -> None:
 
 @shape("StoveBurner")
 def stove_burner(appearance: Appearance) -> Mesh:
-    """An iron grate over a gas burner, or rings if it is flat; on: blue flames or a red glow."""
+    """An iron grate over a gas burner, or flat rings; blue flames or a red glow while on."""
     return _grate(appearance) if appearance.size[1] > 0.015 else _rings(appearance)
 
 
@@ -334,7 +334,7 @@ def _flames(mesh: Mesh, r: float, h: float) -> None:
 def stove_knob(appearance: Appearance) -> Mesh:
     """A round knob with a ridge and a mark, upright when off and level with a red mark when on."""
     face = np.array(appearance.face or (0.0, 0.0, 1.0))
-    # Along each axis its box is as long as what is seen of its disc and of its axle.
+    # Along each axis, its box is as long as the visible part of its disc and its axle.
     spans = np.stack([np.sqrt(1.0 - face**2), np.abs(face)], axis=1)
     (wide, thick), *_ = np.linalg.lstsq(spans, np.array(appearance.size))
     wide, thick = max(wide, 0.01), max(thick, 0.2 * wide)
@@ -347,7 +347,7 @@ def stove_knob(appearance: Appearance) -> Mesh:
 
 
 def _knob(appearance: Appearance, r: float, thick: float) -> Mesh:
-    """The knob on its back, which lies at z = 0."""
+    """The knob, lying on its back at z = 0."""
     knob, turned = Mesh(), Mesh()
     knob.cylinder((0, 0, 0.1 * thick), r, 0.2 * thick, _STEEL, axis="z", segments=14)
     knob.cylinder((0, 0, 0.4 * thick), 0.86 * r, 0.5 * thick, _DARK, top=0.76 * r, axis="z")
@@ -360,7 +360,7 @@ def _knob(appearance: Appearance, r: float, thick: float) -> Mesh:
 
 @shape("Kettle")
 def kettle(appearance: Appearance) -> Mesh:
-    """A squat body, a spout to the front, an arched handle over a lid."""
+    """A squat body with a spout to the front and an arched handle over a lid."""
     w, h, d = appearance.size
     mesh, colour = Mesh(), appearance.palette.accent
     r = min(w / 2, 0.40 * d)

@@ -1,4 +1,4 @@
-"""What is plumbed in: sinks, faucets, toilets, tubs, showers."""
+"""Sinks, faucets, toilets, bathtubs and showers."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _WATER, _STREAM = (0.45, 0.68, 0.84), (0.62, 0.84, 1.0)
 _ROUND, _SQUARE = 2.0, 5.0
 """Exponents of outlines: an ellipse, and a rectangle with round corners."""
 _CORNERS = {"FloorPlan403": (1, -1), "FloorPlan418": (-1, -1), "FloorPlan423": (-1, 1)}
-"""At which sides (of x and z) glass goes round a corner, where it is not at the positive ones."""
+"""Sides (of x and z) at which glass goes round a corner, if they are not the positive ones."""
 Area = tuple[float, float, float, float]
-"""x and z of a middle, width and depth."""
+"""x and z of the middle, width and depth, metres."""
 Ring = tuple[float, float, float]
-"""Width and depth of an outline, and its height."""
+"""Width and depth of an outline, and its height, metres."""
 
 
 def outline(
     ring: Ring, power: float, at: tuple[float, float] = (0.0, 0.0), segments: int = 20
 ) -> NDArray[np.float64]:
-    """(K, 3) a level ring between an ellipse and a rectangle about an x and a z."""
+    """(K, 3) a level ring around an x and a z, between an ellipse and a rectangle."""
     w, d, y = ring
     angle = (np.arange(segments) + 0.5) / segments * 2 * pi
     c, s = np.cos(angle), np.sin(angle)
@@ -48,7 +48,7 @@ def vessel(
     z: float = 0.0,
     segments: int = 20,
 ) -> None:
-    """What rings make that go up at the outside and down at the inside."""
+    """A vessel made of rings that go up at the outside and down at the inside."""
     mesh.skin([outline(ring, power, (0.0, z), segments) for ring in rings], colour)
 
 
@@ -57,7 +57,7 @@ def _ceramic(appearance: Appearance) -> bool:
 
 
 def _place(appearance: Appearance, most: tuple[float, float]) -> tuple[Area, float] | None:
-    """Where in it the basin is, at most so wide and deep, and its top; None where not known."""
+    """The area of the basin, at most this wide and deep, and its top; None if unknown."""
     for kind, (low, high) in appearance.built_in:
         if kind == f"{appearance.kind}Basin":
             w, d = min(high[0] - low[0], most[0]), min(high[2] - low[2], most[1])
@@ -80,7 +80,7 @@ def sink(appearance: Appearance) -> Mesh:
     if max(abs(x) / w, abs(z) / d) < 0.12 or max(wide / w, deep / d) > 0.9:
         _let_in(mesh, appearance, whole, place[0], top)
         return mesh
-    for side in (1, -1):  # two bowls, of which one is an object
+    for side in (1, -1):  # two bowls, one of which is an object
         known = top if side > 0 else None
         if abs(x) / w > abs(z) / d:
             half = (side * np.sign(x) * w / 4, 0.0, w / 2, d)
@@ -92,7 +92,7 @@ def sink(appearance: Appearance) -> Mesh:
 
 
 def _let_in(mesh: Mesh, appearance: Appearance, area: Area, hole: Area, top: float | None) -> None:
-    """A rim with a hole over a basin with that top, or with its own hollow where None."""
+    """A rim with a hole over a basin with this top, or with a hollow of its own if it is None."""
     h, whole = appearance.size[1], area[2:] == (appearance.size[0], appearance.size[2])
     colour = _CERAMIC if _ceramic(appearance) else _STEEL
     rim = min(0.02, 0.15 * h)
@@ -191,7 +191,7 @@ def bathtub(appearance: Appearance) -> Mesh:
 
 
 def _stream(mesh: Mesh, at: tuple[float, float, float], length: float, radius: float) -> None:
-    """Water that falls, light blue."""
+    """Falling water, light blue."""
     x, y, z = at
     line = [(radius, y - length), (0.7 * radius, y - 0.6 * length), (radius, y), (0.0, y)]
     mesh.lathe(line, _STREAM, "glowing", at=(x, 0.0, z), segments=7)
@@ -302,7 +302,7 @@ def _glazed(appearance: Appearance, w: float, h: float, d: float) -> Mesh:
 
 @shape("ShowerDoor")
 def shower_door(appearance: Appearance) -> Mesh:
-    """A tall glass door in a metal frame, with a long handle; hinged at a side."""
+    """A tall glass door in a metal frame, with a long handle and hinges at one side."""
     w, h, d, along_z = across(appearance)
     thick = min(d, 0.06)
     leaf, mesh = _glazed(appearance, w, h, thick), Mesh()
@@ -333,7 +333,7 @@ def shower_glass(appearance: Appearance) -> Mesh:
 
 @shape("ShowerHead")
 def shower_head(appearance: Appearance) -> Mesh:
-    """A broad rose on a tall rail, with a hose and a mixer."""
+    """A broad shower head on a tall rail, with a hose and a mixer."""
     w, h, d = appearance.size
     mesh, metal = Mesh(), mixed(_CHROME, appearance.palette.metal, 0.25)
     rail = -d / 2 + 0.05

@@ -16,12 +16,12 @@ _SHEET, _PILLOW = (0.93, 0.92, 0.89), (0.96, 0.95, 0.92)
 _STAIN = (0.40, 0.28, 0.15)
 _BROWN, _LINING = (0.45, 0.33, 0.24), (0.82, 0.74, 0.60)
 _HEADBOARD = 0.08
-"""Its thickness, metres; it is where the engine takes it to be, at the front."""
+"""Thickness of the headboard, metres. Like the solid's headboard, it is at the front."""
 
 
 @shape("Bed")
 def bed(appearance: Appearance) -> Mesh:
-    """A mattress under a blanket that is turned down before pillows and a headboard."""
+    """A mattress under a blanket, turned down in front of pillows and a headboard."""
     w, h, d = appearance.size
     random, palette = appearance.random(), appearance.palette
     colours = (palette.fabric, mixed(palette.accent, palette.fabric, 0.4), palette.accent)
@@ -29,7 +29,7 @@ def bed(appearance: Appearance) -> Mesh:
     material = ("fabric", "stripes")[int(random.integers(2))]
     wood = shaded(palette.wood, 0.85)
     top = 0.55 * h if appearance.surface is None else min(max(appearance.surface, 0.3 * h), h)
-    rail = 0.42 * top if top < 1.0 else top - 0.35  # a high one is a loft over a desk
+    rail = 0.42 * top if top < 1.0 else top - 0.35  # a high bed is a loft over a desk
     beam = min(0.5 * rail, 0.22)
     mesh = Mesh()
     legs(mesh, (w, rail, d), 0.08, wood)
@@ -46,7 +46,7 @@ def bed(appearance: Appearance) -> Mesh:
 
 
 def _mattress(mesh: Mesh, appearance: Appearance, top: float, rail: float) -> tuple[float, float]:
-    """A mattress in a sheet; where its foot is, and how long it is."""
+    """A mattress in a sheet; returns the z of its foot and its length."""
     w, _, d = appearance.size
     foot, head = -d / 2 + 0.02, d / 2 - _HEADBOARD
     thick = top - 0.015 - rail
@@ -99,7 +99,7 @@ def _pillows(mesh: Mesh, w: float, top: float, head: float, long: float, askew: 
 
 @shape("Pillow")
 def pillow(appearance: Appearance) -> Mesh:
-    """Thick in its middle and thin at its drawn-out corners."""
+    """A pillow, thick in its middle and thin at its corners."""
     size, palette = appearance.size, appearance.palette
     colour = appearance.pick(
         _PILLOW, palette.accent, palette.fabric, mixed(palette.accent, _PILLOW, 0.5)
@@ -117,11 +117,11 @@ def pillow(appearance: Appearance) -> Mesh:
 
 
 def _cushion(size: tuple[float, float, float], colour: Colour, material: str) -> Mesh:
-    """A stuffed square about its middle, that lies."""
+    """A lying pillow about its middle point."""
     count = 7
     t = np.linspace(-1.0, 1.0, count)
     u, v = np.meshgrid(t, t, indexing="ij")
-    # Towards the middle of each side the stuffing draws the seam in.
+    # The stuffing draws the seam in towards the middle of each side.
     x = u * (1.0 - 0.1 * (1.0 - v**2) * np.abs(u) ** 3)
     z = v * (1.0 - 0.1 * (1.0 - u**2) * np.abs(v) ** 3)
     y = ((1.0 - u**4) * (1.0 - v**4)) ** 0.6
@@ -143,7 +143,7 @@ def _cushion(size: tuple[float, float, float], colour: Colour, material: str) ->
 
 
 def _normals(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, N, 3) of a height field (N, N, 3), upwards."""
+    """(N, N, 3) upward normals of a height field (N, N, 3)."""
     along, across = np.gradient(points, axis=0), np.gradient(points, axis=1)
     normals = np.cross(across, along)
     return np.asarray(np.where(normals[..., 1:2] < 0, -normals, normals))

@@ -1,4 +1,4 @@
-"""What one cleans with, and where rubbish goes."""
+"""Cleaning tools and bins."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _BAG = (0.13, 0.14, 0.16)
 
 
 def _also_lying(draw: Shape) -> Shape:
-    """For what stands: laid on its side where its box is not high."""
+    """For standing shapes: lays the shape on its side if its box is not high."""
 
     @wraps(draw)
     def drawn(appearance: Appearance) -> Mesh:
@@ -83,7 +83,7 @@ def _labelled(
     z: float,
     colour: Colour,
 ) -> None:
-    """The lower body of a bottle, round which goes a white label with a dark band."""
+    """The lower part of a bottle with a white label that has a dark band."""
     low, high = label
     foot = [(0, 0), (0.44, 0), (0.5, 0.03 * h), (0.5, low * h)]
     _oval(mesh, foot, size, z, colour)
@@ -132,7 +132,8 @@ def scrub_brush(appearance: Appearance) -> Mesh:
 
 
 def _standing(appearance: Appearance) -> tuple[float, float, float, bool]:
-    """Width, height and depth, turned (then True) so that the depth is the longer level side."""
+    """Width, height and depth with the depth as the longer level side, and whether they were
+    swapped."""
     w, h, d = appearance.size
     return (d, h, w, True) if w > 1.05 * d else (w, h, d, False)
 
@@ -146,7 +147,7 @@ def _turned(mesh: Mesh, turn: bool) -> Mesh:
 @shape("SprayBottle")
 @_also_lying
 def spray_bottle(appearance: Appearance) -> Mesh:
-    """A waisted bottle whose head is a pistol: nozzle, trigger, butt."""
+    """A waisted bottle with a spray head: nozzle, trigger, butt."""
     w, h, d, turn = _standing(appearance)
     mesh, random = Mesh(), appearance.random()
     colour = _SPRAYS[int(random.integers(len(_SPRAYS)))]
@@ -212,7 +213,7 @@ def dish_sponge(appearance: Appearance) -> Mesh:
 
 @shape("PaperTowelRoll")
 def paper_towel_roll(appearance: Appearance) -> Mesh:
-    """A tall white roll, blue print round it, its brown core showing."""
+    """A tall white roll with a blue print and a brown core."""
     mesh = roll(appearance, _PAPER, appearance.used_up)
     if appearance.used_up:
         return mesh
@@ -227,7 +228,7 @@ def paper_towel_roll(appearance: Appearance) -> Mesh:
 
 @shape("AluminumFoil")
 def aluminum_foil(appearance: Appearance) -> Mesh:
-    """A long carton from which a silver roll and a torn sheet come out."""
+    """A long carton with a silver roll and a torn sheet at its opening."""
     w, h, d, turn = _standing(appearance)
     mesh = Mesh()
     mesh.box((0, 0.3 * h, 0), (w, 0.6 * h, d), _CARTON, faces="xXyzZ")
@@ -245,7 +246,7 @@ def aluminum_foil(appearance: Appearance) -> Mesh:
 
 @shape("TissueBox")
 def tissue_box(appearance: Appearance) -> Mesh:
-    """A patterned box with a white tissue that stands out of a slot."""
+    """A patterned box with a white tissue in a slot."""
     w, h, d = appearance.size
     mesh, random = Mesh(), appearance.random()
     colour = mixed(_BOXES[int(random.integers(len(_BOXES)))], _WHITE, 0.3)
@@ -269,7 +270,7 @@ def tissue_box(appearance: Appearance) -> Mesh:
 
 @shape("GarbageCan")
 def garbage_can(appearance: Appearance) -> Mesh:
-    """A bin that widens upwards, open and dark inside, some with a bag over the rim."""
+    """A bin that is wider at the top, open and dark inside, sometimes with a bag over the rim."""
     w, h, d = appearance.size
     mesh, random = Mesh(), appearance.random()
     colour = _BINS[int(random.integers(len(_BINS)))]

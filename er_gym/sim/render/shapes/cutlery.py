@@ -17,11 +17,11 @@ _BLADE, _STEEL, _EDGE = (0.76, 0.80, 0.86), (0.52, 0.55, 0.60), (0.94, 0.96, 0.9
 _BLACK, _WALNUT, _PLASTIC = (0.09, 0.09, 0.10), (0.36, 0.20, 0.11), (0.15, 0.15, 0.17)
 _GRIPS = ((0.70, 0.16, 0.14), (0.16, 0.36, 0.52), (0.14, 0.14, 0.15))
 _THICK = 0.005
-"""Of blades and flat handles, metres."""
+"""Thickness of blades and flat handles, metres."""
 
 
 def _extent(appearance: Appearance) -> tuple[float, float, float]:
-    """Length, breadth and thickness of a thing that lies, or leans if its box is high."""
+    """Length, breadth and thickness of a lying object; it leans if its box is high."""
     w, h, d = appearance.size
     length, breadth = max(w, d), min(w, d)
     return (hypot(length, h) if _leans(appearance) else length), breadth, h
@@ -32,7 +32,7 @@ def _leans(appearance: Appearance) -> bool:
 
 
 def _laid(appearance: Appearance, mesh: Mesh) -> Mesh:
-    """A tool made along x from its grip to its head (at +x), put as its box lies."""
+    """A tool made along x from its grip to its head (at +x), placed as its box lies."""
     if not _leans(appearance):
         return lengthwise(appearance, mesh)
     leaning, rise = Mesh(), degrees(atan2(appearance.size[1], max(appearance.size[::2])))

@@ -56,7 +56,7 @@ _VASES: dict[str, Outline] = {
         (0.22, 0.68), (0.20, 0.82), (0.36, 1.0),
     ),
 }  # fmt: skip
-"""Outlines (radius, height) as shares of width and height, by the second word of an asset."""
+"""Outlines (radius, height) as shares of width and height, by the second word of the asset id."""
 
 
 @shape("Vase")
@@ -85,7 +85,7 @@ def vase(appearance: Appearance) -> Mesh:
 
 
 def _shards(size: Triple, colour: Colour) -> Mesh:
-    """What broke: a jagged bottom, and pieces that lie about it."""
+    """A broken vase: a jagged bottom with pieces around it."""
     w, h, d = size
     mesh, random, count = Mesh(), np.random.default_rng(5), 10
     turn = np.arange(count + 1) / count * 2 * pi
@@ -124,7 +124,7 @@ def statue(appearance: Appearance) -> Mesh:
 
 
 def _rubble(size: Triple, stone: Colour) -> Mesh:
-    """The base and chunks of what stood on it."""
+    """A broken statue: its base and chunks of the figure."""
     w, h, d = size
     mesh, random = Mesh(), np.random.default_rng(9)
     base(mesh, size, 0.4)
@@ -144,7 +144,7 @@ def _rubble(size: Triple, stone: Colour) -> Mesh:
 
 @shape("HousePlant")
 def house_plant(appearance: Appearance) -> Mesh:
-    """A pot with earth, and leaves above it: a bush, blades, fronds that hang over, or a tree."""
+    """A pot with earth and a plant: a bush, blades, hanging fronds, or a tree."""
     w, h, d = appearance.size
     mesh, random = Mesh(), appearance.random()
     pot, green = _POTS[random.integers(len(_POTS))], _GREENS[random.integers(len(_GREENS))]
@@ -258,7 +258,7 @@ def _tree(mesh: Mesh, size: Triple, foot: float, r: float, green: Colour, random
 
 
 _HABITS = (_bush, _fronds, _tree, _blades)
-"""By the number of an asset."""
+"""Shapes by the number of the asset id."""
 
 
 # -- what one waters them with, and other ornaments ------------------------------------------------
@@ -266,7 +266,7 @@ _HABITS = (_bush, _fronds, _tree, _blades)
 
 @shape("WateringCan")
 def watering_can(appearance: Appearance) -> Mesh:
-    """A round can with a long spout that ends in a rose, and a bow for a handle."""
+    """A round can with a long spout that ends in a rose, and an arched handle."""
     w, h, d = appearance.size
     colour = appearance.pick((0.20, 0.48, 0.32), (0.20, 0.42, 0.62), (0.78, 0.25, 0.20))
     mesh, r, tall, z = Mesh(), 0.44 * w, 0.62 * h, -0.12 * d

@@ -16,18 +16,18 @@ from er_gym.sim.render.shapes.registry import shape
 _BLACK, _DARK, _SILVER = (0.06, 0.06, 0.07), (0.15, 0.15, 0.16), (0.72, 0.73, 0.76)
 _WHITE, _KEYS, _LIT = (0.94, 0.93, 0.90), (0.10, 0.10, 0.11), (1.0, 1.0, 1.0)
 _GLOSS = ((0.03, 0.035, 0.05), (0.07, 0.08, 0.11), (0.24, 0.27, 0.33), (0.10, 0.12, 0.15))
-"""A dark screen's four corners: light falls on it from one side."""
+"""Colours of a dark screen's four corners: light falls on it from one side."""
 _SPLINTERS = (0.10, 0.55, 0.04, 0.85, 0.22, 1.0, 0.06, 0.40)
-"""How bright the splinters of a shattered screen are."""
+"""Brightness of the splinters of a shattered screen."""
 _FRONT = 0.006
-"""How far a layer lies before what is under it, metres."""
+"""Distance between two layers, metres."""
 
 
 # -- screens -------------------------------------------------------------------------------------
 
 
 def _screen(appearance: Appearance, width: float, height: float, material: str) -> Mesh:
-    """A screen about the origin that faces forwards: dark, lit or shattered."""
+    """A screen around the origin that faces forwards: dark, lit or shattered."""
     mesh = Mesh()
     if appearance.broken:
         _shattered(mesh, width, height, appearance.on)
@@ -39,7 +39,7 @@ def _screen(appearance: Appearance, width: float, height: float, material: str) 
 
 
 def _shattered(mesh: Mesh, width: float, height: float, on: bool) -> None:
-    """Splinters of glass about where something hit."""
+    """Splinters of glass around a point of impact."""
     half = np.array([width, height]) / 2
     hit = half * (0.22, 0.15)
     corner = [
@@ -59,7 +59,7 @@ def _shattered(mesh: Mesh, width: float, height: float, on: bool) -> None:
 
 
 def _rim(mesh: Mesh, y: float, size: tuple[float, float], border: float, colour: Colour) -> None:
-    """The edge about something that lies in a top face, as wide as ``border``."""
+    """The edge around a part of a top face, as wide as ``border``."""
     w, d = size
     for sign in (-1, 1):
         mesh.panel((sign * (w - border) / 2, y, 0), (border, d), colour, facing="Y")
@@ -90,13 +90,13 @@ def television(appearance: Appearance) -> Mesh:
 
 @shape("Laptop")
 def laptop(appearance: Appearance) -> Mesh:
-    """A slab with keys, and a screen that is hinged at its back."""
+    """A slab with keys, and a screen with a hinge at its back."""
     w, h, d = appearance.size
     mesh, body = Mesh(), appearance.pick(_SILVER, (0.82, 0.82, 0.83), (0.32, 0.33, 0.36))
     shut = h < 0.1
     thick = min(0.02, h / 2)
     depth = d if shut else 0.80 * d
-    # An open lid leans back over its hinge as far as the box goes.
+    # An open lid leans back over its hinge as far as the box allows.
     behind, rise = (0.3 * d, 0.9 * d) if shut else (d - depth, h - thick)
     opened = 180.0 - degrees(atan2(rise, behind))
     reach = depth + (hypot(behind, rise) - depth) * appearance.openness
@@ -108,7 +108,7 @@ def laptop(appearance: Appearance) -> Mesh:
         mesh.panel(keys, (0.88 * w, 0.46 * depth), _LIT, "keys", facing="Y")
         pad = (0, top, d / 2 - 0.21 * depth)
         mesh.panel(pad, (0.30 * w, 0.28 * depth), shaded(body, 0.7), facing="Y")
-    lid = Mesh()  # as it lies when shut: its screen looks down
+    lid = Mesh()  # as it lies when closed: its screen looks down
     lid.box((0, 0, reach / 2), (w, 0.012, reach), body)
     screen = _screen(appearance, 0.95 * w, 0.93 * reach, "desktop")
     lid.add(screen, at=(0, -0.011, reach / 2), turn=("x", 90))
@@ -120,7 +120,7 @@ def laptop(appearance: Appearance) -> Mesh:
 
 @shape("Desktop")
 def desktop(appearance: Appearance) -> Mesh:
-    """A screen on a foot, a tower beside it, keys and a mouse before it."""
+    """A screen on a foot with a tower, keys and a mouse."""
     w, h, d = appearance.size
     mesh = Mesh()
     wide, tall, left = 0.74 * w, 0.76 * h, -0.13 * w
@@ -145,7 +145,7 @@ def desktop(appearance: Appearance) -> Mesh:
 
 @shape("CellPhone")
 def cell_phone(appearance: Appearance) -> Mesh:
-    """A thin dark slab, nearly all of it a screen, in a bright edge."""
+    """A thin dark slab with a large screen in a bright edge."""
     case = appearance.pick(_SILVER, (0.88, 0.86, 0.82), (0.75, 0.60, 0.42), (0.25, 0.35, 0.60))
     return laid(appearance.size, lambda size: _phone(appearance, size, case))
 
@@ -207,7 +207,7 @@ def _remote(size: Triple, case: Colour) -> Mesh:
 
 @shape("AlarmClock")
 def alarm_clock(appearance: Appearance) -> Mesh:
-    """Two bells over a round face; or a box with a face; or a low one with glowing digits."""
+    """Two bells over a round face; or a box with a face; or a low clock with glowing digits."""
     w, h, _ = appearance.size
     colour = appearance.pick(
         (0.75, 0.16, 0.14), (0.16, 0.40, 0.55), (0.20, 0.50, 0.35), (0.85, 0.65, 0.20)

@@ -41,12 +41,12 @@ def _blob(
     rings: int = 8,
     at: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> None:
-    """A rounded lump that fills a size and stands on its underside.
+    """A rounded lump of a given size that stands on its underside.
 
     Args:
         colour: one colour, or a function from directions (V, 3) to colours (V, 3).
-        bump: how far the surface reaches, from directions (V, 3) to factors (V,).
-        power: below 1 it comes closer to a box.
+        bump: a function from directions (V, 3) to factors (V,) of the surface's distance.
+        power: a value below 1 makes it more like a box.
     """
     up = np.linspace(-pi / 2, pi / 2, rings + 1)[:, None]
     around = np.linspace(0, 2 * pi, segments + 1)[None]
@@ -77,7 +77,7 @@ def _blob(
 
 
 def _blend(one: Colour, other: Colour, share: Points) -> Points:
-    """(V, 3) colours between two by shares (V,)."""
+    """(V, 3) mixtures of two colours by shares (V,)."""
     kept = np.clip(share, 0.0, 1.0)[:, None]
     return np.asarray(one) * (1 - kept) + np.asarray(other) * kept
 
@@ -94,7 +94,7 @@ def _lumps(appearance: Appearance, amount: float, pitch: float) -> Callable[[Poi
 
 @shape("Apple")
 def apple(appearance: Appearance) -> Mesh:
-    """Widest above its middle, dented at the stalk, with a leaf."""
+    """An apple: widest above its middle, dented at the stalk, with a leaf."""
     w, h, d = appearance.size
     mesh, red = (
         Mesh(),
@@ -119,7 +119,7 @@ def apple(appearance: Appearance) -> Mesh:
 
 @shape("Tomato")
 def tomato(appearance: Appearance) -> Mesh:
-    """Flat and ribbed, orange red, with a green star on top."""
+    """A tomato: flat and ribbed, orange red, with a green star on top."""
     w, h, d = appearance.size
     mesh = Mesh()
 
@@ -140,7 +140,7 @@ def tomato(appearance: Appearance) -> Mesh:
 
 @shape("Potato")
 def potato(appearance: Appearance) -> Mesh:
-    """Lumpy, long and brown with dark eyes; cooked: browned, cut open crosswise."""
+    """A potato: lumpy, long and brown with dark eyes; cooked: browned and cut open across."""
     mesh, random = Mesh(), appearance.random()
     skin = mixed(_SKIN, (0.76, 0.60, 0.36), float(random.random()))
     skin = mixed(skin, _BROWNED, 0.55) if appearance.cooked else skin
@@ -199,7 +199,7 @@ def lettuce(appearance: Appearance) -> Mesh:
 
 
 def _outer_leaf(mesh: Mesh, size: tuple[float, float, float], angle: float, lift: float) -> None:
-    """A leaf that hugs the head, with a wavy edge that stands off."""
+    """A leaf on the head of lettuce with a wavy edge that stands off."""
     w, h, d = size
     rows = ((0.0, 0.14, 0.3), (0.28, 0.42, 0.56), (0.52, 0.45, 0.66), (0.72, 0.47, 0.55))
     points, colours = [], []
@@ -225,7 +225,7 @@ def _outer_leaf(mesh: Mesh, size: tuple[float, float, float], angle: float, lift
 
 @shape("Egg")
 def egg(appearance: Appearance) -> Mesh:
-    """Smooth and pale, one end narrower."""
+    """An egg: smooth and pale, one end narrower."""
     w, h, _ = appearance.size
     if appearance.broken:
         return egg_cracked(appearance)
@@ -275,7 +275,7 @@ def _dots(
 ) -> None:
     """Ovals on both cut surfaces, (x, y) and (width, height) as shares of the slice.
 
-    ``off``: how far they stand off, a share of its thickness.
+    ``off`` is their distance from the surface, as a share of the slice's thickness.
     """
     breadth, h, thick = _slab(appearance)
     for x, y in spots:

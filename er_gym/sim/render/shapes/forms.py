@@ -1,4 +1,4 @@
-"""Forms that several families share: how things that one can carry lie, and round pictures."""
+"""Forms that several families share: lying and leaning objects, and round pictures."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from er_gym.sim.render.patch import Colour, Triple
 
 
 def laid(size: Triple, build: Callable[[Triple], Mesh]) -> Mesh:
-    """Something thin, so laid or stood that its thickness is the shortest side of its box.
+    """A thin object, lying or standing so that its thickness is the shortest side of its box.
 
     Args:
-        build: makes it lying, of a width, thickness and depth.
+        build: makes it lying, from its width, thickness and depth.
     """
     w, h, d = size
     if h <= min(w, d):
@@ -28,17 +28,17 @@ def laid(size: Triple, build: Callable[[Triple], Mesh]) -> Mesh:
 
 
 def leant(size: Triple, thick: float, build: Callable[[float], Mesh]) -> Mesh:
-    """Something long, so laid that it goes from end to end of its box, askew where that is wide.
+    """A long object from end to end of its box, askew if the box is wide.
 
     Args:
-        thick: how thick it is, metres.
-        build: makes it standing, of a length.
+        thick: its thickness, metres.
+        build: makes it standing, from its length.
     """
     x, y, z = (max(side - 1.3 * thick, 0.0) for side in size)
     level, length = hypot(x, z), hypot(x, y, z)
     mesh, tilted = Mesh(), Mesh()
     long = length + thick * max(x, y, z) / max(length, 1e-6)
-    # Its upper end leans back, against what is behind it.
+    # Its upper end leans back, against the object behind it.
     tilt = -degrees(atan2(level, y))
     tilted.add(
         build(long), at=(0, (size[1] - long) / 2, 0), turn=("x", tilt), about=(0, long / 2, 0)
@@ -50,7 +50,7 @@ def leant(size: Triple, thick: float, build: Callable[[float], Mesh]) -> Mesh:
 def roundel(
     width: float, height: float, colour: Colour, material: str, *, segments: int = 16
 ) -> Mesh:
-    """A round picture about the origin that faces forwards, upright for who looks at it."""
+    """A round picture around the origin that faces forwards, upright for a viewer there."""
     mesh, angle = Mesh(), np.arange(segments) / segments * 2 * pi
     x, y, flat = np.cos(angle) / 2, np.sin(angle) / 2, np.zeros(segments)
     corners = np.stack([x * width, y * height, flat], axis=1)

@@ -1,4 +1,4 @@
-"""What hangs on walls: windows, mirrors, pictures, switches."""
+"""Objects on walls: windows, mirrors, pictures, switches."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ _GREY, _DARK, _CRACK = (0.45, 0.46, 0.48), (0.16, 0.18, 0.20), (0.97, 0.98, 1.0)
 _GRIME, _LIT = (0.42, 0.33, 0.20), (0.35, 0.85, 0.40)
 _PICTURES = 8
 _APART = 0.006
-"""How far layers that lie on each other are kept apart, metres."""
+"""Distance between two layers, metres."""
 
 
 def across(appearance: Appearance) -> tuple[float, float, float, bool]:
-    """Width, height and depth of what is flat, and whether it stands along z instead of x."""
+    """Width, height and depth of a flat object, and whether it is along z instead of x."""
     w, h, d = appearance.size
     return (d, h, w, True) if d > w else (w, h, d, False)
 
 
 def turned(mesh: Mesh, along_z: bool) -> Mesh:
-    """What was made along x, along z if need be."""
+    """A mesh made along x, turned along z if needed."""
     if not along_z:
         return mesh
     found = Mesh()
@@ -40,7 +40,7 @@ def turned(mesh: Mesh, along_z: bool) -> Mesh:
 def frame(
     mesh: Mesh, size: Triple, bar: float, colour: Colour, material: str = "plain", z: float = 0.0
 ) -> None:
-    """Four bars round an upright rectangle; size: width, height, depth."""
+    """Four bars around an upright rectangle; ``size`` is width, height and depth."""
     w, h, d = size
     for side in (-1, 1):
         mesh.box((side * (w - bar) / 2, h / 2, z), (bar, h, d), colour, material, turns=0.5)
@@ -51,14 +51,14 @@ def frame(
 def pane(
     mesh: Mesh, size: tuple[float, float], y: float, z: float, material: str, apart: float = 0.0
 ) -> None:
-    """An upright picture that one sees from both sides."""
+    """An upright picture that is visible from both sides."""
     for facing, side in (("Z", 1), ("z", -1)):
         at = (0.0, y, z + side * apart)
         mesh.panel(at, size, _FULL, material, facing="Z" if facing == "Z" else "z")
 
 
 def cracks(mesh: Mesh, size: tuple[float, float], y: float, z: float, apart: float) -> None:
-    """A star of white cracks with a dark hole in its middle; on both sides."""
+    """A star of white cracks with a dark hole in its middle, on both sides."""
     w, h = size[0] / 2, size[1] / 2
     thick = 0.007 * min(1.0, min(size) / 0.5)
     jag = (0.30, 0.17, 0.34, 0.14, 0.27, 0.18, 0.32, 0.13, 0.29, 0.16, 0.25)
@@ -99,15 +99,15 @@ def _smears(mesh: Mesh, size: tuple[float, float], y: float, z: float) -> None:
 
 
 _CORNER, _AT_THE_BACK = 0.5, 0.1
-"""Windows deeper than the first are in corners, and drawn as deep as the second; metres."""
+"""Windows deeper than the first value are in corners and drawn as deep as the second; metres."""
 
 
 @shape("Window")
 def window(appearance: Appearance) -> Mesh:
-    """Sky behind cross bars, a deep white frame, a sill."""
+    """The sky behind cross bars, with a deep white frame and a sill."""
     w, h, d, along_z = across(appearance)
     if d > _CORNER:
-        # The box of a window in the corner of a room is the room's: it is at the back of it.
+        # The box of a window in a corner surrounds the corner; the window is at its back.
         thin = Mesh()
         wide, tall, _ = appearance.size
         flat = replace(appearance, size=(wide, tall, _AT_THE_BACK))
@@ -147,7 +147,7 @@ def mirror(appearance: Appearance) -> Mesh:
     frame(mesh, (w, h, thick), bar, colour)
     inside = (w - 2 * bar, h - 2 * bar)
     pane(mesh, inside, h / 2, 0.0, "mirror", 0.2 * thick)
-    if d > 0.15 and appearance.height < 0.1:  # it stands on the floor
+    if d > 0.15 and appearance.height < 0.1:  # a mirror on the floor
         for x in (-0.4 * w, 0.4 * w):
             mesh.box((x, 0.02, 0), (0.05, 0.04, d), colour)
     if appearance.dirty:
@@ -217,7 +217,7 @@ def light_switch(appearance: Appearance) -> Mesh:
         x = (k - (rockers - 1) / 2) * w / rockers * 0.85
         mesh.box((x, h / 2, front + 0.002), (1.35 * wide, 1.2 * tall, 0.004), _GREY, faces="xXyYZ")
         up = 1 if appearance.on else -1
-        for half in (-1, 1):  # the half that sticks out is the one to press next
+        for half in (-1, 1):  # press the half that sticks out
             out = deep if half == up else 0.35 * deep
             tint = _WHITE if half == up else shaded(plate, 0.72)
             at = (x, h / 2 + half * tall / 4, front + out / 2)

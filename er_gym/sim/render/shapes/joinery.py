@@ -1,4 +1,4 @@
-"""What furniture is put together from: cases, fronts, handles and legs."""
+"""The parts of furniture: cases, fronts, handles and legs."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ HANDLE = 0.025
 """How far handles stick out, metres."""
 _PLINTH = (0.16, 0.14, 0.13)
 CLEAR = 0.008
-"""How far a board lies under the shelf's own that is drawn at the same height, metres."""
+"""How far a board lies below the Shelf object's board at the same height, metres."""
 
 Rectangle = tuple[float, float, float, float]
-"""Two lower ends and two upper ones, metres."""
+"""Two lower ends and two upper ends, metres."""
 
 
 def grain(colour: Colour) -> str:
-    """Grain on what is as brown as wood; paint has none."""
+    """The material of a colour: brown wood has grain, paint has none."""
     return "wood" if colour[0] - colour[2] > 0.15 else "plain"
 
 
@@ -37,13 +37,13 @@ def legs(
     inset: float = 0.0,
     taper: float = 1.0,
 ) -> None:
-    """Four legs under a box of a size; ``taper``: the share of their width at the floor."""
+    """Four legs under a box; ``taper`` is their width at the floor, as a share."""
     w, h, d = size
     x, z = (w - side) / 2 - inset, (d - side) / 2 - inset
     for a in (-x, x):
         for b in (-z, z):
             leg = Mesh()
-            # A box's taper narrows its top: made head down, then turned over.
+            # A box tapers at its top, so the leg is made upside down.
             leg.box((0, 0, 0), (side, h, side), colour, material, faces="xXzZ", taper=taper)
             mesh.add(leg, at=(a, h / 2, b), turn=("x", 180.0))
 
@@ -52,7 +52,7 @@ def apron(mesh: Mesh, size: tuple[float, float], under: float, high: float, colo
     """The rails that join a table's legs under its top: width and depth, top and height."""
     w, d = size
     middle = under - high / 2
-    # Drawers may come through at the front: the rail there stands well back.
+    # Drawers may come through at the front, so the rail stands well back there.
     for z in (-d / 2, d / 2 - 0.06):
         mesh.box((0, middle, z), (w, high, 0.02), colour, "wood", faces="zZy")
     for sign in (-1, 1):
@@ -60,7 +60,7 @@ def apron(mesh: Mesh, size: tuple[float, float], under: float, high: float, colo
 
 
 def case(mesh: Mesh, low: Triple, high: Triple, colour: Colour, inner: Colour) -> None:
-    """A box that is open at its front, and the inside of it in a colour of its own."""
+    """A box that is open at its front, with another colour inside."""
     material = grain(colour)
     (x0, y0, z0), (x1, y1, z1) = low, high
     middle = ((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2)
@@ -79,7 +79,7 @@ def case(mesh: Mesh, low: Triple, high: Triple, colour: Colour, inner: Colour) -
 
 
 def front(size: tuple[float, float], colour: Colour, thick: float = WALL) -> Mesh:
-    """A door or a drawer front, a frame about a panel; about the origin, its back at z = 0."""
+    """A door or a drawer front: a frame around a panel; its back is at z = 0."""
     w, h = size
     mesh, material = Mesh(), grain(colour)
     mesh.box((0, 0, thick / 2), (w, h, thick), shaded(colour, 0.8), material)
@@ -94,7 +94,7 @@ def front(size: tuple[float, float], colour: Colour, thick: float = WALL) -> Mes
 
 
 def bar(at: Triple, long: float, colour: Colour, *, upright: bool) -> Mesh:
-    """A handle on two feet that stands out in front of a place."""
+    """A handle on two feet in front of a point."""
     mesh, (x, y, z) = Mesh(), at
     half = long / 2 - 0.008
     for sign in (-1, 1):
@@ -106,7 +106,7 @@ def bar(at: Triple, long: float, colour: Colour, *, upright: bool) -> Mesh:
 
 
 def carcass_colour(palette: Palette) -> Colour:
-    """The colour of what counters rest on."""
+    """The colour of counters' carcasses."""
     return shaded(palette.cabinet, 0.85)
 
 
@@ -117,15 +117,16 @@ def panels(
     fitted: Sequence[Box],
     colour: Colour,
 ) -> None:
-    """Upright panels round what a counter rests on, but where a cabinet or a drawer is built in.
+    """Upright panels around a carcass, except where a cabinet or a drawer is built in.
 
     Args:
-        footprint: what it covers on the floor. ends: its height, from and to, metres.
-        fitted: low and high corners of what is built in.
+        footprint: its rectangles on the floor.
+        ends: its lowest and highest height, metres.
+        fitted: low and high corners of the built-in objects.
     """
     floor, top = ends
     for k, part in enumerate(footprint):
-        # What another part touches is no edge.
+        # An edge that touches another part is none.
         others = [
             ((a[0], floor, a[1]), (a[2], top, a[3])) for j, a in enumerate(footprint) if j != k
         ]
@@ -154,7 +155,7 @@ def panels(
 
 
 def _gaps(wall: Rectangle, taken: Sequence[Rectangle]) -> Iterator[Rectangle]:
-    """What is left of an upright rectangle: along from and to, height from and to, metres."""
+    """The free parts of an upright rectangle: along from and to, height from and to, metres."""
     first, last, floor, top = wall
     ends = {first, last}
     ends.update(min(max(end, first), last) for rectangle in taken for end in rectangle[:2])

@@ -26,7 +26,7 @@ _WICK = (0.12, 0.10, 0.09)
 
 @shape("FloorLamp")
 def floor_lamp(appearance: Appearance) -> Mesh:
-    """A shade as high as a person, on a thin pole with a round foot."""
+    """A floor lamp: a shade at the height of a person, on a thin pole with a round foot."""
     _, h, d = appearance.size
     mesh, stem = Mesh(), appearance.pick(*_STEMS)
     bottom = 0.77 * h
@@ -54,7 +54,7 @@ def desk_lamp(appearance: Appearance) -> Mesh:
 
 
 def _shade(mesh: Mesh, appearance: Appearance, bottom: float, top: float) -> None:
-    """A shade of cloth about a bulb: it glows from within, or hangs there dull."""
+    """A cloth shade around a bulb; it glows while the lamp is on."""
     w, _, d = appearance.size
     cloth = appearance.pick(*_SHADES)
     narrow = 0.5 * w * (0.55 + 0.3 * appearance.random().random())
@@ -83,7 +83,7 @@ def _shade(mesh: Mesh, appearance: Appearance, bottom: float, top: float) -> Non
 
 @shape("Candle")
 def candle(appearance: Appearance) -> Mesh:
-    """A wax rod with a dark wick; a flame when it burns."""
+    """A wax rod with a dark wick, and a flame while it burns."""
     w, h, d = appearance.size
     wax = appearance.pick(*_WAXES)
     thick = sorted(appearance.size)[1] if max(w, d) <= h else min(appearance.size)

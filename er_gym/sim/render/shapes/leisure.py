@@ -41,7 +41,7 @@ def basket_ball(appearance: Appearance) -> Mesh:
 
 @shape("BaseballBat")
 def baseball_bat(appearance: Appearance) -> Mesh:
-    """A thick barrel that narrows to a wrapped grip with a knob."""
+    """A baseball bat: a thick barrel, a wrapped grip and a knob."""
     thick = min(0.075, *appearance.size)
     metal = appearance.random().random() < 0.3
     colour, material = (_ALUMINIUM, "metal") if metal else (_ASH, "wood")
@@ -133,7 +133,8 @@ def dumbbell(appearance: Appearance) -> Mesh:
 
 @shape("TeddyBear")
 def teddy_bear(appearance: Appearance) -> Mesh:
-    """It sits: a round head with ears and a snout, a pale belly, arms and legs stretched out."""
+    """A sitting bear: a round head with ears and a snout, a pale belly, arms and legs stretched
+    out."""
     w, h, d = appearance.size
     fur = appearance.pick((0.58, 0.36, 0.18), (0.72, 0.50, 0.28), (0.45, 0.27, 0.14))
     mesh, pale = Mesh(), mixed(fur, _CREAM, 0.75)

@@ -1,4 +1,4 @@
-"""The table from object type to shape."""
+"""The table of shapes by object type."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from er_gym.sim.render.patch import Patch
 
 Shape = Callable[[Appearance], Mesh]
 SHAPES: dict[str, Shape] = {}
-"""Object type to what draws it."""
+"""The shape of each object type."""
 UNSEEN = frozenset({"Floor"})
-"""Types that are drawn with the room."""
+"""Types that are drawn with the room and not as objects."""
 _KEPT = 256
 
 
@@ -32,7 +32,7 @@ def shape(*kinds: str) -> Callable[[Shape], Shape]:
 
 @lru_cache(maxsize=_KEPT)
 def build(appearance: Appearance) -> dict[str, Patch]:
-    """The triangles of a thing by material; a plain box for types without a shape."""
+    """The triangles of an object by material; a type without a shape is drawn as a plain box."""
     function = SHAPES.get(appearance.kind, _plain_box)
     return function(appearance).patches()
 
@@ -48,5 +48,5 @@ def _plain_box(appearance: Appearance) -> Mesh:
 
 
 def without_shape(kinds: list[str]) -> list[str]:
-    """Those of some types that have no shape yet."""
+    """The object types of a list that have no shape."""
     return [kind for kind in kinds if kind not in SHAPES and kind not in UNSEEN]

@@ -15,7 +15,7 @@ _CREAM = (0.80, 0.74, 0.62)
 
 
 def _seat_height(appearance: Appearance, share: float) -> float:
-    """How high the seat is; ``share``: of the height, where the record does not show it."""
+    """Height of the seat; ``share`` is its share of the height if the record does not show it."""
     h = appearance.size[1]
     shown = appearance.surface
     return share * h if shown is None or not 0.25 * h < shown < 0.85 * h else shown
@@ -91,7 +91,7 @@ def arm_chair(appearance: Appearance) -> Mesh:
 
 
 def _upholstered(appearance: Appearance, colour: Colour, cushions: int) -> Mesh:
-    """A seat between two arms, with a back and cushions, where the engine takes them to be."""
+    """A seat between two arms, with a back and cushions, at the places of the solid's parts."""
     w, h, d = appearance.size
     seat = _seat_height(appearance, 0.5)
     arm, back, rest = 0.12 * w, 0.25 * d, min(h, seat + 0.4 * (h - seat))
@@ -124,7 +124,7 @@ def _upholstered(appearance: Appearance, colour: Colour, cushions: int) -> Mesh:
 
 @shape("Stool")
 def stool(appearance: Appearance) -> Mesh:
-    """A small seat without a back on four splayed legs that rungs hold together."""
+    """A small seat without a back, on four splayed legs with rungs."""
     w, h, d = appearance.size
     random, wood = appearance.random(), appearance.palette.wood
     seat = (wood, appearance.palette.accent, _BLACK)[int(random.integers(3))]
@@ -152,7 +152,7 @@ def stool(appearance: Appearance) -> Mesh:
 
 @shape("Ottoman")
 def ottoman(appearance: Appearance) -> Mesh:
-    """A low padded block to put one's feet on, with a seam round it and buttons on top."""
+    """A low padded block for one's feet, with a seam and buttons on top."""
     w, h, d = appearance.size
     palette = appearance.palette
     colour = appearance.pick(

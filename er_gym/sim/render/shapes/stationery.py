@@ -1,4 +1,4 @@
-"""Books, papers, pens and what one carries in a pocket."""
+"""Books, papers, pens and small things for a pocket."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _YELLOW, _RAW_WOOD, _ERASER, _LEAD = (
 
 @shape("Book")
 def book(appearance: Appearance) -> Mesh:
-    """Coloured covers about pale pages, a title; open: two pages of print."""
+    """A book: coloured covers around pale pages, with a title; open: two printed pages."""
     cover = appearance.pick(*_COVERS)
     if appearance.openness <= 0:
         return laid(appearance.size, lambda size: _shut_book(size, cover))
@@ -57,7 +57,7 @@ def _shut_book(size: Triple, cover: Colour) -> Mesh:
 
 
 def _cover(mesh: Mesh, size: Triple, cover: Colour) -> None:
-    """The front: in a frame of the book's colour a pale field with the title."""
+    """The front cover: a pale field with the title in a frame of the book's colour."""
     w, h, d = size
     left, right, near, far = 0.34 * w, -0.42 * w, 0.02 * d, -0.38 * d
     for x0, x1, z0, z1, pale in (
@@ -74,7 +74,7 @@ def _cover(mesh: Mesh, size: Triple, cover: Colour) -> None:
 
 
 def _open_book(size: Triple, cover: Colour, openness: float) -> Mesh:
-    """The upper half turned over the spine, which is at its right; wholly open it lies about it."""
+    """The upper half, turned over the spine at its right; fully open it lies beside it."""
     w, h, d = size
     mesh, half = Mesh(), h / 2
     lower, upper = _half_book((w, half, d), cover), Mesh()
@@ -86,7 +86,7 @@ def _open_book(size: Triple, cover: Colour, openness: float) -> Mesh:
 
 
 def _half_book(size: Triple, cover: Colour) -> Mesh:
-    """A cover with its pages on it, which bulge beside the spine at +x, printed."""
+    """A cover with printed pages, which bulge beside the spine at +x."""
     w, h, d = size
     mesh, board = Mesh(), max(0.002, 0.28 * h)
     mesh.box((0, board / 2, 0), (w, board, d), cover)
@@ -117,7 +117,7 @@ def newspaper(appearance: Appearance) -> Mesh:
 
 
 def _newspaper(size: Triple) -> Mesh:
-    """Folded at its far side, where it is thick; it gets thinner towards its open side."""
+    """A folded newspaper: thick at the fold on its far side, thinner towards the open side."""
     w, h, d = size
     if w < d:
         mesh = Mesh()

@@ -1,4 +1,4 @@
-"""What statues show."""
+"""The figures of statues."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _BASE, _NOSE = (0.16, 0.14, 0.13), (0.10, 0.09, 0.09)
 
 
 def base(mesh: Mesh, size: Triple, share: float = 1.0) -> float:
-    """A plinth over some of the footprint; how high its top is."""
+    """A plinth over a part of the footprint; returns the height of its top."""
     w, h, d = size
     tall = 0.07 * h
     mesh.box((0, tall / 2, 0), (share * w, tall, share * d), _BASE, faces="xXYzZ")
@@ -20,7 +20,7 @@ def base(mesh: Mesh, size: Triple, share: float = 1.0) -> float:
 
 
 def _dog(size: Triple, stone: Colour) -> Mesh:
-    """It stands, its head to the right."""
+    """A standing dog with its head to the right."""
     w, h, d = size
     mesh = Mesh()
     y = base(mesh, size)
@@ -42,7 +42,7 @@ def _dog(size: Triple, stone: Colour) -> Mesh:
 
 
 def _hand(size: Triple, stone: Colour) -> Mesh:
-    """It lies with its palm up; the fingers bend upwards."""
+    """A lying hand with its palm up; the fingers bend upwards."""
     w, h, d = size
     mesh = Mesh()
     mesh.ball((-0.14 * w, 0.24 * h, 0), (0.44 * w, 0.48 * h, 0.72 * d), stone, segments=9, rings=5)
@@ -153,4 +153,4 @@ STATUES: dict[str, Callable[[Triple, Colour], Mesh]] = {
     "Towel": _draped,
     "Waving": _waving,
 }
-"""By the first word of an asset."""
+"""Figures by the first word of the asset id."""

@@ -31,7 +31,7 @@ _BACK = 0.03
 
 
 def _fitted(appearance: Appearance) -> Colour:
-    """Kitchens and bathrooms have cabinets of one colour, other rooms that of their furniture."""
+    """The colour of a cabinet: that of kitchens and bathrooms, or that of the room's furniture."""
     return (
         appearance.palette.cabinet
         if appearance.room in ("kitchens", "bathrooms")
@@ -41,7 +41,7 @@ def _fitted(appearance: Appearance) -> Colour:
 
 @shape("Cabinet")
 def cabinet(appearance: Appearance) -> Mesh:
-    """A case with one door, or two where it is wide, hinged at its sides, and upright handles."""
+    """A case with one door, or two if it is wide, with hinges at its sides and upright handles."""
     w, h, d = appearance.size
     colour, mesh = _fitted(appearance), Mesh()
     thick = min(WALL, 0.4 * d)
@@ -65,10 +65,10 @@ def cabinet(appearance: Appearance) -> Mesh:
 
 
 def _door(appearance: Appearance, w: float, h: float, thick: float, hinge: int) -> Mesh:
-    """A cabinet's door about its middle; ``hinge``: the side that it hangs on, -1 or 1."""
+    """A cabinet's door around its middle; ``hinge`` is the side of its hinges, -1 or 1."""
     mesh = front((w, h), _fitted(appearance), thick)
     long = min(0.16, 0.4 * h)
-    # In reach: near the lower edge of what hangs high, near the upper of what stands low.
+    # The handle is in reach: near the lower edge of a high door, near the upper edge of a low one.
     y = -h / 2 + 0.06 + long / 2 if appearance.height > 1.2 else h / 2 - 0.06 - long / 2
     y = min(max(1.05 - appearance.height - h / 2, -h / 4), h / 4) if h > 1.4 else y
     mesh.add(
@@ -100,7 +100,7 @@ def drawer(appearance: Appearance) -> Mesh:
 
 
 def _tray(mesh: Mesh, size: Triple, back: float, colour: Colour) -> None:
-    """A drawer's box: thin walls about a floor."""
+    """A drawer's box: thin walls around a bottom."""
     w, h, d = size
     z = back + d / 2
     mesh.box((0, 0.004, z), (w, 0.008, d), colour, faces="yY")
@@ -112,9 +112,9 @@ def _tray(mesh: Mesh, size: Triple, back: float, colour: Colour) -> None:
 
 @shape("CounterTop")
 def counter_top(appearance: Appearance) -> Mesh:
-    """A slab of stone with holes for sinks; one that reaches to the floor has sides as well.
+    """A slab of stone with holes for sinks. One that extends to the floor has sides as well.
 
-    What other slabs rest on is no object: :mod:`er_gym.sim.render.carcasses` draws it.
+    :mod:`er_gym.sim.render.carcasses` draws the carcasses of other counters, which are no objects.
     """
     h = appearance.size[1]
     stone, mesh = appearance.palette.counter, Mesh()
@@ -147,7 +147,7 @@ def counter_top(appearance: Appearance) -> Mesh:
 
 @shape("Shelf")
 def shelf(appearance: Appearance) -> Mesh:
-    """A plain board under the room for things that the record calls a shelf."""
+    """The board under the space that the record calls a shelf."""
     w, _, d = appearance.size
     mesh = Mesh()
     mesh.box((0, -0.006, 0), (w, WALL, d), shaded(appearance.palette.wood, 1.05), "wood")
@@ -156,7 +156,7 @@ def shelf(appearance: Appearance) -> Mesh:
 
 @shape("ShelvingUnit")
 def shelving_unit(appearance: Appearance) -> Mesh:
-    """An open frame of four posts with boards one above the other, to be seen through."""
+    """An open frame of four posts with boards above each other."""
     w, h, d = appearance.size
     wood, mesh = appearance.palette.wood, Mesh()
     frame = appearance.pick(shaded(wood, 0.8), (0.24, 0.25, 0.27))
@@ -194,7 +194,7 @@ def _boards(appearance: Appearance) -> list[float]:
 
 @shape("Dresser")
 def dresser(appearance: Appearance) -> Mesh:
-    """A chest: a top that juts out over a case that drawers fill, on short feet."""
+    """A chest: a top that juts out over a case full of drawers, on short feet."""
     w, h, d = appearance.size
     wood, mesh = appearance.palette.wood, Mesh()
     top = h if appearance.surface is None else min(max(appearance.surface, 0.6 * h), h)
@@ -239,7 +239,7 @@ def tv_stand(appearance: Appearance) -> Mesh:
 
 @shape("Safe")
 def safe(appearance: Appearance) -> Mesh:
-    """A steel box with a thick door that bears a dial and a three-armed handle."""
+    """A steel box with a thick door that has a dial and a three-armed handle."""
     w, h, d = appearance.size
     mesh, steel = Mesh(), appearance.pick(_STEEL, _GUNMETAL, (0.24, 0.30, 0.26))
     proud = 0.1 * d
@@ -314,14 +314,14 @@ def _flaps(mesh: Mesh, w: float, d: float, h: float, colour: Colour, openness: f
 
 
 def _corners(long: float, near: float, far: float) -> list[tuple[float, float]]:
-    """Of a rectangle: half its length to both sides, and from one place across to another."""
+    """A rectangle: half its length to both sides, and from one place across to another."""
     half = long / 2
     return [(-half, near), (half, near), (half, far), (-half, far)]
 
 
 @shape("LaundryHamper")
 def laundry_hamper(appearance: Appearance) -> Mesh:
-    """A tall oval basket of wicker with a lid; open, one sees the washing in it."""
+    """A tall oval wicker basket with a lid; the laundry shows when it is open."""
     w, h, d = appearance.size
     mesh, wicker = Mesh(), appearance.pick(*_WICKERS)
     rim, turns = 0.88 * h, (8.0, 0.2)

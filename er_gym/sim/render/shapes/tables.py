@@ -15,14 +15,14 @@ _SLAB = 0.04
 
 
 def top_height(appearance: Appearance) -> float:
-    """How high the top is on which things stand, metres."""
+    """Height of the surface on which things stand, metres."""
     h = appearance.size[1]
     return h if appearance.surface is None else min(max(appearance.surface, 0.3 * h), h)
 
 
 @shape("DiningTable")
 def dining_table(appearance: Appearance) -> Mesh:
-    """A plain top on four stout legs, high enough to sit at."""
+    """A plain top on four stout legs, as high as a dining table."""
     w, h, d = appearance.size
     random, wood = appearance.random(), appearance.palette.wood
     top, style = top_height(appearance), int(random.integers(3))
@@ -85,7 +85,7 @@ def side_table(appearance: Appearance) -> Mesh:
 
 @shape("Desk")
 def desk(appearance: Appearance) -> Mesh:
-    """A top between two upright sides with a board behind the knees; high ones have shelves."""
+    """A top between two upright sides with a board behind the knees; high desks have shelves."""
     w, h, d = appearance.size
     wood = appearance.palette.wood
     random, top = appearance.random(), top_height(appearance)
@@ -109,7 +109,7 @@ def desk(appearance: Appearance) -> Mesh:
 
 
 def _pedestals(mesh: Mesh, appearance: Appearance, under: float, colour: Colour) -> bool:
-    """Cases about the drawers and cabinets built in under a table; whether they reach low down."""
+    """Cases around drawers and cabinets built in under a table; returns whether they reach low."""
     w, _, d = appearance.size
     fitted = [
         box for kind, box in appearance.built_in if kind != "Sink" and box[0][1] < under - 0.05
@@ -123,7 +123,7 @@ def _pedestals(mesh: Mesh, appearance: Appearance, under: float, colour: Colour)
             stacks[-1] = [x0, max(x1, high[0]), min(y0, low[1]), max(y1, high[1]),
                           min(z0, low[2]), max(z1, high[2])]  # fmt: skip
     for x0, x1, y0, y1, z0, z1 in stacks:
-        # A table that stands in the open has drawers at its back as well.
+        # A table in the open has drawers at its back as well.
         back = (
             z0 + 0.055 if appearance.kind == "CoffeeTable" and z0 < -d / 2 + 0.05 else -d / 2 + 0.02
         )

@@ -28,7 +28,7 @@ _PEPPER, _SALT = (0.16, 0.12, 0.11), (0.95, 0.95, 0.94)
 
 
 def lengthwise(appearance: Appearance, mesh: Mesh) -> Mesh:
-    """A mesh made along x, turned to the front if the thing is longer that way."""
+    """A mesh made along x, turned to the front if the object is longer in that direction."""
     if appearance.size[0] >= appearance.size[2]:
         return mesh
     turned = Mesh()
@@ -37,7 +37,7 @@ def lengthwise(appearance: Appearance, mesh: Mesh) -> Mesh:
 
 
 def _coat(appearance: Appearance, colour: Colour) -> NDArray[np.float64]:
-    """A colour for :meth:`Mesh.lathe`; on what is dirty brown stains, vertex by vertex."""
+    """A colour for :meth:`Mesh.lathe`; a dirty object gets brown stains, vertex by vertex."""
     if not appearance.dirty:
         return np.asarray(colour)
     share = appearance.random().choice([0.12, 0.5, 0.92], (2, _SIDES))
@@ -57,7 +57,7 @@ def _turned(
 
 
 def _liquid(mesh: Mesh, appearance: Appearance, x: float, radius: float, height: float) -> None:
-    """The level of what a vessel is filled with."""
+    """The surface of the liquid in a vessel."""
     if appearance.filled:
         colour = _LIQUIDS.get(appearance.filled, _LIQUIDS["water"])
         profile = [(radius, height), (0.6 * radius, height), (0.0, height)]
@@ -78,7 +78,7 @@ def _pieces(
     *,
     x: float = 0.0,
 ) -> None:
-    """Shards that lie about."""
+    """Scattered shards."""
     random = appearance.random()
     thick = max(0.006, 0.05 * radius)
     for k in range(6):
@@ -144,7 +144,7 @@ def _broken_plate(r: float, h: float, ring: Colour) -> Mesh:
             outline = [(high * r * cos(t), high * r * sin(t)) for t in arc]
             outline += [(low * r * cos(t), low * r * sin(t)) for t in (arc[::-1] if low else [a])]
             top = 0.4 * h if low else 0.3 * h
-            if low:  # a ring's piece is not convex: quarter by quarter
+            if low:  # a piece of a ring is not convex, so each is made of four
                 for t, u in itertools.pairwise(arc):
                     ends = [(t, low), (u, low), (u, high), (t, high)]
                     wedge.prism([(s * r * cos(v), s * r * sin(v)) for v, s in ends], 0, top, colour)
@@ -158,7 +158,7 @@ def _broken_plate(r: float, h: float, ring: Colour) -> Mesh:
 
 @shape("Bowl")
 def bowl(appearance: Appearance) -> Mesh:
-    """A half ball, open to the top, coloured without and light within."""
+    """A bowl: a half ball, open at the top, coloured outside and light inside."""
     w, h, d = appearance.size
     mesh, r = Mesh(), min(w, d) / 2
     colour, inside = appearance.pick(_BLUE, _CREAM, _GREEN, _RED, _GREY, _YELLOW), _WHITE
@@ -177,7 +177,7 @@ def bowl(appearance: Appearance) -> Mesh:
 
 @shape("Mug")
 def mug(appearance: Appearance) -> Mesh:
-    """A short cylinder with a big ear."""
+    """A mug: a short cylinder with a big handle."""
     length, h, breadth = max(appearance.size[::2]), appearance.size[1], min(appearance.size[::2])
     mesh, colour = Mesh(), appearance.pick(_BLUE, _RED, _WHITE, _YELLOW, _GREEN)
     r = min(breadth / 2, 0.37 * length)
@@ -198,7 +198,7 @@ def mug(appearance: Appearance) -> Mesh:
 def _ear(
     mesh: Mesh, near: float, far: float, span: tuple[float, float], thick: float, colour: Colour
 ) -> None:
-    """A handle in the shape of an ear, at the side of a vessel."""
+    """An ear-shaped handle at the side of a vessel."""
     low, high = span
     out, bend = far - thick, 0.25 * (high - low)
     path = [(near, high), (out - 0.3 * (out - near), high), (out, high - bend)]
@@ -208,7 +208,7 @@ def _ear(
 
 @shape("Cup")
 def cup(appearance: Appearance) -> Mesh:
-    """A tall tumbler that widens to the top, without an ear, with a band."""
+    """A cup: a tall tumbler that is wider at the top, without a handle, with a band."""
     w, h, d = appearance.size
     mesh, r, colour = Mesh(), min(w, d) / 2, appearance.pick(*_TINTS)
     if appearance.broken:
@@ -256,7 +256,7 @@ def pot(appearance: Appearance) -> Mesh:
 
 
 def _loop(mesh: Mesh, near: float, far: float, y: float, half: float) -> None:
-    """A handle that lies level, from a vessel's wall out and back."""
+    """A level handle that leads out from a vessel's wall and back."""
     thick = 0.010
     out = far - thick * np.sign(far - near)
     path = [(near, y, half), (out, y, 0.8 * half), (out, y, -0.8 * half), (near, y, -half)]
@@ -311,7 +311,7 @@ def wine_bottle(appearance: Appearance) -> Mesh:
 
 @shape("Bottle")
 def bottle(appearance: Appearance) -> Mesh:
-    """Of light blue plastic, broad and waisted, with a short neck and a blue screw cap."""
+    """A bottle of light blue plastic, broad and waisted, with a short neck and a blue screw cap."""
     w, h, d = appearance.size
     mesh, r = Mesh(), min(w, d) / 2
     if appearance.broken:
@@ -331,7 +331,8 @@ def bottle(appearance: Appearance) -> Mesh:
 
 @shape("SaltShaker", "PepperShaker")
 def shaker(appearance: Appearance) -> Mesh:
-    """White with an S or black with a P, under a domed steel cap with holes; tall: a mill."""
+    """A shaker, white with an S or black with a P, under a domed steel cap with holes; tall: a
+    mill."""
     w, h, d = appearance.size
     salt = appearance.kind == "SaltShaker"
     mesh, r, colour = Mesh(), min(w, d) / 2, _SALT if salt else _PEPPER
@@ -366,7 +367,7 @@ def shaker(appearance: Appearance) -> Mesh:
 
 
 def _letter(mesh: Mesh, letter: str, half: float, colour: Colour) -> None:
-    """S or P, of upright and level bars, seen from the front, where x points to the left."""
+    """The letter S or P of upright and level bars, seen from the front (x points left)."""
     t = 0.45 * half
     bars = [(0.0, 4 * half, 2 * half), (0.0, 2 * half, 2 * half)]
     for x, y, wide in [*bars, (0.0, 0.0, 2 * half)] if letter == "S" else bars:

@@ -21,14 +21,14 @@ _SHOWER = ((0.70, 0.86, 0.90), (0.93, 0.90, 0.82), (0.86, 0.76, 0.84))
 _CREAM, _CHROME, _CORD = (0.93, 0.91, 0.85), (0.88, 0.90, 0.94), (0.55, 0.52, 0.46)
 _STAIN, _WHITE = (0.36, 0.25, 0.14), (0.96, 0.96, 0.95)
 _LET_DOWN, _DRAWN = 6.0, 4.0
-"""How far blinds come down and shower curtains go along, in lengths of when they are gathered."""
+"""Length of lowered blinds and closed shower curtains, in multiples of the gathered length."""
 _SLAT = 0.05
 
 
 def _hanging(
     mesh: Mesh, w: float, h: float, d: float, colour: Colour, bands: tuple[float, ...], tint: Colour
 ) -> None:
-    """A cloth folded over a bar: a longer half behind, bands at heights (shares) of the front."""
+    """A cloth over a bar: the front half is longer, with bands at heights (shares) of the front."""
     fold = min(0.9 * d, 0.06)
     for low, z, shade in ((0.12 * h, 0.0, 1.0), (0.0, -0.5 * fold, 0.78)):
         tall = h - 0.5 * fold - low
@@ -169,9 +169,9 @@ def _folds(
     colours: tuple[Colour, Colour],
     flare: float = 1.0,
 ) -> None:
-    """A curtain from low to high x and y, in folds, darker where they go in.
+    """A curtain from low to high x and y, in folds that are darker where they go in.
 
-    ``colours``: of the cloth, and of a band at its hem. ``flare``: how wide it is half way up.
+    ``colours`` are those of the cloth and of a band at its hem. ``flare`` is its width half way up.
     """
     steps = 4 * folds + 1
     t = np.linspace(0, 1, steps)
@@ -190,7 +190,7 @@ def _folds(
 
 @shape("Curtains")
 def curtains(appearance: Appearance) -> Mesh:
-    """Cloth in folds on a rod with knobs: one at each side where it is wide."""
+    """Folded cloth on a rod with knobs: one piece at each side if it is wide."""
     w, h, d, along_z = across(appearance)
     mesh, rod = Mesh(), shaded(appearance.palette.wood, 0.7)
     colour = mixed(appearance.pick(*_DRAPES), appearance.palette.fabric, 0.35)
@@ -220,9 +220,9 @@ def curtains(appearance: Appearance) -> Mesh:
 
 @shape("ShowerCurtain")
 def shower_curtain(appearance: Appearance) -> Mesh:
-    """A pale curtain on rings; gathered as recorded, drawn along the tub when open."""
+    """A pale curtain on rings: gathered as recorded, drawn along the tub when open."""
     w, h, d = appearance.size
-    along_z = not appearance.asset  # as their tubs lie
+    along_z = not appearance.asset  # in the direction of their tubs
     w, d = (d, w) if along_z else (w, d)
     mesh, colour = Mesh(), appearance.pick(*_SHOWER)
     right = -w / 2 + w * (1 + (_DRAWN - 1) * appearance.openness)
@@ -243,7 +243,7 @@ def shower_curtain(appearance: Appearance) -> Mesh:
 
 @shape("Blinds")
 def blinds(appearance: Appearance) -> Mesh:
-    """Slats under a rail; gathered at the top as recorded, let down over the window when open."""
+    """Slats under a rail: gathered at the top as recorded, lowered over the window when open."""
     w, h, d, along_z = across(appearance)
     mesh, colour = (
         Mesh(),

@@ -16,13 +16,13 @@ AXES: tuple[Axis, ...] = ("x", "y", "z")
 
 
 def odd_axis(size: tuple[float, float, float]) -> int:
-    """The axis of a roll: that whose length is unlike the two others'."""
+    """The axis of a roll: its length along it differs from the other two."""
     middle = sorted(size)[1]
     return max(range(3), key=lambda k: abs(size[k] - middle))
 
 
 def roll(appearance: Appearance, paper: Colour, used: bool, material: str = "plain") -> Mesh:
-    """A roll of paper round a tube of cardboard, or the bare tube."""
+    """A roll of paper around a cardboard tube, or the bare tube."""
     axis = odd_axis(appearance.size)
     others = [appearance.size[k] for k in range(3) if k != axis]
     length, r = appearance.size[axis], min(others) / 2
@@ -61,7 +61,7 @@ def toilet_paper(appearance: Appearance) -> Mesh:
 
 @shape("ToiletPaperHanger")
 def toilet_paper_hanger(appearance: Appearance) -> Mesh:
-    """A bar between two arms that come out of the wall; under a hood where its box is high."""
+    """A bar between two arms from the wall; under a hood if its box is high."""
     w, h, d = appearance.size
     mesh, metal = Mesh(), mixed(_CHROME, appearance.palette.metal, 0.4)
     r = min(0.013, 0.3 * h)
