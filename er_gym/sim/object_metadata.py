@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.copy_on_read import CopyOnReadDict
+from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.scene import PROPERTIES, STATES
 from er_gym.sim.space.door_boxes import boxes_with_doors
-from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
 from er_gym.sim.world_cache import ObjectCacheKey

@@ -107,7 +107,7 @@ class Scene:
         types: N object types.
         asset_ids: N names of the asset drawn, ``""`` where the record has none.
         position, rotation: (N, 3) float64, the object's pivot and its Euler angles (see
-            :func:`er_gym.sim.space.rotation.unity_rotation`).
+            :func:`er_gym.sim.rotation.unity_rotation`).
         aabb_center, aabb_size: (N, 3) float64, the box aligned with the world's axes.
         obb: (N, 4, 3) float64, the box aligned with the object's own axes, in the object's own
             frame: corner 0 relative to the pivot, then the edges along x, y and z that lead away

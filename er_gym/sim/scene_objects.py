@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from er_gym.sim.agent import AGENT_HEIGHT
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.nesting import Nesting
+from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.scene import PROPERTIES, STATES, Scene
-from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.start_pose import start_pose
 from er_gym.sim.world_cache import CacheKey, WorldCache
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from er_gym.sim import initial_state
 from er_gym.sim.agent import HAND_OFFSET, Agent
+from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.scene import Scene
 from er_gym.sim.scene_objects import PROPERTY_COLUMN, STATE_COLUMN, SceneObjects
 from er_gym.sim.settings import Settings, ThirdPartyCamera
-from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.start_pose import start_pose
 from er_gym.sim.world_cache import WorldCache
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from er_gym.sim import scene as scene_module
+from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.scene import (
     PROPERTIES,
     SCENE_NAMES,
@@ -19,7 +20,6 @@ from er_gym.sim.scene import (
     read_scene,
     write_scene,
 )
-from er_gym.sim.space.rotation import unity_rotation
 
 ARRAYS = {
     "position": (3,),

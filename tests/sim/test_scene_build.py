@@ -24,8 +24,8 @@ from er_gym.sim.data.build_scenes import (
     oriented_box,
     read_records,
 )
+from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.scene import Scene, load_scene, read_scene
-from er_gym.sim.space.rotation import unity_rotation
 
 REBUILT = ["FloorPlan1", "FloorPlan430"]
 

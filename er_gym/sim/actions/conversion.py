@@ -58,7 +58,7 @@ def _number(value: Any) -> float:
     except (ValueError, OverflowError):
         raise Unconvertible from None
     if not math.isfinite(number):
-        raise Unconvertible("it is no finite number")
+        raise Unconvertible("it is not a finite number")
     return number
 
 

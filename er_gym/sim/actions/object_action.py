@@ -14,7 +14,7 @@ from er_gym.sim.actions.conversion import kind_of
 from er_gym.sim.actions.registry import Parameter, Run, Signature, add_signature, parameters_of
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.render.view import draw, object_at
-from er_gym.sim.space.rotation import unity_rotation
+from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.world import World
 
 

@@ -24,6 +24,7 @@ from zipfile import Path as ZipPath
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.scene import (
     PROPERTIES,
     SCENE_NAMES,
@@ -33,7 +34,6 @@ from er_gym.sim.scene import (
     Scene,
     write_scene,
 )
-from er_gym.sim.space.rotation import unity_rotation
 
 WHEELS = {
     "procthor": (

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from er_gym.sim.render.palette import Palette, palette
 from er_gym.sim.render.patch import Colour
+from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.scene import Scene, scene_category
 from er_gym.sim.space.recorded_surfaces import recorded_surfaces
-from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.solids import solid_of
 from er_gym.sim.space.solids.built_in import Box, built_in
 from er_gym.sim.world import World

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from er_gym.sim.space.rotation import unity_rotation
+from er_gym.sim.rotation import unity_rotation
 
 
 @dataclass(frozen=True, eq=False)

@@ -118,7 +118,7 @@ def wanted_symbols(library: Path) -> tuple[int, list[str]]:
     """
     content = library.read_bytes()
     if content[:6] != b"\x7fELF\x02\x01":
-        raise ImportError(f"{library} is no 64-bit little-endian ELF file")
+        raise ImportError(f"{library} is not a 64-bit little-endian ELF file")
     machine = int(struct.unpack_from("<H", content, 18)[0])
     sections = list(_sections(content))
     table = next((section for section in sections if section.kind == _DYNAMIC_SYMBOLS), None)

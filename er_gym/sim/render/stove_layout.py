@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from er_gym.sim.render.appearance import appearance_of
 from er_gym.sim.render.floor_plan import floor_plan
 from er_gym.sim.render.patch import rotation
-from er_gym.sim.space.rotation import unity_rotation
+from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.space.solids import solid_of
 from er_gym.sim.space.solids.carcass import SUNK
 from er_gym.sim.world import World

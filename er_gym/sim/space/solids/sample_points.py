@@ -7,9 +7,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.scene import Scene
 from er_gym.sim.scene_objects import SceneObjects
-from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.solids.built_in import hosts
 from er_gym.sim.space.solids.carcass import carcass
 from er_gym.sim.space.solids.solid import upright_box

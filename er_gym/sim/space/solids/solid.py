@@ -8,10 +8,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.scene import Scene
 from er_gym.sim.scene_objects import SceneObjects
 from er_gym.sim.space.recorded_surfaces import recorded_surfaces
-from er_gym.sim.space.rotation import unity_rotation
 from er_gym.sim.space.solids.box_transforms import trimmed, turned
 from er_gym.sim.space.solids.carcass import carcass
 from er_gym.sim.space.solids.counter_tops import rectangles
