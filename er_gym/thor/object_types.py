@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from types import MappingProxyType
 
-from er_gym.sim.recorded import USED_UP
+from er_gym.sim.initial_state import USED_UP
 
 
 @dataclass(frozen=True)
