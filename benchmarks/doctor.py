@@ -12,20 +12,15 @@ import time
 from collections.abc import Callable, Iterator
 from ctypes.util import find_library
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
+import er_gym
+from benchmarks.extras import claimants, extras, installed_version, state_of
 from er_gym.thor import SCENE_NAMES, make_controller, thor_executable
 from er_gym.thor.places import GpuMapping, Release
-
-EXTRAS = {
-    "rl": ("sb3-contrib", "stable-baselines3", "tensorboard", "torch", "tqdm"),
-    "trl": ("torch", "transformers", "trl"),
-    "vlm": ("diskcache", "jinja2", "openai", "rapidfuzz"),
-    "local": ("accelerate", "peft", "torch", "transformers"),
-    "match": ("sentence-transformers",),
-}
-"""Extra to the packages that it brings, as in pyproject.toml; a test compares."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +44,15 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Look at every part, in the order in which they matter."""
-    return [*_engine(), _player(), *_programs(), _unity(), _gpu(), *_extras()]
+    return [
+        *_engine(),
+        _player(),
+        *_programs(),
+        _unity(),
+        _gpu(),
+        *_packages(),
+        *_extras(),
+    ]
 
 
 def _engine() -> Iterator[Finding]:
@@ -153,7 +156,7 @@ def version_of_client() -> str:
     """The client that the player takes a build's place for, in words."""
     from ai2thor._builds import COMMIT_ID
 
-    there = _version("ai2thor")
+    there = installed_version("ai2thor")
     known = "" if there == _CLIENT else f" (er-gym was written for {_CLIENT})"
     return f"ai2thor {there}{known}, commit_id {COMMIT_ID[:7]}"
 
@@ -197,19 +200,42 @@ def _names_of_gpus(program: str) -> str:
 
 
 def _extras() -> Iterator[Finding]:
-    for extra, packages in EXTRAS.items():
-        there = {package: _version(package) for package in packages}
-        missing = [package for package, found in there.items() if found is None]
-        says = ", ".join(f"{package} {found or 'missing'}" for package, found in there.items())
-        mend = f"pip install 'er-gym[{extra}]'" if missing else ""
-        yield Finding(f"extra {extra}", not missing, says, mend)
-
-
-def _version(package: str) -> str | None:
     try:
-        return version(package)
+        names = extras()
     except PackageNotFoundError:
-        return None
+        says = "er-gym is not installed in this Python, so its extras cannot be looked up"
+        yield Finding("extras", False, says, "pip install --editable . in the checkout")
+        return
+    for name in names:
+        state = state_of(name)
+        if state.complete:
+            yield Finding(f"extra {name}", True, ", ".join(state.packages))
+            continue
+        lacks = [*(f"{each} missing" for each in state.missing), *state.wrong]
+        lacks += [f"this Python cannot have {each}" for each in state.unsupported]
+        mend = f"pip install 'er-gym[{name}]'" if state.missing or state.wrong else ""
+        yield Finding(f"extra {name}", False, ", ".join(lacks), mend)
+
+
+def _packages() -> Iterator[Finding]:
+    """Whether ``agents`` and ``benchmarks``, common names for packages, are ours here."""
+    for name in ("agents", "benchmarks"):
+        spec = find_spec(name)
+        place = Path(spec.origin).parents[1] if spec is not None and spec.origin else None
+        others = ", ".join(f"{each} {installed_version(each)}" for each in claimants(name))
+        if place != _HOME:
+            says = f"this name imports {place or 'no package'}, not er-gym's in {_HOME}"
+            says += f"; {others} has it too" if others else ""
+            yield Finding(f"package {name}", False, says, _APART, needed=True)
+        elif others:
+            says = f"{others} has a package of this name too: the one installed last overwrites"
+            yield Finding(f"package {name}", False, says, _APART)
+        else:
+            yield Finding(f"package {name}", True, "er-gym's, and of no other distribution")
+
+
+_HOME = Path(er_gym.__file__).parents[1]
+_APART = "give er-gym a virtual environment of its own"
 
 
 def _attempt(what: str, act: Callable[[], str], *, needed: bool = False) -> Finding:

@@ -2,19 +2,20 @@
 
     python -m benchmarks.perf.conversations [--concurrency 8 --workers 2 --latency 0.1]
 
-The server is the tests' own, in a process of its own on the same machine: it answers after the
-given time with the tasks' key actions. Nothing but this machine's cores and that time is in the
+The server runs in a process of its own on the same machine: it answers after the given time with
+the tasks' key actions. Nothing but this machine's cores and that time is in the
 figure, whose upper bound is concurrency / latency.
 """
 
 from __future__ import annotations
 
-import importlib.util
+import json
 import multiprocessing
-import sys
 import tempfile
+import threading
 import time
 from contextlib import closing, suppress
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -25,8 +26,6 @@ from benchmarks.spoken import Voice
 from benchmarks.store import Manifest, RunStore
 from er_gym import __version__
 from er_gym.tasks import Task, load_suite
-
-_SERVER = Path(__file__).resolve().parents[2] / "tests" / "agents" / "vlm" / "naughty_server.py"
 
 
 class Answers:
@@ -47,15 +46,63 @@ class Answers:
         return f"<Thinking>Next.</Thinking><DecisionMaking>{action}</DecisionMaking>"
 
 
+class Server(ThreadingHTTPServer):
+    """An OpenAI-compatible server that always answers, ``latency`` seconds after a request."""
+
+    daemon_threads = True
+    request_queue_size = 128
+
+    def __init__(self, answers: Answers, latency: float) -> None:
+        super().__init__(("127.0.0.1", 0), _Handler)
+        self.answers = answers
+        self.latency = latency
+
+    @property
+    def url(self) -> str:
+        """What goes into ``--base-url``."""
+        return f"http://127.0.0.1:{self.server_port}/v1"
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: Server
+    protocol_version = "HTTP/1.1"  # connections are kept
+    disable_nagle_algorithm = True
+
+    def do_POST(self) -> None:
+        arrived = time.monotonic()
+        asked = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        said = self.server.answers(asked["messages"])
+        body = json.dumps(
+            {
+                "id": "answer",
+                "object": "chat.completion",
+                "created": int(time.time()),
+                "model": asked["model"],
+                "choices": [
+                    {
+                        "index": 0,
+                        "message": {"role": "assistant", "content": said},
+                        "finish_reason": "stop",
+                    }
+                ],
+                "usage": {"prompt_tokens": 100, "completion_tokens": 20, "total_tokens": 120},
+            }
+        ).encode()
+        time.sleep(max(0.0, self.server.latency - (time.monotonic() - arrived)))
+        self.send_response(200)
+        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing."""
+
+
 def serve(pipe: Connection, tasks: list[Task], latency: float) -> None:
     """The server's process."""
-    spec = importlib.util.spec_from_file_location("naughty_server", _SERVER)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    server = module.NaughtyServer(Answers(tasks), latency=latency, keep_bodies=False)
+    server = Server(Answers(tasks), latency)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
     pipe.send(server.url)
     with suppress(EOFError):
         pipe.recv()  # until nobody holds the other end
@@ -78,7 +125,7 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
     process.start()
     theirs.close()
     voice = Voice.of(
-        "openai:naughty-1",
+        "openai:answering-server",
         base_url=ours.recv(),
         overrides=[f"pictures.width={size}", f"pictures.height={size}"],
         concurrency=concurrency,

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from benchmarks import cli, doctor
+from benchmarks.extras import extras, state_of
 from er_gym.thor import player as players
 from er_gym.thor.places import GpuMapping, Release
 
@@ -107,8 +107,11 @@ PROGRAMS = ["Controller(scene=…)", "platform=CloudRendering", "gpu_device=…"
 def lines(out: str) -> dict[str, str]:
     """A part's name to its whole line."""
     parts = ["embedded engine", "renderer", "player", *PROGRAMS, "Unity build", "GPU"]
-    parts += [f"extra {name}" for name in doctor.EXTRAS]
-    found = {part: line for line in out.splitlines() for part in parts if line[4:].startswith(part)}
+    parts += ["package agents", "package benchmarks"]
+    parts += [f"extra {name}" for name in extras()]
+    found = {
+        part: line for line in out.splitlines() for part in parts if line[4:].startswith(f"{part} ")
+    }
     assert list(found) == parts
     assert len(out.splitlines()) == len(parts)
     return found
@@ -139,6 +142,13 @@ def test_doctor_has_a_line_for_each_part(er_gym, the_client):
     assert line["Unity build"].startswith("--")
     for lacking in ("build missing", "Vulkan missing", "display missing", "libvulkan1", "network"):
         assert lacking in line["Unity build"]
+    assert {"rl", "trl", "vlm", "local", "inspect", "charts", "match", "all"} <= set(extras())
+    for name in extras():
+        state = state_of(name)
+        assert line[f"extra {name}"].startswith("ok " if state.complete else "--")
+        assert all(f"{each} missing" in line[f"extra {name}"] for each in state.missing)
+        if state.missing:
+            assert line[f"extra {name}"].endswith(f"; pip install 'er-gym[{name}]'")
 
 
 def test_doctor_tells_the_player_from_unity(er_gym, the_client):
@@ -202,13 +212,12 @@ def test_a_gpu_is_named(er_gym, monkeypatch, home):
     assert lines(er_gym("doctor")[1])["GPU"].startswith("--")
 
 
-def test_extras_are_those_of_the_project(repository: Path):
-    tomllib = pytest.importorskip("tomllib")  # Python 3.11
-    project = tomllib.loads((repository / "pyproject.toml").read_text())["project"]
-    for extra, packages in doctor.EXTRAS.items():
-        wanted = project["optional-dependencies"][extra]
-        names = [name.split(">")[0].split("=")[0] for name in wanted]
-        assert [name for name in names if not name.startswith("er-gym")] == list(packages)
+def test_doctor_says_that_er_gym_is_not_installed(monkeypatch):
+    """As when the command runs from a checkout by PYTHONPATH alone."""
+    monkeypatch.setattr("benchmarks.extras.PROJECT", "er-gym-that-nobody-installed")
+    (finding,) = doctor._extras()
+    assert (finding.what, finding.works) == ("extras", False)
+    assert "pip install" in finding.mend
 
 
 def test_help_imports_nothing_heavy():
