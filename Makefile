@@ -1,6 +1,9 @@
 # make bench    play the bundled suite with the oracle and the random agent, and print the table
 # make test     run the tests
 # make lint     check style and types
+# make check    lint, then test
+# make cover    run the tests and say which lines they do not reach (half as slow again)
+# make test-inspect   run the tests of er-gym inspect, with the extra that they need
 # make clean    remove what these left behind, the virtual environment included; runs/ stays
 #
 # Each does the set-up that it needs in $(VENV), once. Another Python: make bench PYTHON=python3.12
@@ -18,7 +21,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL := $(PIP) install --quiet --no-compile --constraint constraints.txt
 MARK := $(VENV)/.er-gym
 
-.PHONY: bench test lint clean help
+.PHONY: bench test test-inspect cover lint check clean help
 .DELETE_ON_ERROR:
 
 help:
@@ -31,6 +34,16 @@ bench: $(MARK)-core
 
 test: $(MARK)-dev
 	$(BIN)/python -m pytest $(ARGS)
+
+cover: $(MARK)-dev
+	$(BIN)/python -m pytest --cov --cov-report=term-missing:skip-covered $(ARGS)
+
+test-inspect: $(MARK)-dev
+	@$(INSTALL) --editable '.[dev,inspect]'
+	@$(headless)
+	$(BIN)/python -m pytest tests/benchmarks/test_inspect_task.py $(ARGS)
+
+check: lint test
 
 lint: $(MARK)-dev
 	$(BIN)/ruff check .

@@ -40,8 +40,9 @@ def install(force: bool, python: str | None) -> None:
     """
     from benchmarks.doctor import version_of_client
     from er_gym.thor import player as players
+    from er_gym.thor.places import PlayerError
 
-    with bad_input(players.PlayerError):
+    with bad_input(PlayerError):
         installed = players.install(force=force, python=python or sys.executable)
     for release in installed.releases:
         echo(f"{release.platform}: {release.path}")
@@ -61,9 +62,9 @@ def install(force: bool, python: str | None) -> None:
 def uninstall() -> None:
     """Remove what install has put there, and bring back what it has set aside."""
     from er_gym.thor import player as players
-    from er_gym.thor.places import client_home
+    from er_gym.thor.places import PlayerError, client_home
 
-    with bad_input(players.PlayerError):
+    with bad_input(PlayerError):
         unity = players.uninstall()
     echo(f"removed from {client_home()}")
     for release in unity:

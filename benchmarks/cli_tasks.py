@@ -120,10 +120,11 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
     pages = []
     for task in fitted.tasks:
         told = task.extra.get("difficulty")  # whoever wrote the file may mean something else by it
-        known = isinstance(told, Mapping) and all(
+        figures = None
+        if isinstance(told, Mapping) and all(
             type(told.get(name)) in (int, float) for name in names
-        )
-        figures = Difficulty(**{name: told[name] for name in names}) if known else None
+        ):
+            figures = Difficulty(**{name: told[name] for name in names})
         pages.append(describe(task, figures))
     echo("\n\n".join(pages))
 

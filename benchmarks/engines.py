@@ -158,11 +158,13 @@ class RemoteEnv:
         self._task: Any = None
 
     def reset(
-        self, *, seed: int | None = None, options: Mapping[str, Any]
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Begin the episode that ``options["task"]`` states."""
+        if options is None:
+            raise ValueError("no task is given; state one: options={'task': TASK}")
         self._task = options["task"]
-        obs, info = self._ask("reset", seed, dict(options))
+        obs, info = self._ask("reset", seed, options)
         return obs, {"task": self._task, **info}
 
     def step(

@@ -33,7 +33,7 @@ def model_at(name: str, address: str | None) -> Model:
         )
     model = get_model(name, base_url=plain_url(address), memoize=False)
     if url.query:
-        client = getattr(model.api, "client", None)
+        client: Any = getattr(model.api, "client", None)
         if not hasattr(client, "with_options"):
             raise ValueError(f"{name} takes no query in --model-base-url; give the address alone")
         model.api.client = client.with_options(default_query=dict(url.params))

@@ -72,7 +72,7 @@ class Maker:
 
     def _of(self, room: Generator, rng: random.Random) -> Made:
         """The tasks of a room as it is arranged."""
-        kept = []
+        kept: list[Task] = []
         for kind in TASK_TYPES:
             if not self._making.types or kind.name in self._making.types:
                 candidates = list(room.tasks([kind.name]))

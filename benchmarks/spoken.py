@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.base import Agent
+from agents.vlm.agent import VLMAgent
 from agents.vlm.clients.budget import Budget
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import AgentSettings
@@ -97,6 +98,7 @@ class Voice:
 
         def keep(episode: EpisodeRecord, agent: Agent) -> None:
             last = next((step for step in reversed(episode.steps) if not step.appended), None)
+            assert isinstance(agent, VLMAgent)  # as the speaker makes them
             kept = agent.conversation(
                 picture_folder(episode.task_id),
                 feedback=last.feedback if last else "",

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
+import click
+import pytest
+
+from benchmarks.cli import cli
 from er_gym.sim.actions import ACTIONS
 
 
@@ -27,3 +32,34 @@ def test_every_picture_and_page_is_there(repository: Path) -> None:
 def test_the_list_of_actions_is_complete(repository: Path) -> None:
     page = (repository / "docs" / "fidelity.md").read_text().partition("## Actions")[2]
     assert set(re.findall(r"\w+", page)) == {*ACTIONS, "Reset"}
+
+
+PAGES = ("README.md", "CONTRIBUTING.md", *(f"docs/{name}.md" for name in (
+    "agents", "baselines", "fidelity", "gallery", "learning", "player", "serving", "tasks"
+)))  # fmt: skip
+
+
+def commands(page: str) -> list[str]:
+    """What follows ``er-gym`` in the shell examples of a page."""
+    blocks = re.findall(r"```(?:sh|bash)\n(.*?)```", page.replace("\\\n", " "), re.S)
+    lines = [line.partition(" #")[0] for block in blocks for line in block.splitlines()]
+    found = [line.partition("er-gym ")[2] for line in lines if re.search(r"(^|[ /])er-gym ", line)]
+    return [re.split(r" [|>&;]", command)[0] for command in found]
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_commands_and_their_options_exist(repository: Path, name: str) -> None:
+    for command in commands((repository / name).read_text()):
+        context, parsed, rest = click.Context(cli, info_name="er-gym"), cli, shlex.split(command)
+        while isinstance(parsed, click.Group):
+            parsed = parsed.get_command(context, rest.pop(0))
+            assert parsed is not None, command
+            context = click.Context(parsed, parent=context)
+        parsed.make_parser(context).parse_args(rest)  # raises what a user would be told
+
+
+def test_all_pages_are_looked_through(repository: Path) -> None:
+    assert set(PAGES) >= {f"docs/{page.name}" for page in (repository / "docs").glob("*.md")}
+    readme = (repository / "README.md").read_text()
+    assert len(commands(readme)) > 15
+    assert all(command in readme.replace("\\\n", " ") for command in commands(readme))

@@ -7,6 +7,7 @@ undo the policy in the first updates that follow.
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import torch
@@ -62,7 +63,8 @@ def clone(model: MaskablePPO, seen: Demonstrations, how: WarmStart, seed: int) -
         for rows in np.array_split(
             random.permutation(len(seen)), max(1, len(seen) // how.batch_size)
         ):
-            obs, _ = policy.obs_to_tensor({key: value[rows] for key, value in seen.obs.items()})
+            # The policy takes dictionaries, though its annotation asks for one Tensor.
+            obs: Any = policy.obs_to_tensor({key: all_[rows] for key, all_ in seen.obs.items()})[0]
             actions = torch.as_tensor(seen.actions[rows])
             masks = torch.as_tensor(seen.masks[rows])
             values, log_prob, _ = policy.evaluate_actions(obs, actions, action_masks=masks)
@@ -73,6 +75,6 @@ def clone(model: MaskablePPO, seen: Demonstrations, how: WarmStart, seed: int) -
             torch.nn.utils.clip_grad_norm_(policy.parameters(), model.max_grad_norm)
             optimizer.step()
             with torch.no_grad():
-                best = policy.get_distribution(obs, masks).mode()
+                best = policy.get_distribution(obs, seen.masks[rows]).mode()
             agreed += int((best == actions).sum())
     return agreed / len(seen)

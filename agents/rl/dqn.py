@@ -21,8 +21,10 @@ from sb3_contrib.qrdqn.policies import QRDQNPolicy
 from stable_baselines3 import DQN
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.buffers import DictReplayBuffer
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.preprocessing import preprocess_obs
+from stable_baselines3.common.type_aliases import PyTorchObs
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.dqn.policies import DQNPolicy
 from torch import Tensor, nn
@@ -50,34 +52,40 @@ class QuantileNetwork(BasePolicy):
     ) -> None:
         super().__init__(space, actions)
         self.network = TypeNetwork(space, width, kind, quantiles)
-        self.value = nn.Sequential(
-            nn.Linear(self.network.summary_width, width), nn.ReLU(), nn.Linear(width, quantiles)
-        )
-        for last in (self.network.each, self.network.bare, self.value[-1]):
+        value = nn.Linear(width, quantiles)
+        self.value = nn.Sequential(nn.Linear(self.network.summary_width, width), nn.ReLU(), value)
+        for last in (self.network.each, self.network.bare, value):
             with torch.no_grad():
                 last.weight.mul_(0.1)  # begin by expecting nothing much of anything
 
-    def forward(self, obs: dict[str, Tensor]) -> Tensor:
+    def forward(self, obs: PyTorchObs) -> Tensor:
         """(B, N, A); of illegal actions very low numbers."""
         seen = preprocess_obs(obs, self.observation_space)
+        assert isinstance(seen, dict)
         more, summary = self.network(seen)  # (B, A, N), (B, summary)
         quantiles = more + self.value(summary)[:, None]
         illegal = seen["mask"] == 0  # (B, A)
         return quantiles.masked_fill_(illegal[:, :, None], _NEVER).transpose(1, 2)
 
-    def _predict(self, observation: dict[str, Tensor], deterministic: bool = True) -> Tensor:
+    def _predict(self, observation: PyTorchObs, deterministic: bool = True) -> Tensor:
         return self(observation).mean(dim=1).argmax(dim=1)
 
 
 class ValueNetwork(QuantileNetwork):
     """What is to come after each action, on average."""
 
-    def forward(self, obs: dict[str, Tensor]) -> Tensor:
+    def forward(self, obs: PyTorchObs) -> Tensor:
         """(B, A); of illegal actions very low numbers."""
         return super().forward(obs)[:, 0]
 
-    def _predict(self, observation: dict[str, Tensor], deterministic: bool = True) -> Tensor:
+    def _predict(self, observation: PyTorchObs, deterministic: bool = True) -> Tensor:
         return self(observation).argmax(dim=1)
+
+
+def _spaces(policy: BasePolicy) -> tuple[spaces.Dict, spaces.Discrete]:
+    assert isinstance(policy.observation_space, spaces.Dict)
+    assert isinstance(policy.action_space, spaces.Discrete)
+    return policy.observation_space, policy.action_space
 
 
 class TypeDQNPolicy(DQNPolicy):
@@ -87,11 +95,11 @@ class TypeDQNPolicy(DQNPolicy):
         self._shape = {"width": width, "kind": kind}
         super().__init__(*args, **kwargs)
 
-    def make_q_net(self) -> ValueNetwork:
+    # Ours in place of Stable-Baselines3's own network, of which nothing else is asked.
+    def make_q_net(self) -> ValueNetwork:  # type: ignore[override]
         """Another one, online or target."""
-        return ValueNetwork(
-            self.observation_space, self.action_space, **self._shape, quantiles=1
-        ).to(self.device)
+        seen, actions = _spaces(self)
+        return ValueNetwork(seen, actions, **self._shape, quantiles=1).to(self.device)
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
         return {**super()._get_constructor_parameters(), **self._shape}
@@ -104,11 +112,12 @@ class TypeQRDQNPolicy(QRDQNPolicy):
         self._shape = {"width": width, "kind": kind}
         super().__init__(*args, **kwargs)
 
-    def make_quantile_net(self) -> QuantileNetwork:
+    # As above.
+    def make_quantile_net(self) -> QuantileNetwork:  # type: ignore[override]
         """Another one, online or target."""
-        return QuantileNetwork(
-            self.observation_space, self.action_space, **self._shape, quantiles=self.n_quantiles
-        ).to(self.device)
+        seen, actions = _spaces(self)
+        network = QuantileNetwork(seen, actions, **self._shape, quantiles=self.n_quantiles)
+        return network.to(self.device)
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
         return {**super()._get_constructor_parameters(), **self._shape}
@@ -137,29 +146,36 @@ class HalfReplayBuffer(DictReplayBuffer):
 # -- the algorithms ------------------------------------------------------------------------------
 
 
-class _Legal:
-    """Explores among legal actions, each environment for itself; learns from a filled buffer."""
+class _Legal(OffPolicyAlgorithm):
+    """Explores among legal actions, each environment for itself; learns from a filled buffer.
+
+    To be inherited from before DQN or QRDQN.
+    """
+
+    exploration_rate: float
 
     def predict(
         self,
-        observation: Obs,
-        state: Any = None,
-        episode_start: Any = None,
+        observation: NDArray[Any] | Obs,
+        state: tuple[NDArray[Any], ...] | None = None,
+        episode_start: NDArray[Any] | None = None,
         deterministic: bool = False,
         action_masks: Any = None,
-    ) -> tuple[NDArray[np.intp], Any]:
+    ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...] | None]:
         """What is thought best, or tried. Masks are read from the observation, not from
         ``action_masks``, which sb3-contrib's evaluation gives to every learner."""
         return self._act(observation, 0.0 if deterministic else self.exploration_rate), state
 
     def _sample_action(
         self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
-    ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
         filling = self.num_timesteps < learning_starts
+        assert self._last_obs is not None
         actions = self._act(self._last_obs, 1.0 if filling else self.exploration_rate)
         return actions, actions
 
-    def _act(self, obs: Obs, exploration_rate: float) -> NDArray[np.intp]:
+    def _act(self, obs: NDArray[Any] | Obs, exploration_rate: float) -> NDArray[Any]:
+        assert isinstance(obs, dict)  # it tells the action mask
         best, _ = self.policy.predict(obs, deterministic=True)
         lots = obs["mask"] * (1 - np.random.random(obs["mask"].shape))  # (n, A), above 0 if legal
         tries = np.random.random(best.shape) < exploration_rate
@@ -168,12 +184,13 @@ class _Legal:
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
         """Learn, unless the buffer is as good as empty, as it is when a run is continued."""
         buffer = self.replay_buffer
+        assert buffer is not None
         if buffer.full or buffer.size() * buffer.n_envs >= self.learning_starts:
             super().train(gradient_steps, batch_size)
 
-    def learn(self, *args: Any, log_interval: int = _LOG_EVERY, **kwargs: Any) -> Any:
+    def learn(self, *args: Any, **kwargs: Any) -> Any:
         """Go on until so many more steps are made."""
-        return super().learn(*args, log_interval=log_interval, **kwargs)
+        return super().learn(*args, **{"log_interval": _LOG_EVERY, **kwargs})
 
 
 class LegalDQN(_Legal, DQN):
@@ -187,29 +204,28 @@ class LegalQRDQN(_Legal, QRDQN):
 def make(config: TrainConfig, settings: DQNSettings, env: VecEnv) -> BaseAlgorithm:
     """A learner that has learnt nothing yet; which, ``settings.name`` says."""
     policy_kwargs = config.network.model_dump()
-    algorithm, policy = LegalDQN, TypeDQNPolicy
     if settings.name == "qrdqn":
-        algorithm, policy = LegalQRDQN, TypeQRDQNPolicy
         policy_kwargs["n_quantiles"] = settings.quantiles
-    return algorithm(
-        policy,
-        env,
-        learning_rate=settings.learning_rate,
-        buffer_size=settings.buffer_size,
-        learning_starts=settings.learning_starts,
-        batch_size=settings.batch_size,
-        gamma=settings.gamma,
-        train_freq=settings.train_freq,
-        gradient_steps=settings.gradient_steps,
-        target_update_interval=settings.target_update_interval,
-        exploration_fraction=settings.exploration_fraction,
-        exploration_final_eps=settings.exploration_final_eps,
-        max_grad_norm=settings.max_grad_norm,
-        replay_buffer_class=HalfReplayBuffer,
-        policy_kwargs=policy_kwargs,
-        seed=config.seed,
-        device="cpu",
-    )
+    given: dict[str, Any] = {
+        "learning_rate": settings.learning_rate,
+        "buffer_size": settings.buffer_size,
+        "learning_starts": settings.learning_starts,
+        "batch_size": settings.batch_size,
+        "gamma": settings.gamma,
+        "train_freq": settings.train_freq,
+        "gradient_steps": settings.gradient_steps,
+        "target_update_interval": settings.target_update_interval,
+        "exploration_fraction": settings.exploration_fraction,
+        "exploration_final_eps": settings.exploration_final_eps,
+        "max_grad_norm": settings.max_grad_norm,
+        "replay_buffer_class": HalfReplayBuffer,
+        "policy_kwargs": policy_kwargs,
+        "seed": config.seed,
+        "device": "cpu",
+    }
+    if settings.name == "qrdqn":
+        return LegalQRDQN(TypeQRDQNPolicy, env, **given)
+    return LegalDQN(TypeDQNPolicy, env, **given)
 
 
 def load_foreign_dqn(file: Path) -> LegalDQN:

@@ -40,7 +40,7 @@ class TrainingRules(gymnasium.Wrapper[Any, Any, Any, Any]):
         return obs, reward, terminated or truncated, False, info
 
 
-class LearningEnv(gymnasium.Wrapper[Obs, Any, Any, Any]):
+class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
     """Draws tasks of the wanted types, and shows the learner what :class:`Perception` makes.
 
     Args:

@@ -46,6 +46,13 @@ class TypeNetwork(nn.Module):
         outputs: how many numbers an action gets: 1 for a logit or a value, more for quantiles.
     """
 
+    properties: Tensor
+    """Whether each type has each property, (T, P)."""
+    index: Tensor
+    """The action of each type and verb, (T, V)."""
+    bare_index: Tensor
+    """The actions without a type."""
+
     def __init__(
         self, space: spaces.Dict, width: int = 64, kind: int = 16, outputs: int = 1
     ) -> None:
@@ -60,7 +67,11 @@ class TypeNetwork(nn.Module):
         self.register_buffer("index", index.where(index >= 0, _NOWHERE), persistent=False)
         self.kinds = nn.Parameter(torch.randn(len(TYPES), kind) * 0.3)
         known = kind + len(_PROPERTIES)
-        extras = {key: box for key, box in space.spaces.items() if key not in ("state", "mask")}
+        extras = {
+            key: box
+            for key, box in space.spaces.items()
+            if key not in ("state", "mask") and isinstance(box, spaces.Box)
+        }
         told = sum(int(box.shape[0]) for key, box in extras.items() if key != "rgb")
         self.eye = _eye(width, extras["rgb"].shape[0]) if "rgb" in extras else None
         told += width if self.eye is not None else 0

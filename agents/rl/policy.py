@@ -51,6 +51,10 @@ class _Split(nn.Module):
 class TypePolicy(MaskableActorCriticPolicy):
     """Logits and value from one :class:`TypeNetwork`; ``policy_kwargs``: ``width``, ``kind``."""
 
+    # Other modules than those that Stable-Baselines3 makes itself.
+    mlp_extractor: _Split  # type: ignore[assignment]
+    value_net: nn.Sequential  # type: ignore[assignment]
+
     def __init__(self, *args: Any, width: int = 64, kind: int = 16, **kwargs: Any) -> None:
         self._shape = {"width": width, "kind": kind}
         super().__init__(
@@ -63,18 +67,19 @@ class TypePolicy(MaskableActorCriticPolicy):
         )
 
     def _build(self, lr_schedule: Schedule) -> None:
+        assert isinstance(self.features_extractor, TypeFeatures)
         network = self.features_extractor.network
         self.mlp_extractor = _Split(network.actions, network.summary_width)
         self.action_net = nn.Identity()
+        value = nn.Linear(network.width, 1)
         self.value_net = nn.Sequential(
-            nn.Linear(network.summary_width, network.width), nn.ReLU(), nn.Linear(network.width, 1)
+            nn.Linear(network.summary_width, network.width), nn.ReLU(), value
         )
-        for last in (network.each, network.bare, self.value_net[-1]):
+        for last in (network.each, network.bare, value):
             with torch.no_grad():
                 last.weight.mul_(0.1)  # begin by trying everything alike
-        self.optimizer = self.optimizer_class(
-            self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs
-        )
+        settings: dict[str, Any] = {"lr": lr_schedule(1), **self.optimizer_kwargs}
+        self.optimizer = self.optimizer_class(self.parameters(), **settings)
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
         return {**super()._get_constructor_parameters(), **self._shape}

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from sb3_contrib import MaskablePPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList, ProgressBarCallback
 from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
@@ -182,6 +183,7 @@ def quick_arithmetic() -> Iterator[None]:
 
 
 def _warm(model: BaseAlgorithm, config: TrainConfig, how: WarmStart, run: Path, seed: int) -> None:
+    assert isinstance(model, MaskablePPO)  # a configuration of another learner has no warm start
     seen = watch(config, how, seed)
     agreement = clone(model, seen, how, seed)
     rate = seen.successes / seen.episodes

@@ -133,7 +133,7 @@ def serve(pipe: Connection, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]
             try:
                 if envs is None:
                     envs = Envs(make)
-                answer = (None, getattr(envs, method)(*args))
+                answer: tuple[Exception | None, Any] = (None, getattr(envs, method)(*args))
             except Exception as error:  # whatever it is, the trainer has to hear of it
                 answer = (error, None)
             pipe.send(answer)

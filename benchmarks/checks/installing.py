@@ -45,7 +45,9 @@ def main(wanted: tuple[str, ...], python: str) -> None:
 def resolve(python: Path, extra: str) -> str:
     """What pip says to installing the checkout with an extra ("": none)."""
     asked = [str(python), "-m", "pip", "install", "--dry-run", "--constraint", "constraints.txt"]
-    done = subprocess.run([*asked, f".[{extra}]" if extra else "."], cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(
+        [*asked, f".[{extra}]" if extra else "."], cwd=ROOT, capture_output=True, text=True
+    )
     return done.stdout if done.returncode == 0 else done.stderr
 
 

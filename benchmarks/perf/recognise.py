@@ -256,7 +256,7 @@ def learn_and_tell(
             logits = network(varied(prepared(learnt.images[chosen.numpy()])))  # (BATCH, classes)
             loss = F.cross_entropy(logits, labels[chosen], label_smoothing=0.1)
             optimiser.zero_grad(set_to_none=True)
-            loss.backward()  # type: ignore[no-untyped-call]
+            loss.backward()
             optimiser.step()
             schedule.step()
             total += loss.item()

@@ -17,12 +17,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import click
-from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
 
 from agents.rl.callbacks import Threads
-from agents.rl.config import TrainConfig, config_file, load_config
+from agents.rl.config import PPO, TrainConfig, config_file, load_config
 from agents.rl.ppo import make
 from agents.rl.train import quick_arithmetic, vectorised
 
@@ -71,11 +71,12 @@ class Rates(BaseCallback):
         return True
 
 
-def measure(model: BaseAlgorithm, env: VecEnv, steps: int, threads: int) -> tuple[Clock, Rates]:
+def measure(model: OnPolicyAlgorithm, env: VecEnv, steps: int, threads: int) -> tuple[Clock, Rates]:
     """Learn for so many steps; what took the time, and the rate of each tenth."""
     clock, rates = Clock(), Rates(steps)
     env.step = clock.around("environments", env.step)  # type: ignore[method-assign]
-    model.policy.forward = clock.around("choosing actions", model.policy.forward)
+    choose = clock.around("choosing actions", model.policy.forward)
+    model.policy.forward = choose  # type: ignore[method-assign]
     model.train = clock.around("learning", model.train)  # type: ignore[method-assign]
     with clock("all"):
         model.learn(steps, callback=CallbackList([rates, Threads(threads)]))
@@ -84,6 +85,7 @@ def measure(model: BaseAlgorithm, env: VecEnv, steps: int, threads: int) -> tupl
 
 def ours(config: TrainConfig, steps: int) -> tuple[Clock, Rates]:
     """MaskablePPO on an er-gym configuration."""
+    assert isinstance(config.algorithm, PPO), config.algorithm.name
     env = vectorised(config, config.env, config.seed)
     try:
         return measure(make(config, config.algorithm, env), env, steps, config.threads)
@@ -96,7 +98,7 @@ def minigrid(config: TrainConfig, steps: int) -> tuple[Clock, Rates]:
     import gymnasium
     import minigrid  # noqa: F401  (registers the environments)
     from minigrid.wrappers import FlatObsWrapper
-    from stable_baselines3 import PPO
+    from stable_baselines3 import PPO as PlainPPO
 
     def one() -> Any:
         return FlatObsWrapper(gymnasium.make("MiniGrid-DoorKey-8x8-v0"))
@@ -104,7 +106,9 @@ def minigrid(config: TrainConfig, steps: int) -> tuple[Clock, Rates]:
     env = VecMonitor(DummyVecEnv([one] * config.vec.envs))
     settings = config.algorithm.model_dump(include={"n_steps", "batch_size", "n_epochs"})
     try:
-        return measure(PPO("MlpPolicy", env, device="cpu", **settings), env, steps, config.threads)
+        return measure(
+            PlainPPO("MlpPolicy", env, device="cpu", **settings), env, steps, config.threads
+        )
     finally:
         env.close()
 
@@ -129,6 +133,8 @@ def show(name: str, clock: Clock, rates: Rates, steps: int) -> None:
 def main(config: str, steps: int, peer_steps: int, overrides: tuple[str, ...]) -> None:
     """Measure, and print."""
     asked = load_config(config_file(config), overrides)
+    if not isinstance(asked.algorithm, PPO):
+        raise click.BadParameter(f"{config} is of {asked.algorithm.name}; give one of ppo")
     with quick_arithmetic():
         show(config, *ours(asked, steps), steps)
         show("PPO on MiniGrid", *minigrid(asked, peer_steps), peer_steps)

@@ -1,4 +1,4 @@
-"""Inspect plays suites with a model that says what it is told; without the package, skipped."""
+"""Inspect plays suites with a model that says what it is told; ``make test-inspect`` runs these."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-pytest.importorskip("inspect_ai")
+pytest.importorskip("inspect_ai", reason="needs the extra inspect: make test-inspect")
 
 from inspect_ai import eval as evaluate
 from inspect_ai.log import read_eval_log

@@ -112,7 +112,7 @@ def _model(path: str, has_eyes: bool, local: Local, where: dict[str, bool]) -> A
     maker = (
         transformers.AutoModelForImageTextToText if has_eyes else transformers.AutoModelForCausalLM
     )
-    model, found = maker.from_pretrained(
+    loaded: Any = maker.from_pretrained(
         path,
         dtype=local.dtype,
         device_map=local.device_map,
@@ -120,6 +120,7 @@ def _model(path: str, has_eyes: bool, local: Local, where: dict[str, bool]) -> A
         output_loading_info=True,
         **where,
     )
+    model, found = loaded  # a pair, for output_loading_info
     if missing := sorted(found["missing_keys"]):  # transformers would make random ones, and go on
         raise ValueError(f"{len(missing)} of its weights are not there, such as {missing[0]}")
     return model

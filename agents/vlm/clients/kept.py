@@ -119,7 +119,7 @@ def _essence(part: str | Picture) -> str | list[str]:
     return part if isinstance(part, str) else [part.media_type, part.digest]
 
 
-class _Texts(diskcache.Disk):  # type: ignore[misc]
+class _Texts(diskcache.Disk):
     """Reads texts only. Otherwise it would unpickle, and so run, what others put into the file."""
 
     def fetch(self, mode: int, filename: str | None, value: Any, read: bool) -> Any:

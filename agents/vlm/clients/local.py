@@ -229,7 +229,7 @@ class LocalClient:
             "input_ids": ids,
             "attention_mask": torch.tensor([[0] * gap + [1] * (longest - gap) for gap in gaps]),
         }
-        if any(row.pixels is not None for row in rows):
+        if self._place is not None and any(row.pixels is not None for row in rows):
             inputs |= {
                 "pixel_values": torch.cat([row.pixels for row in rows if row.pixels is not None]),
                 "image_grid_thw": torch.cat([row.grids for row in rows if row.grids is not None]),
