@@ -6,13 +6,13 @@ from collections.abc import Callable
 from functools import lru_cache
 from inspect import signature
 
-from agents.base import Agent, Decision
 from agents.scripted.oracle import OracleAgent
 from agents.scripted.random import RandomAgent
 from agents.scripted.searcher import SearcherAgent
+from agents.vlm.factory import AgentFactory, speaks, ways_to_name
 from agents.vlm.settings import AgentSettings
-from agents.vlm.speaker import Speaker, speaks, ways_to_name
 from er_gym.plugins import PluginError, Registry, reason
+from er_gym.rollout.agent import Agent, Decision
 
 __all__ = [
     "AGENTS",
@@ -30,7 +30,7 @@ AGENTS: Registry[Callable[..., Agent]] = Registry(
     kind="agent",
     group="er_gym.agents",
     own={"oracle": OracleAgent, "random": RandomAgent, "searcher": SearcherAgent},
-    expected="an agent's class (agents.base.Agent), or a function that makes an agent",
+    expected="an agent's class (er_gym.rollout.agent.Agent), or a function that makes an agent",
     fits=callable,
     others=f"{RL}RUN with a run directory of er-gym train-rl; {ways_to_name()}",
 )
@@ -40,7 +40,7 @@ arguments."""
 
 def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
     """An agent by name: one of :data:`AGENTS`, ``package.module:Class``, ``rl:RUN`` for a trained
-    policy, or, with the settings that are the default, a model's (:mod:`agents.vlm.speaker`).
+    policy, or, with the settings that are the default, a model's (:mod:`agents.vlm.factory`).
 
     ``trust``: whether a policy may be read from a file that can run code (:mod:`agents.rl.saved`).
 
@@ -69,7 +69,7 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
     if lacking:
         raise PluginError(
             f"agent {name!r} makes {type(agent).__name__}, which has no {lacking[0]!r}; "
-            "an agent has a text obs_mode, and reset and act (agents.base.Agent)"
+            "an agent has a text obs_mode, and reset and act (er_gym.rollout.agent.Agent)"
         )
     return agent
 
@@ -83,8 +83,8 @@ def _called(make: Callable[..., Agent], seed: int) -> Agent:
 
 
 @lru_cache(maxsize=4)
-def _speaker(name: str) -> Speaker:
-    return Speaker(name, AgentSettings())
+def _speaker(name: str) -> AgentFactory:
+    return AgentFactory(name, AgentSettings())
 
 
 def _trained(path: str, trust: bool) -> Agent:

@@ -44,16 +44,16 @@ from inspect_ai.util import JSONSchema
 from agents.vlm.agent import VLMAgent
 from agents.vlm.chat import Message, ModelError, Part, Picture, Reply, Usage
 from agents.vlm.clients.decision_schema import REQUEST_FIELDS
+from agents.vlm.factory import load_settings
 from agents.vlm.matching import Matcher
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import AgentSettings
-from agents.vlm.speaker import load_settings
-from benchmarks.engines import Engines
-from benchmarks.episode import EpisodeRecord
 from benchmarks.inspect_secrets import discreet
-from benchmarks.metrics import METRICS, score_episode
-from benchmarks.play import episode_seed, play_episode
-from benchmarks.scorers import CORRECTED
+from benchmarks.scoring.metrics import METRICS, score_episode
+from benchmarks.scoring.scorers import CORRECTED
+from er_gym.rollout.env_pool import EnvPool
+from er_gym.rollout.play import episode_seed, play_episode
+from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
@@ -61,7 +61,7 @@ from er_gym.tasks.task import Task
 _Result = TypeVar("_Result")
 
 EPISODE = "er_gym:episode"
-"""Where a sample's store keeps the :class:`~benchmarks.episode.EpisodeRecord`."""
+"""Where a sample's store keeps the :class:`~er_gym.rollout.records.EpisodeRecord`."""
 
 
 @task
@@ -144,7 +144,7 @@ def episode(
         def play() -> EpisodeRecord:
             agent = VLMAgent(line, settings, prompts, matcher, seed=number, name=str(model))
             try:
-                with Engines(1, 1, env) as engines:
+                with EnvPool(1, 1, env) as engines:
                     return play_episode(
                         engines.env(0),
                         agent,

@@ -16,14 +16,14 @@ runpy.run_module("household.play")
 
 from agents import make_agent
 from agents.vlm.settings import AgentSettings
-from agents.vlm.speaker import Speaker
+from agents.vlm.factory import AgentFactory
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks import load_suite
 from er_gym.tasks.paraphrase import load_ask
 
 observations = "household.observations:HAND+text"
 env = EmbodiedEnv("household.suites:searches", obs_mode=observations)
-parrot = Speaker("household.clients:PARROT:observe", AgentSettings(sees="text")).agent(0)
+parrot = AgentFactory("household.clients:PARROT:observe", AgentSettings(sees="text")).agent(0)
 for agent in (make_agent("household.agents:Tidy"), parrot):
     obs, info = env.reset(seed=0)
     assert obs in env.observation_space and info["task"].type.search

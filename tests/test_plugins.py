@@ -15,8 +15,8 @@ import pytest
 
 from agents import make_agent
 from agents.vlm.clients.kinds import CLIENTS, client_named, speaks
+from agents.vlm.factory import AgentFactory
 from agents.vlm.settings import AgentSettings
-from agents.vlm.speaker import Speaker
 from er_gym import plugins
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.plugins import PluginError
@@ -85,7 +85,7 @@ def test_an_agent_plays(name: str) -> None:
 @pytest.mark.parametrize("name", ["echo:open Fridge", "household:ECHO:open Fridge"])
 def test_a_model_client_replies(name: str, tmp_path: Path) -> None:
     assert speaks(name)
-    speaker = Speaker(name, AgentSettings(sees="text"), tmp_path)
+    speaker = AgentFactory(name, AgentSettings(sees="text"), tmp_path)
     env = EmbodiedEnv("mini", obs_mode="text")
     obs, info = env.reset(seed=0)
     agent = speaker.agent(0)

@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 import pytest
 
-from benchmarks.cli import cli
+from benchmarks.cli.main import cli
 from er_gym.sim.actions import ACTIONS
 
 

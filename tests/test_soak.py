@@ -10,16 +10,16 @@ import sys
 import pytest
 from rich.console import Console
 
-from benchmarks.perf import soak as soak_script
-from benchmarks.perf import steps as steps_script
-from benchmarks.perf.invariants import (
+from benchmarks.checks import soak as soak_script
+from benchmarks.checks.invariants import (
     INVARIANTS,
     a_refusal_changed_nothing,
     broken,
     floor_of,
     stands_on_the_floor,
 )
-from benchmarks.perf.soak import Report, choose_scenes, soak, soak_scene, verdict
+from benchmarks.checks.soak import Report, choose_scenes, soak, soak_scene, verdict
+from benchmarks.perf import steps as steps_script
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.thor import SCENE_NAMES, make_controller
 
@@ -247,7 +247,7 @@ def test_scenes_are_chosen_by_number_or_name():
 
 @pytest.mark.parametrize("asked", ["0", "121", "FloorPlan31", "some", ""])
 def test_other_scenes_are_bad_input(asked):
-    command = [sys.executable, "-m", "benchmarks.perf.soak", "--scenes", asked]
+    command = [sys.executable, "-m", "benchmarks.checks.soak", "--scenes", asked]
     with pytest.raises(ValueError, match="--scenes takes"):
         choose_scenes(asked)
     if asked == "0":  # once is enough for a process

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from er_gym.tasks.generate.room import Thing
+from er_gym.tasks.generate.scene_graph import Thing
 
 
 def thing(object_type: str, *parents: str, number: int = 0, **fields: Any) -> Thing:

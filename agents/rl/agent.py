@@ -9,12 +9,12 @@ from typing import Any
 
 import torch
 
-from agents.base import Decision
 from agents.rl.config import load_config
-from agents.rl.perception import Perception
+from agents.rl.policy_observation import Perception
 from agents.rl.saved import FOREIGN, MODEL, untrusted
 from agents.rl.train import CONFIG, FAMILIES, load_model
 from er_gym.envs.actions import ACTIONS
+from er_gym.rollout.agent import Decision
 from er_gym.tasks.task import Task
 
 

@@ -17,7 +17,7 @@ from torch.nn import functional
 from agents.rl.config import TrainConfig, WarmStart
 from agents.rl.demonstrations import Demonstrations, joined
 from agents.rl.envs import make_env
-from agents.rl.vec import WorkerVecEnv
+from agents.rl.vec_env import WorkerVecEnv
 
 
 def watch(config: TrainConfig, how: WarmStart, seed: int) -> Demonstrations:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from agents import configs
-from er_gym.envs.instances import EXPLORE
+from er_gym.envs.object_selection import EXPLORE
 from er_gym.tasks.types import BY_NAME
 
 _WHAT = "training run"

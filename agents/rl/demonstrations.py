@@ -12,7 +12,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from agents import make_agent
-from agents.rl.perception import Obs
+from agents.rl.policy_observation import Obs
 from er_gym.envs.actions import ACTIONS, INDEX, Action, understand
 
 

@@ -32,7 +32,7 @@ from torch import Tensor, nn
 from agents.rl.config import DQN as DQNSettings
 from agents.rl.config import TrainConfig
 from agents.rl.network import TypeNetwork
-from agents.rl.perception import Obs
+from agents.rl.policy_observation import Obs
 
 _NEVER = -1e6
 """What an illegal action is worth. Finite: where an episode has ended it is multiplied by 0."""

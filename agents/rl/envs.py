@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from agents.rl.config import Episodes
 from agents.rl.demonstrations import Demonstrations, demonstrate
-from agents.rl.perception import Obs, Perception
+from agents.rl.policy_observation import Obs, Perception
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.envs.wrappers import KeyActionShaping

@@ -41,9 +41,9 @@ from agents.rl.callbacks import (
 from agents.rl.cloning import clone, watch
 from agents.rl.config import Episodes, Evaluation, TrainConfig, WarmStart, load_config
 from agents.rl.envs import for_evaluation, make_env
-from agents.rl.perception import Perception
+from agents.rl.policy_observation import Perception
 from agents.rl.saved import FOREIGN, MODEL, nothing, restore, save, untrusted
-from agents.rl.vec import WorkerVecEnv
+from agents.rl.vec_env import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS
 from er_gym.locking import sole_user
 from er_gym.writing import YAML_MARK, is_ours, make_folder, write_whole

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from agents.base import Decision
 from er_gym.envs.solver import Solver
+from er_gym.rollout.agent import Decision
 from er_gym.tasks.task import Task
 
 

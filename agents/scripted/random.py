@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.base import Decision
+from er_gym.rollout.agent import Decision
 from er_gym.tasks.task import Task
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from agents.base import Decision
 from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture
 from agents.vlm.matching import Matcher
 from agents.vlm.parsing import Parsed, parse
@@ -23,6 +22,7 @@ from agents.vlm.record import (
 )
 from agents.vlm.settings import AgentSettings
 from er_gym.envs.actions import NO_ACTION, Action, applies
+from er_gym.rollout.agent import Decision
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 

@@ -17,7 +17,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from agents.vlm.meanings import Meanings
+from agents.vlm.name_embeddings import Meanings
 from agents.vlm.names_en import MODIFIERS, NAMES_EN, SHARED_EN
 from agents.vlm.names_zh import NAMES_ZH, SHARED_ZH
 from agents.vlm.settings import Matching

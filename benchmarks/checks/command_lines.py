@@ -29,12 +29,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-import benchmarks.report
-import benchmarks.runner
-import benchmarks.spoken  # noqa: F401  # imported once, not in each fork
-from benchmarks import cli
+import benchmarks.cli.vlm_run  # noqa: F401  # imported once, not in each fork
 from benchmarks.checks.bad_commands import Line, lines
 from benchmarks.checks.bad_files import make
+from benchmarks.cli.main import main as cli
 
 _AT_ONCE = 2
 _REAL_EVERY = 10

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import click
 
-from benchmarks.extras import extras
+from benchmarks.cli.extras import extras
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -34,7 +34,7 @@ import er_gym  # noqa: F401  (registers the environments)
 from er_gym.envs.actions import ACTIONS, INDEX, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.errors import ResetNeeded
-from er_gym.envs.live import Live
+from er_gym.envs.generated_source import Live
 from er_gym.envs.sources import TaskList
 from er_gym.envs.wrappers import InstructionEmbedding, KeyActionShaping
 from er_gym.tasks import load_suite

@@ -29,13 +29,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.base import CannotGoOn
 from agents.vlm.chat import Message, ModelError, Picture, Reply
 from agents.vlm.clients.budget import Budget
 from agents.vlm.clients.watch import Notice
+from agents.vlm.factory import SPENDING, AgentFactory
 from agents.vlm.settings import AgentSettings
-from agents.vlm.speaker import SPENDING, Speaker
 from benchmarks.checks.faulty_server import CASES, KEY, Case, FaultyServer
+from er_gym.rollout.agent import CannotGoOn
 
 _KEY_FROM = "ER_GYM_CHECK_KEY"
 _TIMEOUT = 0.7
@@ -111,7 +111,7 @@ def _problems(case: Case, server: FaultyServer, directory: Path) -> Iterator[str
     )
     notices: list[Notice] = []
     began = time.monotonic()
-    speaker = Speaker("openai:m", settings, directory, Budget(max_usd=1000))
+    speaker = AgentFactory("openai:m", settings, directory, Budget(max_usd=1000))
     speaker.watch.show = notices.append
     client = speaker.client
     ends, told = [], []

@@ -22,9 +22,9 @@ from typing import Any
 
 import click
 
-from benchmarks.spoken import Voice
-from benchmarks.store import Manifest, RunStore
+from benchmarks.cli.vlm_run import VLMRun
 from er_gym import __version__
+from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks import Task, load_suite
 
 
@@ -124,7 +124,7 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
     )
     process.start()
     theirs.close()
-    voice = Voice.of(
+    voice = VLMRun.of(
         "openai:answering-server",
         base_url=ours.recv(),
         overrides=[f"pictures.width={size}", f"pictures.height={size}"],
@@ -137,7 +137,7 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
             suite=suite.name, suite_digest=suite.digest, suite_size=len(suite.tasks),
             agent=voice.name, env=env, seed=0, er_gym=__version__,
         )  # fmt: skip
-        store = RunStore.create(Path(place), manifest)
+        store = RunDirectory.create(Path(place), manifest)
         began = time.perf_counter()
         with closing(voice.speaker(store.path)) as speaker:
             outcome = voice.play(

@@ -38,9 +38,9 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from benchmarks.perf.jobs import choose_scenes
-from benchmarks.perf.output import Output, write_figures
-from benchmarks.perf.soak import free_play
+from benchmarks.checks.output import Output, write_figures
+from benchmarks.checks.scene_jobs import choose_scenes
+from benchmarks.checks.soak import free_play
 from benchmarks.perf.steps import Walker
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.sim.render.camera import Camera

@@ -28,7 +28,7 @@ from rich.progress import track
 from rich.table import Table
 
 import er_gym  # noqa: F401  (registers the environments)
-from benchmarks.perf.output import Output, write_figures
+from benchmarks.checks.output import Output, write_figures
 from er_gym.tasks.types import TASK_TYPES
 from er_gym.thor import make_controller
 

@@ -13,11 +13,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs import instances as which
 from er_gym.envs import legality, skills
+from er_gym.envs import object_selection as which
 from er_gym.envs.actions import Action
 from er_gym.envs.legality import Known, Surroundings
-from er_gym.envs.percept import Percept
+from er_gym.envs.perception import Percept
 from er_gym.envs.skills import Outcome, Reachable
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose, KeyAction, Task
@@ -36,7 +36,7 @@ class Setting:
         floor: where the agent can stand.
         start: where it will be placed.
         grid_size: metres.
-        instances: which object a type name stands for, see :mod:`er_gym.envs.instances`.
+        instances: which object a type name stands for, see :mod:`er_gym.envs.object_selection`.
     """
 
     task: Task

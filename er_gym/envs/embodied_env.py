@@ -14,7 +14,7 @@ from gymnasium import spaces
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from er_gym.envs import instances as which
+from er_gym.envs import object_selection as which
 from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS, Action, AnyAction
 from er_gym.envs.arguments import flag, number, one_of, shown, whole
@@ -29,13 +29,13 @@ from er_gym.envs.observations import (
     goal_row,
     parse_obs_mode,
 )
-from er_gym.envs.percept import Percept
+from er_gym.envs.perception import Percept
 from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.tasks import verbs
+from er_gym.tasks.arrangement import begin
 from er_gym.tasks.goal import Condition, unmet
 from er_gym.tasks.judge import Criteria, Progress
-from er_gym.tasks.start import begin
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import TaskType
 from er_gym.tasks.types import task_type as look_up_type

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs.actions import ACTIONS, INDEX, INDICES, Action, applies
-from er_gym.envs.percept import Percept, marked, names
+from er_gym.envs.perception import Percept, marked, names
 from er_gym.tasks import verbs
 from er_gym.tasks.verbs import Verb
 from er_gym.thor.objects import KIND_OF, PROPERTY_OF_STATE, TYPES, ObjectTable

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from er_gym.envs.actions import Action
 from er_gym.envs.arguments import shown
 from er_gym.envs.legality import Known, Surroundings
-from er_gym.envs.percept import Percept
+from er_gym.envs.perception import Percept
 from er_gym.plugins import PluginError, Registry, is_dotted
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose

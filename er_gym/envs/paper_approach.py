@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from er_gym.envs.percept import perceive
+from er_gym.envs.perception import perceive
 from er_gym.envs.skills import Outcome, Reachable
 from er_gym.tasks.task import AgentPose
 from er_gym.thor.objects import is_there

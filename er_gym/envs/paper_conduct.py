@@ -16,7 +16,7 @@ from er_gym.envs.conduct import Done, Setting
 from er_gym.envs.legality import Known, Surroundings, navigable_within
 from er_gym.envs.paper_approach import Thing, approach, current, thing_of
 from er_gym.envs.paper_skills import interact, move_forward, observe, start_again
-from er_gym.envs.percept import Percept, marked
+from er_gym.envs.perception import Percept, marked
 from er_gym.envs.skills import Outcome
 from er_gym.tasks import verbs
 from er_gym.tasks.task import KeyAction

@@ -11,7 +11,7 @@ from math import hypot
 from typing import Any
 
 from er_gym.envs.paper_approach import Thing, stand_at, unseen
-from er_gym.envs.percept import Percept, perceive
+from er_gym.envs.perception import Percept, perceive
 from er_gym.envs.skills import FORWARD_STEP, VIEWS, Outcome
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose

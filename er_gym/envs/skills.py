@@ -2,7 +2,7 @@
 
 A skill takes the controller and an object's row in a table and returns an :class:`Outcome`; whether
 it may be used now is not its business (see :mod:`er_gym.envs.legality`). No skill keeps an event
-while it calls the controller: see :mod:`er_gym.envs.percept`.
+while it calls the controller: see :mod:`er_gym.envs.perception`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.percept import Percept, perceive
+from er_gym.envs.perception import Percept, perceive
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.tasks.task import AgentPose

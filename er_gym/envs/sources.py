@@ -118,7 +118,7 @@ def make_source(source: Source) -> EpisodeSource:
     """
     if isinstance(source, str) and source == GENERATE:
         # Late: what verifies tasks is made of environments, which are made of sources.
-        from er_gym.envs.live import Live
+        from er_gym.envs.generated_source import Live
 
         return Live()
     if isinstance(source, str | Path):

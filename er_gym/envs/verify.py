@@ -11,8 +11,8 @@ from er_gym.tasks.difficulty import difficulty
 from er_gym.tasks.generate import Generator
 from er_gym.tasks.generate.generator import DONE_ALREADY
 from er_gym.tasks.goal import unmet
-from er_gym.tasks.making import Making
 from er_gym.tasks.splits import UNSEEN_TYPES, subject_types
+from er_gym.tasks.suite_spec import Making
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TASK_TYPES
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from er_gym.tasks import verbs
 from er_gym.tasks.errors import SetAside, TaskFileError
-from er_gym.tasks.rooms import room_kind
+from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, TaskType
 

@@ -19,6 +19,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, field_validator
 
+from er_gym.tasks.arrangement import ObjectPose, Start
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import (
     Entry,
@@ -32,7 +33,6 @@ from er_gym.tasks.files import (
 )
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.reading import read_json_lines
-from er_gym.tasks.start import ObjectPose, Start
 from er_gym.tasks.task import AgentPose, KeyAction, Task, type_of_id
 from er_gym.writing import write_output
 

@@ -37,7 +37,7 @@ from er_gym.tasks.paper_records import (
     with_own_fields,
 )
 from er_gym.tasks.reading import parse_json, read_text
-from er_gym.tasks.rooms import room_kind
+from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TASK_TYPES, TaskType
 from er_gym.writing import check_output, make_folder, write_output

@@ -20,9 +20,9 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.tasks import verbs
+from er_gym.tasks.arrangement import ObjectPose, Start
 from er_gym.tasks.files import as_utf8, known_scene, known_type, known_verb
 from er_gym.tasks.jsonl_format import ConditionRecord, PoseRecord
-from er_gym.tasks.start import ObjectPose, Start
 from er_gym.tasks.task import AgentPose, KeyAction, Task
 
 _SPELLED = {verbs.PUT: "put"}

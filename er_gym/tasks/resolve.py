@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from math import dist, inf
 from typing import Any
 
+from er_gym.tasks.arrangement import Start, begin
 from er_gym.tasks.errors import SetAside, Taken, TaskFileError
-from er_gym.tasks.start import Start, begin
 from er_gym.tasks.task import Task, type_of_id
 from er_gym.thor import make_controller
 

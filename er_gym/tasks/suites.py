@@ -20,8 +20,8 @@ from er_gym.plugins import PluginError, Registry, reason
 from er_gym.tasks import jsonl_format, paper_format
 from er_gym.tasks.errors import SetAside, TaskFileError, in_short
 from er_gym.tasks.files import validated
-from er_gym.tasks.making import Making
 from er_gym.tasks.reading import read_yaml
+from er_gym.tasks.suite_spec import Making
 from er_gym.tasks.task import Task
 
 _PACKAGE = Path(__file__).resolve().parents[1]

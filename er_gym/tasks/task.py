@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from er_gym.tasks import verbs
+from er_gym.tasks.arrangement import Start
 from er_gym.tasks.goal import Condition
-from er_gym.tasks.start import Start
 from er_gym.tasks.types import TaskType
 
 _COORDINATE = re.compile(r"[+-]?\d+\.\d+")

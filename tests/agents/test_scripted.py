@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from agents import AGENTS, make_agent
-from benchmarks.metrics import score_episode
-from benchmarks.play import episode_seed, play_episode
-from benchmarks.scorers import CORRECTED, PAPER
+from benchmarks.scoring.metrics import score_episode
+from benchmarks.scoring.scorers import CORRECTED, PAPER
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.tasks.paper_format import read_tasks
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite

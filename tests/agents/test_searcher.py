@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 
 from agents import make_agent
-from agents.scripted.searcher import words
-from agents.scripted.searcher.words import Goal, understand
-from benchmarks.metrics import score_episode
-from benchmarks.play import episode_seed, play_episode
-from benchmarks.scorers import CORRECTED
+from agents.scripted.searcher import instruction as words
+from agents.scripted.searcher.instruction import Goal, understand
+from benchmarks.scoring.metrics import score_episode
+from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.tasks.judge import search_targets

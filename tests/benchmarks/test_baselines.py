@@ -12,7 +12,7 @@ pytest.importorskip("matplotlib", reason="needs the extra charts")
 
 from agents.rl.config import TrainConfig
 from agents.rl.train import train
-from benchmarks.baselines import main
+from benchmarks.pages.baselines import main
 
 
 def test_the_page_says_what_was_played(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from support import make_task
 
-from benchmarks.charts import draw_charts
+from benchmarks.scoring.charts import draw_charts
 from er_gym.tasks import load_suite
 
 NAMES = ["types.png", "objects.png", "receptacles.png", "lengths.png", "rooms.png"]

@@ -8,9 +8,10 @@ import sys
 
 import pytest
 
-from benchmarks import cli, doctor
-from benchmarks.extras import extras, state_of
-from er_gym.thor import player as players
+from benchmarks.cli.extras import extras, state_of
+from benchmarks.cli.main import diagnosis as doctor
+from benchmarks.cli.main import main as cli
+from er_gym.thor import player_install as players
 from er_gym.thor.places import GpuMapping, Release
 
 
@@ -214,7 +215,7 @@ def test_a_gpu_is_named(er_gym, monkeypatch, home):
 
 def test_doctor_says_that_er_gym_is_not_installed(monkeypatch):
     """As when the command runs from a checkout by PYTHONPATH alone."""
-    monkeypatch.setattr("benchmarks.extras.PROJECT", "er-gym-that-nobody-installed")
+    monkeypatch.setattr("benchmarks.cli.extras.PROJECT", "er-gym-that-nobody-installed")
     (finding,) = doctor._extras()
     assert (finding.what, finding.works) == ("extras", False)
     assert "pip install" in finding.mend

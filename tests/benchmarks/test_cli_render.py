@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from benchmarks.cli import cli, main
+from benchmarks.cli.main import cli, main
 
 
 def picture(tmp_path: Path, *arguments: str) -> np.ndarray:

@@ -19,13 +19,13 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from benchmarks import cli
+from benchmarks.cli.main import main as cli
 from er_gym.tasks import TASK_TYPES, Task, TaskFileError, load_suite, suite_from_file
+from er_gym.tasks.describe import describe
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.jsonl_format import digest, read_tasks, write_tasks
 from er_gym.tasks.paraphrase import names_in
-from er_gym.tasks.rooms import ROOM_KINDS
-from er_gym.tasks.show import describe
+from er_gym.tasks.room_kinds import ROOM_KINDS
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "benchmarks.cli", "tasks"]

@@ -21,8 +21,8 @@ pytest.importorskip("openai", reason="needs the extra vlm")
 from click.testing import CliRunner
 
 from agents.vlm.record import ConversationRecord
-from benchmarks.cli import cli
-from benchmarks.store import RunStore
+from benchmarks.cli.main import cli
+from er_gym.rollout.run_directory import RunDirectory
 from er_gym.tasks import load_suite
 
 _HELPERS = Path(__file__).parents[1] / "agents" / "vlm"
@@ -70,7 +70,7 @@ def conversations(out: Path) -> list[ConversationRecord]:
 def assert_whole(out: Path, tasks: int) -> None:
     """As many episodes and conversations as tasks, none crashed, and the costs of all that was no
     rejected answer add up."""
-    episodes = list(RunStore.open(out).episodes())
+    episodes = list(RunDirectory.open(out).episodes())
     assert len(episodes) == tasks
     assert {each.error for each in episodes} == {""}
     talks = conversations(out)
@@ -101,7 +101,7 @@ def test_two_hundred_episodes_with_a_server_that_misbehaves(tmp_path: Path) -> N
     events = (tmp_path / "server-events.jsonl").read_text().splitlines()
     tries = [json.loads(line)["event"] for line in events]
     assert tries.count("retry") == server.count - (len(entries) - len(rejected))
-    ends = Counter(each.end_reason for each in RunStore.open(tmp_path).episodes())
+    ends = Counter(each.end_reason for each in RunDirectory.open(tmp_path).episodes())
     assert set(ends) <= {"end", "no known action"}
     assert ends["end"] > 150
 
@@ -192,7 +192,7 @@ def test_a_recorded_run_is_played_again_without_a_server(tmp_path: Path) -> None
     played = [
         [
             [step.text for step in episode.steps]
-            for episode in RunStore.open(tmp_path / x).episodes()
+            for episode in RunDirectory.open(tmp_path / x).episodes()
         ]
         for x in "ab"
     ]
@@ -398,7 +398,7 @@ def test_the_server_is_killed_and_comes_back(server: Any, tmp_path: Path) -> Non
     assert "(try 1 of 2); trying again in 0." in said
     assert "requests in a row, the last with: naughty-1 at http://127.0.0.1:" in said
     assert "the same command continues" in said
-    crashed = [each for each in RunStore.open(tmp_path).episodes() if each.error]
+    crashed = [each for each in RunDirectory.open(tmp_path).episodes() if each.error]
     assert len(crashed) <= 2  # not one by one to the last
     port = int(url.rpartition(":")[2].partition("/")[0])
     server(port)

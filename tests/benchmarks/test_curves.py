@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from benchmarks.curves import draw_curves
+from benchmarks.scoring.curves import draw_curves
 
 
 @dataclass

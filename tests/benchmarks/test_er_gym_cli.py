@@ -14,9 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import cli, runner
-from benchmarks.runner import Outcome
-from benchmarks.store import RunStore
+from benchmarks.cli.main import main as cli
+from er_gym.rollout import runner
+from er_gym.rollout.run_directory import RunDirectory
+from er_gym.rollout.runner import Outcome
 from er_gym.tasks.types import TASK_TYPES
 
 COUNTER = "CounterTop|-00.08|+01.15|00.00"
@@ -284,8 +285,8 @@ def test_a_run_is_played_and_continued_under_one_protocol(
     code, shown, err = er_gym(*command, *where, "--protocol", "paper")
     assert code == 0, err
     assert "protocol paper" in shown
-    assert RunStore.open(out).manifest.env["protocol"] == "paper"
-    (episode,) = RunStore.open(out).episodes()
+    assert RunDirectory.open(out).manifest.env["protocol"] == "paper"
+    (episode,) = RunDirectory.open(out).episodes()
     assert episode.success
 
     code, shown, err = er_gym(*command, *where)
@@ -346,7 +347,7 @@ def test_an_ended_run_continues(tasks_file, tmp_path, signum):
     after = episode_times(out)
     assert len(after) == 7
     assert {name: after[name] for name in before} == before
-    assert not any(episode.error for episode in RunStore.open(out).episodes())
+    assert not any(episode.error for episode in RunDirectory.open(out).episodes())
 
 
 def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, episode):

@@ -15,7 +15,7 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from benchmarks.extras import closure, installed_requires, installed_version, state_of
+from benchmarks.cli.extras import closure, installed_requires, installed_version, state_of
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -177,7 +177,7 @@ def install_beside(folder: Path, distribution: str, package: str) -> None:
 def packages_here(*path: Path) -> dict[str, tuple[bool, bool, str]]:
     """What doctor says of the top-level packages: works, needed, says; in a Python with a path."""
     program = (
-        "import json; from benchmarks.doctor import _packages\n"
+        "import json; from benchmarks.cli.diagnosis import _packages\n"
         "print(json.dumps({f.what: (f.works, f.needed, f.says + f.mend) for f in _packages()}))"
     )
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, path))}

@@ -12,11 +12,11 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-from benchmarks.perf import fuzz as fuzz_script
-from benchmarks.perf.fuzz import fuzz, main, play, play_run
-from benchmarks.perf.fuzz_checks import QUESTIONS, floor, goes_over_the_wire, pictures_fit
-from benchmarks.perf.fuzz_report import Plan, Report, show
-from benchmarks.perf.fuzz_requests import BENDS, PARAMETERS, SANE, Room, draw_request
+from benchmarks.checks import fuzz as fuzz_script
+from benchmarks.checks.fuzz import fuzz, main, play, play_run
+from benchmarks.checks.fuzz_checks import QUESTIONS, floor, goes_over_the_wire, pictures_fit
+from benchmarks.checks.fuzz_report import Plan, Report, show
+from benchmarks.checks.fuzz_requests import BENDS, PARAMETERS, SANE, Room, draw_request
 from er_gym.sim import engine as engine_module
 from er_gym.sim.actions import ACTIONS
 from er_gym.sim.engine import Engine
@@ -190,7 +190,7 @@ def changes_behind_the_cache(world):
 )
 def test_a_broken_engine_is_found(monkeypatch, broken, action, found):
     run_instead(monkeypatch, action, broken)
-    monkeypatch.setattr("benchmarks.perf.fuzz_requests.NAMES", [action, "Done"])
+    monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", [action, "Done"])
     total = played(Plan(seed=0, actions=60, scenes=("FloorPlan402",)))
     assert any(re.search(found, problem) for step in total.wrong for problem in step.problems)
 
@@ -201,7 +201,7 @@ def test_a_failed_action_that_leaves_a_trace_is_found(monkeypatch):
         raise ActionFailed("cannot")
 
     run_instead(monkeypatch, "OpenObject", half_done)
-    monkeypatch.setattr("benchmarks.perf.fuzz_requests.NAMES", ["OpenObject"])
+    monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", ["OpenObject"])
     total = played(Plan(seed=0, actions=10, scenes=("FloorPlan402",)))
     problems = [problem for step in total.wrong for problem in step.problems]
     assert any("a refused action changed" in problem for problem in problems)
@@ -214,7 +214,7 @@ def test_a_client_that_raises_the_wrong_thing_is_found(monkeypatch):
             return super().step(*args, **kwargs)
 
     monkeypatch.setattr(fuzz_script, "EmbeddedController", Timid)
-    monkeypatch.setattr("benchmarks.perf.fuzz_requests.NAMES", ["Stand"])
+    monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", ["Stand"])
     total = played(Plan(seed=0, actions=2000, scenes=("FloorPlan402",)), [9])
     assert any("raised None, not <class 'RuntimeError'>" in str(step) for step in total.wrong)
 
@@ -228,7 +228,7 @@ def test_the_game_goes_on_after_an_exception(monkeypatch):
         return metadata(world, action, *rest)
 
     monkeypatch.setattr(engine_module, "metadata", sometimes)
-    monkeypatch.setattr("benchmarks.perf.fuzz_requests.NAMES", ["Done", "Pass"])
+    monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", ["Done", "Pass"])
     total = played(Plan(seed=0, actions=40, scenes=("FloorPlan402",)))
     assert total.total.tries == 40
     assert total.tallies["Pass"].successes > 5
@@ -259,7 +259,7 @@ def test_questions_are_actions():
 
 def test_problems_are_shown_with_the_way_to_see_them_again(monkeypatch):
     run_instead(monkeypatch, "Pass", raises)
-    monkeypatch.setattr("benchmarks.perf.fuzz_requests.NAMES", ["Pass"])
+    monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", ["Pass"])
     plan = Plan(seed=5, actions=8, scenes=("FloorPlan402",))
     console = Console(record=True, width=120)
     assert show(played(plan), plan, 1.0, console) == 1

@@ -23,13 +23,13 @@ from inspect_ai.model import ModelAPI, ModelOutput, ModelUsage, get_model, model
 
 from agents.scripted.oracle import OracleAgent
 from agents.vlm.parsing_words import DECISION
-from benchmarks.cli_errors import CRASHED
-from benchmarks.cli_inspect import inspect
-from benchmarks.episode import EpisodeRecord
+from benchmarks.cli.errors import CRASHED
+from benchmarks.cli.inspect import inspect
 from benchmarks.inspect_task import EPISODE, er_gym
-from benchmarks.metrics import METRICS
-from benchmarks.play import episode_seed, play_episode
+from benchmarks.scoring.metrics import METRICS
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.rollout.play import episode_seed, play_episode
+from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.suites import load_suite
 
 _SERVER = Path(__file__).parents[1] / "agents" / "vlm" / "naughty_server.py"

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from benchmarks.metrics import (
+from benchmarks.scoring.metrics import (
     METRICS,
     Score,
     normal,
@@ -16,7 +16,7 @@ from benchmarks.metrics import (
     summarise_by,
     wilson,
 )
-from benchmarks.scorers import CORRECTED, PAPER, SCORERS
+from benchmarks.scoring.scorers import CORRECTED, PAPER, SCORERS
 
 TRANSPORT = (
     "navigate to CounterTop",

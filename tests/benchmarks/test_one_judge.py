@@ -8,12 +8,12 @@ from collections.abc import Iterator
 import pytest
 
 from benchmarks.checks.one_judge import PLAYERS, judge_twice, some_of_each_type
-from benchmarks.metrics import score_episode
-from benchmarks.report import load_run
-from benchmarks.scorers import CORRECTED
-from benchmarks.store import RunStore
-from benchmarks.tables import tables
+from benchmarks.scoring.metrics import score_episode
+from benchmarks.scoring.report import load_run
+from benchmarks.scoring.scorers import CORRECTED
+from benchmarks.scoring.tables import tables
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.rollout.run_directory import RunDirectory
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.types import TASK_TYPES
 
@@ -71,7 +71,7 @@ def test_put_in_bathtub_is_put_in_its_basin_to_both(text_env: EmbodiedEnv) -> No
 
 @pytest.mark.parametrize("player", ["oracle", "random"])
 def test_a_search_whose_old_record_does_not_say_for_what(
-    text_env: EmbodiedEnv, store: RunStore, player: str
+    text_env: EmbodiedEnv, store: RunDirectory, player: str
 ) -> None:
     """What was found follows from what the environment said; a report says so in a line."""
     searches = [task for task in ER_1K if task.type.search][:4]

@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from benchmarks.episode import EpisodeRecord, KeyActionRecord, StepRecord, record_episode
-from benchmarks.metrics import score_episode
-from benchmarks.scorers import PAPER
+from benchmarks.scoring.metrics import score_episode
+from benchmarks.scoring.scorers import PAPER
+from er_gym.rollout.records import EpisodeRecord, KeyActionRecord, StepRecord, record_episode
 from er_gym.tasks.paper_format import read_tasks
 from er_gym.tasks.types import TASK_TYPES
 

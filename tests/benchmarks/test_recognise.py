@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.perf.recognise import (
+from benchmarks.checks.recognisability import (
     SIDE,
     TYPES,
     Verdict,

@@ -7,11 +7,12 @@ import json
 import pytest
 from rich.console import Console
 
-from benchmarks import cli_options, report
-from benchmarks.report import load_run
-from benchmarks.store import RunStore
-from benchmarks.tables import as_markdown, print_tables, tables
+from benchmarks.cli.main import options as cli_options
+from benchmarks.scoring import report
+from benchmarks.scoring.report import load_run
+from benchmarks.scoring.tables import as_markdown, print_tables, tables
 from er_gym.envs.protocol import PROTOCOLS
+from er_gym.rollout.run_directory import RunDirectory
 
 KEYS = ("navigate to CounterTop", "pickup Egg", "navigate to Bowl", "put in Bowl", "end")
 UNTYPED = ("pickup Egg", "put in = Plate|-01.47|+01.31|+00.24", "end")
@@ -96,7 +97,7 @@ def test_a_run_without_episodes_is_a_row_of_dashes(store):
 
 
 def test_what_differs_between_runs_has_a_column(run, tmp_path, manifest, episode):
-    other = RunStore.create(tmp_path / "y", manifest.model_copy(update={"suite": "other"}))
+    other = RunDirectory.create(tmp_path / "y", manifest.model_copy(update={"suite": "other"}))
     other.write(episode(KEYS, KEYS))
     overview = tables([run, load_run(other.path)])[0]
     assert overview.title == "Results, in %"
@@ -110,7 +111,7 @@ def test_what_differs_between_runs_has_a_column(run, tmp_path, manifest, episode
 
 def test_another_protocol_than_the_default_is_named(run, tmp_path, manifest, episode):
     env = {**manifest.env, "protocol": "paper"}
-    other = RunStore.create(tmp_path / "y", manifest.model_copy(update={"env": env}))
+    other = RunDirectory.create(tmp_path / "y", manifest.model_copy(update={"env": env}))
     other.write(episode(KEYS, KEYS))
     papers = load_run(other.path)
     assert "protocol paper" in tables([papers])[0].title

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import cli
 from benchmarks.checks.bad_files import HOSTILE
-from benchmarks.progress import Progress
-from benchmarks.tables import Table, print_tables
-from benchmarks.terminal import plain, terminal
+from benchmarks.cli.main import main as cli
+from benchmarks.cli.progress import Progress
+from benchmarks.cli.terminal import plain, terminal
+from benchmarks.scoring.tables import Table, print_tables
 
 
 def test_what_a_terminal_obeys_is_shown_as_an_escape():

@@ -11,17 +11,17 @@ import gymnasium
 import pytest
 from support import make_task
 
-from agents.base import Decision
-from benchmarks.episode import EpisodeRecord
-from benchmarks.metrics import score_episode
-from benchmarks.play import play_episode
-from benchmarks.scorers import CORRECTED, PAPER
+from benchmarks.scoring.metrics import score_episode
+from benchmarks.scoring.scorers import CORRECTED, PAPER
 from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS, INDEX, NO_ACTION, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.paper_conduct import NO_OBJECT, understand_as_paper
 from er_gym.envs.paper_skills import observe
 from er_gym.envs.protocol import PROTOCOLS
+from er_gym.rollout.agent import Decision
+from er_gym.rollout.play import play_episode
+from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.paper_format import with_every_pose
 from er_gym.tasks.task import AgentPose, Task
 

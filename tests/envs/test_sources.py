@@ -16,12 +16,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.live import TRAINING, Live
+from er_gym.envs.generated_source import TRAINING, Live
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.envs.verify import Verifier
 from er_gym.tasks import TASK_TYPES, Task, TaskType, jsonl_format, load_suite, paper_format
-from er_gym.tasks.making import Making
 from er_gym.tasks.splits import TRAINING_SCENES, UNSEEN_TYPES, subject_types
+from er_gym.tasks.suite_spec import Making
 
 IDS = [task_type.env_id for task_type in TASK_TYPES]
 MINI = load_suite("mini").tasks

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.perf.comparisons.reachable import (
+from benchmarks.checks.comparisons.reachable import (
     BEFORE,
     LARGER,
     POSITIONS,

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from agents.base import Decision
 from agents.vlm.chat import Message, Reply
 from agents.vlm.clients.kinds import ModelClient
 from er_gym.envs.observations import Observation
+from er_gym.rollout.agent import Decision
 from er_gym.tasks import Suite, Task, load_suite
 
 

@@ -20,10 +20,10 @@ from er_gym.envs.actions import ACTIONS, INDEX, parse
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.solver import Solver
 from er_gym.tasks import jsonl_format
+from er_gym.tasks.arrangement import Start
+from er_gym.tasks.describe import describe
 from er_gym.tasks.generate import arranged
 from er_gym.tasks.generate.recipes import read_recipes, rows
-from er_gym.tasks.show import describe
-from er_gym.tasks.start import Start
 from er_gym.thor import make_controller
 
 out = Path(sys.argv[1])

@@ -7,7 +7,7 @@ from math import cos, hypot, radians, sin
 
 import pytest
 
-from benchmarks.perf.invariants import broken
+from benchmarks.checks.invariants import broken
 from er_gym.sim.actions.arrange_objects import id_of_place
 from er_gym.sim.placement_restrictions import accepts
 from er_gym.sim.scene import SCENE_NAMES, load_scene

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.perf.agreement import SIZES, Shares, sightings
+from benchmarks.checks.picture_agreement import SIZES, Shares, sightings
 from er_gym.sim.agent import Agent
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.scene_graph import scene_graph_of

@@ -9,7 +9,7 @@ from math import hypot, sqrt, tan
 import numpy as np
 import pytest
 
-from benchmarks.perf.comparisons.reachable import pieces
+from benchmarks.checks.comparisons.reachable import pieces
 from er_gym.sim.agent import Agent
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.settings import Settings

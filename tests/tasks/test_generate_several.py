@@ -28,12 +28,12 @@ from rooms_by_hand import (
 )
 
 from er_gym.tasks import verbs
+from er_gym.tasks.arrangement import ObjectPose, Start
 from er_gym.tasks.generate import generate_tasks
 from er_gym.tasks.generate.generator import AMBIGUOUS
-from er_gym.tasks.generate.room import read_room
+from er_gym.tasks.generate.scene_graph import read_room
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.judge import Criteria, Progress
-from er_gym.tasks.start import ObjectPose, Start
 
 # -- several objects of a type -------------------------------------------------------------------
 

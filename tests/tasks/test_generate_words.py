@@ -30,11 +30,11 @@ from rooms_by_hand import (
     thing,
 )
 
-from benchmarks.perf.key_actions import compare
+from benchmarks.checks.key_actions import compare
 from er_gym.tasks import TASK_TYPES, verbs
 from er_gym.tasks.generate import generate_tasks
-from er_gym.tasks.generate.plan import Row
 from er_gym.tasks.generate.rules import ROWS
+from er_gym.tasks.generate.task_plan import Row
 from er_gym.tasks.paper_format import read_tasks
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.types import COMPOSITE, SEARCH

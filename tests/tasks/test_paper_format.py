@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from er_gym.tasks import AgentPose, KeyAction, Task, TaskFileError, load_suite, task_type, verbs
+from er_gym.tasks.arrangement import ObjectPose, Start
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.paper_format import read_poses, read_tasks, with_poses, write_poses, write_tasks
-from er_gym.tasks.start import ObjectPose, Start
 
 MUG = "Mug|-00.38|+01.09|+03.19"
 SINK = "Sink|-01.39|+00.98|+00.44|SinkBasin"

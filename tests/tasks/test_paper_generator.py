@@ -10,9 +10,9 @@ import pytest
 
 from er_gym.tasks import AgentPose, KeyAction, Task, TaskFileError, load_suite, task_type, verbs
 from er_gym.tasks import paper_format as test_file
+from er_gym.tasks.arrangement import ObjectPose, Start
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.paper_generator import read_generator_tasks, write_generator_tasks
-from er_gym.tasks.start import ObjectPose, Start
 
 MUG = "Mug|-00.38|+01.09|+03.19"
 SINK = "Sink|-01.39|+00.98|+00.44|SinkBasin"

@@ -8,15 +8,15 @@ from dataclasses import replace
 import pytest
 from things_by_hand import thing
 
-from er_gym.tasks.generate.plan import Plan
 from er_gym.tasks.generate.recipes import (
     KINDS,
     Recipe,
     bundled_recipes,
     rows,
 )
-from er_gym.tasks.generate.room import Room, Thing
+from er_gym.tasks.generate.scene_graph import Room, Thing
 from er_gym.tasks.generate.script import Impossible
+from er_gym.tasks.generate.task_plan import Plan
 from er_gym.tasks.goal import Condition
 
 RECIPES = {recipe.name: recipe for recipe in bundled_recipes()}

@@ -11,10 +11,10 @@ import pytest
 from support import make_task
 
 from er_gym.tasks import AgentPose, Task, TaskFileError, load_suite
+from er_gym.tasks.arrangement import ObjectPose, Start
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.paper_format import read_tasks
 from er_gym.tasks.resolve import NEAR, resolve_task, resolve_tasks
-from er_gym.tasks.start import ObjectPose, Start
 
 SAFE = "Safe|+01.62|00.00|+00.45"
 POSE = AgentPose(0.0, 0.9, 0.0, 90.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from things_by_hand import thing
 
-from er_gym.tasks.generate.room import Room
+from er_gym.tasks.generate.scene_graph import Room
 from er_gym.tasks.generate.script import Impossible, Script
 from er_gym.tasks.goal import Condition
 

@@ -12,7 +12,7 @@ from support import make_task
 from er_gym.tasks import TASK_TYPES, Task
 from er_gym.tasks.generate import select_balanced
 from er_gym.tasks.generate.select import shares
-from er_gym.tasks.rooms import room_kind
+from er_gym.tasks.room_kinds import room_kind
 
 NAMES = ("Apple", "Mug", "Bread", "Egg", "Fork")
 

@@ -10,7 +10,7 @@ from support import make_task
 
 from er_gym.tasks import Task, load_suite
 from er_gym.tasks.paper_format import read_tasks
-from er_gym.tasks.rooms import ROOM_KINDS, room_kind
+from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
 from er_gym.tasks.splits import (
     EVALUATION_SCENES,
     SCENES,

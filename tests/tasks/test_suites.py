@@ -20,12 +20,12 @@ from er_gym.tasks import (
     task_type,
     verbs,
 )
+from er_gym.tasks.arrangement import ObjectPose, Start
 from er_gym.tasks.generate import GENERATED_TYPES
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.jsonl_format import FORMAT, digest, read_tasks, write_tasks
 from er_gym.tasks.paper_format import write_tasks as write_paper_tasks
-from er_gym.tasks.rooms import ROOM_KINDS, room_kind
-from er_gym.tasks.start import ObjectPose, Start
+from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
 
 PLATE = "Plate|+00.96|+01.65|-02.61"
 TASK = Task(

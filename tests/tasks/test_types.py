@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from er_gym.tasks import GROUPS, TASK_TYPES, task_type
-from er_gym.tasks.rooms import ROOM_KINDS, room_kind
+from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
 from er_gym.thor import SCENE_NAMES
 
 

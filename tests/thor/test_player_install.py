@@ -15,7 +15,7 @@ import pytest
 from ai2thor.platform import Linux64, Request
 
 from er_gym.thor import BackendError, client_hook, make_controller
-from er_gym.thor import player as players
+from er_gym.thor import player_install as players
 from er_gym.thor.places import GpuMapping, Release
 
 RELEASES = players.RELEASES

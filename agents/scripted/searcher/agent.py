@@ -7,10 +7,11 @@ from collections.abc import Container, Generator, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
-from agents.base import Decision
-from agents.scripted.searcher import places, words
-from agents.scripted.searcher.words import Goal, understand
+from agents.scripted.searcher import instruction as words
+from agents.scripted.searcher import places
+from agents.scripted.searcher.instruction import Goal, understand
 from er_gym.envs.actions import Action
+from er_gym.rollout.agent import Decision
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 

@@ -15,8 +15,8 @@ from concurrent.futures import Future, InvalidStateError
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-from agents.base import CannotGoOn
 from agents.vlm.chat import ModelError
+from er_gym.rollout.agent import CannotGoOn
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")

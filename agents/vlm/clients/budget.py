@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from agents.base import CannotGoOn
 from agents.vlm.chat import Message, Reply, Usage
-from agents.vlm.clients.lines import Lines
 from agents.vlm.clients.watch import AGAIN, Watch
 from agents.vlm.settings import Prices
+from er_gym.rollout.agent import CannotGoOn
+from er_gym.rollout.json_lines import Lines
 
 if TYPE_CHECKING:
-    from agents.vlm.clients.kept import Identified
+    from agents.vlm.clients.reply_cache import Identified
 
 
 @dataclass(frozen=True)

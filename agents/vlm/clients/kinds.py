@@ -16,7 +16,7 @@ from er_gym.plugins import PluginError, Registry, is_dotted
 
 if TYPE_CHECKING:
     from agents.vlm.clients.budget import Ledger
-    from agents.vlm.clients.kept import Identified
+    from agents.vlm.clients.reply_cache import Identified
     from agents.vlm.clients.watch import Watch
     from agents.vlm.settings import AgentSettings
 

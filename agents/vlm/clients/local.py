@@ -22,12 +22,12 @@ import torch
 import transformers
 from PIL import Image
 
-from agents.base import CannotGoOn
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients.batching import Batcher
 from agents.vlm.clients.checkpoint import load, one_line
 from agents.vlm.clients.watch import AGAIN, Watch
 from agents.vlm.settings import AgentSettings
+from er_gym.rollout.agent import CannotGoOn
 
 _THINK, _THOUGHT = "<think>", "</think>"
 _CLOSED = "the model has been closed"

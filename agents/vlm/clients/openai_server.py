@@ -15,7 +15,6 @@ from typing import Any
 import httpx2
 import openai
 
-from agents.base import CannotGoOn
 from agents.vlm.chat import Message, Reply
 from agents.vlm.clients.budget import Budget, Entry, Ledger
 from agents.vlm.clients.decision_schema import REQUEST_FIELDS
@@ -34,6 +33,7 @@ from agents.vlm.clients.wire import (
     request_body,
 )
 from agents.vlm.settings import AgentSettings, Server
+from er_gym.rollout.agent import CannotGoOn
 
 OPENAI_URL = "https://api.openai.com/v1"
 _SEEDS = 2**31

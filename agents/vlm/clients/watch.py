@@ -18,8 +18,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from agents.base import CannotGoOn
 from agents.vlm.chat import ModelError
+from er_gym.rollout.agent import CannotGoOn
 
 AGAIN = "run the same command again to continue"
 REFUSED = 3

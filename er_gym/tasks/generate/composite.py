@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import cycle, islice
 
-from er_gym.tasks.generate.plan import Plan, Row, from_templates, plan_of
-from er_gym.tasks.generate.room import Room, Thing
+from er_gym.tasks.generate.scene_graph import Room, Thing
 from er_gym.tasks.generate.script import Script
+from er_gym.tasks.generate.task_plan import Plan, Row, from_templates, plan_of
 from er_gym.tasks.generate.templates import MOVE_TWO
 from er_gym.tasks.generate.transport import transfers
 from er_gym.tasks.generate.words import in_the

@@ -10,14 +10,14 @@ from functools import cached_property
 from typing import Any
 
 from er_gym.tasks import verbs
-from er_gym.tasks.generate.plan import Plan, Row
-from er_gym.tasks.generate.room import Accepts, Room, Thing, read_room
+from er_gym.tasks.arrangement import Start, begin, shuffled
 from er_gym.tasks.generate.rules import ROWS
+from er_gym.tasks.generate.scene_graph import Accepts, Room, Thing, read_room
 from er_gym.tasks.generate.script import Impossible
+from er_gym.tasks.generate.task_plan import Plan, Row
 from er_gym.tasks.generate.words import a, in_the, is_are, it
 from er_gym.tasks.goal import Condition, unmet
-from er_gym.tasks.rooms import room_kind
-from er_gym.tasks.start import Start, begin, shuffled
+from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME
 from er_gym.thor import accepts as thor_accepts

@@ -17,9 +17,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from er_gym.tasks import verbs
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import validated
-from er_gym.tasks.generate.plan import Plan, Row, plan_of
-from er_gym.tasks.generate.room import Room, Thing, largest, may_fill
+from er_gym.tasks.generate.scene_graph import Room, Thing, largest, may_fill
 from er_gym.tasks.generate.script import Impossible, Script
+from er_gym.tasks.generate.task_plan import Plan, Row, plan_of
 from er_gym.tasks.generate.templates import STYLES, in_order
 from er_gym.tasks.generate.words import in_the
 from er_gym.tasks.reading import read_yaml

@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import chain
 
 from er_gym.tasks import verbs
-from er_gym.tasks.generate.room import Room, Thing
+from er_gym.tasks.generate.scene_graph import Room, Thing
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.task import KeyAction
 from er_gym.tasks.verbs import Verb

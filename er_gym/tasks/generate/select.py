@@ -9,7 +9,7 @@ from itertools import islice
 from statistics import fmean
 
 from er_gym.tasks import verbs
-from er_gym.tasks.rooms import room_kind
+from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, TaskType
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import agents.rl.demonstrations
-from agents.base import Decision
 from agents.rl.cloning import clone, watch
 from agents.rl.config import TrainConfig, WarmStart
 from agents.rl.demonstrations import demonstrate
 from agents.rl.envs import make_env
 from agents.rl.train import FAMILIES, train, vectorised
 from er_gym.envs.actions import INDEX, Action
+from er_gym.rollout.agent import Decision
 
 Make = Callable[..., TrainConfig]
 

@@ -13,9 +13,9 @@ from click.testing import CliRunner
 from agents import make_agent
 from agents.rl.agent import RLAgent
 from agents.rl.config import Episodes, TrainConfig
-from agents.rl.perception import Perception
+from agents.rl.policy_observation import Perception
 from agents.rl.train import train
-from benchmarks.cli import cli
+from benchmarks.cli.main import cli
 from er_gym.envs.actions import INDEX
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks import load_suite

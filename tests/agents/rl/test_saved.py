@@ -21,7 +21,7 @@ from agents.rl.agent import RLAgent
 from agents.rl.config import TrainConfig
 from agents.rl.saved import FOREIGN, MODEL, UntrustedModel
 from agents.rl.train import CONFIG, load_last, train
-from benchmarks.cli import cli
+from benchmarks.cli.main import cli
 
 Make = Callable[..., TrainConfig]
 SMALL = {"vec": {"envs": 2, "workers": 1}, "algorithm": {"name": "ppo", "n_steps": 16}}

@@ -15,9 +15,9 @@ from agents.vlm.clients.scripted import RecordedClient, ScriptedClient
 from agents.vlm.matching import Matcher
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import AgentSettings
-from benchmarks.play import play_episode
-from benchmarks.store import picture_folder
 from er_gym import EmbodiedEnv
+from er_gym.rollout.play import play_episode
+from er_gym.rollout.run_directory import picture_folder
 from er_gym.tasks import Task, load_suite
 
 PICKUP = next(

@@ -11,9 +11,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
 
-from agents.base import CannotGoOn
 from agents.vlm.chat import ModelError
 from agents.vlm.clients.batching import Batcher
+from er_gym.rollout.agent import CannotGoOn
 
 LONG = 60.0  # seconds; nothing here waits so long unless it is broken
 Outcome = str | type[Exception]

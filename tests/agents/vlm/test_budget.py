@@ -18,11 +18,11 @@ from pathlib import Path
 import pytest
 from naughty_server import MODEL, NaughtyServer
 
-from agents.base import CannotGoOn
 from agents.vlm.chat import Message, Reply, Usage
 from agents.vlm.clients.budget import Budget, Entry, Ledger, Metered, Spent
 from agents.vlm.clients.watch import Watch
 from agents.vlm.settings import AgentSettings, Prices
+from er_gym.rollout.agent import CannotGoOn
 
 HELLO = (Message("user", ("hello",)),)
 UNLIMITED = Budget()
@@ -263,8 +263,8 @@ def test_all_together(
     two broken answers included; what is kept is not paid again, and the key is nowhere."""
     pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
     pytest.importorskip("diskcache", reason="needs pip install 'er-gym[vlm]'")
-    from agents.vlm.clients.kept import Kept
     from agents.vlm.clients.openai_server import OpenAIClient
+    from agents.vlm.clients.reply_cache import Kept
 
     key = "sk-test-4f1c9e0b7a2d"
     monkeypatch.setenv("OUR_TEST_KEY", key)

@@ -26,11 +26,11 @@ import torch
 from PIL import Image
 from tiny_qwen import make_tiny_qwen
 
-from agents.base import CannotGoOn
 from agents.vlm.chat import Message, ModelError, Picture, Reply
 from agents.vlm.clients.local import LocalClient, _Draw, _without_thought
 from agents.vlm.clients.watch import Watch
 from agents.vlm.settings import AgentSettings
+from er_gym.rollout.agent import CannotGoOn
 
 LONG = 60.0  # seconds; nothing here waits so long unless it is broken
 PATCH = {"qwen2_vl": 14, "qwen2_5_vl": 14, "qwen3_vl": 16}  # pixels a side; a token is 2 by 2

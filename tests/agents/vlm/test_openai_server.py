@@ -26,7 +26,6 @@ pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
 
 import openai
 
-from agents.base import CannotGoOn
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients import watch, wire
 from agents.vlm.clients.budget import Budget, Ledger
@@ -35,6 +34,7 @@ from agents.vlm.clients.tokens import Asked, picture_at_most, usage_of
 from agents.vlm.clients.transport import LARGEST_ANSWER, Pace
 from agents.vlm.clients.watch import Watch
 from agents.vlm.settings import AgentSettings, Prices, Server
+from er_gym.rollout.agent import CannotGoOn
 
 KEY = "sk-test-4f1c9e0b7a2d"
 HELLO = (Message("user", ("hello",)),)

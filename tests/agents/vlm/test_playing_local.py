@@ -13,8 +13,8 @@ from click.testing import CliRunner
 from tiny_qwen import make_tiny_qwen
 
 from agents.vlm.record import ConversationRecord
-from benchmarks.cli import cli
-from benchmarks.store import RunStore
+from benchmarks.cli.main import cli
+from er_gym.rollout.run_directory import RunDirectory
 
 
 def test_a_tiny_qwen_plays_with_pictures(tmp_path: Path) -> None:
@@ -34,7 +34,7 @@ def test_a_tiny_qwen_plays_with_pictures(tmp_path: Path) -> None:
         standalone_mode=False,
     )  # fmt: skip
     assert result.return_value == 0, result.output
-    episodes = list(RunStore.open(out).episodes())
+    episodes = list(RunDirectory.open(out).episodes())
     assert [each.end_reason for each in episodes] == ["no known action"] * 3
     for file in (out / "conversations").glob("*.json"):
         talk = ConversationRecord.model_validate_json(file.read_bytes())

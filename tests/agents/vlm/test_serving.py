@@ -19,9 +19,9 @@ import pytest
 from click.testing import CliRunner
 
 from agents.vlm.serving import ENGINES, Command, Machine, Wanted, command_for, look_around
-from benchmarks import cli_serve
-from benchmarks.cli_serve import ENGINE_CHOICES, run_server, serve
-from benchmarks.server_process import LINES, ServerError, ServerProcess
+from benchmarks.cli.main import serve as cli_serve
+from benchmarks.cli.serve import ENGINE_CHOICES, run_server, serve
+from benchmarks.cli.server_process import LINES, ServerError, ServerProcess
 
 ROOT = Path(__file__).resolve().parents[3]
 EVERYTHING = frozenset().union(*(engine.needs for engine in ENGINES.values()))
@@ -336,7 +336,7 @@ STUBBORN = """
 
 def test_a_server_that_does_not_heed_signals_is_killed(stand_in):
     short = (
-        "import sys; from benchmarks import guard; guard.GRACE = 3; "
+        "import sys; from benchmarks.cli import process_guard as guard; guard.GRACE = 3; "
         "sys.exit(guard.main(sys.argv[1:]))"
     )
     guarded = subprocess.Popen(
@@ -438,7 +438,7 @@ def serving(stand_in):
         # What runs in the background has Ctrl-C ignored.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from agents.vlm.serving import Command\n"
-        "from benchmarks.cli_serve import run_server\n"
+        "from benchmarks.cli.serve import run_server\n"
         f"sys.exit(run_server({command!r}, patience=60, verbose=True))"
     )
     process = subprocess.Popen(
@@ -487,7 +487,7 @@ def test_progress_is_one_line_on_a_terminal(stand_in, capfd, monkeypatch):
 
 def test_names_are_matched_over_http():
     code = (
-        "from benchmarks.cli_serve import match_server\n"
+        "from benchmarks.cli.serve import match_server\n"
         "match_server.main(['--port', '0', '--set', 'matching.fuzzy=100'], standalone_mode=False)"
     )
     process = subprocess.Popen(

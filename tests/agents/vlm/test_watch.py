@@ -6,10 +6,10 @@ import time
 
 import pytest
 
-from agents.base import CannotGoOn
 from agents.vlm.chat import ModelError
 from agents.vlm.clients import watch as module
 from agents.vlm.clients.watch import Notice, Watch, duration
+from er_gym.rollout.agent import CannotGoOn
 
 
 @pytest.fixture

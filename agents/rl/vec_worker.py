@@ -1,0 +1,144 @@
+"""What a worker process does: several environments, stepped one after the other.
+
+Imports no torch: a worker starts in a second and stays small. Several environments share one
+process because the engine remembers what it worked out about a room for the whole process, and
+because one message then carries a batch.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.rl.policy_observation import Obs
+
+
+class Batch(NamedTuple):
+    """What k environments answer: arrays of k rows.
+
+    Attributes:
+        obs: by the observation's keys, (k, …); after the end of an episode the next one's first.
+        rewards: (k,) float32.
+        dones: (k,) bool.
+        masks: (k, A) int8, the actions that are legal now.
+        infos: k small dictionaries: of an episode that has ended its ``is_success``, ``task_type``,
+            ``end_reason`` and ``terminal_observation``, otherwise empty.
+    """
+
+    obs: Obs
+    rewards: NDArray[np.float32]
+    dones: NDArray[np.bool_]
+    masks: NDArray[np.int8]
+    infos: list[dict[str, Any]]
+
+
+class Envs:
+    """A few environments in this process."""
+
+    def __init__(self, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]]) -> None:
+        self.envs = [each() for each in make]
+
+    def reset(self, seeds: Sequence[int | None]) -> Batch:
+        """Begin an episode in each."""
+        began = [env.reset(seed=seed) for env, seed in zip(self.envs, seeds, strict=True)]
+        nothing = np.zeros(len(began), np.float32)
+        return _batch(
+            [obs for obs, _ in began],
+            nothing,
+            nothing.astype(bool),
+            [info["action_mask"] for _, info in began],
+            [{} for _ in began],
+        )
+
+    def step(self, actions: NDArray[np.intp]) -> Batch:
+        """Do one action in each; where an episode ends, the next begins."""
+        all_obs, rewards, dones, masks, infos = [], [], [], [], []
+        for env, action in zip(self.envs, actions.tolist(), strict=True):
+            obs, reward, terminated, truncated, info = env.step(action)
+            told = {}
+            if terminated or truncated:
+                told = {
+                    "terminal_observation": obs,
+                    "TimeLimit.truncated": truncated and not terminated,
+                    "is_success": info["success"],
+                    "task_type": info["task"].type.name,
+                    "end_reason": info["end_reason"],
+                }
+                obs, info = env.reset()
+            all_obs.append(obs)
+            rewards.append(reward)
+            dones.append(terminated or truncated)
+            masks.append(info["action_mask"])
+            infos.append(told)
+        return _batch(all_obs, np.array(rewards, np.float32), np.array(dones), masks, infos)
+
+    def call(self, name: str, rows: Sequence[int], args: Any, kwargs: Any) -> list[Any]:
+        """Call a method of some, wherever it is in their wrappers."""
+        return [self.envs[row].get_wrapper_attr(name)(*args, **kwargs) for row in rows]
+
+    def get(self, name: str, rows: Sequence[int]) -> list[Any]:
+        """An attribute of some.
+
+        Raises:
+            AttributeError: they have none of that name.
+        """
+        return [self.envs[row].get_wrapper_attr(name) for row in rows]
+
+    def set(self, name: str, rows: Sequence[int], value: Any) -> None:
+        """Set an attribute of some."""
+        for row in rows:
+            self.envs[row].set_wrapper_attr(name, value)
+
+    def spaces(self) -> tuple[Any, Any]:
+        """Their observation and action space."""
+        return self.envs[0].observation_space, self.envs[0].action_space
+
+    def close(self) -> None:
+        """Close them."""
+        for env in self.envs:
+            env.close()
+
+
+def _batch(
+    obs: list[Obs],
+    rewards: NDArray[np.float32],
+    dones: NDArray[np.bool_],
+    masks: list[NDArray[np.int8]],
+    infos: list[dict[str, Any]],
+) -> Batch:
+    stacked = {key: np.stack([each[key] for each in obs]) for key in obs[0]}
+    return Batch(stacked, rewards, dones, np.stack(masks), infos)
+
+
+def serve(pipe: Connection, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]]) -> None:
+    """Answer ``(method of Envs, arguments)`` with ``(error or None, answer)`` until told to close,
+    or until the other end is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the trainer's business
+    # A batch process does not push the trainer aside when it is woken: on a machine with as many
+    # cores as workers, the others would otherwise wait for their actions until it is done.
+    with contextlib.suppress(AttributeError, OSError):  # not everywhere, nor always allowed
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    envs: Envs | None = None
+    try:
+        while True:
+            method, args = pipe.recv()
+            try:
+                if envs is None:
+                    envs = Envs(make)
+                answer: tuple[Exception | None, Any] = (None, getattr(envs, method)(*args))
+            except Exception as error:  # whatever it is, the trainer has to hear of it
+                answer = (error, None)
+            pipe.send(answer)
+            if method == "close":
+                return
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        if envs is not None:
+            envs.close()

@@ -1,0 +1,148 @@
+"""What all the agents of a run share that speak: a model's client, prompts, a matcher of names."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from agents import configs
+from agents.vlm.chat import Client
+from agents.vlm.clients.kinds import client_named, speaks, ways_to_name
+from agents.vlm.record import without_secrets
+from agents.vlm.settings import AgentSettings, Prices
+
+if TYPE_CHECKING:
+    from agents.vlm.agent import VLMAgent
+    from agents.vlm.clients.budget import Budget
+    from agents.vlm.clients.watch import Notice
+    from er_gym.rollout.json_lines import Lines
+
+__all__ = ["AgentFactory", "consequential", "load_settings", "speaks", "ways_to_name"]
+
+_WHAT = "agent"
+SPENDING = "spending.jsonl"
+EVENTS = "server-events.jsonl"
+REPLIES = "replies"
+_OF_NO_CONSEQUENCE: Mapping[str, Any] = {
+    "server": {"base_url", "key_from", "timeout", "connect", "tries", "requests_per_minute"},
+    "local": {"device_map", "batch", "wait"},
+    "prompts": {"dataset"},
+    "prices": True,
+}
+"""Settings that change when and where a model answers, and not what it says. Prompts are known by
+their digest."""
+
+
+def load_settings(name: str | None, overrides: Sequence[str] = ()) -> AgentSettings:
+    """The settings of an agent: a file of ``configs/agents`` by name, or any by path.
+
+    Raises:
+        ValueError: there is no such file, or it does not fit, or an override does not.
+    """
+    file = configs.file_of("agents", name, _WHAT) if name else None
+    return configs.load(AgentSettings, file, _WHAT, overrides)
+
+
+class AgentFactory:
+    """Makes the agents of a run.
+
+    Attributes:
+        client: of the model.
+        watch: the run's time and news; ``watch.show`` is called with what a user should hear.
+
+    Args:
+        name: a model client's name and what it is to open: ``openai:MODEL``
+            (:data:`agents.vlm.clients.kinds.CLIENTS`).
+        settings: of the agent.
+        directory: where replies are kept, so that none is paid for twice, what has been spent, and
+            what went wrong with the server; without it, nothing is kept.
+        budget: what may be spent.
+
+    Raises:
+        ValueError: the name, the prompts or the matcher's model are not there, packages are
+            missing, or the directory's ledger is a link.
+        CannotGoOn: there is no key, or the model cannot be loaded.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        settings: AgentSettings,
+        directory: Path | None = None,
+        budget: Budget | None = None,
+    ) -> None:
+        from agents.vlm.matching import Matcher
+        from agents.vlm.prompts import load_prompts
+
+        kind, opened = client_named(name)
+        self.name, self.settings = name, settings
+        self.prompts = load_prompts(settings.prompts)
+        self._matcher = Matcher(settings.matching)
+        self._matcher.prepare()
+        self._events: Lines | None = None
+        self._keeping = threading.Lock()
+        self._directory = directory
+        try:
+            from agents.vlm.clients.budget import Budget, Ledger
+            from agents.vlm.clients.watch import Watch
+
+            asked = budget or Budget()
+            self.watch = Watch(asked.max_minutes)
+            self._ledger = Ledger(asked, settings.prices if kind.priced else Prices())
+            client = kind.open(opened, settings, self._ledger, self.watch)
+            self.client: Client = client
+            if directory is not None:
+                from agents.vlm.clients.reply_cache import Kept
+
+                self._ledger.open(directory / SPENDING)
+                self.watch.keep = self._keep
+                self.client = Kept(client, directory / REPLIES)
+        except ImportError as error:
+            raise ValueError(
+                f"agent {name} needs {error.name}, which is not installed: "
+                f"pip install '{kind.install}'"
+            ) from error
+
+    def agent(self, seed: int) -> VLMAgent:
+        """An agent for an episode."""
+        from agents.vlm.agent import VLMAgent
+
+        return VLMAgent(
+            self.client, self.settings, self.prompts, self._matcher, seed=seed, name=self.name
+        )
+
+    @property
+    def spent(self) -> str:
+        """What the run has cost so far, for people; "" where nothing is written down."""
+        if self._directory is None:
+            return ""
+        spent = self._ledger.spent
+        most = "at most " if spent.usage.estimated else ""
+        words = f"{most}{spent.usage.total:,} tokens in {spent.requests:,} replies"
+        return f"{words}, {most}${spent.cost:.2f}" if spent.cost else words
+
+    def close(self) -> None:
+        """Let go of the client."""
+        self.client.close()
+        self._ledger.close()
+        if self._events is not None:
+            self._events.close()
+
+    def _keep(self, notice: Notice) -> None:
+        """Write down what went wrong; the file is made when something does."""
+        from er_gym.rollout.json_lines import Lines
+
+        assert self._directory is not None
+        # A full disk is told where something is lost by it.
+        with contextlib.suppress(OSError, ValueError), self._keeping:
+            self._events = self._events or Lines(self._directory / EVENTS)
+            self._events.add(notice.model_dump_json())
+
+
+def consequential(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:
+    """What of the settings decides what an agent says: two runs compare if theirs are equal."""
+    kept = settings.model_dump(mode="json", exclude=dict(_OF_NO_CONSEQUENCE))
+    return {**without_secrets(settings, kept), "prompts_digest": prompts_digest}

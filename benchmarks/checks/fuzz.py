@@ -1,0 +1,232 @@
+"""Play random actions, sane and absurd, and look for whatever the engine must never do.
+
+    python -m benchmarks.checks.fuzz --actions 100000 --seed 0 [--workers 2] [--scenes all|N|names]
+    python -m benchmarks.checks.fuzz --actions 100000 --seed 0 --run 17    # one run, step by step
+
+The actions are split into runs of 200 in a scene each. A run depends on its number and the seed
+alone, so that the same seed plays the same whatever the number of workers; the ``fingerprint`` at
+the end, of all requests and answers, shows it. One run in ten goes through the official client's
+face, the others to the engine itself. After each action :mod:`benchmarks.checks.fuzz_checks` looks
+for what is wrong; what it finds is printed with the command to see it again, and makes the exit
+code 1.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from random import Random
+from traceback import extract_tb
+from typing import Any
+
+import click
+from rich.console import Console
+
+from benchmarks.checks.fuzz_checks import Pictures, Witness, floor, scene_of
+from benchmarks.checks.fuzz_report import Plan, Report, Step, show
+from benchmarks.checks.fuzz_requests import Request, Room, draw_request
+from benchmarks.checks.scene_jobs import choose_scenes, do_all
+from benchmarks.cli.progress import bar
+from er_gym.rollout.worker_pool import Lost
+from er_gym.sim.controller import EmbeddedController
+from er_gym.sim.engine import Engine
+from er_gym.sim.errors import CLIENT_ERRORS
+from er_gym.sim.world import World
+
+_THROUGH_THE_CLIENT = 10
+"""One run in so many."""
+_WIDTH, _HEIGHT = 32, 24
+_INTERRUPTED = 130
+
+
+@dataclass
+class Answer:
+    """What came back: plain metadata, the pictures drawn, and what is wrong with the call."""
+
+    metadata: dict[str, Any]
+    pictures: Pictures
+    problems: list[str] = field(default_factory=list)
+
+
+class ByEngine:
+    """Plays the engine itself, which never raises."""
+
+    def __init__(self) -> None:
+        self._engine = Engine(_WIDTH, _HEIGHT)
+
+    @property
+    def world(self) -> World:
+        return self._engine.world
+
+    def step(self, request: Request) -> Answer:
+        """Do an action."""
+        metadata, view = self._engine.step(request)
+        views = () if view is None else (view, *view.third_party)
+        drawn = [p for v in views for p in (v.rgb, v.depth, v.instances, v.classes)]
+        return Answer(dict(metadata), [picture for picture in drawn if picture is not None])
+
+
+class ByClient:
+    """Plays the official controller's face, which raises where the official one does."""
+
+    def __init__(self) -> None:
+        self._controller = EmbeddedController(width=_WIDTH, height=_HEIGHT)
+
+    @property
+    def world(self) -> World:
+        assert self._controller.server is not None
+        return self._controller.server._engine.world  # the fuzz looks behind the face
+
+    def step(self, request: Request) -> Answer:
+        """Do an action, and see that exactly the failed ones raise what they should."""
+        raised: Exception | None = None
+        try:
+            self._controller.step(request, raise_for_failure=True)
+        except (ValueError, RuntimeError) as error:
+            if self._controller.last_event is None:
+                raise  # not the client's doing
+            raised = error
+        event: Any = self._controller.last_event
+        metadata = dict(event.metadata)
+        wrong_call = metadata["errorCode"] in CLIENT_ERRORS
+        due = None if metadata["lastActionSuccess"] else ValueError if wrong_call else RuntimeError
+        problems = []
+        if (type(raised) if raised else None) is not due or (
+            raised and str(raised) != metadata["errorMessage"]
+        ):
+            problems.append(f"raised {raised!r}, not {due}, at {metadata['errorMessage']!r}")
+        # Not the depth, which the client squeezes: a picture a pixel high has no height.
+        drawn = (event.frame, event.instance_segmentation_frame)
+        return Answer(metadata, [picture for picture in drawn if picture is not None], problems)
+
+
+class Game:
+    """A scene being played in: who does it, who looks, and what has been seen there."""
+
+    def __init__(self, by: type[ByEngine] | type[ByClient]) -> None:
+        self._player = by()
+        self._witness = Witness()
+        self._ids: dict[str, None] = {}
+        self.metadata: dict[str, Any] = {}
+        self.seconds = 0.0
+
+    def do(self, request: Request) -> list[str]:
+        """Do an action; returns what is wrong after it."""
+        start = time.perf_counter()
+        answer = self._player.step(request)
+        self.seconds = time.perf_counter() - start
+        self.metadata = answer.metadata
+        self._ids.update(dict.fromkeys(entry["objectId"] for entry in self.metadata["objects"]))
+        seen = self._witness.sees(request, answer.metadata, answer.pictures, self._player.world)
+        return [*answer.problems, *seen]
+
+    def room(self, random: Random, scenes: Sequence[str]) -> Room:
+        """What the next request is drawn from."""
+        there = {entry["objectId"] for entry in self.metadata["objects"]}
+        gone = [object_id for object_id in self._ids if object_id not in there]
+        return Room(random, scenes, self.metadata, floor(scene_of(self.metadata), 0.25), gone)
+
+
+def play(plan: Plan, run: int) -> Iterator[Step]:
+    """The steps of a run. A game in which something was raised is begun anew."""
+    random = Random(f"{plan.seed} {run}")
+    scene = random.choice(plan.scenes)
+    by = ByClient if run % _THROUGH_THE_CLIENT == _THROUGH_THE_CLIENT - 1 else ByEngine
+    game: Game | None = None
+    for number in range(plan.steps(run)):
+        request: Request = {"action": "Reset", "sceneName": scene, "renderImage": False}
+        problems, seconds = [], 0.0
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            try:
+                if game is None:
+                    game = Game(by)
+                    problems += game.do(request)
+                scene = scene_of(game.metadata)
+                request = draw_request(game.room(random, plan.scenes))
+                problems += game.do(request)
+                error, seconds = game.metadata["errorMessage"], game.seconds
+            except Exception as failure:  # nothing whatever may be raised
+                error, game = f"{type(failure).__name__}: {failure}", None
+                problems.append(f"raised at {_place(failure)}: {error}")
+        problems += [f"warned at {Path(w.filename).name}:{w.lineno}: {w.message}" for w in warned]
+        yield Step(run, number, scene, request, error, problems, seconds)
+
+
+def _place(error: Exception) -> str:
+    """Where it was raised: the last of our own lines."""
+    calls = extract_tb(error.__traceback__)
+    ours = [call for call in calls if "er_gym" in call.filename] or calls
+    return f"{Path(ours[-1].filename).name}:{ours[-1].lineno}"
+
+
+def play_run(run: int, *, plan: Plan) -> Report:
+    """A whole run, counted."""
+    report = Report()
+    for step in play(plan, run):
+        report.count(step)
+    return report
+
+
+def _player(plan: Plan) -> Callable[[int], Report]:
+    return partial(play_run, plan=plan)
+
+
+def fuzz(plan: Plan, workers: int) -> Iterator[Report]:
+    """Every run's report, as they are done, in so many processes (1: in this one)."""
+    for run, report in do_all(partial(_player, plan), range(plan.runs), workers):
+        if isinstance(report, Lost):
+            died = f"the process died, exit code {report.exitcode}"
+            report = Report(wrong=[Step(run, 0, "?", {}, "", [died], 0.0)])
+        yield report
+
+
+@click.command()
+@click.option("--actions", default=10_000, show_default=True, type=click.IntRange(1))
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
+@click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
+@click.option("--scenes", default="all", show_default=True, help="all, how many, or names.")
+@click.option("--run", type=click.IntRange(0), help="Play only this run, and print every step.")
+def main(actions: int, seed: int, workers: int, scenes: str, run: int | None) -> None:
+    """Play random actions, sane and absurd, and check what must always hold."""
+    try:
+        plan = Plan(seed, actions, tuple(choose_scenes(scenes)))
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    console = Console(width=None if sys.stdout.isatty() else 120)
+    total, start = Report(), time.perf_counter()
+    if run is not None:
+        if run >= plan.runs:
+            raise click.UsageError(f"--run is one of 0 to {plan.runs - 1}, not {run}")
+        for step in play(plan, run):
+            total.count(step)
+            console.print(str(step), markup=False, soft_wrap=True)
+        raise SystemExit(show(total, plan, time.perf_counter() - start, console))
+    code = 0
+    try:
+        _play_all(plan, workers, total)
+    except KeyboardInterrupt:
+        console.print("interrupted; so far:")
+        code = _INTERRUPTED
+    raise SystemExit(show(total, plan, time.perf_counter() - start, console) or code)
+
+
+def _play_all(plan: Plan, workers: int, total: Report) -> None:
+    """Every run, with a bar; what is done is counted at once, for whoever interrupts."""
+    start = time.perf_counter()
+    with bar(Console(stderr=True)) as progress:
+        task = progress.add_task("fuzz", total=plan.runs, status="starting")
+        for report in fuzz(plan, workers):
+            total.add(report)
+            speed = total.total.tries / (time.perf_counter() - start)
+            status = f"{speed:.0f} actions/s, {len(total.wrong)} with problems"
+            progress.update(task, advance=1, status=status)
+
+
+if __name__ == "__main__":
+    main()

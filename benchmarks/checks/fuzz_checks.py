@@ -1,0 +1,195 @@
+"""What the fuzz looks at after every action, besides :mod:`benchmarks.checks.invariants`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from math import isfinite
+from typing import Any
+
+import msgpack  # type: ignore[import-untyped]  # what the player sends metadata with
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.checks.invariants import (
+    INVARIANTS,
+    Metadata,
+    a_refusal_changed_nothing,
+    floor_of,
+    stands_on_the_floor,
+    values_are_plain,
+)
+from er_gym.sim.object_metadata import objects as objects_of
+from er_gym.sim.scene import load_scene
+from er_gym.sim.settings import Settings
+from er_gym.sim.space.walkable_floor import standing_places
+from er_gym.sim.world import World
+
+Pictures = Sequence[NDArray[Any]]
+
+LONGEST_MESSAGE = 2000
+OF_THE_ACTION = frozenset(
+    {"lastAction", "lastActionSuccess", "errorMessage", "errorCode", "actionReturn", "colors"}
+)
+"""What metadata say of the last action; all the rest is the state of the world."""
+QUESTIONS = frozenset(
+    {
+        *("Pass", "Done", "PausePhysicsAutoSim", "UnpausePhysicsAutoSim", "AdvancePhysicsStep"),
+        *("GetScenesInBuild", "GetObjectInFrame", "GetReachablePositions", "GetInteractablePoses"),
+        *("GetCoordinateFromRaycast", "GetSpawnCoordinatesAboveReceptacle", "GetShortestPath"),
+        *("GetShortestPathToPoint", "ObjectNavExpertAction", "SetRandomSeed"),
+        *("RandomizeColors", "RandomizeMaterials", "RandomizeLighting"),
+        "ChangeQuality",
+    }
+)
+"""Actions that change nothing, done or refused."""
+_TELEPORTS = ("Teleport", "TeleportFull")
+_FLOOR_STEP = 0.05
+_ODD_TIMES = 25
+"""The dear checks are made after every so many actions."""
+_OF_THE_OBJECTS = [invariant for invariant in INVARIANTS if invariant is not values_are_plain]
+
+
+@lru_cache(maxsize=128)
+def floor(scene: str, step: float = _FLOOR_STEP) -> tuple[dict[str, float], ...]:
+    """Where the agent can stand in a scene, on all pieces of its floor."""
+    y = World.load(load_scene(scene), Settings()).standing_height
+    return tuple({"x": x, "y": y, "z": z} for x, z in standing_places(scene, step).tolist())
+
+
+@lru_cache(maxsize=128)
+def _floor_points(scene: str) -> NDArray[np.float64]:
+    return floor_of(list(floor(scene)))
+
+
+def scene_of(metadata: Metadata) -> str:
+    """The name of the scene, as ``Reset`` takes it."""
+    return str(metadata["sceneName"]).removesuffix("_physics")
+
+
+def says_why(metadata: Metadata) -> Iterator[str]:
+    """What is said of a refusal is one line that can be read, and nothing is returned."""
+    message = metadata["errorMessage"]
+    if len(message) > LONGEST_MESSAGE:
+        yield f"errorMessage has {len(message)} characters: {message[:60]!r}…"
+    if len(message.splitlines()) > 1:
+        yield f"errorMessage has {len(message.splitlines())} lines: {message[:200]!r}"
+    told = message if metadata["lastAction"] == "GetObjectInFrame" else None
+    if not metadata["lastActionSuccess"] and metadata["actionReturn"] not in (None, told):
+        yield "a refused action returned something"
+
+
+def the_rest_is_the_same(before: Metadata, after: Metadata) -> Iterator[str]:
+    """Nothing in the metadata has changed but what they say of the last action."""
+    for name in sorted({*before, *after} - OF_THE_ACTION):
+        if name not in before or name not in after or before[name] != after[name]:
+            yield f"{after['lastAction']}, which changes nothing, changed {name}"
+
+
+def goes_over_the_wire(metadata: Metadata) -> Iterator[str]:
+    """Packs as msgpack and as JSON, of plain types, with no NaN and no infinity anywhere."""
+    try:
+        _packed(metadata)
+    except (TypeError, ValueError, OverflowError) as error:
+        yield f"the metadata cannot be packed: {type(error).__name__}: {error}"
+    try:
+        json.dumps(metadata, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        yield f"the metadata are no JSON: {error}, at {', '.join(_endless('', metadata)) or '?'}"
+
+
+def _packed(metadata: Metadata) -> bytes:
+    """As the player sends it, which replaces what is no Unicode; no tuples, no NumPy numbers."""
+    packed: bytes = msgpack.packb(metadata, strict_types=True, unicode_errors="replace")
+    return packed
+
+
+def _endless(path: str, value: Any) -> Iterator[str]:
+    """Where there are numbers that are NaN or infinite."""
+    if isinstance(value, float) and not isfinite(value):
+        yield f"{path} = {value}"
+    elif isinstance(value, Mapping):
+        for name, part in value.items():
+            yield from _endless(f"{path}.{name}", part)
+    elif isinstance(value, (list, tuple)):
+        for number, part in enumerate(value):
+            yield from _endless(f"{path}[{number}]", part)
+
+
+def pictures_fit(pictures: Pictures, metadata: Metadata) -> Iterator[str]:
+    """Every picture has the size that the metadata tell, and no pixel is NaN.
+
+    Depth may be infinite, where the wall is nearer than the near plane.
+    """
+    size = metadata["screenHeight"], metadata["screenWidth"]
+    for picture in pictures:
+        if picture.shape[:2] != size:
+            yield f"a picture is {picture.shape[:2]}, and the metadata say {size}"
+        if np.isnan(picture).any():
+            yield "a picture has a pixel that is NaN"
+
+
+def is_worked_out_anew(world: World, metadata: Metadata) -> Iterator[str]:
+    """What the engine keeps of the world is what it would work out without."""
+    untouched = world.untouched
+    world.untouched = False  # an untouched world's entries are those of its scene
+    world.forget()
+    anew = objects_of(world)
+    world.untouched = untouched
+    for old, new in zip(metadata["objects"], anew, strict=True):
+        for name in new:
+            if old[name] != new[name]:
+                yield f"{new['objectId']}.{name} is {new[name]}, and {old[name]} was kept"
+
+
+class Witness:
+    """Sees every event of one room, in order, and says what is wrong with each."""
+
+    def __init__(self) -> None:
+        self.seen = 0
+        self._before: dict[str, Any] | None = None
+        self._settings: object = None
+        self._kept: tuple[dict[str, Any], bytes] | None = None
+
+    def sees(
+        self, request: Mapping[str, Any], metadata: dict[str, Any], pictures: Pictures, world: World
+    ) -> Iterator[str]:
+        """Everything that is wrong after this request."""
+        before, self._before = self._before, metadata
+        self.seen += 1
+        yield from says_why(metadata)
+        yield from pictures_fit(pictures, metadata)
+        if before is None or before["objects"] != metadata["objects"]:
+            # Else they were found to be well the last time.
+            for invariant in _OF_THE_OBJECTS:
+                yield from invariant(metadata)
+            yield from values_are_plain({"objects": metadata["objects"]})
+        yield from goes_over_the_wire({**metadata, "objects": []})
+        if before is not None:
+            yield from self._compared(request, before, metadata, world)
+        if self.seen % _ODD_TIMES == 0:
+            yield from goes_over_the_wire(metadata)
+            yield from is_worked_out_anew(world, metadata)
+            yield from self._compared_with_long_ago(metadata)
+        self._settings = world.settings
+
+    def _compared(
+        self, request: Mapping[str, Any], before: Metadata, after: Metadata, world: World
+    ) -> Iterator[str]:
+        name = request.get("action")
+        if not after["lastActionSuccess"] or (isinstance(name, str) and name in QUESTIONS):
+            yield from a_refusal_changed_nothing(before, after)
+            yield from the_rest_is_the_same(before, after)
+            if self._settings != world.settings:
+                yield f"{name}, which changes nothing, changed {self._settings}"
+        # Whoever forces a teleport may stand in a wall.
+        forced = name in _TELEPORTS and "forceAction" in request
+        if before["agent"]["position"] != after["agent"]["position"] and not forced:
+            yield from stands_on_the_floor(after, _floor_points(scene_of(after)))
+
+    def _compared_with_long_ago(self, metadata: dict[str, Any]) -> Iterator[str]:
+        """Metadata that somebody has kept say what they said."""
+        if self._kept is not None and _packed(self._kept[0]) != self._kept[1]:
+            yield f"the metadata of {_ODD_TIMES} actions ago have changed since"
+        self._kept = metadata, _packed(metadata)

@@ -1,0 +1,174 @@
+"""What the fuzz plays and what came of it: plans, steps, counts, and how they are printed."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from benchmarks.checks.fuzz_requests import PARAMETERS, Request
+from er_gym.sim.scene import SCENE_NAMES
+
+STEPS = 200
+"""Actions in a run."""
+_SHOWN = 3
+"""Problems of one kind that are printed; of the others only how many there are."""
+_LONG = 600
+"""Characters of a request or a message that are printed."""
+_OTHER = "(none of them)"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is played; the runs of a plan do not depend on each other."""
+
+    seed: int = 0
+    actions: int = STEPS
+    scenes: Sequence[str] = tuple(SCENE_NAMES)
+
+    @property
+    def runs(self) -> int:
+        return -(-self.actions // STEPS)
+
+    def steps(self, run: int) -> int:
+        """How many actions a run has: the last one may have fewer."""
+        return min(STEPS, self.actions - run * STEPS)
+
+
+@dataclass(frozen=True)
+class Step:
+    """An action of a run, and what came of it."""
+
+    run: int
+    number: int
+    scene: str
+    request: Request
+    error: str
+    problems: list[str]
+    seconds: float
+
+    @property
+    def name(self) -> str:
+        name = self.request.get("action")
+        return name if isinstance(name, str) and name in PARAMETERS else _OTHER
+
+    def __str__(self) -> str:
+        came = _short(repr(self.error)) if self.error else "done"
+        said = "".join(f"\n  WRONG: {_short(problem)}" for problem in self.problems)
+        where = f"run {self.run} step {self.number} in {self.scene}"
+        return f"{where}: {_short(repr(self.request))}: {came}{said}"
+
+
+def _short(text: str) -> str:
+    """The beginning and the end of a text that is too long to read."""
+    return text if len(text) <= _LONG else f"{text[: _LONG - 100]} … {text[-97:]}"
+
+
+@dataclass
+class Tally:
+    """How it went with the actions of one name."""
+
+    tries: int = 0
+    successes: int = 0
+    problems: int = 0
+    seconds: float = 0.0
+    slowest: float = 0.0
+
+    def add(self, other: Tally) -> None:
+        """Count another tally too."""
+        self.tries += other.tries
+        self.successes += other.successes
+        self.problems += other.problems
+        self.seconds += other.seconds
+        self.slowest = max(self.slowest, other.slowest)
+
+
+@dataclass
+class Report:
+    """What came of one or several runs; ``wrong`` are the steps with problems."""
+
+    tallies: dict[str, Tally] = field(default_factory=dict)
+    wrong: list[Step] = field(default_factory=list)
+    fingerprint: int = 0
+
+    def add(self, other: Report) -> None:
+        """Count another report too, in whatever order they come."""
+        for name, tally in other.tallies.items():
+            self.tallies.setdefault(name, Tally()).add(tally)
+        self.wrong += other.wrong
+        self.fingerprint ^= other.fingerprint
+
+    def count(self, step: Step) -> None:
+        """Count a step."""
+        one = Tally(1, not step.error, len(step.problems), step.seconds, step.seconds)
+        self.tallies.setdefault(step.name, Tally()).add(one)
+        if step.problems:
+            self.wrong.append(step)
+        said = f"{step.run} {step.request!r} {step.error}".encode(errors="replace")
+        self.fingerprint = zlib.crc32(said, self.fingerprint)
+
+    @property
+    def total(self) -> Tally:
+        """Of all names together."""
+        total = Tally()
+        for tally in self.tallies.values():
+            total.add(tally)
+        return total
+
+
+def show(report: Report, plan: Plan, seconds: float, console: Console) -> int:
+    """Print the problems, the table and a line that sums it up; returns the exit code."""
+    kinds: Counter[str] = Counter()
+    for step in sorted(report.wrong, key=lambda step: (step.run, step.number)):
+        kind = _kind(step.problems[0])
+        kinds[kind] += 1
+        if kinds[kind] <= _SHOWN:
+            console.print(f"{step}\n  again: {again(plan, step.run)}", markup=False, soft_wrap=True)
+    for kind, count in kinds.items():
+        if count > _SHOWN:
+            console.print(f"{count - _SHOWN} more where: {kind}", markup=False, soft_wrap=True)
+    console.print(_table(report))
+    total, bad = report.total, len(report.wrong)
+    console.print(
+        f"{'BROKEN' if bad else 'ok'}: {total.tries} actions in {seconds:.1f} s "
+        f"({100 * total.successes / max(1, total.tries):.1f} % succeeded), seed {plan.seed}, "
+        f"fingerprint {report.fingerprint:08x}, problems {bad}",
+        soft_wrap=True,
+        highlight=False,
+    )
+    return 1 if bad else 0
+
+
+def _kind(problem: str) -> str:
+    """What is alike in problems of one kind: no numbers, no object ids, no particulars."""
+    return re.sub(r"\S+\|\S+|\b\d+(?= )", "…", problem).partition(": ")[0][:100]
+
+
+def again(plan: Plan, run: int) -> str:
+    """The command that plays a run once more."""
+    every = tuple(plan.scenes) == tuple(SCENE_NAMES)
+    scenes = "" if every else f" --scenes {','.join(plan.scenes)}"
+    return (
+        f"python -m benchmarks.checks.fuzz --actions {plan.actions} --seed {plan.seed}{scenes} "
+        f"--run {run}"
+    )
+
+
+def _table(report: Report) -> Table:
+    table = Table(title="Actions played")
+    table.add_column("action")
+    for heading in ("tries", "successes", "refusals", "problems", "mean ms", "slowest ms"):
+        table.add_column(heading, justify="right")
+    rows = [*sorted(report.tallies.items()), ("all", report.total)]
+    for name, tally in rows:
+        counts = (tally.tries, tally.successes, tally.tries - tally.successes, tally.problems)
+        times = (tally.seconds / max(1, tally.tries), tally.slowest)
+        cells = (*map(str, counts), *(f"{1000 * value:.2f}" for value in times))
+        table.add_row(escape(name), *cells, end_section=name == rows[-2][0])
+    return table

@@ -1,0 +1,45 @@
+"""What the long random plays share: which scenes, and how many processes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from er_gym.rollout.worker_pool import Lost, do_jobs
+from er_gym.thor import SCENE_NAMES
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+
+def choose_scenes(asked: str) -> list[str]:
+    """Scenes by number, spread over the room kinds; "all"; or names with commas between them.
+
+    Raises:
+        ValueError: it is none of these.
+    """
+    if asked == "all":
+        return list(SCENE_NAMES)
+    if asked.isdecimal() and 1 <= int(asked) <= len(SCENE_NAMES):
+        chosen = np.linspace(0, len(SCENE_NAMES), int(asked), endpoint=False).astype(int)
+        return [SCENE_NAMES[k] for k in chosen]
+    names = asked.split(",")
+    unknown = [name for name in names if name not in SCENE_NAMES]
+    if unknown:
+        raise ValueError(
+            f"--scenes takes all, a number from 1 to {len(SCENE_NAMES)} or names such as "
+            f"FloorPlan1,FloorPlan201; not {unknown[0]!r}"
+        )
+    return names
+
+
+def do_all(
+    make: Callable[[], Callable[[Job], Result]], jobs: Sequence[Job], workers: int
+) -> Iterator[tuple[Job, Result | Lost]]:
+    """Do every job once, each whole in one of so many processes (1: in this one)."""
+    if workers == 1:
+        do = make()
+        return ((job, do(job)) for job in jobs)
+    return do_jobs(make, jobs, workers=workers, tries=1)

@@ -1,0 +1,1 @@
+"""The command ``er-gym``: one file a command."""

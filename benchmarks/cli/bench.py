@@ -1,0 +1,350 @@
+"""``er-gym bench``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, replace
+from functools import reduce
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from benchmarks.cli.errors import (
+    CRASHED,
+    INTERRUPTED,
+    STOPPED,
+    BadInput,
+    bad_input,
+    complain,
+    tell_left_out,
+)
+from benchmarks.cli.options import (
+    Finite,
+    agent_config_option,
+    overrides_option,
+    protocol_option,
+    scorer_option,
+    seed_option,
+    split,
+    trust_option,
+    workers_type,
+)
+from benchmarks.cli.terminal import stdout, terminal
+
+if TYPE_CHECKING:
+    from benchmarks.cli.vlm_run import VLMRun
+    from er_gym.rollout.records import EpisodeRecord
+    from er_gym.rollout.run_directory import Manifest, RunDirectory
+    from er_gym.rollout.runner import Outcome
+    from er_gym.tasks.suites import Suite
+    from er_gym.tasks.task import Task
+
+    OnEpisode = Callable[[EpisodeRecord], None]
+    Say = Callable[[object], None]
+
+_existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
+_directory = click.Path(file_okay=False, path_type=Path)
+
+
+@dataclass(frozen=True)
+class Spoken:
+    """The options of agents that speak, as they are on the command line."""
+
+    agent_config: str | None
+    overrides: tuple[str, ...]
+    base_url: str | None
+    prompts_from: Path | None
+    concurrency: int | None
+    max_usd: float | None
+    max_tokens: int | None
+    max_minutes: float | None
+
+
+_SPOKEN_OPTIONS = (
+    agent_config_option,
+    overrides_option("sampling.temperature=0.7"),
+    click.option("--base-url", metavar="URL", help="Where its server is."),
+    click.option(
+        "--prompts-from",
+        type=_existing_file,
+        metavar="DATASET",
+        help="Take the prompts from a training file in the paper's format.",
+    ),
+    click.option(
+        "--concurrency",
+        type=click.IntRange(1, 1000),
+        help="How many conversations at once.  [default: 8]",
+    ),
+    click.option("--max-usd", type=Finite(), help="Stop when so much is spent."),
+    click.option("--max-tokens", type=int, help="Stop at so many tokens."),
+    click.option("--max-minutes", type=Finite(), help="Stop after so long, requests included."),
+)
+"""For agents that speak; the budgets are of the run, however often it is continued, and the minutes
+of this command."""
+
+
+def _spoken_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Gives a command these options; it gets them as one ``spoken``."""
+
+    def with_spoken(**given: Any) -> Any:
+        spoken = Spoken(**{name: given.pop(name) for name in Spoken.__dataclass_fields__})
+        return command(spoken=spoken, **given)
+
+    with_spoken.__doc__ = command.__doc__
+    return reduce(lambda made, option: option(made), reversed(_SPOKEN_OPTIONS), with_spoken)
+
+
+@click.command(name="bench")
+@click.option("--suite", help="A bundled suite; `er-gym suites` lists them.")
+@click.option("--tasks-file", type=_existing_file, help="Tasks in the paper's file format.")
+@click.option("--poses", type=_existing_file, help="Exact poses, in the paper's file format.")
+@click.option(
+    "--agent", required=True, help="Who plays: oracle, random, searcher, rl:RUN, openai:MODEL …"
+)
+@click.option("--out", type=_directory, help="The run directory.  [default: runs/SUITE-AGENT]")
+@click.option("--workers", type=workers_type, default=1, show_default=True)
+@click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
+@click.option("--task-ids", multiple=True, metavar="ID,…", help="Play these; may be repeated.")
+@click.option("--shard", metavar="I/N", help="Play the I-th of N parts, such as 2/8.")
+@seed_option
+@click.option("--backend", help="The engine: embedded or unity.  [default: the suite's]")
+@trust_option
+@click.option("--instances", help="What a type name stands for.  [default: the suite's]")
+@protocol_option
+@scorer_option
+@_spoken_options
+def bench(
+    suite: str | None,
+    tasks_file: Path | None,
+    poses: Path | None,
+    agent: str,
+    out: Path | None,
+    workers: int,
+    limit: int | None,
+    task_ids: tuple[str, ...],
+    shard: str | None,
+    seed: int,
+    backend: str | None,
+    trust: bool,
+    instances: str | None,
+    protocol: str,
+    scorer: str,
+    spoken: Spoken,
+) -> int:
+    """Play a suite with an agent and print the result table.
+
+    The same command again continues: episodes that are done are not played again. A task that
+    cannot be played is set aside and named; the others are played. The options from
+    --agent-config on are for agents that speak, such as openai:MODEL.
+    """
+    from agents import RL
+    from benchmarks.cli.progress import Progress
+    from benchmarks.scoring.metrics import score_episode
+    from benchmarks.scoring.report import load_run
+    from benchmarks.scoring.scorers import CORRECTED, SCORERS
+    from benchmarks.scoring.tables import print_tables, tables
+    from er_gym import __version__
+    from er_gym.rollout.agent import CannotGoOn
+    from er_gym.rollout.run_directory import Manifest
+    from er_gym.rollout.runner import Shard, finished, select
+    from er_gym.rollout.worker_pool import WorkerSetupError
+    from er_gym.tasks.errors import in_short
+    from er_gym.tasks.resolve import resolve_tasks
+    from er_gym.thor import BackendError
+    from er_gym.writing import file_stem
+
+    console = terminal(stderr=True)
+    with bad_input(BackendError):
+        part = Shard.parse(shard) if shard is not None else None
+        asked = _load_suite(suite, tasks_file, poses, protocol)
+        voice = _voice(agent, spoken)
+        if trust and not agent.startswith(RL):
+            raise BadInput(f"--trust is for trained policies, {RL}RUN, not for {agent}")
+        env = _env_kwargs(
+            asked, agent, seed, voice, protocol, trust, backend=backend, instances=instances
+        )
+        fitted = resolve_tasks(asked.tasks, env["backend"])
+        aside = (*asked.set_aside, *fitted.set_aside)
+        if aside and not fitted.tasks:
+            raise BadInput(f"{asked.name}: no task can be played: {in_short(aside)}")
+        chosen = select(
+            fitted.tasks, task_ids=split(*task_ids), shard=part, limit=limit, set_aside=aside
+        )
+        out = out or Path("runs") / f"{file_stem(asked.name)}-{file_stem(agent)}"
+        manifest = Manifest(
+            suite=asked.name,
+            suite_digest=asked.digest,
+            suite_size=len(fitted.tasks),
+            agent=agent,
+            agent_settings=voice.consequential if voice else {},
+            env=env,
+            seed=seed,
+            er_gym=__version__,
+            set_aside=aside,
+            taken=fitted.taken,
+        )
+    tell_left_out(asked.name, aside, fitted.taken)
+    for note in fitted.notes:
+        console.print(note, style="dim", soft_wrap=True)
+
+    judge = SCORERS.get(scorer, CORRECTED)
+    try:
+        with _claimed(out, manifest) as store:
+            for line in store.move_aside(task.id for task in chosen):
+                complain(line)
+            before = finished(store, chosen)
+            succeeded = sum(score_episode(episode, judge).success for episode in before)
+            with _player(store, chosen, workers, voice, trust) as (play, spent):
+                progress = Progress(
+                    console, f"{asked.name}, {agent}", len(chosen), len(before), succeeded, spent
+                )
+                with progress:
+                    outcome = play(
+                        lambda episode: progress.episode(score_episode(episode, judge).success),
+                        progress.say,
+                    )
+                bill = spent()
+    except WorkerSetupError as error:
+        raise click.ClickException(f"{error}; {_left_in(out, chosen)}") from error
+    except OSError as error:  # the disk is full, the share is gone
+        raise BadInput(f"{error}; {_left_in(out, chosen)}") from error
+    except (KeyboardInterrupt, CannotGoOn) as error:
+        why = str(error) if isinstance(error, CannotGoOn) else "interrupted"
+        complain(f"{why}: {_left_in(out, chosen)}")
+        return STOPPED if isinstance(error, CannotGoOn) else INTERRUPTED
+    print_tables(tables([load_run(out)], scorer=scorer), stdout())
+    if bill:
+        console.print(bill)
+    if outcome.crashed:
+        first = outcome.crashed[0]
+        complain(
+            f"{len(outcome.crashed)} of {outcome.played} episodes crashed, the first of them "
+            f"{first.task_id}: {first.error}; the same command plays them again"
+        )
+        return CRASHED
+    return 0
+
+
+@contextmanager
+def _claimed(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
+    """The run directory; what keeps it from being used is the user's to mend."""
+    from er_gym.rollout.run_directory import claimed
+
+    with ExitStack() as stack:
+        with bad_input():
+            store = stack.enter_context(claimed(out, manifest))
+        yield store
+
+
+def _left_in(out: Path, chosen: Sequence[Task]) -> str:
+    """What a run that ended early has left, in words."""
+    from er_gym.rollout.run_directory import MANIFEST, RunDirectory
+    from er_gym.rollout.runner import finished
+
+    if not (out / MANIFEST).exists():
+        return f"no episode was played, and nothing is left in {out}"
+    done = len(finished(RunDirectory.open(out), chosen))
+    return f"{done} of {len(chosen)} episodes are in {out}; the same command continues"
+
+
+@contextmanager
+def _player(
+    store: RunDirectory, chosen: Sequence[Task], workers: int, voice: VLMRun | None, trust: bool
+) -> Iterator[tuple[Callable[[OnEpisode, Say], Outcome], Callable[[], str]]]:
+    """How the chosen tasks are played, and how to hear what that has cost."""
+    from er_gym.rollout.agent import CannotGoOn
+    from er_gym.rollout.runner import run
+
+    if voice is None:
+        yield (
+            lambda on_episode, _: run(
+                store, chosen, workers=workers, on_episode=on_episode, trust=trust
+            ),
+            str,
+        )
+        return
+    with bad_input(CannotGoOn):  # no key, no such model
+        speaker = voice.speaker(store.path)
+    with closing(speaker):
+        yield (
+            lambda on_episode, say: voice.play(speaker, store, chosen, workers, on_episode, say),
+            lambda: speaker.spent,
+        )
+
+
+def _load_suite(
+    name: str | None, tasks_file: Path | None, poses: Path | None, protocol: str
+) -> Suite:
+    """The suite; under the paper's protocol a stated pose is the object's in every task."""
+    from er_gym.envs.protocol import PAPER
+    from er_gym.tasks.jsonl_format import digest
+    from er_gym.tasks.paper_format import read_poses, with_every_pose, with_poses
+    from er_gym.tasks.suites import load_suite, suite_from_file, suite_names
+
+    if (name is None) == (tasks_file is None):
+        raise BadInput(f"give either --suite (one of: {', '.join(suite_names())}) or --tasks-file")
+    if name is not None:
+        if poses is not None:
+            raise BadInput("--poses goes with --tasks-file; a suite has its own")
+        suite = load_suite(name)
+    else:
+        assert tasks_file is not None
+        suite = suite_from_file(tasks_file)
+    stated = {} if poses is None else read_poses(poses)
+    if stated:
+        tasks = tuple(with_poses(suite.tasks, stated, suite.places))
+        suite = replace(suite, tasks=tasks, digest=digest(tasks))
+    if protocol == PAPER.name:
+        suite = replace(suite, tasks=tuple(with_every_pose(suite.tasks, stated)))
+    return suite
+
+
+def _env_kwargs(
+    suite: Suite,
+    agent: str,
+    seed: int,
+    voice: VLMRun | None,
+    protocol: str,
+    trust: bool,
+    **given: str | None,
+) -> dict[str, Any]:
+    """The environment's arguments: the suite's, overruled by the options that were given, and the
+    observations that the agent needs. Agent and environment are made once, to hear of what is wrong
+    with them before any worker is started."""
+    from agents import make_agent
+    from er_gym.envs.embodied_env import EmbodiedEnv
+    from er_gym.envs.protocol import DEFAULT, protocol_named
+    from er_gym.thor import BACKENDS
+
+    env = {"backend": "embedded", **suite.env}
+    if protocol != DEFAULT.name:  # runs of before, which say nothing of it, can be continued
+        env["protocol"] = protocol
+    if protocol_named(protocol).chooses_instances:
+        env.pop("instances", None)
+    env |= {name: value for name, value in given.items() if value is not None}
+    if env["backend"] not in BACKENDS:
+        raise ValueError(
+            f"unknown backend {env['backend']!r}; choose one of: {', '.join(BACKENDS)}"
+        )
+    if voice is None:
+        env["obs_mode"] = make_agent(agent, seed=seed, trust=trust).obs_mode
+    else:
+        env |= voice.env
+    EmbodiedEnv((), **env)
+    return env
+
+
+def _voice(agent: str, spoken: Spoken) -> VLMRun | None:
+    """What an agent that speaks is made of; None for others, which take none of these options."""
+    from agents.vlm.factory import speaks
+    from benchmarks.cli.vlm_run import VLMRun
+
+    if speaks(agent):
+        return VLMRun.of(agent, **vars(spoken))
+    given = [name for name, value in vars(spoken).items() if value not in (None, ())]
+    if given:
+        option = "--set" if given[0] == "overrides" else f"--{given[0].replace('_', '-')}"
+        raise BadInput(f"{option} is for agents that speak, such as openai:MODEL, not for {agent}")
+    return None

@@ -1,0 +1,266 @@
+"""``er-gym tasks generate``."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from benchmarks.cli.errors import BadInput, bad_input
+from benchmarks.cli.options import MOST_SEED, Span, force_option, split, workers_option
+from benchmarks.cli.terminal import echo, terminal
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from benchmarks.cli.suite_builder import Made
+    from er_gym.tasks.suite_spec import Making
+    from er_gym.tasks.task import Task
+
+_DEFAULT_TOTAL = 100
+_INTERRUPTED = 130
+
+
+@click.command()
+@click.option("--suite", help="Make this suite, as its configuration says.")
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="The task file, .jsonl or .jsonl.gz.  [default: where er-gym looks for the suite]",
+)
+@click.option(
+    "--total", type=click.IntRange(min=1), help=f"How many tasks.  [default: {_DEFAULT_TOTAL}]"
+)
+@click.option("--scenes", metavar="NAMES", help="all, training, evaluation, or rooms with commas.")
+@click.option("--types", metavar="NAMES", help="Types of tasks, with commas.  [default: all]")
+@click.option("--layouts", type=click.IntRange(0, 10_000), help="Rearrangements of each room.")
+@click.option("--per-layout", type=click.IntRange(min=1), help="Tasks of a type in each of them.")
+@click.option("--hidden-depth", type=Span(), help="How many containers must be opened.")
+@click.option("--distractors", type=Span(), help="How many other objects of the types named.")
+@click.option("--distance", type=Span(), help="How far it is, metres.")
+@click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the suite's, or 0]")
+@click.option(
+    "--paraphraser",
+    metavar="MODULE:FUNCTION",
+    help="A function from a prompt to a language model's reply; its wordings join the templates'.",
+)
+@force_option
+@workers_option
+def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -> int:
+    """Generate tasks, play each of them, and write those that can be done.
+
+    What has been made when it is interrupted is kept: the same command goes on. The same seed gives
+    the same file. Beside the file comes a card, in Markdown.
+    """
+    from benchmarks.cli.suite_builder import parts_of, remove_parts
+    from benchmarks.scoring.task_counts import print_counts
+    from er_gym.rollout.worker_pool import WorkerSetupError
+    from er_gym.tasks import jsonl_format
+    from er_gym.writing import check_output, make_folder
+
+    console = terminal(stderr=True)
+    with bad_input():
+        order = _order(paraphraser=paraphraser, **given)
+        paraphrase = _paraphraser(paraphraser, order) if paraphraser else None
+        make_folder(order.out.parent)
+        for file in (order.out, order.card):
+            check_output(file, force=force)
+    parts = parts_of(order.out, order.making, order.seed)
+    try:
+        made, verified = _make(order, parts, workers, console)
+        chosen = made.tasks
+        if not chosen:
+            raise click.ClickException(f"no task could be made: {_reasons(made)}")
+        if paraphrase:
+            chosen = tuple(_paraphrased(task, paraphrase) for task in chosen)
+        _write(order, chosen, force)
+    except (WorkerSetupError, RuntimeError) as error:
+        raise click.ClickException(f"{error}; what is done is in {parts}") from error
+    except (ValueError, OSError) as error:  # the disk is full, another file is there by now
+        raise BadInput(f"{error}; what is done is in {parts}") from error
+    except KeyboardInterrupt:
+        done = len(list(parts.glob("*.jsonl")))
+        echo(
+            f"er-gym: interrupted: {done} of {len(order.making.rooms)} rooms are in {parts}; "
+            "the same command goes on",
+            err=True,
+        )
+        return _INTERRUPTED
+    remove_parts(parts)
+    print_counts(chosen, made.dropped)
+    echo(f"{len(chosen)} tasks of {verified} verified: {order.out}")
+    echo(f"sha256 of the tasks {jsonl_format.digest(chosen)}; card: {order.card}")
+    if len(chosen) < order.making.total:
+        console.print(f"{order.making.total} were asked for; more layouts or rooms give more")
+    return 0
+
+
+@dataclass(frozen=True)
+class _Order:
+    """What is to be made.
+
+    Attributes:
+        name, description: for the card.
+        command: what makes it again.
+    """
+
+    name: str
+    description: str
+    making: Making
+    seed: int
+    out: Path
+    command: str
+    paraphraser: str | None
+
+    @property
+    def card(self) -> Path:
+        """Where the card goes: beside the task file."""
+        return self.out.with_name(f"{self.out.name.partition('.jsonl')[0]}.md")
+
+
+def _order(
+    *, suite: str | None, out: Path | None, seed: int | None, paraphraser: str | None, **given: Any
+) -> _Order:
+    """Work out what is to be made: as the suite says, overruled by the options that were given."""
+    from er_gym.tasks.files import validated
+    from er_gym.tasks.splits import SCENES
+    from er_gym.tasks.suite_spec import Making
+    from er_gym.tasks.suites import suite_config, suite_file, suite_home
+    from er_gym.tasks.types import task_type
+
+    told = {name: value for name, value in given.items() if value is not None}
+    config = None if suite is None else suite_config(suite)
+    base = config.generate.model_dump() if config and config.generate else {"total": _DEFAULT_TOTAL}
+    if out is None:
+        if suite is None:
+            raise BadInput("give --out, or --suite to make one that er-gym knows")
+        out = suite_file(suite)
+        if out.parent != suite_home():
+            raise BadInput(f"the suite {suite!r} comes with er-gym; give --out to make it anew")
+    if not out.name.endswith((".jsonl", ".jsonl.gz")):
+        raise BadInput(f"--out {out}: a task file that is made ends in .jsonl or .jsonl.gz")
+    stem = out.name.removesuffix(".gz").removesuffix(".jsonl")
+    parts = ["er-gym", "tasks", "generate", *(["--suite", suite] if suite else ["--out", out.name])]
+    for name, value in told.items():
+        parts += [f"--{name.replace('_', '-')}", _spoken(value)]
+    if "scenes" in told and told["scenes"] not in SCENES:
+        told["scenes"] = tuple(split(told["scenes"]))
+    if "types" in told:
+        told["types"] = tuple(task_type(name).name for name in split(told["types"]))
+    seed = seed if seed is not None else config.seed if config else 0
+    parts += ["--seed", str(seed), *(["--paraphraser", paraphraser] if paraphraser else [])]
+    plain = config is not None and not told
+    return _Order(
+        name=suite if suite and plain else stem,
+        description=config.description if config and plain else "Generated tasks.",
+        making=validated(Making, {**base, **told}, "what to make"),
+        seed=seed,
+        out=out,
+        command=shlex.join(parts),
+        paraphraser=paraphraser,
+    )
+
+
+def _spoken(value: Any) -> str:
+    """A value as it is given on the command line."""
+    if not isinstance(value, tuple):
+        return str(value)
+    low, high = value
+    return f"{low:g}-{'' if high is None else f'{high:g}'}"
+
+
+def _make(order: _Order, parts: Path, workers: int, console: Console) -> tuple[Made, int]:
+    """Make it, showing how far it is; returns what is chosen, and of how many."""
+    from benchmarks.cli.progress import bar
+    from benchmarks.cli.suite_builder import make_suite
+
+    rooms = len(order.making.rooms)
+    verified = done = 0
+    with bar(console) as progress:
+        shown = progress.add_task("making tasks", total=rooms, status="")
+
+        def on_room(scene: str, made: Made) -> None:
+            nonlocal verified, done
+            verified, done = verified + len(made.tasks), done + 1
+            progress.update(shown, advance=1, status=f"{verified} verified, last {scene}")
+            if not console.is_terminal and done * 10 // rooms > (done - 1) * 10 // rooms:
+                console.print(f"{done}/{rooms} rooms, {verified} tasks verified")
+
+        made = make_suite(order.making, order.seed, parts=parts, workers=workers, on_room=on_room)
+    return made, verified
+
+
+def _reasons(made: Made) -> str:
+    """Why tasks were dropped, the commonest first."""
+    common = made.dropped.most_common(3)
+    return "; ".join(f"{reason} ({count})" for reason, count in common) or "the rooms have none"
+
+
+def _write(order: _Order, chosen: tuple[Task, ...], force: bool) -> None:
+    """Write the task file and its card."""
+    from er_gym import __version__
+    from er_gym.tasks import jsonl_format
+    from er_gym.tasks.suite_card import card
+    from er_gym.writing import check_output, write_output
+
+    how = {
+        "suite": order.name,
+        "seed": order.seed,
+        "er_gym": __version__,
+        **order.making.model_dump(mode="json", exclude_defaults=True),
+        **({"paraphraser": order.paraphraser} if order.paraphraser else {}),
+    }
+    check_output(order.card, force=force)  # before one of the two is written
+    jsonl_format.write_tasks(order.out, chosen, force=force, **how)
+    text = card(order.name, order.description, chosen, how, order.command)
+    write_output(order.card, text, force=force)
+
+
+def _paraphraser(spec: str, order: _Order) -> Any:
+    from er_gym.tasks.paraphrase import Paraphraser, load_ask
+
+    ask = load_ask(spec)
+
+    def asked(prompt: str) -> str:
+        try:
+            reply = ask(prompt)
+        except (Exception, SystemExit) as error:  # it is the user's, and may raise anything
+            raise RuntimeError(f"{spec} raised {type(error).__name__}: {error}") from error
+        if not isinstance(reply, str):
+            raise RuntimeError(
+                f"{spec} returned {type(reply).__name__}, not a text; let it return its reply, "
+                "as str"
+            )
+        return reply
+
+    return Paraphraser(asked, order.out.with_name(f"{order.name}.paraphrases.jsonl"))
+
+
+def _paraphrased(task: Task, paraphrase: Any) -> Task:
+    """A task in a language model's words, or in the template's: each is as likely."""
+    from dataclasses import replace
+
+    from er_gym.tasks.paraphrase import choose, names_in
+
+    kept = {*names_in(task.instruction), *_ways(task)}
+    variants = paraphrase(task.instruction, kept)
+    return replace(
+        task, instruction=choose((task.instruction, *variants), f"{task.id} in other words")
+    )
+
+
+def _ways(task: Task) -> set[str]:
+    """What a task's words say of switches: "on", "off"."""
+    states: Mapping[object, str] = {True: "on", False: "off"}
+    ways = {
+        states[value]
+        for condition in task.goal
+        for name, value in condition.state
+        if name == "isToggled"
+    }
+    words = set(task.instruction.lower().replace(".", " ").replace("?", " ").split())
+    return ways & words

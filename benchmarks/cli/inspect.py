@@ -1,0 +1,90 @@
+"""``er-gym inspect``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from benchmarks.cli.errors import CRASHED, BadInput, bad_input, complain
+from benchmarks.cli.options import agent_config_option, overrides_option, seed_option
+from benchmarks.cli.terminal import echo
+
+if TYPE_CHECKING:
+    from inspect_ai.log import EvalLog
+
+
+@click.command(name="inspect")
+@click.option("--suite", default="mini", show_default=True, help="`er-gym suites` lists them.")
+@click.option(
+    "--model", required=True, help="As Inspect names it: openai/gpt-4o, vllm/…, mockllm/model."
+)
+@click.option("--model-base-url", metavar="URL", help="Where the model's server is.")
+@agent_config_option
+@overrides_option("sees=text")
+@click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
+@seed_option
+@click.option(
+    "--concurrency",
+    type=click.IntRange(1, 256),
+    default=4,
+    show_default=True,
+    help="How many conversations at once, each with an engine in a process of its own.",
+)
+@click.option("--log-dir", metavar="DIRECTORY", help="[default: Inspect's, ./logs]")
+def inspect(
+    suite: str,
+    model: str,
+    model_base_url: str | None,
+    agent_config: str | None,
+    overrides: tuple[str, ...],
+    limit: int | None,
+    seed: int,
+    concurrency: int,
+    log_dir: str | None,
+) -> int:
+    """Play a suite with a model of Inspect; needs the extra inspect.
+
+    `inspect view` then shows every conversation with its pictures. For all that Inspect can do:
+    `inspect eval benchmarks/inspect_task.py@er_gym`.
+    """
+    try:
+        from inspect_ai import eval as evaluate
+        from inspect_ai._util.error import PrerequisiteError  # a key or a package is missing
+
+        from benchmarks.inspect_secrets import model_at
+        from benchmarks.inspect_task import er_gym
+    except ImportError as error:
+        raise BadInput(
+            f"{error.name} is not installed, and Inspect needs it: pip install 'er-gym[inspect]'"
+        ) from error
+    with bad_input():
+        asked = er_gym(suite, limit, agent_config, overrides, seed)
+        try:
+            logs = evaluate(
+                asked,
+                model=model_at(model, model_base_url),
+                log_dir=log_dir,
+                max_samples=concurrency,
+            )
+        except PrerequisiteError as error:
+            from rich.text import Text
+
+            said = Text.from_markup(str(error.message)).plain
+            raise BadInput(" ".join(said.split())) from error
+    return _say(logs[0])
+
+
+def _say(log: EvalLog) -> int:
+    """The means, and where the log is."""
+    results: Any = log.results.scores if log.results else []
+    for metric in results:
+        mean = metric.metrics.get("mean")
+        if mean is not None:
+            echo(f"{metric.name}: {mean.value:.3f}")
+    echo(log.location)
+    if log.status == "success":
+        return 0
+    why = log.error.message if log.error else "cancelled"
+    complain(f"the evaluation ended early: {why}")
+    return CRASHED

@@ -1,0 +1,160 @@
+"""The command ``er-gym``.
+
+Only click is imported before a subcommand runs, so that ``er-gym --help`` is instant. Whatever the
+user got wrong ends the command with exit code 2 and one line on stderr.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+import click
+
+from benchmarks.cli.bench import bench
+from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, complain
+from benchmarks.cli.inspect import inspect
+from benchmarks.cli.options import scorer_option
+from benchmarks.cli.player import doctor, player
+from benchmarks.cli.render import play, render
+from benchmarks.cli.serve import match_server, serve
+from benchmarks.cli.tasks import tasks
+from benchmarks.cli.terminal import echo, stdout, use_any_encoding
+from benchmarks.cli.train import train_rl
+
+FORMATS = ("table", "md", "csv", "json")
+_directory = click.Path(file_okay=False, path_type=Path)
+
+
+def main(args: Sequence[str] | None = None) -> NoReturn:
+    """Run the command and exit: 0; 2 for bad input; others as in ``benchmarks.cli.errors``."""
+    use_any_encoding()
+    try:
+        code = cli.main(args=args, prog_name="er-gym", standalone_mode=False)
+    except click.UsageError as error:
+        help_command = f"{error.ctx.command_path if error.ctx else 'er-gym'} --help"
+        complain(f"{error.format_message().rstrip('.')}; see {help_command}")
+        sys.exit(error.exit_code)
+    except click.ClickException as error:
+        complain(error.format_message())
+        sys.exit(error.exit_code)
+    except ValueError as error:
+        from er_gym.plugins import PluginError  # late: it takes half a second
+
+        if not isinstance(error, PluginError):
+            raise
+        complain(str(error))
+        sys.exit(BadInput.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        complain("interrupted")
+        sys.exit(INTERRUPTED)
+    except OSError as error:  # a full disk, a directory that has gone
+        complain(str(error))
+        sys.exit(1)
+    except MemoryError as error:
+        complain(f"the memory does not suffice: {error}".rstrip(": "))
+        sys.exit(1)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--version", is_flag=True, is_eager=True, help="Show the version and exit.")
+@click.pass_context
+def cli(context: click.Context, version: bool) -> None:
+    """Embodied reasoning tasks in AI2-THOR rooms: play them, score them, report."""
+    if version:
+        from er_gym import __version__
+
+        echo(f"er-gym {__version__}")
+        context.exit()
+    if context.invoked_subcommand is None:
+        echo(context.get_help())
+
+
+cli.add_command(bench)
+cli.add_command(player)
+cli.add_command(doctor)
+cli.add_command(render)
+cli.add_command(play)
+cli.add_command(tasks)
+cli.add_command(train_rl)
+cli.add_command(serve)
+cli.add_command(match_server)
+cli.add_command(inspect)
+
+
+@cli.command()
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...", type=_directory)
+@click.option("--format", "layout", type=click.Choice(FORMATS), default="table", show_default=True)
+@scorer_option
+@click.option("--by-type", is_flag=True, help="Add every metric for each group and task type.")
+@click.option("--misses", is_flag=True, help="Add the episodes without success, and why.")
+def report(runs: tuple[Path, ...], layout: str, scorer: str, by_type: bool, misses: bool) -> None:
+    """Show the results in one or several run directories.
+
+    Rates have Wilson's 95 % interval. The json format carries every metric, slice, score and miss,
+    whatever the other options.
+    """
+    from benchmarks.scoring import report as reports
+    from benchmarks.scoring.tables import as_markdown, print_tables, tables
+
+    if misses and layout == "csv":
+        raise BadInput(
+            "--misses does not go with --format csv, which holds means; choose json, md or table"
+        )
+    with bad_input():
+        loaded = [reports.load_run(path) for path in runs]
+    if layout == "json":
+        echo(reports.as_json(loaded))
+    elif layout == "csv":
+        echo(reports.as_csv(loaded, scorer, by_type), nl=False)
+    else:
+        found = tables(loaded, scorer=scorer, with_types=by_type, with_misses=misses)
+        if layout == "md":
+            echo(as_markdown(found), nl=False)
+        else:
+            print_tables(found, stdout())
+
+
+@cli.command()
+def suites() -> None:
+    """List the suites."""
+    from collections import Counter
+
+    from er_gym.tasks.suites import (
+        load_suite,
+        suite_config,
+        suite_file,
+        suite_names,
+        suite_registry,
+    )
+    from er_gym.tasks.types import GROUPS
+
+    for name in suite_registry().names():
+        if name in suite_names() and not suite_file(name).exists():
+            echo(
+                f"{name}: not made yet (er-gym tasks generate --suite {name}); "
+                f"{suite_config(name).description}"
+            )
+            continue
+        with bad_input():
+            tasks = load_suite(name).tasks
+        counts = Counter(task.type.group for task in tasks)
+        groups = ", ".join(f"{group} {counts[group]}" for group in GROUPS if counts[group])
+        echo(f"{name}: {len(tasks)} tasks ({groups})")
+
+
+@cli.command()
+def envs() -> None:
+    """List the registered environments, one for each task type."""
+    from er_gym.tasks.types import TASK_TYPES
+
+    widest = max(len(kind.env_id) for kind in TASK_TYPES)
+    for kind in TASK_TYPES:
+        echo(f"{kind.env_id:{widest}}  {kind.group}: {kind.title}, {kind.max_steps} steps")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import Any
+
+import click
+
+SCORER_CHOICES = ("both", "paper", "corrected")
+"""As in ``benchmarks.scoring.report``, which is too heavy to import for ``--help``; a test compares."""
+
+scorer_option = click.option(
+    "--scorer",
+    type=click.Choice(SCORER_CHOICES),
+    default="both",
+    show_default=True,
+    help="Which scorer the table shows; both: each where they differ.",
+)
+
+PROTOCOL_CHOICES = ("default", "paper")
+"""As in ``er_gym.envs.protocol``, likewise."""
+
+protocol_option = click.option(
+    "--protocol",
+    type=click.Choice(PROTOCOL_CHOICES),
+    default=PROTOCOL_CHOICES[0],
+    show_default=True,
+    help="The rules of an episode; paper: those of the paper's own evaluation program, for figures "
+    "that stand beside its table.",
+)
+
+_MOST_WORKERS = 256
+"""Each takes a hundred megabytes and more."""
+MOST_SEED = 2**32 - 1
+"""NumPy's and PyTorch's generators take no larger one."""
+
+seed_option = click.option(
+    "--seed", type=click.IntRange(0, MOST_SEED), default=0, show_default=True
+)
+
+workers_type = click.IntRange(1, _MOST_WORKERS)
+
+workers_option = click.option(
+    "--workers",
+    type=workers_type,
+    default=os.cpu_count() or 1,
+    help="How many processes.  [default: one for each processor]",
+)
+
+force_option = click.option(
+    "--force", is_flag=True, help="Replace also files that er-gym did not write."
+)
+
+agent_config_option = click.option(
+    "--agent-config", metavar="FILE", help="An agent's settings, in YAML, or their name."
+)
+
+trust_option = click.option(
+    "--trust",
+    is_flag=True,
+    help="Read a policy from a file of Stable-Baselines3 too, which runs whatever code is in it.",
+)
+
+
+def overrides_option(example: str) -> Any:
+    """``--set NAME=VALUE``, which overrules settings of a file."""
+    return click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="NAME=VALUE",
+        help=f"Overrule a setting, such as {example}; again and again.",
+    )
+
+
+def split(*lists: str | None) -> list[str]:
+    """The words of comma-separated lists."""
+    return [word.strip() for text in lists for word in (text or "").split(",") if word.strip()]
+
+
+class Finite(click.FloatRange):
+    """A number in a range, or any, but neither NaN nor infinite."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is no finite number", param, ctx)
+        return float(number)
+
+
+class Span(click.ParamType):
+    """``3``, ``2-5`` or ``4-``: from and to, both included."""
+
+    name = "A-B"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[float, float | None]:
+        low, dash, high = str(value).partition("-")
+        try:
+            start = float(low)
+            return start, (float(high) if high else None) if dash else start
+        except ValueError:
+            self.fail(f"{value!r} is no range; give a number, A-B, or A- for no end", param, ctx)

@@ -1,0 +1,236 @@
+"""``er-gym render`` and ``er-gym play``: look at a room, and play a task in it oneself."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from benchmarks.cli.errors import BadInput, bad_input
+from benchmarks.cli.options import Finite, force_option, seed_option
+from benchmarks.cli.terminal import echo
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+WHAT = ("rgb", "depth", "ids", "map")
+_ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+_ENDINGS_OF_DEPTH = (".png", ".tif", ".tiff")
+"""Those that hold 16 bits."""
+_DEPTH_UNIT = 1000.0
+"""Depth pictures are 16 bit, so many steps a metre."""
+_ABOVE = 60.0
+"""Vertical field of view of the camera that looks down on the whole room, degrees."""
+
+
+@click.command()
+@click.option("--scene", required=True, help="Such as FloorPlan1.")
+@click.option("--pose", metavar="X,Z,ROTATION[,HORIZON]", help="Metres and degrees.")
+@click.option("--what", type=click.Choice(WHAT), default="rgb", show_default=True)
+@click.option("--width", type=click.IntRange(64, 1920), default=800, show_default=True)
+@click.option("--height", type=click.IntRange(64, 1280), default=450, show_default=True)
+@click.option("--fov", type=Finite(30, 150), default=90, show_default=True)
+@click.option("--annotate", is_flag=True, help="Write the types of things into the picture.")
+@click.option(
+    "--out", default=Path("room.png"), show_default=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+)  # fmt: skip
+@force_option
+def render(
+    scene: str, pose: str | None, what: str, width: int, height: int, fov: float, annotate: bool,
+    out: Path, force: bool,
+) -> None:  # fmt: skip
+    """Write a picture of a room.
+
+    rgb: what the agent sees; depth: the same in 16 bit, millimetres; ids: a colour for each object;
+    map: the whole room from above.
+    """
+    from PIL import Image
+
+    from er_gym.thor import SCENE_NAMES, UnknownSceneError, make_controller
+    from er_gym.writing import check_output, write_picture
+
+    if scene not in SCENE_NAMES:
+        raise BadInput(str(UnknownSceneError(scene)))
+    endings = _ENDINGS_OF_DEPTH if what == "depth" else _ENDINGS
+    if out.suffix.lower() not in endings:
+        raise BadInput(f"--out {out}: such a picture's name ends in one of: {', '.join(endings)}")
+    with bad_input():
+        check_output(out, force=force)
+    stand = None if pose is None else _pose(pose)
+    controller = make_controller(
+        scene=scene,
+        width=width,
+        height=height,
+        fieldOfView=fov,
+        renderDepthImage=what == "depth",
+        renderInstanceSegmentation=what == "ids" or annotate,
+        snapToGrid=False,
+    )
+    if stand is not None:
+        _stand(controller, stand)
+    event = controller.last_event
+    if what == "map":
+        event = _from_above(controller)
+        frame = event.third_party_camera_frames[-1]
+    elif what == "depth":
+        frame = (event.depth_frame * _DEPTH_UNIT).clip(0, 65535).astype("uint16")
+    elif what == "ids":
+        frame = event.instance_segmentation_frame
+    else:
+        frame = event.frame
+    if annotate and what == "rgb":
+        from er_gym.envs.annotate import annotated
+
+        frame = annotated(frame, event.instance_detections2D)
+    with bad_input():
+        write_picture(out, Image.fromarray(frame), force=force)
+    agent = event.metadata["agent"]
+    at = agent["position"]
+    echo(
+        f"{out}: {what} of {scene} from ({at['x']:.2f}, {at['z']:.2f}), rotation "
+        f"{agent['rotation']['y']:g}, horizon {agent['cameraHorizon']:g}"
+    )
+
+
+def _pose(text: str) -> tuple[float, float, float, float]:
+    """X, z, rotation and horizon of a pose given in words; metres and degrees."""
+    found: tuple[float, ...]
+    try:
+        found = tuple(float(number) for number in text.split(","))
+    except ValueError:
+        found = ()
+    if len(found) not in (3, 4) or not all(map(math.isfinite, found)):
+        raise BadInput(
+            f"{text!r:.80} is no pose; say X,Z,ROTATION or X,Z,ROTATION,HORIZON, such as "
+            "1.0,-0.5,90"
+        )
+    x, z, rotation, tilt = (*found, 0.0)[:4]
+    return x, z, rotation, tilt
+
+
+def _stand(controller: Any, pose: tuple[float, float, float, float]) -> None:
+    """Put the agent at a pose."""
+    x, z, rotation, tilt = pose
+    agent = controller.last_event.metadata["agent"]["position"]
+    event = controller.step(
+        action="TeleportFull", position={"x": x, "y": agent["y"], "z": z},
+        rotation={"x": 0.0, "y": rotation, "z": 0.0}, horizon=tilt, standing=True,
+    )  # fmt: skip
+    if not event.metadata["lastActionSuccess"]:
+        raise BadInput(event.metadata["errorMessage"])
+
+
+def _from_above(controller: Any) -> Any:
+    """An event with a picture of the whole room from above, which has no ceiling from there."""
+    from math import radians, tan
+
+    bounds = controller.last_event.metadata["sceneBounds"]
+    middle, size = bounds["center"], bounds["size"]
+    aspect = controller.last_event.screen_width / controller.last_event.screen_height
+    up = max(size["z"], size["x"] / aspect) / 2 / tan(radians(_ABOVE) / 2)
+    return controller.step(
+        action="AddThirdPartyCamera",
+        position={"x": middle["x"], "y": middle["y"] + size["y"] / 2 + up, "z": middle["z"]},
+        rotation={"x": 90, "y": 0, "z": 0},
+        fieldOfView=_ABOVE,
+    )
+
+
+@click.command()
+@click.option("--suite", default="mini", show_default=True, help="Where the task is from.")
+@click.option("--task", "task_id", help="Its id.  [default: one by chance]")
+@click.option("--scene", help="A task by chance in this scene.")
+@seed_option
+@click.option(
+    "--frames", default=Path("frames"), show_default=True,
+    type=click.Path(file_okay=False, path_type=Path), help="Where each step's picture goes.",
+)  # fmt: skip
+@force_option
+@click.option("--window/--no-window", default=None, help="Show it in a window.  [default: if any]")
+def play(
+    suite: str, task_id: str | None, scene: str | None, seed: int, frames: Path,
+    force: bool, window: bool | None,
+) -> None:  # fmt: skip
+    """Play a task oneself, in words; each step's picture is written, and shown if it can be."""
+    from er_gym.envs.embodied_env import EmbodiedEnv
+    from er_gym.tasks.suites import load_suite
+    from er_gym.writing import check_output, make_folder
+
+    with bad_input():
+        tasks = [t for t in load_suite(suite).tasks if scene is None or t.scene == scene]
+    if task_id is not None:
+        tasks = [task for task in tasks if task.id == task_id]
+    if not tasks:
+        raise BadInput(f"the suite {suite} has no such task; `er-gym suites` lists the suites")
+    with bad_input():
+        make_folder(frames)
+        for file in frames.glob("[0-9][0-9][0-9].png"):
+            check_output(file, force=force)
+    show = _window(window)
+    env = EmbodiedEnv(tasks, obs_mode="rgb+text", max_steps=None)
+    obs, _ = env.reset(seed=seed)
+    step = 0
+    while True:
+        _keep(obs["rgb"], frames / f"{step:03d}.png", show, force)
+        echo(f"\n{obs['text']}")
+        try:
+            said = click.prompt("What do you do", default="quit", show_default=True)
+        except click.Abort:
+            said = "quit"
+        if said == "quit":
+            break
+        obs, reward, terminated, truncated, info = env.step(said)
+        step += 1
+        if reward:
+            echo(f"reward {reward:g}")
+        if terminated or truncated:
+            _keep(obs["rgb"], frames / f"{step:03d}.png", show, force)
+            outcome = "solved" if info["success"] else f"not solved ({info['end_reason']})"
+            echo(f"\n{obs['text']}\n{outcome} after {info['steps']} steps")
+            break
+    env.close()
+    echo(f"pictures in {frames}")
+
+
+def _keep(frame: NDArray[np.uint8], file: Path, show: Any, force: bool) -> None:
+    from PIL import Image
+
+    from er_gym.writing import write_picture
+
+    picture = Image.fromarray(frame)
+    with bad_input():
+        write_picture(file, picture, force=force)
+    if show is not None:
+        show(picture)
+
+
+def _window(wanted: bool | None) -> Any:
+    """What shows a picture in a window, None where there is none or none is wanted."""
+    if wanted is False:
+        return None
+    try:
+        import tkinter
+
+        from PIL import ImageTk
+
+        root = tkinter.Tk()
+    except (
+        Exception
+    ) as error:  # no Tk, no display: tkinter.TclError is no class where it is missing
+        if wanted:
+            raise BadInput(f"there is no window here: {error}") from None
+        return None
+    root.title("er-gym")
+    label = tkinter.Label(root)
+    label.pack()
+
+    def show(picture: Any) -> None:
+        label.image = ImageTk.PhotoImage(picture)  # type: ignore[attr-defined]  # keeps it alive
+        label.configure(image=label.image)  # type: ignore[attr-defined]
+        root.update()
+
+    return show

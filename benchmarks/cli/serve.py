@@ -1,0 +1,221 @@
+"""``er-gym serve`` and ``er-gym match-server``: what agents that speak talk to."""
+
+from __future__ import annotations
+
+import shlex
+import signal
+import socket
+import sys
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, complain
+from benchmarks.cli.options import Finite, agent_config_option, overrides_option
+from benchmarks.cli.terminal import echo, terminal
+
+if TYPE_CHECKING:
+    from agents.vlm.serving import Command
+    from benchmarks.cli.server_process import ServerProcess
+
+ENGINE_CHOICES = ("vllm", "transformers", "llama_cpp")
+"""As in ``agents.vlm.serving``, which is too heavy to import for ``--help``; a test compares."""
+
+_TERMINATED = 143
+
+
+@click.command(epilog="What follows -- is handed to the server as it is.")
+@click.argument("model")
+@click.argument("more", nargs=-1, metavar="[-- ARGUMENTS...]", type=click.UNPROCESSED)
+@click.option("--engine", type=click.Choice(ENGINE_CHOICES), help="[default: the one that fits]")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="0: a free one."
+)
+@click.option("--name", default="", help="What requests call the model.")
+@click.option(
+    "--context",
+    type=click.IntRange(min=1),
+    help="Tokens of a conversation; not transformers.",
+)
+@click.option(
+    "--pictures",
+    type=click.IntRange(min=0),
+    default=40,
+    show_default=True,
+    help="Pictures of a conversation at most; vllm only.",
+)
+@click.option("--gpus", type=click.IntRange(min=0), help="Over how many.  [default: all]")
+@click.option(
+    "--python",
+    default=sys.executable,
+    help="The Python that has the server's packages.  [default: this one]",
+)
+@click.option(
+    "--patience",
+    type=Finite(min=0, min_open=True),
+    default=1200.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="How long the server may take to load the model.",
+)
+@click.option("--verbose", is_flag=True, help="Show what the server writes.")
+@click.option("--dry-run", is_flag=True, help="Only print the server's command.")
+def serve(
+    model: str,
+    more: tuple[str, ...],
+    engine: str | None,
+    port: int,
+    name: str,
+    context: int | None,
+    pictures: int,
+    gpus: int | None,
+    python: str,
+    patience: float,
+    verbose: bool,
+    dry_run: bool,
+) -> int:
+    """Start a server for a model, for `er-gym bench --agent openai:MODEL` to play with.
+
+    MODEL is a directory, a .gguf file or a name on a model hub. vLLM serves it where that is
+    installed and there is a GPU, otherwise transformers; llama.cpp serves .gguf files. The server
+    listens on 127.0.0.1 only, and ends when this command does.
+    """
+    from agents.vlm.serving import Wanted, command_for, look_around
+
+    _must_be_there(model)
+    wanted = Wanted(
+        port=_usable_port(port),
+        engine=engine or "",
+        name=name,
+        pictures=pictures,
+        context=context,
+        gpus=gpus,
+        more=more,
+    )
+    with bad_input():
+        command = command_for(model, wanted, look_around(python))
+    if dry_run:
+        echo(_as_shell(command))
+        return 0
+    return run_server(command, patience=patience, verbose=verbose)
+
+
+@click.command(name="match-server")
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=8001,
+    show_default=True,
+    help="0: a free one.",
+)
+@agent_config_option
+@overrides_option("matching.fuzzy=90")
+def match_server(port: int, agent_config: str | None, overrides: tuple[str, ...]) -> int:
+    """Tell over HTTP what object types names stand for, at /match.
+
+    Names are matched as an agent of these settings has them matched. The server listens on
+    127.0.0.1 only.
+    """
+    from agents.vlm.factory import load_settings
+    from agents.vlm.match_server import serve as serve_matches
+    from agents.vlm.matching import Matcher
+
+    with bad_input():
+        settings = load_settings(agent_config, overrides)
+        serve_matches(Matcher(settings.matching), port)
+    return 0
+
+
+def run_server(command: Command, *, patience: float, verbose: bool = False) -> int:
+    """Run a server until it or this command is ended, and say how to play with it once it is ready.
+
+    Args:
+        command: the server's.
+        patience: seconds until it has to be ready.
+        verbose: whether to show all that it writes.
+
+    Returns:
+        130, after Ctrl-C.
+
+    Raises:
+        SystemExit: with 143, after SIGTERM.
+        click.ClickException: the server ended, or was not ready in time.
+    """
+    from benchmarks.cli.server_process import ServerError, ServerProcess
+
+    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
+    show = partial(echo, err=True)
+    listeners = [show] if verbose else []
+    try:
+        with ServerProcess(command.argv, command.environment, *listeners) as server:
+            try:
+                seconds = _wait(server, command, patience, verbose)
+                echo(f"ready after {seconds:.0f} s: {command.base_url}")
+                echo(_how_to_play(command))
+                server.wait()
+            except ServerError as error:
+                server.stop()
+                if not verbose:
+                    show("\n".join(server.last_lines))
+                raise click.ClickException(f"{command.engine}: {error}") from error
+    except KeyboardInterrupt:
+        complain("the server has ended")
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    return INTERRUPTED
+
+
+def _wait(server: ServerProcess, command: Command, patience: float, verbose: bool) -> float:
+    """Wait with a line that tells how it goes, where there is a terminal to show it on."""
+    from rich.text import Text
+
+    console = terminal(stderr=True)
+    if verbose or not console.is_terminal:
+        echo(f"starting {command.engine} for {command.name}", err=True)
+        return server.wait_until_ready(command.ready_url, patience)
+    with console.status(f"starting {command.engine}") as line:
+        return server.wait_until_ready(
+            command.ready_url,
+            patience,
+            lambda since, last: line.update(
+                Text(f"{command.engine}, {since:.0f} s: {last}"[: console.width - 4])
+            ),
+        )
+
+
+def _how_to_play(command: Command) -> str:
+    player = ["--agent", f"openai:{command.name}", "--base-url", command.base_url]
+    return shlex.join(["er-gym", "bench", "--suite", "mini", *player, *command.bench_options])
+
+
+def _as_shell(command: Command) -> str:
+    variables = [f"{name}={shlex.quote(value)}" for name, value in command.environment.items()]
+    return " ".join([*variables, shlex.join(command.argv)])
+
+
+def _must_be_there(model: str) -> None:
+    """A model's name may be a hub's, but some can only be paths."""
+    path = Path(model)
+    if model.lower().endswith(".gguf") and not path.is_file():
+        raise BadInput(f"{model} is no file; give the path of one, or another kind of model")
+    if model.startswith(("/", "./", "../", "~")) and not path.exists():
+        raise BadInput(f"{model} is not there; give a model's directory, or its name on a hub")
+
+
+def _usable_port(port: int) -> int:
+    """The port, or a free one for 0."""
+    from agents.vlm.serving import HOST
+
+    with socket.socket() as probe:
+        # As servers do, so that one that has just ended is not in the way.
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except OSError as error:
+            raise BadInput(
+                f"port {port} of {HOST} cannot be had ({error.strerror}); choose another --port, "
+                "or 0 for a free one"
+            ) from error
+        return int(probe.getsockname()[1])

@@ -1,0 +1,195 @@
+"""``er-gym tasks``: make tasks, check them, read them, count them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from benchmarks.cli.errors import BadInput, bad_input, tell_left_out
+from benchmarks.cli.generate import generate
+from benchmarks.cli.options import force_option, split, workers_option
+from benchmarks.cli.terminal import echo, terminal
+
+if TYPE_CHECKING:
+    from er_gym.tasks.suites import Suite
+
+
+@click.group()
+def tasks() -> None:
+    """Make tasks, check that they can be done, read them, count them."""
+
+
+tasks.add_command(generate)
+
+
+@tasks.command()
+@click.argument("suites", nargs=-1, required=True, metavar="SUITE|FILE...")
+@workers_option
+def verify(suites: tuple[str, ...], workers: int) -> int:
+    """Play every task with the solver, and say which cannot be done.
+
+    Exit code 1 if there is one, or one that is set aside since it does not fit its scene. The
+    solver knows the key actions; it must succeed from the task's own start, within the step limit,
+    and earn the whole reward.
+    """
+    from contextlib import closing
+
+    from benchmarks.cli.progress import Progress
+    from er_gym.envs.verify import Verifier
+    from er_gym.rollout.worker_pool import Lost, do_jobs
+    from er_gym.tasks.errors import in_short
+    from er_gym.tasks.resolve import resolve_tasks
+
+    console = terminal(stderr=True)
+    failed = 0
+    for name in suites:
+        with bad_input():
+            suite = _suite(name)
+            fitted = resolve_tasks(suite.tasks)
+            todo, aside = fitted.tasks, (*suite.set_aside, *fitted.set_aside)
+            if aside and not todo:
+                raise BadInput(f"{suite.name}: no task can be played: {in_short(aside)}")
+        tell_left_out(suite.name, (), fitted.taken)
+        for one in aside:
+            echo(f"{suite.name}: set aside: {one}")
+        solved = 0
+        with (
+            Progress(console, suite.name, len(todo)) as progress,
+            closing(do_jobs(Verifier, todo, workers=workers)) as results,
+        ):
+            for task, verdict in results:
+                problem = "the engine died" if isinstance(verdict, Lost) else verdict.problem
+                solved += not problem
+                progress.episode(not problem)
+                if problem:
+                    detail = "" if isinstance(verdict, Lost) else f": {verdict.detail}"
+                    echo(f"{suite.name}: {task.id}: {problem}{detail}")
+        every = len(todo) + len(aside)
+        failed += every - solved
+        told = f"; {len(aside)} set aside" if aside else ""
+        echo(f"{suite.name}: {solved} of {every} tasks can be done{told}")
+    return 1 if failed else 0
+
+
+@tasks.command()
+@click.argument("suite", metavar="SUITE|FILE")
+@click.argument("ids", nargs=-1, metavar="[ID...]")
+@click.option(
+    "--limit",
+    type=click.IntRange(min=1),
+    default=3,
+    show_default=True,
+    help=("Without ids: how many of each type."),
+)
+@click.option("--types", metavar="NAMES", help="Without ids: of these types, with commas.")
+def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> None:
+    """Print tasks as a person would want to read them."""
+    from dataclasses import fields
+
+    from er_gym.tasks.describe import describe
+    from er_gym.tasks.difficulty import Difficulty
+    from er_gym.tasks.errors import in_short
+    from er_gym.tasks.resolve import resolve_tasks
+    from er_gym.tasks.types import BY_NAME, task_type
+
+    with bad_input():
+        found = _suite(suite)
+        every, aside = found.tasks, list(found.set_aside)
+        if ids:
+            known = {task.id: task for task in every}
+            aside = [one for one in aside if one.task in ids]
+            ids = tuple(i for i in ids if i not in {one.task for one in aside})
+            unknown = [i for i in ids if i not in known]
+            if unknown:
+                some = ", ".join(list(known)[:3])
+                raise BadInput(f"no task {unknown[0]!r} in {suite}; ids are such as {some}")
+            chosen = [known[i] for i in ids]
+        else:
+            kinds = [task_type(name) for name in split(types)] or list(BY_NAME.values())
+            by_kind = [[task for task in every if task.type is kind] for kind in kinds]
+            chosen = [task for of_kind in by_kind for task in of_kind[:limit]]
+        fitted = resolve_tasks(chosen)
+        aside += fitted.set_aside
+        if aside and not fitted.tasks:
+            raise BadInput(f"{suite}: no task to show: {in_short(aside)}")
+    tell_left_out(suite, aside, fitted.taken)
+    names = [field.name for field in fields(Difficulty)]
+    pages = []
+    for task in fitted.tasks:
+        told = task.extra.get("difficulty")  # whoever wrote the file may mean something else by it
+        figures = None
+        if isinstance(told, Mapping) and all(
+            type(told.get(name)) in (int, float) for name in names
+        ):
+            figures = Difficulty(**{name: told[name] for name in names})
+        pages.append(describe(task, figures))
+    echo("\n\n".join(pages))
+
+
+@tasks.command()
+@click.argument("suite", metavar="SUITE|FILE")
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help=("Draw the charts into this folder, as PNG."),
+)
+@force_option
+def stats(suite: str, out: Path | None, force: bool) -> None:
+    """Count a suite's tasks by type, room, scene and split, and draw the distributions."""
+    from benchmarks.scoring.task_counts import print_counts
+
+    with bad_input(ImportError):
+        found = _suite(suite)
+        tell_left_out(found.name, found.set_aside)
+        print_counts(found.tasks, {}, by_scene=True)
+        if out is not None:
+            from benchmarks.scoring.charts import draw_charts
+
+            for file in draw_charts(found.tasks, out, found.name, force=force):
+                echo(file)
+
+
+@tasks.command()
+@click.argument("suite", metavar="SUITE|FILE|FOLDER")
+@click.argument("out", metavar="FILE|FOLDER", type=click.Path(path_type=Path))
+@force_option
+def convert(suite: str, out: Path, force: bool) -> None:
+    """Write tasks in another format, without loss; one that cannot be read is left out and named.
+
+    FILE.json is the paper's test file, FILE.jsonl or FILE.jsonl.gz our own; a folder holds the
+    paper's generator files, one for each scene and type, and is read and written as a whole. The
+    paper's files do not say who wrote them: another one is replaced with --force only.
+    """
+    from er_gym.tasks import jsonl_format, paper_format
+    from er_gym.tasks.errors import in_short
+    from er_gym.tasks.paper_generator import read_generated, write_generator_tasks
+
+    with bad_input():
+        read = read_generated(suite) if Path(suite).is_dir() else _suite(suite)
+        found, aside = list(read.tasks), read.set_aside
+        if aside and not found:
+            raise BadInput(f"{suite}: no task can be read: {in_short(aside)}")
+        tell_left_out(suite, aside)
+        if out.name.endswith((".jsonl", ".jsonl.gz")):
+            jsonl_format.write_tasks(out, found, force=force)
+        elif out.suffix == ".json":
+            paper_format.write_tasks(out, found, force=force)
+        elif out.suffix:
+            raise BadInput(f"{out}: give FILE.json, FILE.jsonl, FILE.jsonl.gz or a folder")
+        else:
+            write_generator_tasks(out, found, force=force)
+    echo(f"{len(found)} tasks: {out}")
+
+
+# -- parts ----------------------------------------------------------------------------------------
+
+
+def _suite(name: str) -> Suite:
+    """A suite by its name, or a task file."""
+    from er_gym.tasks.suites import load_suite, suite_from_file, suite_names
+
+    path = Path(name)
+    return load_suite(name) if name in suite_names() or not path.exists() else suite_from_file(path)

@@ -1,0 +1,73 @@
+"""``er-gym train-rl``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, complain
+from benchmarks.cli.options import MOST_SEED, overrides_option, trust_option
+from benchmarks.cli.terminal import echo
+
+
+@click.command(name="train-rl")
+@click.option(
+    "--config",
+    required=True,
+    metavar="FILE",
+    help="A training run in YAML, or the name of one that comes with er-gym.",
+)
+@overrides_option("total_steps=20000 or env.types=[single_search]")
+@click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the configuration's]")
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="The run directory.  [default: runs/rl/CONFIG-SEED]",
+)
+@trust_option
+def train_rl(
+    config: str, overrides: tuple[str, ...], seed: int | None, out: Path | None, trust: bool
+) -> int:
+    """Train a policy by reinforcement learning; needs the extra rl.
+
+    The same command again continues from the last checkpoint. `er-gym bench --agent rl:RUN` plays a
+    suite with what has been learnt.
+    """
+    from agents.rl.config import config_file, load_config
+
+    with bad_input():
+        file = config_file(config)
+        wanted = load_config(file, overrides, {} if seed is None else {"seed": seed})
+    run = out or Path("runs") / "rl" / f"{file.stem}-{wanted.seed}"
+    try:
+        from agents.rl import train as training
+    except ImportError as error:
+        raise BadInput(
+            f"{error.name or error} is not installed, and training needs it: "
+            "pip install 'er-gym[rl]'"
+        ) from error
+    try:
+        with bad_input():
+            model = training.train(wanted, run, show_progress=True, trust=trust)
+    except (RuntimeError, EOFError, MemoryError) as error:
+        raise click.ClickException(f"{error}; what has been learnt is in {run}") from error
+    except KeyboardInterrupt:
+        kept = run.exists()
+        left = f"what has been learnt is in {run}, the same command continues" if kept else ""
+        complain(f"interrupted; {left or 'nothing had been learnt, and nothing is left behind'}")
+        return INTERRUPTED
+    _say_result(run, model)
+    return 0
+
+
+def _say_result(run: Path, model: Any) -> None:
+    from agents.rl.callbacks import read_curve
+
+    echo(f"{model.num_timesteps:,} steps: {run}")
+    looked = [line for line in read_curve(run) if "eval/success_rate" in line]
+    if looked:
+        rate = looked[-1]["eval/success_rate"]
+        echo(f"success on the episodes of evaluation: {100 * rate:.1f} %")
+    echo(f"er-gym bench --suite mini --instances explore --agent rl:{run}")

@@ -1,0 +1,119 @@
+"""Runs of agents that speak: what the command line says of them, and how they are played."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from agents.vlm.agent import VLMAgent
+from agents.vlm.clients.budget import Budget
+from agents.vlm.factory import AgentFactory, consequential, load_settings
+from agents.vlm.prompts import load_prompts
+from agents.vlm.settings import AgentSettings
+from er_gym.rollout.agent import Agent
+from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.run_directory import RunDirectory, picture_folder
+from er_gym.rollout.runner import Outcome
+from er_gym.rollout.thread_executor import run_threaded
+from er_gym.tasks.task import Task
+
+_CONCURRENCY = 8
+
+
+@dataclass(frozen=True)
+class VLMRun:
+    """An agent that speaks, as it was asked for.
+
+    Attributes:
+        name: such as ``openai:MODEL``.
+        settings: of the agent.
+        budget: what may be spent.
+        concurrency: how many conversations at once.
+    """
+
+    name: str
+    settings: AgentSettings
+    budget: Budget
+    concurrency: int
+
+    @staticmethod
+    def of(
+        name: str,
+        *,
+        agent_config: str | None = None,
+        overrides: Sequence[str] = (),
+        base_url: str | None = None,
+        prompts_from: Path | None = None,
+        concurrency: int | None = None,
+        max_usd: float | None = None,
+        max_tokens: int | None = None,
+        max_minutes: float | None = None,
+    ) -> VLMRun:
+        """From the options of the command line.
+
+        Raises:
+            ValueError: a setting does not fit.
+        """
+        given = {"server.base_url": base_url, "prompts.dataset": prompts_from}
+        more = (f"{name}={json.dumps(str(value))}" for name, value in given.items() if value)
+        settings = load_settings(agent_config, (*overrides, *more))
+        budget = Budget(max_usd=max_usd, max_tokens=max_tokens, max_minutes=max_minutes)
+        return VLMRun(name, settings, budget, concurrency or _CONCURRENCY)
+
+    @property
+    def consequential(self) -> dict[str, Any]:
+        """What decides what it says."""
+        return consequential(self.settings, load_prompts(self.settings.prompts).digest)
+
+    @property
+    def env(self) -> dict[str, Any]:
+        """The environment's arguments that it asks for."""
+        size = {"width": self.settings.pictures.width, "height": self.settings.pictures.height}
+        wanted = {name: value for name, value in size.items() if value is not None}
+        return {**wanted, "obs_mode": self.settings.obs_mode}
+
+    def speaker(self, run: Path) -> AgentFactory:
+        """Who makes its agents, with what they keep in a run directory; see :class:`AgentFactory`."""
+        return AgentFactory(self.name, self.settings, run, self.budget)
+
+    def play(
+        self,
+        speaker: AgentFactory,
+        store: RunDirectory,
+        tasks: Sequence[Task],
+        workers: int,
+        on_episode: Callable[[EpisodeRecord], None],
+        say: Callable[[object], None] | None = None,
+    ) -> Outcome:
+        """Play the tasks that the store has no finished episode of; see :func:`run_threaded`.
+
+        ``say`` is called with what a user should hear of the server, from any thread; without it,
+        a logger warns.
+        """
+        if say is not None:
+            speaker.watch.show = say
+
+        def keep(episode: EpisodeRecord, agent: Agent) -> None:
+            last = next((step for step in reversed(episode.steps) if not step.appended), None)
+            assert isinstance(agent, VLMAgent)  # as the speaker makes them
+            kept = agent.conversation(
+                picture_folder(episode.task_id),
+                feedback=last.feedback if last else "",
+                success=last.success if last else False,
+                error=episode.error,
+            )
+            if kept is not None:
+                store.write_conversation(*kept)
+
+        return run_threaded(
+            store,
+            tasks,
+            lambda task, seed: speaker.agent(seed),
+            workers=workers,
+            concurrency=self.concurrency,
+            on_episode=on_episode,
+            keep=keep,
+        )

@@ -1,0 +1,337 @@
+"""docs/baselines.md: what trained policies achieve, from their run directories.
+
+
+    python -m benchmarks.pages.baselines runs/rl/*
+
+Plays every run, and beside it the searcher, the random agent and the oracle, on tasks of the types
+that it was trained on: those of er-1k, in rooms that training has never seen, and as many of a type
+of the suite that it was trained on. What has been played is not played again (``--work``).
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from random import Random
+
+import click
+import numpy as np
+from rich.console import Console
+
+from agents import make_agent
+from agents.rl.callbacks import read_curve
+from agents.rl.config import TrainConfig, load_config
+from agents.rl.saved import FOREIGN, MODEL
+from benchmarks.cli.errors import bad_input
+from benchmarks.cli.options import force_option, trust_option
+from benchmarks.cli.progress import Progress
+from benchmarks.scoring.curves import draw_curves
+from benchmarks.scoring.metrics import Score, score_episode, wilson
+from benchmarks.scoring.scorers import CORRECTED
+from er_gym import __version__
+from er_gym.rollout.run_directory import Manifest, RunDirectory, claimed
+from er_gym.rollout.runner import finished, run
+from er_gym.tasks import jsonl_format, load_suite
+from er_gym.tasks.task import Task
+from er_gym.tasks.types import GROUPS
+from er_gym.writing import MARKDOWN_MARK, check_output, file_stem, write_output
+
+UNSEEN = "er-1k"
+_EACH = 91
+"""As many tasks of a type as er-1k has."""
+_SEED = 0
+_DOCS = Path(__file__).resolve().parents[2] / "docs"
+_SCRIPTED = ("random", "searcher", "oracle")
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A run directory.
+
+    Attributes:
+        path: of it.
+        config: what it was trained with.
+    """
+
+    path: Path
+    config: TrainConfig
+
+    @staticmethod
+    def load(path: Path) -> Trained:
+        """Read it.
+
+        Raises:
+            ValueError: it is none, or its training is not at its end.
+        """
+        if not any((path / name).exists() for name in (MODEL, FOREIGN)):
+            raise ValueError(f"{path} has no {MODEL}; give run directories of er-gym train-rl")
+        trained = Trained(path, load_config(path / "config.yaml"))
+        if trained.steps < trained.config.total_steps:
+            raise ValueError(
+                f"{path} has {trained.steps:,} of {trained.config.total_steps:,} steps; "
+                "run er-gym train-rl again to continue it"
+            )
+        return trained
+
+    @property
+    def name(self) -> str:
+        """That of the configuration: the directory's without the seed."""
+        return re.sub(r"-\d+$", "", self.path.name)
+
+    @cached_property
+    def curve(self) -> list[dict[str, float]]:
+        """What was logged."""
+        return read_curve(self.path)
+
+    @property
+    def steps(self) -> int:
+        """How many it has made."""
+        return int(self.curve[-1]["steps"]) if self.curve else 0
+
+    @property
+    def minutes(self) -> float:
+        """How long that took."""
+        return self.curve[-1]["seconds"] / 60
+
+
+class Player:
+    """Plays tasks with agents, once each.
+
+    Args:
+        work: where the episodes are kept.
+        workers: how many processes.
+        trust: whether policies may be read from files of Stable-Baselines3.
+    """
+
+    def __init__(self, work: Path, workers: int, trust: bool = False) -> None:
+        self._work, self._workers, self._trust = work, workers, trust
+        self._console = Console(stderr=True)
+
+    def play(self, agent: str, tasks: Sequence[Task], where: str, name: str) -> list[Score]:
+        """The scores of an agent under ``instances="explore"``."""
+        manifest = Manifest(
+            suite=where,
+            suite_digest=jsonl_format.digest(tasks),
+            suite_size=len(tasks),
+            agent=agent,
+            env={"instances": "explore", "obs_mode": make_agent(agent, trust=self._trust).obs_mode}
+            | _picture_size(agent),
+            seed=_SEED,
+            er_gym=__version__,
+        )
+        with claimed(self._work / f"{file_stem(name)}-{where}", manifest) as store:
+            return self._play(store, tasks, where, name)
+
+    def _play(
+        self, store: RunDirectory, tasks: Sequence[Task], where: str, name: str
+    ) -> list[Score]:
+        before = finished(store, tasks)
+        progress = Progress(self._console, f"{where}, {name}", len(tasks), len(before), 0)
+        with progress:
+            run(
+                store,
+                tasks,
+                workers=self._workers,
+                trust=self._trust,
+                on_episode=lambda episode: progress.episode(
+                    score_episode(episode, CORRECTED).success
+                ),
+            )
+        wanted = {task.id for task in tasks}
+        return [
+            score_episode(episode, CORRECTED)
+            for episode in store.episodes()
+            if episode.task_id in wanted
+        ]
+
+
+def _picture_size(agent: str) -> dict[str, int]:
+    """A policy that sees is shown pictures of the size that it was trained with."""
+    if not agent.startswith("rl:"):
+        return {}
+    options = load_config(Path(agent.removeprefix("rl:")) / "config.yaml").env
+    return {"width": options.width, "height": options.height} if "rgb" in options.obs_mode else {}
+
+
+def of_types(tasks: Iterable[Task], types: Sequence[str], each: int) -> list[Task]:
+    """So many tasks of each type, drawn the same way every time; all types where none is named."""
+    by_type = defaultdict(list)
+    for task in tasks:
+        if not types or task.type.name in types:
+            by_type[task.type.name].append(task)
+    return [
+        task
+        for name in sorted(by_type)
+        for task in Random(name).sample(by_type[name], min(each, len(by_type[name])))
+    ]
+
+
+def rates(scores: Sequence[Score]) -> dict[str, tuple[int, int]]:
+    """Successes and episodes: of "all", and of each group that was played."""
+    found = {"all": (sum(score.success for score in scores), len(scores))}
+    for group in GROUPS:
+        mine = [score.success for score in scores if score.group == group]
+        if mine:
+            found[group] = (sum(mine), len(mine))
+    return found
+
+
+def _percent(runs: Sequence[Mapping[str, tuple[int, int]]], part: str) -> str:
+    """The mean over seeds and their span; of one seed, with Wilson's interval."""
+    pairs = [each[part] for each in runs if part in each]
+    if not pairs:
+        return ""
+    shares = [100 * successes / n for successes, n in pairs]
+    if len(pairs) > 1:
+        return f"{np.mean(shares):.1f} ({min(shares):.1f} to {max(shares):.1f})"
+    estimate = wilson(*pairs[0])
+    return f"{shares[0]:.1f} ({100 * (estimate.low or 0):.1f} to {100 * (estimate.high or 0):.1f})"
+
+
+def machine() -> str:
+    """The processor and how many there are."""
+    text = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
+    names = re.findall(r"^model name\s*: (.*)$", text, re.MULTILINE) or [platform.processor()]
+    return f"{len(names)} cores of an {names[0]}"
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--work", type=click.Path(path_type=Path), default=Path("runs/baselines"))
+@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True)
+@click.option("--each", type=click.IntRange(min=1), default=_EACH, help="Tasks of a type.")
+@click.option("--out", type=click.Path(path_type=Path), default=_DOCS / "baselines.md")
+@force_option
+@trust_option
+def main(
+    runs: tuple[Path, ...],
+    work: Path,
+    workers: int,
+    each: int,
+    out: Path,
+    force: bool,
+    trust: bool,
+) -> None:
+    """Write docs/baselines.md and its pictures."""
+    families: defaultdict[str, list[Trained]] = defaultdict(list)
+    for path in runs:
+        trained = Trained.load(path)
+        families[trained.name].append(trained)
+    with bad_input():
+        check_output(out, force=force)
+    player = Player(work, workers, trust)
+    unseen = load_suite(UNSEEN).tasks
+    parts = []
+    for name, members in families.items():
+        config = members[0].config
+        tasks = {
+            "training": of_types(load_suite(config.env.episodes).tasks, config.env.types, each),
+            "unseen": of_types(unseen, config.env.types, each),
+        }
+        results = {
+            where: {
+                "trained": [
+                    rates(player.play(f"rl:{member.path}", of, where, member.path.name))
+                    for member in members
+                ]
+            }
+            | {
+                agent: [rates(player.play(agent, of, where, f"{name}-{agent}"))]
+                for agent in _SCRIPTED
+            }
+            for where, of in tasks.items()
+        }
+        told = {"format": "er-gym/baselines/1", "results": results}
+        write_output(work / f"{name}.json", json.dumps(told))
+        parts.append(_section(name, members, results))
+    with bad_input():
+        pictures = draw_curves(families, out.parent / "images", force=force)
+        write_output(out, MARKDOWN_MARK + _page(parts, pictures), force=force)
+    click.echo(f"{out}, {', '.join(str(picture) for picture in pictures)}")
+
+
+Results = Mapping[str, Mapping[str, Sequence[Mapping[str, tuple[int, int]]]]]
+
+
+def _section(name: str, members: Sequence[Trained], results: Results) -> str:
+    config = members[0].config
+    minutes = [each.minutes for each in members]
+    groups = [group for group in GROUPS if group in results["unseen"]["trained"][0]]
+    lines = [
+        f"## {name}",
+        "",
+        f"{_algorithm(config)} on `{config.env.obs_mode}`, {members[0].steps:,} steps, "
+        f"{_span(minutes)} minutes; seeds {', '.join(str(each.config.seed) for each in members)}. "
+        f"Types: {', '.join(config.env.types) or 'all'}.",
+        "",
+        "| Agent | Training rooms | Unseen rooms | "
+        + " | ".join(f"{group}, unseen" for group in groups)
+        + " |",
+        "| --- " * (3 + len(groups)) + "|",
+    ]
+    for agent in ("trained", *_SCRIPTED):
+        cells = [
+            _percent(results["training"][agent], "all"),
+            _percent(results["unseen"][agent], "all"),
+            *(_percent(results["unseen"][agent], group) for group in groups),
+        ]
+        lines.append(f"| {name if agent == 'trained' else agent} | {' | '.join(cells)} |")
+    n = results["unseen"]["trained"][0]["all"][1], results["training"]["trained"][0]["all"][1]
+    lines += [
+        "",
+        f"{n[1]} tasks in training rooms, {n[0]} in unseen ones. Made by",
+        "",
+        "```sh",
+        *(f"er-gym train-rl --config {name} --seed {each.config.seed}" for each in members),
+        "```",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _algorithm(config: TrainConfig) -> str:
+    names = {
+        "ppo": "MaskablePPO",
+        "dqn": "DQN over legal actions",
+        "qrdqn": "QR-DQN over legal actions",
+    }
+    warm = config.warm_start
+    after = f", after cloning {warm.episodes:,} episodes of the {warm.teacher}" if warm else ""
+    return names[config.algorithm.name] + after
+
+
+def _span(values: Sequence[float]) -> str:
+    low, high = round(min(values), 1), round(max(values), 1)
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+
+
+def _page(parts: Sequence[str], pictures: Sequence[Path]) -> str:
+    shown = "\n\n".join(f"![{picture.stem}](images/{picture.name})" for picture in pictures)
+    tables = "\n".join(parts)
+    return f"""# Baselines
+
+What policies learn on the embedded engine, beside agents that do not learn. This page is made by
+`python -m benchmarks.pages.baselines` from run directories. Everything is under `instances="explore"`,
+where a type name says nothing of the task's objects, and with the corrected scorer. A trained
+policy plays what it thinks best; it is the one at the end of training, none is chosen by how it
+did in an evaluation. Success in %: the mean over seeds with the least and the most; where there is
+one run only, Wilson's 95 % interval. The rooms of the unseen tasks (`er-1k`) are the paper's twelve
+test rooms, none of them in training; some of their tasks are about types of things that training
+has never named. Training tasks are a sample of those that were trained on.
+
+Times are from the beginning of training to its end, evaluations included, on {machine()}.
+The suite `train` is made once: `er-gym tasks generate --suite train`, about 3 minutes.
+
+{shown}
+
+{tables}"""
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Score episodes and report: metrics, tables, charts."""

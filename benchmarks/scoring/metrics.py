@@ -1,0 +1,223 @@
+"""What an episode is worth: pure functions over :class:`~er_gym.rollout.records.EpisodeRecord`.
+
+The definitions are those of the Embodied-Reasoner benchmark (arXiv 2503.21696) as its released
+program computes them, so that numbers compare with its table. A scorer (:mod:`benchmarks.scoring.scorers`)
+walks through an episode once; every metric is one small function of its tally and the episode;
+:func:`score_episode` puts them side by side, and :func:`summarise` takes their means.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from benchmarks.scoring.scorers import JUDGED_BY_NAME, Scorer, Tally
+from er_gym.rollout.records import EpisodeRecord
+from er_gym.tasks.types import task_type
+from er_gym.tasks.verbs import END
+
+_Z = 1.959963984540054  # the 97.5 % point of the normal distribution
+
+
+def completeness(counted: Tally) -> float:
+    """The share of the scoring key actions that were done; whether it succeeded if it has none.
+
+    An ``end`` is done where the scorer says so: to the judge, only an ``end`` that is a success.
+    Above 1 under ``paper`` in a task that does not ask for the ``end`` that scored.
+    """
+    if not counted.expected:
+        return float(counted.success)
+    return counted.points / len(counted.expected)
+
+
+def search_efficiency(episode: EpisodeRecord, counted: Tally) -> float:
+    """(key actions + 1) / steps for a success, else 0.
+
+    Navigations and ``end`` are among the key actions; ``init``, the one more, and ``end`` are among
+    the steps. Above 1 if the agent found a shorter way than the task's.
+    """
+    return (len(episode.key_actions) + 1) / counted.steps if counted.success else 0.0
+
+
+def ordered_completeness(episode: EpisodeRecord, counted: Tally) -> float:
+    """The longest common subsequence of done and expected, over expected.
+
+    A ``single_search`` has nothing to order: its completeness.
+    """
+    if episode.task_type == JUDGED_BY_NAME or not counted.expected:
+        return completeness(counted)
+    return _longest_common(counted.scored, counted.expected) / len(counted.expected)
+
+
+def repeat_rate(counted: Tally) -> float:
+    """The share of navigations, failed ones too, that name a type navigated to before."""
+    targets = counted.gone_to
+    return (len(targets) - len(set(targets))) / len(targets) if targets else 0.0
+
+
+def steps_saved(episode: EpisodeRecord) -> float:
+    """(max_steps - steps) / max_steps, successful or not: another efficiency in circulation.
+
+    0 where the paper's protocol says ``end`` beyond the step limit.
+    """
+    return max(episode.max_steps - episode.num_steps, 0) / episode.max_steps
+
+
+def key_action_precision(episode: EpisodeRecord, counted: Tally) -> float:
+    """Key actions done, navigations among them, over actions predicted (``init`` is none).
+
+    The completeness of the paper's text; its scorer computes :func:`completeness`.
+    """
+    predicted = len(episode.predicted)
+    return (counted.points + counted.routes) / predicted if predicted else 0.0
+
+
+def _longest_common(first: Sequence[str], second: Sequence[str]) -> int:
+    """The length of the longest common subsequence."""
+    row = [0] * (len(second) + 1)
+    for item in first:
+        diagonal = 0
+        for column, other in enumerate(second, start=1):
+            above = row[column]
+            row[column] = diagonal + 1 if item == other else max(above, row[column - 1])
+            diagonal = above
+    return row[-1]
+
+
+@dataclass(frozen=True)
+class Score:
+    """An episode's metrics under one scorer; each but ``success`` is the function of its name.
+
+    Attributes:
+        task_id, task_type, group: what was played.
+        success: the tally's; also where the paper's program gives more than 1, as it does in a task
+            whose only other key action was done and that does not ask for ``end``.
+        missing: the scoring key actions that were not done, as ``"verb Type"``.
+    """
+
+    task_id: str
+    task_type: str
+    group: str
+    success: bool
+    search_efficiency: float
+    completeness: float
+    ordered_completeness: float
+    repeat_rate: float
+    steps_saved: float
+    key_action_precision: float
+    missing: tuple[str, ...]
+
+
+METRICS = (
+    "success",
+    "search_efficiency",
+    "completeness",
+    "ordered_completeness",
+    "repeat_rate",
+    "steps_saved",
+    "key_action_precision",
+)
+"""The fields of :class:`Score` that are averaged, in the order in which reports give them."""
+
+
+def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
+    """All metrics of one episode."""
+    counted = scorer.tally(episode)
+    missing = Counter(counted.expected) - Counter(counted.scored)
+    if counted.points > len(counted.scored):
+        missing.pop(END, None)
+    return Score(
+        task_id=episode.task_id,
+        task_type=episode.task_type,
+        group=task_type(episode.task_type).group,
+        success=counted.success,
+        search_efficiency=search_efficiency(episode, counted),
+        completeness=completeness(counted),
+        ordered_completeness=ordered_completeness(episode, counted),
+        repeat_rate=repeat_rate(counted),
+        steps_saved=steps_saved(episode),
+        key_action_precision=key_action_precision(episode, counted),
+        missing=tuple(missing.elements()),
+    )
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean with its 95 % interval; ``low`` and ``high`` are None where n says nothing of it."""
+
+    mean: float
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The means over ``n`` episodes: one :class:`Estimate` for each of :data:`METRICS`."""
+
+    n: int
+    metrics: dict[str, Estimate]
+
+    def __getitem__(self, metric: str) -> Estimate:
+        return self.metrics[metric]
+
+
+def wilson(successes: int, n: int) -> Estimate:
+    """A rate of success with Wilson's score interval, which holds for rates near 0 and 1 too.
+
+    Raises:
+        ValueError: ``n`` is 0.
+    """
+    if n == 0:
+        raise ValueError("no episodes: a rate needs at least one")
+    rate = successes / n
+    scale = 1 + _Z**2 / n
+    centre = (rate + _Z**2 / (2 * n)) / scale
+    half = _Z / scale * math.sqrt(rate * (1 - rate) / n + _Z**2 / (4 * n**2))
+    # At the ends the interval touches 0 or 1, but for rounding.
+    return Estimate(rate, max(centre - half, 0.0), min(centre + half, 1.0))
+
+
+def normal(values: Sequence[float]) -> Estimate:
+    """A mean with the normal interval, 1.96 standard errors to each side.
+
+    The standard error is that of the sample (n - 1). The interval is somewhat narrow for n below
+    about 20, missing for one value, and not cut at 0 or 1.
+
+    Raises:
+        ValueError: ``values`` is empty.
+    """
+    n = len(values)
+    if n == 0:
+        raise ValueError("no episodes: a mean needs at least one")
+    mean = math.fsum(values) / n
+    if n == 1:
+        return Estimate(mean, None, None)
+    half = _Z * math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (n - 1) / n)
+    return Estimate(mean, mean - half, mean + half)
+
+
+def summarise(scores: Sequence[Score]) -> Summary:
+    """Means over episodes with 95 % intervals: Wilson's for success, the normal one for the rest.
+
+    Raises:
+        ValueError: there are no scores.
+    """
+    means = {metric: normal([getattr(each, metric) for each in scores]) for metric in METRICS[1:]}
+    rate = wilson(sum(each.success for each in scores), len(scores))
+    return Summary(len(scores), {"success": rate, **means})
+
+
+def summarise_by(
+    scores: Iterable[Score], key: Callable[[Score], str], order: Iterable[str]
+) -> dict[str, Summary]:
+    """A summary for each value of ``key``, in the given order; values without scores are left out.
+
+    Raises:
+        KeyError: a score's key is not in ``order``.
+    """
+    parts: dict[str, list[Score]] = {name: [] for name in order}
+    for each in scores:
+        parts[key(each)].append(each)
+    return {name: summarise(part) for name, part in parts.items() if part}

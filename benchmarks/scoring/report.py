@@ -1,0 +1,229 @@
+"""One or several run directories, scored and laid out for reading or for other programs."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.scoring.metrics import (
+    METRICS,
+    Score,
+    Summary,
+    score_episode,
+    summarise,
+    summarise_by,
+)
+from benchmarks.scoring.scorers import CORRECTED, PAPER, SCORERS, lacks_search_targets
+from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.run_directory import Manifest, RunDirectory
+from er_gym.tasks.errors import told_once
+from er_gym.tasks.types import BY_NAME, GROUPS
+
+BOTH = "both"
+"""The choice of scorer that shows each where they differ and one line where they do not."""
+
+SCORER_CHOICES = (BOTH, *SCORERS)
+
+
+@dataclass(frozen=True)
+class Miss:
+    """An episode that is no success under the ``corrected`` scorer, and why.
+
+    Attributes:
+        task_id, task_type, scene: what was played.
+        end_reason: why the episode ended, ``"crashed"`` if it crashed.
+        feedback: the error, or what the agent was told last.
+        missing: the key actions that were not done, as ``"verb Type"``.
+    """
+
+    task_id: str
+    task_type: str
+    scene: str
+    end_reason: str
+    feedback: str
+    missing: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """A run directory's episodes and their scores.
+
+    Attributes:
+        path: the directory.
+        manifest: what was played.
+        episodes: in the order of their file names.
+        unusable: what else is among their files, in words; it is not counted.
+        scores: for each scorer's name, one score per episode, in the same order.
+    """
+
+    path: Path
+    manifest: Manifest
+    episodes: tuple[EpisodeRecord, ...]
+    scores: dict[str, tuple[Score, ...]]
+    unusable: tuple[str, ...] = ()
+
+    @property
+    def differ(self) -> tuple[str, ...]:
+        """The ids of the tasks that the scorers score differently."""
+        pairs = zip(self.scores[PAPER.name], self.scores[CORRECTED.name], strict=True)
+        return tuple(
+            paper.task_id
+            for paper, corrected in pairs
+            if any(getattr(paper, name) != getattr(corrected, name) for name in METRICS)
+        )
+
+    @property
+    def misses(self) -> tuple[Miss, ...]:
+        """Every episode without success, and why."""
+        pairs = zip(self.episodes, self.scores[CORRECTED.name], strict=True)
+        return tuple(_miss(episode, each) for episode, each in pairs if not each.success)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """In words: what the figures do not count, and what was taken for what a scene lacks."""
+        aside = [
+            f"{len(self.manifest.set_aside)} of the suite's tasks set aside and not counted"
+        ] * bool(self.manifest.set_aside)
+        return (
+            *aside,
+            *(f"set aside: {one}" for one in self.manifest.set_aside),
+            *told_once(self.manifest.taken),
+            *(f"not counted: {one}" for one in self.unusable),
+        )
+
+    @property
+    def crashed(self) -> int:
+        """How many episodes crashed; the same command as before plays them again."""
+        return sum(bool(episode.error) for episode in self.episodes)
+
+    @property
+    def without_targets(self) -> int:
+        """How many searches have records that do not say what is searched for."""
+        return sum(map(lacks_search_targets, self.episodes))
+
+    def shown(self, scorer: str) -> dict[str, tuple[Score, ...]]:
+        """The scores to show for a choice of :data:`SCORER_CHOICES`, by the name to show."""
+        if scorer != BOTH:
+            return {scorer: self.scores[scorer]}
+        if not self.differ:
+            return {BOTH: self.scores[CORRECTED.name]}
+        return self.scores
+
+
+def load_run(path: Path) -> RunReport:
+    """Read and score a run directory.
+
+    Raises:
+        RunDirectoryError: there is no run.
+    """
+    store = RunDirectory.open(path)
+    found = store.read()
+    scores = {
+        name: tuple(score_episode(episode, scorer) for episode in found.episodes)
+        for name, scorer in SCORERS.items()
+    }
+    unusable = tuple(map(str, found.unusable))
+    return RunReport(path, store.manifest, found.episodes, scores, unusable)
+
+
+def _miss(episode: EpisodeRecord, scored: Score) -> Miss:
+    last = episode.steps[-1].feedback if episode.steps else ""
+    return Miss(
+        task_id=episode.task_id,
+        task_type=episode.task_type,
+        scene=episode.scene,
+        end_reason="crashed" if episode.error else episode.end_reason,
+        feedback=" ".join((episode.error or last).split()),
+        missing=scored.missing,
+    )
+
+
+def slices(scores: Sequence[Score]) -> list[tuple[str, str, Summary]]:
+    """(level, name, summary) overall, for each group and for each task type that was played."""
+    if not scores:
+        return []
+    return [
+        ("overall", "all", summarise(scores)),
+        *(("group", *each) for each in by_group(scores).items()),
+        *(("type", *each) for each in by_type(scores).items()),
+    ]
+
+
+def by_group(scores: Sequence[Score]) -> dict[str, Summary]:
+    """Summaries of the groups that were played, in the order of the paper's table."""
+    return summarise_by(scores, lambda each: each.group, GROUPS)
+
+
+def by_type(scores: Sequence[Score]) -> dict[str, Summary]:
+    """Summaries of the task types that were played, in the order of the table of task types."""
+    return summarise_by(scores, lambda each: each.task_type, BY_NAME)
+
+
+def as_json(runs: Sequence[RunReport]) -> str:
+    """Everything: manifests, which tell what was set aside, every slice's means and intervals,
+    every episode's scores, misses."""
+    return json.dumps({"format": "er-gym/report/1", "runs": [_run(run) for run in runs]}, indent=2)
+
+
+def _run(run: RunReport) -> dict[str, Any]:
+    return {
+        "path": str(run.path),
+        "protocol": run.manifest.protocol,
+        "manifest": run.manifest.model_dump(),
+        "episodes": len(run.episodes),
+        "crashed": run.crashed,
+        "not_counted": run.unusable,
+        "scorers_differ": run.differ,
+        "scorers": {
+            name: {
+                "slices": [
+                    {
+                        "level": level,
+                        "name": part,
+                        "n": summary.n,
+                        **{key: dataclasses.asdict(summary[key]) for key in METRICS},
+                    }
+                    for level, part, summary in slices(scores)
+                ],
+                "episodes": [dataclasses.asdict(each) for each in scores],
+            }
+            for name, scores in run.scores.items()
+        },
+        "misses": [dataclasses.asdict(miss) for miss in run.misses],
+    }
+
+
+def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = False) -> str:
+    """One line per run, scorer and slice (overall and groups; task types if asked for).
+
+    Rates are fractions; a missing interval is empty. A task that was set aside, or an object that
+    stands for one that a scene lacks, has a line without figures; so has a file that is no episode.
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    columns = [f"{metric}{end}" for metric in METRICS for end in ("", "_low", "_high")]
+    writer.writerow(["run", "agent", "suite", "protocol", "scorer", "level", "name", "n", *columns])
+    for run in runs:
+        manifest = run.manifest
+        head = [str(run.path), manifest.agent, manifest.suite, manifest.protocol]
+        for name, scores in run.shown(scorer).items():
+            for level, part, summary in slices(scores):
+                if level == "type" and not with_types:
+                    continue
+                estimates = [dataclasses.astuple(summary[metric]) for metric in METRICS]
+                numbers = [number for estimate in estimates for number in estimate]
+                writer.writerow([*head, name, level, part, summary.n, *numbers])
+        for level, lines in (
+            ("set aside", map(str, run.manifest.set_aside)),
+            ("taken", told_once(run.manifest.taken)),
+            ("not counted", run.unusable),
+        ):
+            for line in lines:
+                writer.writerow([*head, "", level, line, 0, *[""] * len(columns)])
+    return out.getvalue()

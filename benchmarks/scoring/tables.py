@@ -1,0 +1,282 @@
+"""Reports as tables for people: on the terminal or in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from textwrap import fill
+
+from rich import box
+from rich.console import Console
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from benchmarks.cli.terminal import plain
+from benchmarks.scoring.metrics import METRICS, Estimate, Score, Summary
+from benchmarks.scoring.report import BOTH, RunReport, by_group, by_type, slices
+from er_gym.envs.protocol import DEFAULT
+from er_gym.tasks.types import BY_NAME, GROUPS
+
+_NONE = "-"
+_IDS_SHOWN = 5
+_WORDS_WIDTH = 18
+"""Columns of words are not folded to less than this many characters."""
+_GAP = 2
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells as they are shown.
+
+    Attributes:
+        title: above the table.
+        head: column names.
+        rows: as wide as ``head``; where there are none, only the title is shown.
+        text_columns: how many columns, from the left, hold words; the rest are figures.
+        notes: lines below it.
+        may_turn: whether rows and columns may change places where the terminal is narrow.
+    """
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    text_columns: int
+    notes: tuple[str, ...] = ()
+    may_turn: bool = False
+
+
+def tables(
+    runs: Sequence[RunReport],
+    *,
+    scorer: str = BOTH,
+    with_types: bool = False,
+    with_misses: bool = False,
+) -> list[Table]:
+    """The tables of a report.
+
+    Args:
+        runs: a line each, or one for each scorer where the scorers differ.
+        scorer: one of ``report.SCORER_CHOICES``.
+        with_types: add a table per run of every metric for each group and task type.
+        with_misses: add a table per run of the episodes without success, under ``corrected``.
+    """
+    found = [_overview(runs, scorer)]
+    if with_types:
+        found += [
+            _types(run, name, scores)
+            for run in runs
+            for name, scores in run.shown(scorer).items()
+            if scores
+        ]
+    if with_misses:
+        found += [_misses(run) for run in runs]
+    return found
+
+
+def _overview(runs: Sequence[RunReport], scorer: str) -> Table:
+    """The columns of the paper's result table, in its order.
+
+    Suite, protocol and scorer are columns only where they differ, else part of the title, in which
+    the default protocol goes without saying.
+    """
+    head = (
+        *("Agent", "Suite", "Protocol", "Scorer", "n", "Success", "95 %"),
+        *("Search efficiency", "Task completeness"),
+        *GROUPS,
+    )
+    rows = [
+        _overview_row(run, name, scores)
+        for run in runs
+        for name, scores in run.shown(scorer).items()
+    ]
+    constant = [column for column in (1, 2, 3) if len({row[column] for row in rows}) == 1]
+    about = [
+        f"{head[column].lower()} {rows[0][column]}"
+        for column in constant
+        if (column, rows[0][column]) != (2, DEFAULT.name)
+    ]
+
+    def rest(row: Sequence[str]) -> tuple[str, ...]:
+        return tuple(cell for column, cell in enumerate(row) if column not in constant)
+
+    return Table(
+        title=", ".join(["Results", *about, "in %"]),
+        head=rest(head),
+        rows=tuple(rest(row) for row in rows),
+        text_columns=4 - len(constant),
+        notes=tuple(note for run in runs for note in _notes(run)),
+        may_turn=True,
+    )
+
+
+def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple[str, ...]:
+    size = run.manifest.suite_size
+    n = str(size) if len(scores) == size else f"{len(scores)}/{size}"
+    head = (run.manifest.agent, run.manifest.suite, run.manifest.protocol, scorer, n)
+    if not scores:
+        return (*head, *[_NONE] * (4 + len(GROUPS)))
+    groups = by_group(scores)
+    overall = slices(scores)[0][2]
+    return (
+        *head,
+        _percent(overall["success"].mean),
+        _interval(overall["success"]),
+        _percent(overall["search_efficiency"].mean),
+        _percent(overall["completeness"].mean),
+        *(_percent(groups[name]["success"].mean) if name in groups else _NONE for name in GROUPS),
+    )
+
+
+def _notes(run: RunReport) -> list[str]:
+    notes = [f"{run.path}: {note}" for note in run.left_out]
+    if run.differ:
+        ids = ", ".join(run.differ[:_IDS_SHOWN])
+        more = f" and {len(run.differ) - _IDS_SHOWN} more" if len(run.differ) > _IDS_SHOWN else ""
+        notes.append(
+            f"{run.path}: the scorers differ in {len(run.differ)} of {len(run.episodes)} "
+            f"episodes: {ids}{more}"
+        )
+    if run.without_targets:
+        notes.append(
+            f"{run.path}: {run.without_targets} of {len(run.episodes)} episodes are searches whose "
+            "old records do not say for what; whether it was found is taken from the environment"
+        )
+    if run.crashed:
+        notes.append(
+            f"{run.path}: {run.crashed} of {len(run.episodes)} episodes crashed and count as "
+            "failures; running the same command again plays them again"
+        )
+    return notes
+
+
+def _types(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
+    lines: Iterable[tuple[str, Summary]] = (
+        ("All", slices(scores)[0][2]),
+        *by_group(scores).items(),
+        *((BY_NAME[name].title, summary) for name, summary in by_type(scores).items()),
+    )
+    rows = [
+        (
+            name,
+            str(summary.n),
+            _percent(summary["success"].mean),
+            _interval(summary["success"]),
+            *(_percent(summary[metric].mean) for metric in METRICS[1:]),
+        )
+        for name, summary in lines
+    ]
+    return Table(
+        title=f"{run.path}, scorer {scorer}, in %",
+        head=(
+            *("", "n", "Success", "95 %"),
+            *(name.replace("_", " ").capitalize() for name in METRICS[1:]),
+        ),
+        rows=tuple(rows),
+        text_columns=1,
+    )
+
+
+def _misses(run: RunReport) -> Table:
+    rows = [
+        (
+            miss.task_id,
+            miss.task_type,
+            miss.scene,
+            miss.end_reason,
+            miss.feedback or _NONE,
+            ", ".join(miss.missing) or _NONE,
+        )
+        for miss in run.misses
+    ]
+    return Table(
+        title=f"{run.path}: {len(rows)} of {len(run.episodes)} episodes without success",
+        head=("Task", "Type", "Scene", "Ended by", "Last feedback", "Key actions left"),
+        rows=tuple(rows),
+        text_columns=6,
+    )
+
+
+def _percent(rate: float) -> str:
+    return f"{100 * rate:.2f}"
+
+
+def _interval(estimate: Estimate) -> str:
+    if estimate.low is None or estimate.high is None:
+        return _NONE
+    return f"{100 * estimate.low:.1f} to {100 * estimate.high:.1f}"
+
+
+def as_markdown(found: Sequence[Table]) -> str:
+    """The tables in GitHub's Markdown."""
+    return "\n".join(_markdown(table) for table in found)
+
+
+def _markdown(table: Table) -> str:
+    rules = ["---" if column < table.text_columns else "---:" for column in range(len(table.head))]
+    lines = [
+        "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |"
+        for row in (table.head, tuple(rules), *table.rows)
+    ]
+    notes = [f"\n{note}" for note in table.notes]
+    return "\n".join([f"**{table.title}**\n", *(lines if table.rows else ()), *notes]) + "\n"
+
+
+def print_tables(found: Sequence[Table], console: Console) -> None:
+    """Print the tables as the terminal's width allows: a table that may be turned is turned where
+    that makes it fit, words are folded, figures never."""
+    for table in map(_plain, found):
+        if table.may_turn and _width(table) > console.width > _width(_turned(table)):
+            table = _turned(table)
+        console.print(Text(f"\n{table.title}", style="bold"), soft_wrap=True)
+        if table.rows:
+            console.print(_rich(table, console.width), crop=False)
+        for note in table.notes:
+            console.print(Text(note, style="dim"), soft_wrap=True)
+
+
+def _plain(table: Table) -> Table:
+    """The table as it is shown, so that columns are as wide as their words."""
+    rows = tuple(tuple(map(plain, row)) for row in table.rows)
+    return replace(table, head=tuple(map(plain, table.head)), rows=rows)
+
+
+def _turned(table: Table) -> Table:
+    """Rows for columns; the first column's cells are the head."""
+    first, *others = zip(table.head, *table.rows, strict=True)
+    return replace(table, head=("", *first[1:]), rows=tuple(others), text_columns=1)
+
+
+def _widths(table: Table) -> list[int]:
+    """How narrow each column can get: figures and the words over them are left whole."""
+    widths = []
+    for column, cells in enumerate(zip(table.head, *table.rows, strict=True)):
+        if column < table.text_columns:
+            widths.append(min(max(map(len, cells)), _WORDS_WIDTH))
+        else:
+            widths.append(max(map(len, [*cells[0].split(), *cells[1:]]), default=0))
+    return widths
+
+
+def _width(table: Table) -> int:
+    return sum(_widths(table)) + _GAP * (len(table.head) - 1)
+
+
+def _rich(table: Table, room: int) -> RichTable:
+    needed = _width(table)
+    shown = RichTable(
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+        padding=(0, _GAP - 1, 0, 0),  # the box draws one more
+        # Too wide even so: the terminal breaks the lines, but nothing is lost.
+        width=needed if needed > room else None,
+    )
+    for column, (name, width) in enumerate(zip(table.head, _widths(table), strict=True)):
+        if column < table.text_columns:
+            shown.add_column(Text(name), min_width=width, overflow="fold")
+        else:
+            head = Text(fill(name, max(width, 1)))
+            shown.add_column(head, min_width=width, no_wrap=True, justify="right")
+    for row in table.rows:
+        shown.add_row(*(Text(cell) for cell in row))
+    return shown

@@ -1,0 +1,63 @@
+"""How many tasks there are of what, as tables."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from benchmarks.cli.terminal import stdout
+from benchmarks.scoring.tables import Table, print_tables
+from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
+from er_gym.tasks.splits import split
+from er_gym.tasks.task import Task
+from er_gym.tasks.types import BY_NAME
+
+
+def print_counts(
+    chosen: Sequence[Task], dropped: Mapping[str, int], by_scene: bool = False
+) -> None:
+    """Print how many tasks there are of each type in each kind of room, and why some are not.
+
+    Args:
+        dropped: reason to how many tasks were not taken for it.
+        by_scene: also count by scene, and by split.
+    """
+    kinds = [kind for kind in BY_NAME.values() if any(task.type is kind for task in chosen)]
+    cells = Counter((task.type, room_kind(task.scene)) for task in chosen)
+    rows = [
+        (kind.group, kind.name, *(str(cells[kind, room]) for room in ROOM_KINDS),
+         str(sum(cells[kind, room] for room in ROOM_KINDS)))
+        for kind in kinds
+    ]  # fmt: skip
+    rows.append(
+        ("", "all", *(str(sum(cells[kind, room] for kind in kinds)) for room in ROOM_KINDS),
+         str(len(chosen)))
+    )  # fmt: skip
+    found = [Table("Tasks", ("Group", "Type", *ROOM_KINDS, "all"), tuple(rows), 2)]
+    if by_scene:
+        found += [_scene_table(chosen), _count_table("Splits", Counter(map(split, chosen)))]
+    if dropped:
+        found.append(_count_table("Dropped", dropped))
+    print_tables(found, stdout())
+
+
+def _scene_table(chosen: Sequence[Task]) -> Table:
+    cells = Counter((task.scene, task.type) for task in chosen)
+    scenes = sorted({task.scene for task in chosen}, key=lambda name: (len(name), name))
+    kinds = list(BY_NAME.values())
+    rows = tuple(
+        (
+            scene,
+            *(str(cells[scene, kind]) for kind in kinds),
+            str(sum(cells[scene, kind] for kind in kinds)),
+        )
+        for scene in scenes
+    )
+    names = tuple(kind.env_id.removeprefix("ER-").removesuffix("-v0") for kind in kinds)
+    return Table("Tasks by scene", ("Scene", *names, "all"), rows, 1)
+
+
+def _count_table(title: str, counts: Mapping[str, int]) -> Table:
+
+    rows = tuple((name, str(n)) for name, n in sorted(counts.items(), key=lambda item: -item[1]))
+    return Table(title, (title, "Tasks"), rows, 1)

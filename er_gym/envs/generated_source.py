@@ -1,0 +1,89 @@
+"""An endless stream of tasks: rooms rearranged, tasks generated, each played before it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache, partial
+
+import numpy as np
+
+from er_gym.envs.arguments import shown
+from er_gym.envs.verify import Verifier, unwanted, with_difficulty
+from er_gym.tasks.generate import Generator, arranged
+from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.task import Task
+from er_gym.tasks.types import BY_NAME, TaskType
+from er_gym.thor import SCENE_NAMES, make_controller
+
+TRAINING = Making(total=1, scenes="training", layouts=1000, unseen_objects=False)
+"""Tasks in the training rooms, none about things that are kept for evaluation."""
+_ROOMS = 40
+"""How many rooms are looked at for a task."""
+_CANDIDATES = 4
+"""How many tasks of one room are played before another is looked at."""
+_KEPT = 32
+"""How many arranged rooms are remembered."""
+
+
+class Live:
+    """Makes tasks as they are asked for; needs no files and never runs out.
+
+    A draw takes a room, an arrangement of it and a task at random, and plays the task on an
+    embedded engine of its own; what cannot be done is passed over. It depends on the state of the
+    random generator alone, not on earlier draws.
+
+    Args:
+        making: in which rooms, of which types, how many arrangements of a room there are to draw
+            beside the recorded one, how difficult; its ``total`` and ``per_layout`` mean nothing
+            here.
+    """
+
+    def __init__(self, making: Making = TRAINING) -> None:
+        self._making = making
+        self._kinds = [BY_NAME[name] for name in making.types or BY_NAME]
+        self._controller = make_controller(headless=True)
+        self._verify = Verifier()
+        self._room: Callable[[str, int], Generator]
+        self._room = lru_cache(_KEPT)(partial(arranged, self._controller))
+
+    def __reduce__(self) -> tuple[type[Live], tuple[Making]]:
+        # A copy has engines of its own; what is drawn depends on the random generator alone.
+        return Live, (self._making,)
+
+    def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
+        """A task that the solver has just done."""
+        if scene and scene not in SCENE_NAMES:
+            raise ValueError(f"unknown scene {shown(scene)}; give a name such as FloorPlan1")
+        kinds = [task_type] if task_type else self._kinds
+        rooms = (scene,) if scene else self._making.rooms
+        for _ in range(_ROOMS):
+            kind = kinds[int(rng.integers(len(kinds)))]
+            name = rooms[int(rng.integers(len(rooms)))]
+            room = self._room(name, int(rng.integers(self._making.layouts + 1)))
+            tasks = [
+                task
+                for task in room.tasks([kind.name])
+                if not unwanted(task, room, self._making, self._verify)
+            ]
+            order: list[int] = rng.permutation(len(tasks)).tolist()
+            for task in (tasks[number] for number in order[:_CANDIDATES]):
+                verdict = self._verify(task)
+                if verdict.solved:
+                    return with_difficulty(task, room, verdict)
+        asked = f"{task_type.name} " if task_type else ""
+        raise ValueError(
+            f"no {asked}task was found in {_ROOMS} arrangements of {scene or 'the rooms'}; "
+            "ask for another type or room"
+        )
+
+    def find(self, task_id: str) -> Task:
+        """There are no tasks to be found by their ids."""
+        raise ValueError(
+            f"no task {shown(task_id)}: tasks that are generated live cannot be asked for by id; "
+            "pass the Task itself"
+        )
+
+    def close(self) -> None:
+        """Stop its engines."""
+        self._controller.stop()
+        self._verify.close()

@@ -1,0 +1,1 @@
+"""Play episodes: the agent protocol, records, processes, threads, and the run directory."""

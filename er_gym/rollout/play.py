@@ -1,0 +1,140 @@
+"""Play one episode and write down what happened."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+import traceback
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from er_gym.rollout.agent import Agent, CannotGoOn
+from er_gym.rollout.records import ERROR, EpisodeRecord, StepRecord, record_episode
+from er_gym.tasks.task import Task
+from er_gym.tasks.verbs import END, INIT
+
+
+class Playable(Protocol):
+    """What is asked of an environment: an ``EmbodiedEnv``, here or in another process."""
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Begin an episode."""
+
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Do an action."""
+
+
+def episode_seed(seed: int, task_id: str) -> int:
+    """The seed of one episode, in [0, 2**31), from the run's seed and the task's id.
+
+    The same in every process and on every machine, and whatever else the run plays.
+    """
+    return int.from_bytes(hashlib.sha256(f"{seed}/{task_id}".encode()).digest()[:4], "big") >> 1
+
+
+def play_episode(
+    env: Playable,
+    agent: Agent,
+    task: Task,
+    seed: int,
+    *,
+    agent_name: str = "",
+    max_steps: int | None = None,
+) -> EpisodeRecord:
+    """Play ``task`` from ``reset`` to its end.
+
+    An exception in the agent or the environment does not leave this function: the record holds the
+    steps until then and, in ``error``, what happened where. The environment should not be used
+    again after that.
+
+    Args:
+        env: any scene and task; it is reset to this one.
+        agent: it is reset too.
+        task: what to play.
+        seed: passed to ``env.reset``.
+        agent_name: how the record names the agent; its class name by default.
+        max_steps: the step limit that ``env`` was made with, for the record of an episode that
+            crashes before ``env`` tells it; the task's own by default.
+
+    Raises:
+        CannotGoOn: the agent says that no further episode can be played; there is no record of
+            this one.
+    """
+    steps: list[StepRecord] = []
+    info: Mapping[str, Any] = {}
+    error = ""
+    start = time.perf_counter()
+    try:
+        obs, info = env.reset(seed=seed, options={"task": task})
+        steps.append(_placed(info))
+        agent.reset(task, obs, info)
+        over = False
+        while not over:
+            decision = agent.act(obs, info)
+            obs, reward, terminated, truncated, info = env.step(decision.action)
+            steps.append(_stepped(info, float(reward), decision.thought))
+            if info.get("end_appended"):
+                steps.append(_appended(steps[-1]))
+            over = terminated or truncated
+    except CannotGoOn:
+        raise
+    except Exception as caught:  # agents are anybody's code; one must not end the run
+        error = one_line(caught)
+    return record_episode(
+        task,
+        agent=agent_name or type(agent).__name__,
+        seed=seed,
+        max_steps=info.get("max_steps", max_steps),
+        steps=steps,
+        success=bool(info.get("success", False)) and not error,
+        goal_unmet=[str(condition) for condition in info.get("goal_unmet", ())],
+        end_reason="" if error else str(info["end_reason"]),
+        seconds=time.perf_counter() - start,
+        error=error,
+    )
+
+
+def one_line(error: BaseException) -> str:
+    """What was raised, its message and where it was raised, in one line."""
+    text = " ".join(traceback.format_exception_only(error)[-1].split())
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"{text} ({frames[-1].filename}:{frames[-1].lineno})" if frames else text
+
+
+def _placed(info: Mapping[str, Any]) -> StepRecord:
+    return StepRecord(
+        verb=INIT,
+        success=True,
+        feedback=info["feedback"],
+        navigable=list(info["navigable"]),
+        interactable=list(info["interactable"]),
+    )
+
+
+def _appended(last: StepRecord) -> StepRecord:
+    """The ``end`` that the protocol appends; what it earned is in the last step's reward."""
+    return StepRecord(
+        verb=END,
+        success=True,
+        navigable=last.navigable,
+        interactable=last.interactable,
+        appended=True,
+    )
+
+
+def _stepped(info: Mapping[str, Any], reward: float, thought: str) -> StepRecord:
+    action = info["action"]
+    return StepRecord(
+        verb=ERROR if action is None else action.verb,
+        object_type="" if action is None else action.object_type,
+        object_id=info["object_id"],
+        success=bool(info["action_success"]) and action is not None,
+        feedback=info["feedback"],
+        navigable=list(info["navigable"]),
+        interactable=list(info["interactable"]),
+        reward=reward,
+        thought=thought,
+        text=info["action_text"],
+    )

@@ -1,0 +1,346 @@
+"""The run directory: a manifest that says what is played, and one file per episode.
+
+::
+
+    runs/x/run.json                      the manifest
+    runs/x/episodes/<task id>.json       an episode each
+    runs/x/conversations/<task id>.json  what was said in it, with an agent that speaks
+    runs/x/pictures/<task id>/           and shown
+
+Files are written beside their place and moved there, so that whatever is found under its name is
+whole; what a killed run left half-written has another name and is never read. Running again
+continues: :meth:`RunDirectory.read` tells what is there. Who plays has the directory to himself:
+:func:`claimed`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import shutil
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from agents.vlm.factory import EVENTS, REPLIES, SPENDING
+from agents.vlm.record import ConversationRecord
+from er_gym.envs.protocol import DEFAULT
+from er_gym.locking import sole_user
+from er_gym.rollout.agent import CannotGoOn
+from er_gym.rollout.play import episode_seed
+from er_gym.rollout.records import EpisodeRecord
+from er_gym.tasks.errors import SetAside, Taken, TaskFileError
+from er_gym.tasks.reading import read_bytes, read_text
+from er_gym.writing import file_stem, make_folder, write_whole
+
+MANIFEST = "run.json"
+EPISODES = "episodes"
+CONVERSATIONS = "conversations"
+PICTURES = "pictures"
+
+_KEPT = (EPISODES, CONVERSATIONS, PICTURES, SPENDING, EVENTS, REPLIES)
+"""What a run directory holds beside its manifest."""
+
+
+class RunDirectoryError(ValueError):
+    """A directory that cannot be used as this run's; the message says why and what to do."""
+
+
+class Manifest(BaseModel):
+    """What a run plays. Two runs with equal manifests may share a directory.
+
+    Attributes:
+        format: the version of this layout.
+        suite: the suite's name.
+        suite_digest: of its tasks' content.
+        suite_size: how many tasks it has that can be played; a run need not have played them all.
+        agent: the agent's spec.
+        agent_settings: of an agent that speaks, what decides what it says.
+        env: the keyword arguments of the environment.
+        seed: the run's; every episode's is derived from it.
+        er_gym: the version of the package.
+        set_aside: the suite's tasks that cannot be played, and why; they are not in its size.
+        taken: what stands for objects that tasks name and their scenes lack.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    format: Literal["er-gym/run/1"] = "er-gym/run/1"
+    suite: str
+    suite_digest: str
+    suite_size: int
+    agent: str
+    agent_settings: dict[str, Any] = {}
+    env: dict[str, Any]
+    seed: int
+    er_gym: str
+    set_aside: tuple[SetAside, ...] = ()
+    taken: tuple[Taken, ...] = ()
+
+    @property
+    def protocol(self) -> str:
+        """By which rules episodes are played, see :mod:`er_gym.envs.protocol`."""
+        return str(self.env.get("protocol", DEFAULT.name))
+
+    @property
+    def digest(self) -> str:
+        """What the run's episodes know it by: 16 hex digits of a sha256. Fields that it does not
+        state, later ones too, do not change it."""
+        told = self.model_dump(mode="json", exclude_defaults=True)
+        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Unusable:
+    """A file among a run's episodes that is none of them.
+
+    Attributes:
+        path: of the file.
+        reason: what is wrong with it.
+    """
+
+    path: Path
+    reason: str
+
+    def __str__(self) -> str:
+        line = f"{EPISODES}/{self.path.name}: {self.reason}"
+        return "".join(char if char.isprintable() else "?" for char in line)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What is in a run directory.
+
+    Attributes:
+        episodes: by file name.
+        unusable: the other files among them.
+    """
+
+    episodes: tuple[EpisodeRecord, ...]
+    unusable: tuple[Unusable, ...]
+
+
+class RunDirectory:
+    """A run directory, opened with :meth:`create` to play or :meth:`open` to read.
+
+    Attributes:
+        path: the directory.
+        manifest: what is played in it.
+    """
+
+    def __init__(self, path: Path, manifest: Manifest) -> None:
+        self.path = path
+        self.manifest = manifest
+
+    @classmethod
+    def create(cls, path: Path, manifest: Manifest) -> RunDirectory:
+        """Start a run in a directory, or continue it if it is the same run.
+
+        Raises:
+            RunDirectoryError: another run's results are there; nothing is changed.
+            OSError: the directory cannot be made or written to.
+        """
+        if (path / MANIFEST).exists():
+            other = cls.open(path).manifest
+            if other.protocol != manifest.protocol:
+                raise RunDirectoryError(
+                    f"{path} holds a run under the {other.protocol} protocol, not the "
+                    f"{manifest.protocol} one; choose another --out, or continue that run with "
+                    f"--protocol {other.protocol}"
+                )
+            theirs = other.model_dump(mode="json")
+            for name, here in manifest.model_dump(mode="json").items():
+                there = theirs[name]
+                if there != here:
+                    raise RunDirectoryError(
+                        f"{path} holds another run: its {name} is {there!r}, this one's {here!r}; "
+                        "choose another --out, or start that run again as it was"
+                    )
+        elif there := [name for name in _KEPT if _holds_something(path / name)]:
+            raise RunDirectoryError(
+                f"{path} holds {there[0]} but no {MANIFEST} that tells of which run; "
+                "choose another --out"
+            )
+        else:
+            make_folder(path / EPISODES)
+            write_whole(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
+        return cls(path, manifest)
+
+    @classmethod
+    def open(cls, path: Path) -> RunDirectory:
+        """Open a run directory to read it.
+
+        Raises:
+            RunDirectoryError: there is no run.
+        """
+        try:
+            text = read_text(path / MANIFEST)
+        except TaskFileError as error:
+            raise RunDirectoryError(
+                f"{path} is no run directory: {error}; give the directory that was "
+                "er-gym bench's --out"
+            ) from error
+        try:
+            return cls(path, Manifest.model_validate_json(text))
+        except ValidationError as error:
+            raise RunDirectoryError(
+                f"{path / MANIFEST} is no run manifest: {_first_problem(error)}"
+            ) from error
+
+    def write(self, episode: EpisodeRecord) -> Path:
+        """Keep an episode, in place of an earlier one of the same task."""
+        path = self._file(episode.task_id)
+        make_folder(path.parent)
+        told = episode.model_copy(update={"run": self.manifest.digest})
+        write_whole(path, told.model_dump_json(indent=1) + "\n")
+        return path
+
+    def write_conversation(
+        self, conversation: ConversationRecord, pictures: Mapping[str, bytes]
+    ) -> None:
+        """Keep a conversation, in place of an earlier one of the same task.
+
+        Args:
+            conversation: what was said.
+            pictures: files by path from the run directory on, all in :func:`picture_folder`.
+        """
+        task_id = conversation.task_id
+        shutil.rmtree(self.path / picture_folder(task_id), ignore_errors=True)
+        for name, data in pictures.items():
+            path = self.path / name
+            make_folder(path.parent)
+            write_whole(path, data)
+        place = self.path / CONVERSATIONS / f"{file_stem(task_id)}.json"
+        make_folder(place.parent)
+        write_whole(place, conversation.model_dump_json(indent=1) + "\n")
+
+    def read(self) -> Found:
+        """Every episode there is, and what else is among them: broken, copied and foreign files."""
+        episodes, unusable = [], []
+        for path in sorted((self.path / EPISODES).glob("*.json")):
+            try:
+                episodes.append(self._episode(path))
+            except ValueError as error:
+                unusable.append(Unusable(path, str(error)))
+        return Found(tuple(episodes), tuple(unusable))
+
+    def episodes(self) -> Iterator[EpisodeRecord]:
+        """Every episode there is, by file name; files that hold none of this run's are left out."""
+        yield from self.read().episodes
+
+    def move_aside(self, task_ids: Iterable[str]) -> list[str]:
+        """Move what is none of this run's episodes out of the way of those of some tasks.
+
+        Returns:
+            In a line each, what was moved and why, and what else is no episode of this run's.
+        """
+        ways = {self._file(task_id) for task_id in task_ids}
+        told = []
+        for one in self.read().unusable:
+            then = "it is not counted"
+            if one.path in ways:
+                aside = _free_name(one.path)
+                one.path.rename(aside)
+                then = f"it is now {aside.name}, and the task is played anew"
+            told.append(f"{self.path / str(one)}; {then}")
+        return told
+
+    def _withdraw(self) -> None:
+        """Remove the run; first what it keeps, so that a kill leaves a run, not a riddle."""
+        for name in _KEPT:
+            path = self.path / name
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+        (self.path / MANIFEST).unlink()
+
+    def _file(self, task_id: str) -> Path:
+        return self.path / EPISODES / f"{file_stem(task_id)}.json"
+
+    def _episode(self, path: Path) -> EpisodeRecord:
+        """The episode in a file; a ValueError says in one line why there is none of this run's."""
+        if not path.is_file():  # a pipe would be waited for
+            raise ValueError("no file")
+        try:
+            episode = EpisodeRecord.model_validate_json(read_bytes(path))
+        except ValidationError as error:
+            raise ValueError(f"broken: {_first_problem(error)}") from None
+        except TaskFileError as error:
+            raise ValueError(f"it cannot be read: {error}") from None
+        name = self._file(episode.task_id).name
+        if name != path.name:
+            raise ValueError(f"a copy: it holds the episode of {episode.task_id!r:.80}, as {name}")
+        manifest = self.manifest
+        if episode.run:
+            told = [("run", episode.run, manifest.digest)]
+        else:  # written before episodes told of their run
+            seed = episode_seed(manifest.seed, episode.task_id)
+            told = [("agent", episode.agent, manifest.agent), ("seed", episode.seed, seed)]
+        for what, its, ours in told:
+            if its != ours:
+                raise ValueError(f"of another run: its {what} is {its!r:.80}, not {ours!r:.80}")
+        return episode.model_copy(update={"run": ""})
+
+
+@contextlib.contextmanager
+def claimed(path: Path, manifest: Manifest) -> Iterator[RunDirectory]:
+    """A run directory to play in, which nobody else plays in meanwhile.
+
+    Where it ends with an exception before anything is there that could be lost (an episode that did
+    not crash, a reply that was paid for), a run that was begun here is removed, so that a
+    mistyped command leaves nothing in the way of the right one. A run that was killed so early
+    gives way, too.
+
+    Raises:
+        Locked: another process plays in it.
+        RunDirectoryError: another run's results are there; nothing is changed.
+        OSError: the directory cannot be made or written to.
+    """
+    with sole_user(path):
+        if (path / MANIFEST).exists():
+            begun = RunDirectory.open(path)
+            if not any(_holds_something(path / name) for name in (EPISODES, SPENDING, REPLIES)):
+                begun._withdraw()
+        new = not (path / MANIFEST).exists()
+        store = RunDirectory.create(path, manifest)
+        try:
+            yield store
+        except BaseException as error:  # Ctrl-C too
+            paid = _holds_something(path / SPENDING)
+            # What crashed since nobody answered says no more than the error does.
+            refused = isinstance(error, CannotGoOn)
+            if new and not paid and all(one.error and refused for one in store.episodes()):
+                store._withdraw()
+            raise
+
+
+def picture_folder(task_id: str) -> str:
+    """Where the pictures of a conversation are, from the run directory on."""
+    return f"{PICTURES}/{file_stem(task_id)}"
+
+
+def _first_problem(error: ValidationError) -> str:
+    """Pydantic's first complaint, in one line."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    where = ".".join(map(str, first["loc"])) or "the file"
+    return f"{where}: {first['msg']}"
+
+
+def _holds_something(path: Path) -> bool:
+    """Whether a file has content, or a folder files."""
+    if path.is_dir():
+        return any(path.iterdir())
+    return path.exists() and path.stat().st_size > 0
+
+
+def _free_name(path: Path) -> Path:
+    """A name beside a file that is not taken, and that no reader takes for an episode's."""
+    number = 1
+    while (aside := path.with_name(f"{path.name}.aside-{number}")).exists():
+        number += 1
+    return aside

@@ -1,0 +1,234 @@
+"""What a suite is made of: counts over its tasks, and a card in Markdown that tells them."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from textwrap import fill
+
+from er_gym.tasks import jsonl_format, verbs
+from er_gym.tasks.difficulty import hidden_depth, length
+from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
+from er_gym.tasks.task import Task, type_of_id
+from er_gym.tasks.types import BY_NAME, GROUPS
+from er_gym.thor import OBJECT_TYPES
+from er_gym.writing import MARKDOWN_MARK
+
+_WIDTH = 100
+_TIED = "\u00a0"
+"""Holds a name and its count together while lines are wrapped; a plain space afterwards."""
+_LICENCE = (
+    "Licence: Apache-2.0. The scene data that the tasks build on derive from ProcTHOR's "
+    "ai2thor-object-metadata (Apache-2.0) and from ALFWorld (MIT); see NOTICE."
+)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """How many tasks there are of each kind; what does not occur is left out.
+
+    Attributes:
+        tasks: how many there are.
+        groups, types, room_kinds: in the order of their tables.
+        scenes: in the order of their numbers.
+        subjects: by :func:`subject_type`, the most frequent first.
+        receptacles: how many tasks go to a receptacle of the type, the most frequent first. A task
+            that goes to several types counts for each.
+        lengths, depths: by number of key actions, and of those that open something; ascending.
+        rearranged: how many tasks begin in a scene that differs from the recorded one.
+        layouts: how many different arrangements these have.
+    """
+
+    tasks: int
+    groups: Mapping[str, int]
+    types: Mapping[str, int]
+    room_kinds: Mapping[str, int]
+    scenes: Mapping[str, int]
+    subjects: Mapping[str, int]
+    receptacles: Mapping[str, int]
+    lengths: Mapping[int, int]
+    depths: Mapping[int, int]
+    rearranged: int
+    layouts: int
+
+
+def subject_type(task: Task) -> str:
+    """The type of what a task is about: of the first thing handled; ``""`` where nothing is."""
+    types = [
+        *map(type_of_id, task.related_objects[:1]),
+        *(
+            action.actual_type
+            for action in task.key_actions
+            if action.verb in (verbs.PICKUP, verbs.TOGGLE)
+        ),
+    ]
+    return next(filter(None, types), "")
+
+
+def receptacle_types(task: Task) -> tuple[str, ...]:
+    """The types of the receptacles that key actions go to, each once, in their order."""
+    gone_to = (action.actual_type for action in task.key_actions if action.verb == verbs.NAVIGATE)
+    return tuple(dict.fromkeys(name for name in gone_to if _is_receptacle(name)))
+
+
+def _is_receptacle(object_type: str) -> bool:
+    return object_type in OBJECT_TYPES and "receptacle" in OBJECT_TYPES[object_type].properties
+
+
+def summarise(tasks: Iterable[Task]) -> Summary:
+    """Count tasks by everything that a suite should be balanced in."""
+    tasks = list(tasks)
+    scenes = Counter(task.scene for task in tasks)
+    lengths = Counter(length(task) for task in tasks)
+    depths = Counter(hidden_depth(task) for task in tasks)
+    rearranged = [task for task in tasks if task.start.poses]
+    return Summary(
+        tasks=len(tasks),
+        groups=_in_order(GROUPS, (task.type.group for task in tasks)),
+        types=_in_order(BY_NAME, (task.type.name for task in tasks)),
+        room_kinds=_in_order(ROOM_KINDS, (room_kind(task.scene) for task in tasks)),
+        scenes={scene: scenes[scene] for scene in sorted(scenes, key=_scene_order)},
+        subjects=_by_frequency(filter(None, map(subject_type, tasks))),
+        receptacles=_by_frequency(name for task in tasks for name in receptacle_types(task)),
+        lengths={number: lengths[number] for number in sorted(lengths)},
+        depths={number: depths[number] for number in sorted(depths)},
+        rearranged=len(rearranged),
+        layouts=len({(task.scene, task.start.layout) for task in rearranged}),
+    )
+
+
+def _in_order(order: Iterable[str], names: Iterable[str]) -> dict[str, int]:
+    counts = Counter(names)
+    return {name: counts[name] for name in order if counts[name]}
+
+
+def _by_frequency(names: Iterable[str]) -> dict[str, int]:
+    return dict(sorted(Counter(names).items(), key=lambda item: (-item[1], item[0])))
+
+
+def _scene_order(scene: str) -> tuple[int, str]:
+    return int("".join(filter(str.isdigit, scene))), scene
+
+
+def card(
+    suite_name: str,
+    description: str,
+    tasks: Sequence[Task],
+    made: Mapping[str, object],
+    command: str,
+) -> str:
+    """A suite's card in Markdown; the same for the same arguments.
+
+    Args:
+        made: what the task file's header says of how it was made.
+        command: what makes the task file anew.
+    """
+    summary = summarise(tasks)
+    parts = [
+        f"# {suite_name}",
+        _prose(description),
+        _prose(_size(summary)),
+        _prose(_LICENCE),
+        "## How it was made",
+        f"```sh\n{command.strip()}\n```",
+        _table(("Field", "Value"), [(name, _value(value)) for name, value in made.items()]),
+        f"sha256 of the tasks (`er_gym.tasks.jsonl_format.digest`):\n"
+        f"`{jsonl_format.digest(tasks)}`",
+        *(_counts(summary) if tasks else ()),
+    ]
+    return MARKDOWN_MARK + "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _size(summary: Summary) -> str:
+    size = f"{_number(summary.tasks, 'task')} in {_number(len(summary.scenes), 'scene')}."
+    layouts = f"{summary.rearranged} of them, in {_number(summary.layouts, 'layout')}"
+    return f"{size} Rearranged at the start: {layouts if summary.rearranged else 'none'}."
+
+
+def _counts(summary: Summary) -> list[str]:
+    return [
+        "## Types",
+        _types(summary),
+        "## Scenes",
+        _across("Room", summary.room_kinds),
+        _scenes(summary),
+        "## Objects",
+        _prose("Tasks by the type of the first thing that they handle:"),
+        _tally(summary.subjects) or "none",
+        "## Receptacles",
+        _prose("Tasks that go to a receptacle of a type, one task to several of them:"),
+        _tally(summary.receptacles) or "none",
+        "## Length",
+        _prose("Tasks by the number of their key actions, the closing one included:"),
+        _across("Key actions", summary.lengths),
+        "## Hidden depth",
+        _prose("Tasks by how many times something must be opened:"),
+        _across("Opened", summary.depths),
+    ]
+
+
+def _types(summary: Summary) -> str:
+    rows = []
+    for name, count in summary.types.items():
+        row = BY_NAME[name]
+        group = f"{row.group} ({summary.groups[row.group]})"
+        rows.append((group, row.title, f"`{name}`", str(count)))
+    return _table(("Group", "Type", "In files", "Tasks"), rows, figures=1)
+
+
+def _scenes(summary: Summary) -> str:
+    """A line for each kind of room."""
+    lines = []
+    for kind in summary.room_kinds:
+        mine = {scene: n for scene, n in summary.scenes.items() if room_kind(scene) == kind}
+        lines.append(f"- {kind} ({_number(len(mine), 'scene')}): {_listed(mine)}")
+    return "\n".join(_prose(line, indent="  ") for line in lines)
+
+
+def _tally(counts: Mapping[str, int]) -> str:
+    return _prose(_listed(counts))
+
+
+def _listed(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{name}{_TIED}{count}" for name, count in counts.items())
+
+
+def _across(title: str, counts: Mapping[str, int] | Mapping[int, int]) -> str:
+    """A table of one row."""
+    head = (title, *map(str, counts))
+    return _table(head, [("Tasks", *map(str, counts.values()))], figures=len(counts))
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]], figures: int = 0) -> str:
+    """A table of which the last so many columns hold figures; nothing where there are no rows."""
+    if not rows:
+        return ""
+    words = len(head) - figures
+    rules = ["---"] * words + ["---:"] * figures
+    cells = [head, rules, *([_cell(cell) for cell in row] for row in rows)]
+    return "\n".join(f"| {' | '.join(row)} |" for row in cells)
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")
+
+
+def _value(value: object) -> str:
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+
+
+def _number(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _prose(text: str, indent: str = "") -> str:
+    wrapped = fill(
+        text,
+        _WIDTH,
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return wrapped.replace(_TIED, " ")

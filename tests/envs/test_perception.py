@@ -1,0 +1,289 @@
+"""What is perceived, judged and remembered is what the metadata says, whoever made the columns."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from math import hypot
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from er_gym.envs import skills
+from er_gym.envs.actions import ACTIONS
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.legality import Known, legal_actions, navigable_within, surroundings
+from er_gym.envs.observations import Memory
+from er_gym.envs.perception import Percept, names, perceive
+from er_gym.sim.lazy_metadata import LazyMetadata
+from er_gym.tasks.suites import load_suite
+from er_gym.tasks.task import AgentPose
+from er_gym.thor.objects import KIND_OF, TYPES
+
+Entry = dict[str, Any]
+START = AgentPose(0.0, 0.9, 0.0, 0.0)
+FAR = (60.0, 0.0, 0.0)
+
+
+def make_entry(
+    object_id: str,
+    centre: tuple[float, float, float] = (0.5, 0.0, 0.0),
+    size: tuple[float, float, float] = (0.1, 0.1, 0.1),
+    **fields: Any,
+) -> Entry:
+    """An object's metadata: visible, and of the type that its id begins with."""
+    flags = ("isPickedUp", "pickupable", "receptacle", "openable", "toggleable", "sliceable")
+    return {
+        "objectId": object_id,
+        "objectType": object_id.split("|")[0],
+        "visible": True,
+        "isInteractable": True,
+        **dict.fromkeys((*flags, "isOpen", "isToggled"), False),
+        **dict.fromkeys(("parentReceptacles", "receptacleObjectIds", "controlledObjects")),
+        "axisAlignedBoundingBox": {
+            "size": dict(zip("xyz", size, strict=True)),
+            "center": dict(zip("xyz", centre, strict=True)),
+        },
+        **fields,
+    }
+
+
+def percept_of(*entries: Entry) -> Percept:
+    """What an agent in the origin perceives of some objects."""
+    metadata = {
+        "objects": list(entries),
+        "agent": {
+            "position": {"x": 0.0, "y": 0.9, "z": 0.0},
+            "rotation": {"x": 0.0, "y": 0.0, "z": 0.0},
+            "cameraHorizon": 0.0,
+            "isStanding": True,
+        },
+        "inventoryObjects": [{"objectId": e["objectId"]} for e in entries if e["isPickedUp"]],
+    }
+    return perceive(SimpleNamespace(metadata=metadata, frame=None, instance_detections2D=None))
+
+
+def box(x: float, y: float, z: float, distance: float, **fields: Any) -> Entry:
+    return make_entry("Apple|1", size=(x, y, z), centre=(distance, 5.0, 0.0), **fields)
+
+
+@pytest.mark.parametrize(
+    ("entry", "expected"),
+    [
+        (box(0.01, 0.01, 0.01, 0.99), True),
+        (box(0.01, 0.01, 0.01, 1.0), False),
+        (box(0.8, 0.8, 0.0, 9.9), True),  # S = 0.64 > 0.5, d < 10
+        (box(0.8, 0.8, 0.0, 10.1), False),
+        (box(0.4, 0.4, 0.0, 3.9), True),  # S = 0.16 > 0.15, d < 4
+        (box(0.4, 0.4, 0.0, 4.1), False),
+        (box(0.3, 0.3, 0.0, 2.4), True),  # S = 0.09 > 0.08, d < 2.5
+        (box(0.3, 0.3, 0.0, 2.6), False),
+        (box(0.2, 0.2, 0.2, 1.9), True),  # V = 0.008 > 0.005, d < 2
+        (box(0.2, 0.2, 0.2, 2.1), False),
+        (box(0.11, 0.11, 0.11, 1.4), True),  # V = 0.0013 > 0.001, d < 1.5
+        (box(0.11, 0.11, 0.11, 1.6), False),
+        (box(0.27, 0.27, 0.27, 0.9), True),
+        (box(0.386, 0.386, 0.386, 2.8), True),  # V = 0.0575, V/d = 0.0205 > 0.02; S < 0.15
+        (box(0.386, 0.386, 0.386, 2.9), False),  # V/d = 0.0198
+        (box(2.0, 2.0, 2.0, 0.5, visible=False), False),
+        (box(2.0, 2.0, 2.0, 0.5, objectType="Floor"), False),
+        (box(0.1, 0.1, 0.1, 0.5, isPickedUp=True), False),
+    ],
+)
+def test_navigable_rule(entry: Entry, expected: bool) -> None:
+    around = surroundings(percept_of(entry))
+    assert around.navigable.tolist() == around.interactable.tolist() == [0] * expected
+
+
+def rule(volume: float, face: float, distance: float) -> bool:
+    """The paper's, as it is written there."""
+    return (
+        distance < 1
+        or (face > 0.5 and distance < 10)
+        or (face > 0.15 and distance < 4)
+        or (face > 0.08 and distance < 2.5)
+        or (volume > 0.005 and distance < 2)
+        or (volume > 0.001 and distance < 1.5)
+        or (volume >= 0.01 and volume / distance > 0.02)
+    )
+
+
+def test_how_near_one_must_be_is_the_papers_rule() -> None:
+    random = np.random.default_rng(0)
+    volume, face = 10 ** random.uniform(-4, 0.5, (2, 20_000))
+    face[:2000] = random.choice([0.08, 0.15, 0.5], 2000)  # the bounds themselves, too
+    volume[2000:4000] = random.choice([0.001, 0.005, 0.01], 2000)
+    distance = random.uniform(0.01, 12, 20_000)
+    distance[4000:6000] = random.choice([1, 1.5, 2, 2.5, 4, 10], 2000)
+    expected = list(map(rule, volume, face, distance))
+    assert (distance < navigable_within(volume, face)).tolist() == expected
+
+
+def test_what_is_like_the_contents_of_where_one_is_can_be_handled_wherever_it_is_seen() -> None:
+    percept = percept_of(
+        make_entry("Bowl|1", centre=FAR, receptacle=True, receptacleObjectIds=["Egg|1"]),
+        make_entry("Egg|1", centre=FAR, visible=False, parentReceptacles=["Bowl|1"]),
+        make_entry("Egg|2", centre=FAR),
+        make_entry("Egg|3", centre=FAR, isPickedUp=True),
+        make_entry("Apple|1", centre=FAR),
+        make_entry("Egg|4"),
+    )
+    around = surroundings(percept, "Bowl|1")
+    assert [percept.objects.ids[k] for k in around.navigable] == ["Egg|4"]
+    assert [percept.objects.ids[k] for k in around.interactable] == ["Egg|2", "Egg|4"]
+    for elsewhere in ("", "Egg|4", "Bowl|2"):
+        found = surroundings(percept, elsewhere).interactable
+        assert [percept.objects.ids[k] for k in found] == ["Egg|4"]
+
+
+def told(mask: np.ndarray) -> list[str]:
+    return [str(ACTIONS[k]) for k in np.flatnonzero(mask)]
+
+
+def test_the_hand_decides_between_picking_up_and_putting() -> None:
+    near = (make_entry("Apple|1", pickupable=True), make_entry("Bowl|1", receptacle=True))
+    held = make_entry("Egg|1", pickupable=True, isPickedUp=True)
+    for entries, legal in ((near, "pickup Apple"), ((*near, held), "put in Bowl")):
+        mask = legal_actions(surroundings(percept_of(*entries)), Known(["Narnia", "Floor"]))
+        assert set(told(mask)) == {"observe", "move forward", "end", legal}
+
+
+def test_known_types_grow_and_are_told_in_order() -> None:
+    known = Known(["Mug", "Narnia", "Floor"])
+    assert known.names == ("Mug", "Narnia")
+    known.add(np.array([KIND_OF["Apple"], KIND_OF["Mug"], KIND_OF["Apple"]]))
+    assert known.names == ("Apple", "Mug", "Narnia")
+    assert told(known.legal)[3:] == ["navigate to Apple", "navigate to Mug"]
+    assert "Narnia" in known
+    assert "Floor" not in known
+
+
+def test_memory_is_of_what_was_seen_last() -> None:
+    memory = Memory(START)
+    shut, opened = make_entry("Cabinet|1"), make_entry("Cabinet|2", isOpen=True, isToggled=True)
+    unseen = {**opened, "visible": False}
+    for entries, remembered in (
+        ((shut, unseen), False),
+        ((opened, shut), True),  # any that is open
+        ((unseen, make_entry("Apple|1")), True),
+        ((shut, unseen), False),
+    ):
+        memory.look(percept_of(*entries))
+        assert names(memory.is_open) == names(memory.is_on) == ("Cabinet",) * remembered
+    assert names(memory.seen) == ("Apple", "Cabinet")
+
+
+# -- random play -----------------------------------------------------------------------------------
+
+
+def navigable_ids(metadata: dict[str, Any]) -> list[str]:
+    """By the paper's rule, object by object."""
+    agent = metadata["agent"]["position"]
+    found = []
+    for entry in metadata["objects"]:
+        centre, size = (entry["axisAlignedBoundingBox"][key] for key in ("center", "size"))
+        x, y, z = (size[axis] for axis in "xyz")
+        distance = hypot(centre["x"] - agent["x"], centre["z"] - agent["z"])
+        if (
+            entry["visible"]
+            and not entry["isPickedUp"]
+            and entry["objectType"] != "Floor"
+            and rule(x * y * z, max(x * y, y * z, x * z), distance)
+        ):
+            found.append(entry["objectId"])
+    return found
+
+
+@dataclasses.dataclass
+class Twin:
+    """Perceives as the environment does, and again from plain dictionaries; both must agree."""
+
+    memories: tuple[Memory, Memory] = dataclasses.field(
+        default_factory=lambda: (Memory(START), Memory(START))
+    )
+    held: int = 0
+    events: int = 0
+
+    def perceive(self, event: Any) -> Percept:
+        metadata = dict(event.metadata)
+        ours, plain = (
+            perceive(event),
+            perceive(SimpleNamespace(metadata=metadata, frame=None, instance_detections2D=None)),
+        )
+        assert ours.pose == plain.pose
+        assert np.allclose(ours.objects.centre, plain.objects.centre)  # what is carried moves
+        assert (ours.visible_types == plain.visible_types).all()
+        known = Known([])
+        for at in ("", *ours.objects.ids):
+            one, other = surroundings(ours, at), surroundings(plain, at)
+            assert [ours.objects.ids[k] for k in one.navigable] == navigable_ids(metadata)
+            assert one.interactable.tolist() == other.interactable.tolist()
+            assert one.in_reach == other.in_reach
+            assert told(legal_actions(one, known)) == told(legal_actions(other, known))
+        for memory, percept in zip(self.memories, (ours, plain), strict=True):
+            memory.look(percept)
+        for field in ("seen", "is_open", "is_on"):
+            one_mark, other_mark = (getattr(memory, field) for memory in self.memories)
+            assert (one_mark == other_mark).all()
+        self.held += ours.objects.held >= 0
+        self.events += 1
+        return ours
+
+
+def random_play(env: EmbodiedEnv, steps: int) -> Iterator[dict[str, Any]]:
+    random = np.random.default_rng(0)
+    over = True
+    for _ in range(steps):
+        if over:
+            _, info = env.reset(seed=int(random.integers(1000)))
+        legal = np.flatnonzero(info["action_mask"])
+        # Navigation outnumbers the rest by far: take a verb first.
+        verb = random.choice(sorted({ACTIONS[k].verb for k in legal} - {"end"}))
+        action = random.choice([k for k in legal if ACTIONS[k].verb == verb])
+        *_, terminated, truncated, info = env.step(int(action))
+        over = terminated or truncated
+        yield info
+
+
+SCENES = ("FloorPlan1", "FloorPlan212", "FloorPlan302", "FloorPlan410")
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_columns_and_entries_are_perceived_alike(
+    scene: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task = dataclasses.replace(load_suite("mini").tasks[0], scene=scene)
+    env, twin = EmbodiedEnv([task], obs_mode="state", instances="explore"), Twin()
+    monkeypatch.setattr(skills, "perceive", twin.perceive)
+    infos = list(random_play(env, 60))
+    assert {info["action"].verb for info in infos} >= {"pickup", "put in", "observe"}
+    assert twin.events > 60
+    assert twin.held > 5
+    env.close()
+
+
+def test_no_event_is_kept_while_the_controller_acts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the engine would have to work out all that it says before the world changes."""
+    settled: list[LazyMetadata] = []
+    monkeypatch.setattr(LazyMetadata, "settle", lambda self: settled.append(self))
+    env = EmbodiedEnv(obs_mode="state+text")
+    reset = env.reset
+
+    def reset_apart(**arguments: Any) -> Any:  # the official client's reset keeps its last event
+        kept = len(settled)
+        began = reset(**arguments)
+        del settled[kept:]
+        return began
+
+    monkeypatch.setattr(env, "reset", reset_apart)
+    infos = list(random_play(env, 60))
+    assert {info["action"].verb for info in infos} >= {"observe", "move forward", "navigate to"}
+    assert not settled
+    env.close()
+
+
+def test_types_are_in_alphabetical_order() -> None:
+    """Names are read off arrays over types, and told in that order."""
+    assert list(TYPES) == sorted(TYPES)

@@ -1,0 +1,10 @@
+"""Fixtures of hand-made episodes and tasks."""
+
+from episodes_by_hand import (  # noqa: F401
+    episode,
+    manifest,
+    paper_tasks,
+    step,
+    store,
+    tasks_file,
+)

@@ -1,0 +1,127 @@
+"""Real processes, and real signals to them."""
+
+from __future__ import annotations
+
+import importlib
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from er_gym.rollout.worker_pool import Lost, WorkerSetupError, do_jobs
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent.parent
+
+
+@pytest.fixture
+def jobs(monkeypatch):
+    """The module of what workers do, where their processes find it too."""
+    monkeypatch.syspath_prepend(HERE)
+    return importlib.import_module("pool_jobs")
+
+
+def test_every_job_is_done_once(jobs):
+    results = list(do_jobs(jobs.Squarer, range(20), workers=3))
+    assert sorted(results) == [(job, job * job) for job in range(20)]
+
+
+def test_no_jobs_start_no_process(jobs):
+    assert list(do_jobs(jobs.no_such_engine, [], workers=3)) == []
+
+
+def test_workers_are_other_processes_and_are_closed(jobs, tmp_path):
+    list(do_jobs(partial(jobs.Closing, tmp_path), range(6), workers=2))
+    pids = {int(path.name) for path in tmp_path.iterdir()}
+    assert len(pids) == 2
+    assert os.getpid() not in pids
+
+
+def test_a_killed_worker_costs_one_try(jobs, tmp_path):
+    results = dict(do_jobs(partial(jobs.Fragile, tmp_path, False), range(8), workers=2))
+    assert results == {job: job for job in range(8)}
+    tried = [path.name.split("-")[0] for path in tmp_path.iterdir()]
+    assert sorted(tried) == [*"01233", *"4567"]  # no other job was tried again
+
+
+def test_a_job_that_always_kills_is_given_up(jobs, tmp_path):
+    results = dict(do_jobs(partial(jobs.Fragile, tmp_path, True), range(8), workers=2, tries=3))
+    assert results.pop(3) == Lost(tries=3, exitcode=-signal.SIGKILL)
+    assert results == {job: job for job in (0, 1, 2, 4, 5, 6, 7)}
+    assert len(list(tmp_path.glob("3-*"))) == 3
+
+
+def test_a_worker_that_cannot_be_set_up_ends_it(jobs):
+    with pytest.raises(WorkerSetupError, match="OSError: no such engine"):
+        list(do_jobs(jobs.no_such_engine, range(4), workers=2))
+    assert multiprocessing.active_children() == []
+
+
+def test_leaving_early_ends_workers_at_once(jobs, tmp_path):
+    started = time.monotonic()
+    results = do_jobs(partial(jobs.Mixed, tmp_path), ["quick", "slow"], workers=2)
+    assert next(results) == ("quick", "quick")
+    wait_for(lambda: list(tmp_path.glob("began-*")))
+    results.close()
+    assert multiprocessing.active_children() == []
+    assert list(tmp_path.glob("closed-*"))  # what they held was closed
+    assert time.monotonic() - started < 30
+
+
+PARENT = """
+from functools import partial
+from pathlib import Path
+from pool_jobs import Slow
+from er_gym.rollout.worker_pool import do_jobs
+if __name__ == "__main__":
+    list(do_jobs(partial(Slow, Path({folder!r})), [1, 2], workers=2))
+"""
+
+
+@pytest.mark.parametrize(
+    "signum", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT], ids=["KILL", "TERM", "INT"]
+)
+def test_workers_do_not_outlive_their_parent(tmp_path, signum):
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT.format(folder=str(tmp_path)))
+    parent = subprocess.Popen(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(HERE)])},
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        wait_for(lambda: len(list(tmp_path.glob("began-*"))) == 2)
+        pids = [int(path.name.split("-")[1]) for path in tmp_path.glob("began-*")]
+        if signum == signal.SIGINT:
+            os.killpg(parent.pid, signum)  # as a terminal does: to the workers, too
+        else:
+            parent.send_signal(signum)
+        _, stderr = parent.communicate(timeout=20)
+        wait_for(lambda: not any(alive(pid) for pid in pids))
+        assert len(list(tmp_path.glob("closed-*"))) == 2
+        assert stderr.count("Traceback") == (signum == signal.SIGINT)  # the parent's own
+    finally:
+        parent.kill()
+
+
+def alive(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def wait_for(condition, seconds: float = 20.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.02)
