@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from inspect import signature
 
@@ -13,11 +14,13 @@ from agents.vlm.factory import AgentFactory, speaks, ways_to_name
 from agents.vlm.settings import AgentSettings
 from er_gym.plugins import PluginError, Registry, reason
 from er_gym.rollout.agent import Agent, Decision
+from er_gym.tasks.task import Task
 
 __all__ = [
     "AGENTS",
     "Agent",
     "Decision",
+    "NamedAgent",
     "OracleAgent",
     "RandomAgent",
     "SearcherAgent",
@@ -80,6 +83,19 @@ def _called(make: Callable[..., Agent], seed: int) -> Agent:
     except (TypeError, ValueError):  # built in, without a signature
         takes_seed = False
     return make(seed=seed) if takes_seed else make()
+
+
+@dataclass(frozen=True)
+class NamedAgent:
+    """Makes the agents of a run by name, in any process: a :class:`.rollout.agent.MakeAgent`."""
+
+    name: str
+    trust: bool = False
+    """See :func:`make_agent`."""
+
+    def __call__(self, task: Task, seed: int) -> Agent:
+        """The agent of an episode."""
+        return make_agent(self.name, seed, trust=self.trust)
 
 
 @lru_cache(maxsize=4)

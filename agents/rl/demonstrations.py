@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from agents import make_agent
 from agents.rl.policy_observation import Obs
 from er_gym.envs.actions import ACTIONS, INDEX, Action, understand
+from er_gym.rollout.loop import transitions
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +60,11 @@ def demonstrate(
         agent = make_agent(teacher)
         obs, info = env.reset()
         agent.reset(info["task"], info["seen"], info)
-        steps, done = [], False
-        while not done:
-            action = agent.act(info["seen"], info).action
-            mask, before = info["action_mask"], obs
-            obs, reward, terminated, truncated, info = env.step(action)
-            done = terminated or truncated
-            steps.append(_Step(before, mask, understand(action)[0], float(reward)))
+        steps = []
+        for each in transitions(env, agent, obs, info, seen="seen"):
+            mask, action = each.info_before["action_mask"], understand(each.decision.action)[0]
+            steps.append(_Step(each.before, mask, action, each.reward))
+            info = each.info
         successes += info["success"]
         if info["success"] or not successes_only:
             kept.append(_of(env, steps, gamma))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -16,6 +15,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
 from agents.rl.vec_worker import Batch, serve
+from er_gym.rollout.processes import CONTEXT, end_processes, start_process
 
 _CLOSING = 5.0
 """Seconds that a worker has to close before it is stopped."""
@@ -40,15 +40,13 @@ class WorkerVecEnv(VecEnv):
     def __init__(
         self, make: Sequence[Callable[..., gymnasium.Env[Any, Any]]], workers: int = 2
     ) -> None:
-        context = multiprocessing.get_context("spawn")
         workers = min(workers, len(make))
         self._rows = np.array_split(np.arange(len(make)), workers)
         self._pipes, self._processes = [], []
         for worker, rows in enumerate(self._rows):
-            ours, theirs = context.Pipe()
+            ours, theirs = CONTEXT.Pipe()
             mine = [partial(make[row], share=(worker, workers)) for row in rows]
-            process = context.Process(target=serve, args=(theirs, mine), daemon=True)
-            process.start()
+            process = start_process(serve, theirs, mine)
             theirs.close()
             self._pipes.append(ours)
             self._processes.append(process)
@@ -127,10 +125,7 @@ class WorkerVecEnv(VecEnv):
                 while process.is_alive() and time.monotonic() < deadline:
                     if pipe.poll(0.05):
                         pipe.recv()
-            process.join(0.5)
-            if process.is_alive():
-                process.terminate()
-                process.join()
+            end_processes([process], grace=0.5)
             pipe.close()
 
     # -- talking to the workers ------------------------------------------------------------------

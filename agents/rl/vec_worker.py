@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import signal
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
@@ -121,7 +120,6 @@ def _batch(
 def serve(pipe: Connection, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]]) -> None:
     """Answer ``(method of Envs, arguments)`` with ``(error or None, answer)`` until told to close,
     or until the other end is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the trainer's business
     # A batch process does not push the trainer aside when it is woken: on a machine with as many
     # cores as workers, the others would otherwise wait for their actions until it is done.
     with contextlib.suppress(AttributeError, OSError):  # not everywhere, nor always allowed

@@ -22,7 +22,9 @@ from agents.vlm.record import (
 )
 from agents.vlm.settings import AgentSettings
 from er_gym.envs.actions import NO_ACTION, Action, applies
-from er_gym.rollout.agent import Decision
+from er_gym.rollout.agent import Decision, ModelReply
+from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.run_directory import CONVERSATIONS, PICTURES
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 
@@ -43,6 +45,8 @@ class VLMAgent:
         seed: of the episode; the client's.
         name: its spec, for the record.
     """
+
+    attachment_folders = (PICTURES, CONVERSATIONS)
 
     def __init__(
         self,
@@ -99,7 +103,15 @@ class VLMAgent:
             )
         )
         thought = "\n".join(f"{each.kind}: {each.text}" for each in parsed.thoughts)
-        return Decision(action or _as_written(parsed, said), thought)
+        took = ModelReply(
+            model=reply.model,
+            seconds=reply.seconds,
+            prompt_tokens=reply.usage.prompt,
+            completion_tokens=reply.usage.completion,
+            cost=reply.cost,
+            cached=reply.kept,
+        )
+        return Decision(action or _as_written(parsed, said), thought, took)
 
     # -- what is said to the model ---------------------------------------------------------------
 
@@ -173,22 +185,18 @@ class VLMAgent:
 
     # -- the record ------------------------------------------------------------------------------
 
-    def conversation(
-        self, folder: str, feedback: str = "", success: bool = False, error: str = ""
-    ) -> tuple[ConversationRecord, dict[str, bytes]] | None:
-        """The record of the episode, and its pictures by path; None if it never began.
-
-        Args:
-            folder: where its pictures are to be, such as ``pictures/TASK``.
-            feedback, success: the environment's answer to the last action.
-            error: what the episode crashed with.
-        """
+    def attachments(self, episode: EpisodeRecord, stem: str) -> dict[str, bytes]:
+        """The conversation and its pictures, by path; nothing if the episode never began."""
         if self._task is None:
-            return None
+            return {}
         files: dict[str, bytes] = {}
         rounds = list(self._rounds)
         if rounds and not rounds[-1].feedback:
-            answer = {"feedback": feedback, "success": success}
+            last = next((step for step in reversed(episode.steps) if not step.appended), None)
+            answer = {
+                "feedback": last.feedback if last else "",
+                "success": last.success if last else False,
+            }
             rounds[-1] = rounds[-1].model_copy(update=answer)
         record = ConversationRecord(
             task_id=self._task.id,
@@ -198,15 +206,16 @@ class VLMAgent:
             settings=plain_settings(self._settings),
             prompts=self._prompts.name,
             prompts_digest=self._prompts.digest,
-            messages=[_kept(message, folder, files) for message in self._messages],
+            messages=[_kept(message, f"{PICTURES}/{stem}", files) for message in self._messages],
             rounds=rounds,
             prompt_tokens=sum(each.prompt_tokens for each in rounds),
             completion_tokens=sum(each.completion_tokens for each in rounds),
             cost=sum(each.cost for each in rounds),
             estimated=any(each.estimated for each in rounds),
-            error=error,
+            error=episode.error,
         )
-        return record, files
+        files[f"{CONVERSATIONS}/{stem}.json"] = (record.model_dump_json(indent=1) + "\n").encode()
+        return files
 
 
 def _as_written(parsed: Parsed, said: str) -> str:

@@ -13,19 +13,18 @@ from agents.vlm.chat import Client
 from agents.vlm.clients.kinds import client_named, speaks, ways_to_name
 from agents.vlm.record import without_secrets
 from agents.vlm.settings import AgentSettings, Prices
+from er_gym.rollout.events import Cost
+from er_gym.rollout.run_directory import REPLIES, SERVER_EVENTS, SPENDING
 
 if TYPE_CHECKING:
     from agents.vlm.agent import VLMAgent
     from agents.vlm.clients.budget import Budget
     from agents.vlm.clients.watch import Notice
-    from er_gym.rollout.json_lines import Lines
+    from er_gym.rollout.json_lines import JsonLines
 
 __all__ = ["AgentFactory", "consequential", "load_settings", "speaks", "ways_to_name"]
 
 _WHAT = "agent"
-SPENDING = "spending.jsonl"
-EVENTS = "server-events.jsonl"
-REPLIES = "replies"
 _OF_NO_CONSEQUENCE: Mapping[str, Any] = {
     "server": {"base_url", "key_from", "timeout", "connect", "tries", "requests_per_minute"},
     "local": {"device_map", "batch", "wait"},
@@ -82,7 +81,7 @@ class AgentFactory:
         self.prompts = load_prompts(settings.prompts)
         self._matcher = Matcher(settings.matching)
         self._matcher.prepare()
-        self._events: Lines | None = None
+        self._events: JsonLines | None = None
         self._keeping = threading.Lock()
         self._directory = directory
         try:
@@ -115,14 +114,17 @@ class AgentFactory:
         )
 
     @property
-    def spent(self) -> str:
-        """What the run has cost so far, for people; "" where nothing is written down."""
+    def cost(self) -> Cost | None:
+        """What the run has cost so far; None where nothing is written down."""
         if self._directory is None:
-            return ""
+            return None
         spent = self._ledger.spent
-        most = "at most " if spent.usage.estimated else ""
-        words = f"{most}{spent.usage.total:,} tokens in {spent.requests:,} replies"
-        return f"{words}, {most}${spent.cost:.2f}" if spent.cost else words
+        return Cost(
+            requests=spent.requests,
+            tokens=spent.usage.total,
+            cost=spent.cost,
+            estimated=spent.usage.estimated,
+        )
 
     def close(self) -> None:
         """Let go of the client."""
@@ -133,12 +135,12 @@ class AgentFactory:
 
     def _keep(self, notice: Notice) -> None:
         """Write down what went wrong; the file is made when something does."""
-        from er_gym.rollout.json_lines import Lines
+        from er_gym.rollout.json_lines import JsonLines
 
         assert self._directory is not None
         # A full disk is told where something is lost by it.
         with contextlib.suppress(OSError, ValueError), self._keeping:
-            self._events = self._events or Lines(self._directory / EVENTS)
+            self._events = self._events or JsonLines(self._directory / SERVER_EVENTS)
             self._events.add(notice.model_dump_json())
 
 

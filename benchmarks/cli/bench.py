@@ -34,15 +34,13 @@ from benchmarks.cli.options import (
 from benchmarks.cli.terminal import stdout, terminal
 
 if TYPE_CHECKING:
+    from benchmarks.cli.progress import Progress
     from benchmarks.cli.vlm_run import VLMRun
-    from er_gym.rollout.records import EpisodeRecord
+    from er_gym.rollout.events import Cost
     from er_gym.rollout.run_directory import Manifest, RunDirectory
     from er_gym.rollout.runner import Outcome
     from er_gym.tasks.suites import Suite
     from er_gym.tasks.task import Task
-
-    OnEpisode = Callable[[EpisodeRecord], None]
-    Say = Callable[[object], None]
 
 _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 _directory = click.Path(file_okay=False, path_type=Path)
@@ -141,14 +139,13 @@ def bench(
     """
     from agents import RL
     from benchmarks.cli.progress import Progress
-    from benchmarks.scoring.metrics import score_episode
     from benchmarks.scoring.report import load_run
-    from benchmarks.scoring.scorers import CORRECTED, SCORERS
     from benchmarks.scoring.tables import print_tables, tables
     from er_gym import __version__
     from er_gym.rollout.agent import CannotGoOn
     from er_gym.rollout.run_directory import Manifest
-    from er_gym.rollout.runner import Shard, finished, select
+    from er_gym.rollout.runner import finished
+    from er_gym.rollout.selection import Shard, select
     from er_gym.rollout.worker_pool import WorkerSetupError
     from er_gym.tasks.errors import in_short
     from er_gym.tasks.resolve import resolve_tasks
@@ -189,23 +186,18 @@ def bench(
     for note in fitted.notes:
         console.print(note, style="dim", soft_wrap=True)
 
-    judge = SCORERS.get(scorer, CORRECTED)
     try:
         with _claimed(out, manifest) as store:
             for line in store.move_aside(task.id for task in chosen):
                 complain(line)
             before = finished(store, chosen)
-            succeeded = sum(score_episode(episode, judge).success for episode in before)
-            with _player(store, chosen, workers, voice, trust) as (play, spent):
-                progress = Progress(
-                    console, f"{asked.name}, {agent}", len(chosen), len(before), succeeded, spent
-                )
+            succeeded = sum(episode.success for episode in before)
+            title = f"{asked.name}, {agent}"
+            progress = Progress(console, title, len(chosen), len(before), succeeded)
+            with _player(store, chosen, workers, agent, voice, trust) as (play, cost):
                 with progress:
-                    outcome = play(
-                        lambda episode: progress.episode(score_episode(episode, judge).success),
-                        progress.say,
-                    )
-                bill = spent()
+                    outcome = play(progress)
+                bill = cost()
     except WorkerSetupError as error:
         raise click.ClickException(f"{error}; {_left_in(out, chosen)}") from error
     except OSError as error:  # the disk is full, the share is gone
@@ -216,7 +208,7 @@ def bench(
         return STOPPED if isinstance(error, CannotGoOn) else INTERRUPTED
     print_tables(tables([load_run(out)], scorer=scorer), stdout())
     if bill:
-        console.print(bill)
+        console.print(str(bill))
     if outcome.crashed:
         first = outcome.crashed[0]
         complain(
@@ -251,26 +243,29 @@ def _left_in(out: Path, chosen: Sequence[Task]) -> str:
 
 @contextmanager
 def _player(
-    store: RunDirectory, chosen: Sequence[Task], workers: int, voice: VLMRun | None, trust: bool
-) -> Iterator[tuple[Callable[[OnEpisode, Say], Outcome], Callable[[], str]]]:
+    store: RunDirectory,
+    chosen: Sequence[Task],
+    workers: int,
+    agent: str,
+    voice: VLMRun | None,
+    trust: bool,
+) -> Iterator[tuple[Callable[[Progress], Outcome], Callable[[], Cost | None]]]:
     """How the chosen tasks are played, and how to hear what that has cost."""
+    from agents import NamedAgent
     from er_gym.rollout.agent import CannotGoOn
+    from er_gym.rollout.executor import Size
     from er_gym.rollout.runner import run
 
     if voice is None:
-        yield (
-            lambda on_episode, _: run(
-                store, chosen, workers=workers, on_episode=on_episode, trust=trust
-            ),
-            str,
-        )
+        make, size = NamedAgent(agent, trust), Size(workers)
+        yield lambda shown: run(store, chosen, make, size=size, listeners=[shown]), lambda: None
         return
     with bad_input(CannotGoOn):  # no key, no such model
-        speaker = voice.speaker(store.path)
-    with closing(speaker):
+        factory = voice.factory(store.path)
+    with closing(factory):
         yield (
-            lambda on_episode, say: voice.play(speaker, store, chosen, workers, on_episode, say),
-            lambda: speaker.spent,
+            lambda shown: voice.play(factory, store, chosen, workers, [shown], shown.say),
+            lambda: factory.cost,
         )
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
+
+from er_gym.rollout.events import Cost, EpisodeEnded, Event
 
 _LINES = 10
 """How many lines a whole run prints where there is no terminal."""
@@ -28,7 +29,7 @@ def bar(console: Console) -> Bar:
 
 
 class Progress:
-    """A context manager; call :meth:`episode` for each that is over.
+    """A context manager that listens to a run's events, or is told of each :meth:`episode`.
 
     Args:
         console: where to, a :func:`~benchmarks.cli.terminal.terminal`.
@@ -36,7 +37,6 @@ class Progress:
         total: how many episodes there are.
         done: how many of them were there before.
         succeeded: how many of those were a success.
-        more: what else is to be said each time, such as what has been spent.
     """
 
     def __init__(
@@ -46,9 +46,8 @@ class Progress:
         total: int,
         done: int = 0,
         succeeded: int = 0,
-        more: Callable[[], str] = lambda: "",
     ) -> None:
-        self._more = more
+        self._cost = ""
         self._console = console
         self._title = title
         self._total = total
@@ -70,6 +69,13 @@ class Progress:
         where: TracebackType | None,
     ) -> None:
         self._bar.stop()
+
+    def __call__(self, event: Event) -> None:
+        """Hear of an event of the run."""
+        if isinstance(event, Cost):
+            self._cost = str(event)
+        elif isinstance(event, EpisodeEnded):
+            self.episode(event.success)
 
     def episode(self, success: bool) -> None:
         """Count an episode."""
@@ -93,4 +99,4 @@ class Progress:
         played = self._done - self._before
         speed = played / max(time.monotonic() - self._start, 1e-9)
         said = f"{100 * self._succeeded / self._done:.1f} % success, {speed:.1f} episodes/s"
-        return ", ".join(filter(None, (said, self._more())))
+        return ", ".join(filter(None, (said, self._cost)))

@@ -1,9 +1,9 @@
-"""Runs of agents that speak: what the command line says of them, and how they are played."""
+"""Runs of vision-language agents: what the command line says of them, and how they are played."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,11 +13,10 @@ from agents.vlm.clients.budget import Budget
 from agents.vlm.factory import AgentFactory, consequential, load_settings
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import AgentSettings
-from er_gym.rollout.agent import Agent
-from er_gym.rollout.records import EpisodeRecord
-from er_gym.rollout.run_directory import RunDirectory, picture_folder
-from er_gym.rollout.runner import Outcome
-from er_gym.rollout.thread_executor import run_threaded
+from er_gym.rollout.events import Emit
+from er_gym.rollout.executor import Size
+from er_gym.rollout.run_directory import RunDirectory
+from er_gym.rollout.runner import Outcome, run
 from er_gym.tasks.task import Task
 
 _CONCURRENCY = 8
@@ -25,7 +24,7 @@ _CONCURRENCY = 8
 
 @dataclass(frozen=True)
 class VLMRun:
-    """An agent that speaks, as it was asked for.
+    """The options of a run with a vision-language agent.
 
     Attributes:
         name: such as ``openai:MODEL``.
@@ -75,45 +74,32 @@ class VLMRun:
         wanted = {name: value for name, value in size.items() if value is not None}
         return {**wanted, "obs_mode": self.settings.obs_mode}
 
-    def speaker(self, run: Path) -> AgentFactory:
-        """Who makes its agents, with what they keep in a run directory; see :class:`AgentFactory`."""
+    def factory(self, run: Path) -> AgentFactory:
+        """What makes the agents of a run; it keeps replies and bills in the run directory."""
         return AgentFactory(self.name, self.settings, run, self.budget)
 
     def play(
         self,
-        speaker: AgentFactory,
-        store: RunDirectory,
+        factory: AgentFactory,
+        directory: RunDirectory,
         tasks: Sequence[Task],
         workers: int,
-        on_episode: Callable[[EpisodeRecord], None],
+        listeners: Iterable[Emit] = (),
         say: Callable[[object], None] | None = None,
     ) -> Outcome:
-        """Play the tasks that the store has no finished episode of; see :func:`run_threaded`.
+        """Play the tasks that the run directory has no finished episode of.
 
         ``say`` is called with what a user should hear of the server, from any thread; without it,
         a logger warns.
         """
         if say is not None:
-            speaker.watch.show = say
-
-        def keep(episode: EpisodeRecord, agent: Agent) -> None:
-            last = next((step for step in reversed(episode.steps) if not step.appended), None)
-            assert isinstance(agent, VLMAgent)  # as the speaker makes them
-            kept = agent.conversation(
-                picture_folder(episode.task_id),
-                feedback=last.feedback if last else "",
-                success=last.success if last else False,
-                error=episode.error,
-            )
-            if kept is not None:
-                store.write_conversation(*kept)
-
-        return run_threaded(
-            store,
+            factory.watch.show = say
+        return run(
+            directory,
             tasks,
-            lambda task, seed: speaker.agent(seed),
-            workers=workers,
-            concurrency=self.concurrency,
-            on_episode=on_episode,
-            keep=keep,
+            lambda task, seed: factory.agent(seed),
+            executor="threads",
+            size=Size(workers, self.concurrency),
+            listeners=listeners,
+            cost=lambda: factory.cost,
         )

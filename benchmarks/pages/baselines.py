@@ -24,7 +24,7 @@ import click
 import numpy as np
 from rich.console import Console
 
-from agents import make_agent
+from agents import NamedAgent, make_agent
 from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig, load_config
 from agents.rl.saved import FOREIGN, MODEL
@@ -35,6 +35,7 @@ from benchmarks.scoring.curves import draw_curves
 from benchmarks.scoring.metrics import Score, score_episode, wilson
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym import __version__
+from er_gym.rollout.executor import Size
 from er_gym.rollout.run_directory import Manifest, RunDirectory, claimed
 from er_gym.rollout.runner import finished, run
 from er_gym.tasks import jsonl_format, load_suite
@@ -134,15 +135,8 @@ class Player:
         before = finished(store, tasks)
         progress = Progress(self._console, f"{where}, {name}", len(tasks), len(before), 0)
         with progress:
-            run(
-                store,
-                tasks,
-                workers=self._workers,
-                trust=self._trust,
-                on_episode=lambda episode: progress.episode(
-                    score_episode(episode, CORRECTED).success
-                ),
-            )
+            make, size = NamedAgent(agent, trust=self._trust), Size(self._workers)
+            run(store, tasks, make, size=size, listeners=[progress])
         wanted = {task.id for task in tasks}
         return [
             score_episode(episode, CORRECTED)

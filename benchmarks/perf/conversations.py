@@ -24,6 +24,7 @@ import click
 
 from benchmarks.cli.vlm_run import VLMRun
 from er_gym import __version__
+from er_gym.rollout.events import EpisodeEnded, Event
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks import Task, load_suite
 
@@ -139,14 +140,13 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
         )  # fmt: skip
         store = RunDirectory.create(Path(place), manifest)
         began = time.perf_counter()
-        with closing(voice.speaker(store.path)) as speaker:
-            outcome = voice.play(
-                speaker,
-                store,
-                tasks,
-                workers,
-                lambda episode: ended.append((time.perf_counter(), len(episode.steps) - 1)),
-            )
+
+        def note(event: Event) -> None:
+            if isinstance(event, EpisodeEnded):
+                ended.append((time.perf_counter(), event.steps))
+
+        with closing(voice.factory(store.path)) as factory:
+            outcome = voice.play(factory, store, tasks, workers, [note])
     ours.close()
     process.join(5)
     whole = ended[-1][0] - began

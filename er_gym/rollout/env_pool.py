@@ -1,19 +1,17 @@
-"""Environments in worker processes, for threads of this one: a pipe each, several in a process.
+"""Environments in worker processes, for threads of this process: a pipe each, several per process.
 
-:mod:`er_gym.rollout.worker_pool` plays whole episodes elsewhere. Here the agent stays, since what it waits for
-is somebody's reply, and only the engine, which takes a core and memory, is in another process.
+:mod:`er_gym.rollout.worker_pool` plays whole episodes in other processes. Here the agent stays in
+this process, because it mostly waits for a server's reply. Only the engine, which needs a core and
+memory, runs elsewhere.
 """
 
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import pickle
-import signal
 import threading
-import time
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from types import TracebackType
@@ -21,15 +19,9 @@ from typing import Any
 
 from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.rollout.worker_pool import (
-    GRACE,
-    WorkerSetupError,
-    exit_cleanly,
-    follow_parent,
-    interrupts_ignored,
-)
+from er_gym.rollout.processes import CONTEXT, end_processes, start_process
+from er_gym.rollout.worker_pool import WorkerSetupError
 
-_CONTEXT = multiprocessing.get_context("spawn")
 _PROTOCOL = 5
 """Pickle's: takes half as long for pictures as what ``Connection.send`` uses."""
 _NOBODY = -1
@@ -126,7 +118,7 @@ class EnvPool:
         with self._lock:
             if stuck:
                 worker.process.kill()
-            _end([worker])
+            end_processes([worker.process])
         at_fault = worker.serving.value in (slot, _NOBODY)
         return EnvLost(worker.process.exitcode, at_fault)
 
@@ -136,7 +128,7 @@ class EnvPool:
             for worker in self._team:
                 worker.process.terminate()
             # Pipes are left open: another thread may be reading from one, and sees it end.
-            _end(self._team)
+            end_processes(worker.process for worker in self._team)
 
 
 class RemoteEnv:
@@ -206,38 +198,14 @@ class _Worker:
     """
 
     def __init__(self, slots: Sequence[int], env: Mapping[str, Any]) -> None:
-        pairs = {slot: _CONTEXT.Pipe() for slot in slots}
+        pairs = {slot: CONTEXT.Pipe() for slot in slots}
         self.pipes = {slot: ours for slot, (ours, _) in pairs.items()}
-        self.serving = _CONTEXT.RawValue("i", _NOBODY)
+        self.serving = CONTEXT.RawValue("i", _NOBODY)
         theirs = {slot: pipe for slot, (_, pipe) in pairs.items()}
-        self.process = _CONTEXT.Process(
-            target=_serve, args=(theirs, env, self.serving), daemon=True
-        )
-        with interrupts_ignored(), _interrupts_held_back():
-            self.process.start()
+        self.process = start_process(_serve, theirs, env, self.serving)
         # With our copies closed, the pipes end when the process does.
         for pipe in theirs.values():
             pipe.close()
-
-
-def _end(workers: Sequence[_Worker]) -> None:
-    """Wait for processes that are about to end, and kill those that do not."""
-    until = time.monotonic() + GRACE
-    for worker in workers:
-        worker.process.join(max(0.0, until - time.monotonic()))
-        if worker.process.is_alive():
-            worker.process.kill()
-            worker.process.join()
-
-
-@contextlib.contextmanager
-def _interrupts_held_back() -> Iterator[None]:
-    """Let no Ctrl-C through to this thread, whichever it is, nor to a process that it starts."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 # -- in the worker process -----------------------------------------------------------------------
@@ -303,9 +271,6 @@ def _without_task(info: dict[str, Any]) -> dict[str, Any]:
 
 def _serve(pipes: Mapping[int, Connection], env: Mapping[str, Any], serving: Any) -> None:
     """The worker process: one question after the other, until no pipe has another end."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, exit_cleanly)
-    threading.Thread(target=follow_parent, daemon=True).start()
     seats = {slot: _Seat(env) for slot in pipes}
     there = dict(pipes)
     try:

@@ -11,7 +11,7 @@ from pathlib import Path
 _CLOSED = -1
 
 
-class Lines:
+class JsonLines:
     """A file of lines; it and its directory are made.
 
     Args:

@@ -8,7 +8,9 @@ import traceback
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from er_gym.rollout.agent import Agent, CannotGoOn
+from er_gym.rollout.agent import Agent, CannotGoOn, Decision
+from er_gym.rollout.events import Emit, EpisodeBegun, Reply, StepDone, nobody
+from er_gym.rollout.loop import transitions
 from er_gym.rollout.records import ERROR, EpisodeRecord, StepRecord, record_episode
 from er_gym.tasks.task import Task
 from er_gym.tasks.verbs import END, INIT
@@ -42,6 +44,7 @@ def play_episode(
     *,
     agent_name: str = "",
     max_steps: int | None = None,
+    emit: Emit = nobody,
 ) -> EpisodeRecord:
     """Play ``task`` from ``reset`` to its end.
 
@@ -57,6 +60,7 @@ def play_episode(
         agent_name: how the record names the agent; its class name by default.
         max_steps: the step limit that ``env`` was made with, for the record of an episode that
             crashes before ``env`` tells it; the task's own by default.
+        emit: called with the beginning of the episode, each reply of a model, and each step.
 
     Raises:
         CannotGoOn: the agent says that no further episode can be played; there is no record of
@@ -70,14 +74,13 @@ def play_episode(
         obs, info = env.reset(seed=seed, options={"task": task})
         steps.append(_placed(info))
         agent.reset(task, obs, info)
-        over = False
-        while not over:
-            decision = agent.act(obs, info)
-            obs, reward, terminated, truncated, info = env.step(decision.action)
-            steps.append(_stepped(info, float(reward), decision.thought))
+        emit(_begun(task, max_steps))
+        for each in transitions(env, agent, obs, info):
+            info = each.info
+            steps.append(_stepped(info, each.reward, each.decision.thought))
+            _emit_step(emit, task.id, len(steps) - 1, each.decision, steps[-1])
             if info.get("end_appended"):
                 steps.append(_appended(steps[-1]))
-            over = terminated or truncated
     except CannotGoOn:
         raise
     except Exception as caught:  # agents are anybody's code; one must not end the run
@@ -101,6 +104,32 @@ def one_line(error: BaseException) -> str:
     text = " ".join(traceback.format_exception_only(error)[-1].split())
     frames = traceback.extract_tb(error.__traceback__)
     return f"{text} ({frames[-1].filename}:{frames[-1].lineno})" if frames else text
+
+
+def _begun(task: Task, max_steps: int | None) -> EpisodeBegun:
+    return EpisodeBegun(
+        task_id=task.id,
+        task_type=task.type.name,
+        scene=task.scene,
+        instruction=task.instruction,
+        max_steps=task.max_steps if max_steps is None else max_steps,
+    )
+
+
+def _emit_step(emit: Emit, task_id: str, number: int, decision: Decision, step: StepRecord) -> None:
+    if decision.reply is not None:
+        emit(Reply(task_id=task_id, step=number, **vars(decision.reply)))
+    emit(
+        StepDone(
+            task_id=task_id,
+            step=number,
+            verb=step.verb,
+            object_type=step.object_type,
+            success=step.success,
+            reward=step.reward,
+            thought=step.thought,
+        )
+    )
 
 
 def _placed(info: Mapping[str, Any]) -> StepRecord:

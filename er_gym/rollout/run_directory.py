@@ -3,13 +3,15 @@
 ::
 
     runs/x/run.json                      the manifest
-    runs/x/episodes/<task id>.json       an episode each
-    runs/x/conversations/<task id>.json  what was said in it, with an agent that speaks
-    runs/x/pictures/<task id>/           and shown
+    runs/x/events.jsonl                  what happened when, see er_gym.rollout.events
+    runs/x/episodes/<task id>.json       the record of each episode
+    runs/x/conversations/<task id>.json  with a vision-language agent: what was said,
+    runs/x/pictures/<task id>/           and the pictures that were shown
 
-Files are written beside their place and moved there, so that whatever is found under its name is
-whole; what a killed run left half-written has another name and is never read. Running again
-continues: :meth:`RunDirectory.read` tells what is there. Who plays has the directory to himself:
+An agent may leave other files beside the records: :class:`.agent.LeavesAttachments`. A file is
+written to a temporary file and moved to its name, so a file under its name is whole; what a killed
+run left half-written has another name and is never read. The same run continues where it was:
+:meth:`RunDirectory.read` tells what is there. One process at a time plays in a directory:
 :func:`claimed`.
 """
 
@@ -19,18 +21,17 @@ import contextlib
 import hashlib
 import json
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from agents.vlm.factory import EVENTS, REPLIES, SPENDING
-from agents.vlm.record import ConversationRecord
 from er_gym.envs.protocol import DEFAULT
 from er_gym.locking import sole_user
 from er_gym.rollout.agent import CannotGoOn
+from er_gym.rollout.events import EVENTS
 from er_gym.rollout.play import episode_seed
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.errors import SetAside, Taken, TaskFileError
@@ -41,8 +42,10 @@ MANIFEST = "run.json"
 EPISODES = "episodes"
 CONVERSATIONS = "conversations"
 PICTURES = "pictures"
-
-_KEPT = (EPISODES, CONVERSATIONS, PICTURES, SPENDING, EVENTS, REPLIES)
+SPENDING = "spending.jsonl"
+REPLIES = "replies"
+SERVER_EVENTS = "server-events.jsonl"
+_KEPT = (EPISODES, CONVERSATIONS, PICTURES, SPENDING, SERVER_EVENTS, REPLIES, EVENTS)
 """What a run directory holds beside its manifest."""
 
 
@@ -199,24 +202,23 @@ class RunDirectory:
         write_whole(path, told.model_dump_json(indent=1) + "\n")
         return path
 
-    def write_conversation(
-        self, conversation: ConversationRecord, pictures: Mapping[str, bytes]
+    def attach(
+        self, task_id: str, attachments: Mapping[str, bytes], folders: Sequence[str]
     ) -> None:
-        """Keep a conversation, in place of an earlier one of the same task.
+        """Keep the files that an agent leaves, in place of earlier ones of the same task.
 
         Args:
-            conversation: what was said.
-            pictures: files by path from the run directory on, all in :func:`picture_folder`.
+            task_id: of the episode.
+            attachments: bytes by path from the run directory on; the last is written last.
+            folders: the folders that such files go to; what they hold of the task is removed.
         """
-        task_id = conversation.task_id
-        shutil.rmtree(self.path / picture_folder(task_id), ignore_errors=True)
-        for name, data in pictures.items():
-            path = self.path / name
-            make_folder(path.parent)
-            write_whole(path, data)
-        place = self.path / CONVERSATIONS / f"{file_stem(task_id)}.json"
-        make_folder(place.parent)
-        write_whole(place, conversation.model_dump_json(indent=1) + "\n")
+        stem = file_stem(task_id)
+        for folder in folders:
+            shutil.rmtree(self.path / folder / stem, ignore_errors=True)
+        for name, data in attachments.items():
+            place = self.path / name
+            make_folder(place.parent)
+            write_whole(place, data)
 
     def read(self) -> Found:
         """Every episode there is, and what else is among them: broken, copied and foreign files."""
@@ -317,11 +319,6 @@ def claimed(path: Path, manifest: Manifest) -> Iterator[RunDirectory]:
             if new and not paid and all(one.error and refused for one in store.episodes()):
                 store._withdraw()
             raise
-
-
-def picture_folder(task_id: str) -> str:
-    """Where the pictures of a conversation are, from the run directory on."""
-    return f"{PICTURES}/{file_stem(task_id)}"
 
 
 def _first_problem(error: ValidationError) -> str:

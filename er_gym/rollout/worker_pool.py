@@ -8,24 +8,16 @@ known, is tried again, and the others are not disturbed.
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
-import os
-import signal
-import sys
-import threading
-import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from typing import Generic, NoReturn, TypeVar
+from typing import Generic, TypeVar
+
+from er_gym.rollout.processes import CONTEXT, end_processes, start_process
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
-
-_CONTEXT = multiprocessing.get_context("spawn")
-GRACE = 5.0
-"""Seconds that a worker has for closing what it holds."""
 
 
 @dataclass(frozen=True)
@@ -60,11 +52,9 @@ class _Worker(Generic[Job, Result]):
     """A process, the pipe to it, and the job it holds."""
 
     def __init__(self, make: Callable[[], Callable[[Job], Result]]) -> None:
-        self.connection, theirs = _CONTEXT.Pipe()
+        self.connection, theirs = CONTEXT.Pipe()
         self.holds: _Try[Job] | None = None
-        self.process = _CONTEXT.Process(target=_serve, args=(theirs, make), daemon=True)
-        with interrupts_ignored():
-            self.process.start()
+        self.process = start_process(_serve, theirs, make)
         # With our copy closed, the pipe ends when the process does.
         theirs.close()
 
@@ -89,10 +79,7 @@ class _Worker(Generic[Job, Result]):
     def stop(self) -> int | None:
         """End the process, killing it if it does not end by itself, and return its exit code."""
         self.dismiss()
-        self.process.join(GRACE)
-        if self.process.is_alive():
-            self.process.kill()
-            self.process.join()
+        end_processes([self.process])
         return self.process.exitcode
 
 
@@ -155,24 +142,8 @@ def do_jobs(
             worker.stop()
 
 
-@contextlib.contextmanager
-def interrupts_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C while a process is started: it inherits that, from its first instruction on."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread may set handlers, and only it gets interrupts
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
 def _serve(connection: Connection, make: Callable[[], Callable[[Job], Result]]) -> None:
     """The worker process: do what comes through the pipe until it is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, exit_cleanly)
-    threading.Thread(target=follow_parent, daemon=True).start()
     try:
         do = make()
     except Exception as error:  # whatever it is, the parent must hear of it
@@ -188,18 +159,3 @@ def _serve(connection: Connection, make: Callable[[], Callable[[Job], Result]]) 
     finally:
         with contextlib.suppress(Exception):
             getattr(do, "close", lambda: None)()
-
-
-def exit_cleanly(signum: int, frame: object) -> NoReturn:
-    """A handler of signals that lets everything be closed first."""
-    sys.exit(128 + signum)
-
-
-def follow_parent() -> None:
-    """End this process once its parent has ended: first cleanly, then at once."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os.kill(os.getpid(), signal.SIGTERM)
-    time.sleep(GRACE)
-    os._exit(1)

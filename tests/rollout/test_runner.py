@@ -11,15 +11,18 @@ from dataclasses import replace
 
 import pytest
 
-from agents import Decision, make_agent
+from agents import Decision, NamedAgent, make_agent
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.rollout import runner
+from er_gym.rollout import process_executor, runner
+from er_gym.rollout.events import EpisodeEnded
+from er_gym.rollout.executor import Size
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.runner import Outcome, Shard, run, select
+from er_gym.rollout.runner import Outcome
+from er_gym.rollout.selection import Shard, select
 from er_gym.rollout.worker_pool import Lost
 from er_gym.tasks.paper_format import read_tasks
 
@@ -53,6 +56,17 @@ def new_store(tmp_path, manifest):
         return RunDirectory.create(tmp_path / name, changed)
 
     return make
+
+
+def run(store: RunDirectory, tasks, *, workers=1, on_episode=lambda event: None) -> Outcome:
+    """Play with the agent that the manifest names; hear of episodes that end."""
+
+    def listen(event):
+        if isinstance(event, EpisodeEnded):
+            on_episode(event)
+
+    agent = NamedAgent(store.manifest.agent)
+    return runner.run(store, tasks, agent, size=Size(workers), listeners=[listen])
 
 
 def modified(store: RunDirectory) -> dict[str, int]:
@@ -249,7 +263,7 @@ def test_a_task_that_kills_its_worker_is_reported(new_store, tasks, monkeypatch)
         for job in jobs:
             yield job, Lost(tries=3, exitcode=-9)
 
-    monkeypatch.setattr(runner, "do_jobs", give_up)
+    monkeypatch.setattr(process_executor, "do_jobs", give_up)
     outcome = run(store, tasks[:1])
     (record,) = outcome.crashed
     assert record.error == "the worker process died 3 times, last with exit code -9"

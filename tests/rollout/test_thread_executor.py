@@ -17,12 +17,13 @@ import pytest
 
 from agents import Decision, make_agent
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.rollout import thread_executor as together
+from er_gym.rollout import thread_executor
 from er_gym.rollout.agent import CannotGoOn
+from er_gym.rollout.events import EpisodeEnded
+from er_gym.rollout.executor import Size
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.runner import Outcome
-from er_gym.rollout.thread_executor import Stopped, run_threaded
+from er_gym.rollout.runner import Outcome, Stopped, run
 from er_gym.rollout.worker_pool import WorkerSetupError
 from er_gym.tasks.paper_format import read_tasks
 
@@ -88,6 +89,37 @@ class Kills:
         return signal.raise_signal, (signal.SIGKILL,)
 
 
+class Leaving:
+    """An agent that leaves no files, but says when it is asked for them."""
+
+    attachment_folders = ()
+
+    def __init__(self, agent, keep) -> None:
+        self._agent, self._keep = agent, keep
+        self.obs_mode, self.reset, self.act = agent.obs_mode, agent.reset, agent.act
+
+    def attachments(self, episode, stem):
+        self._keep(episode, self._agent)
+        return {}
+
+
+def run_threaded(
+    store, tasks, make, *, workers=1, concurrency=8, on_episode=lambda event: None, keep=None
+) -> Outcome:
+    """Play in threads; hear of episodes that end, and of what agents are asked to leave."""
+
+    def listen(event):
+        if isinstance(event, EpisodeEnded):
+            on_episode(event)
+
+    def make_leaving(task, seed):
+        agent = make(task, seed)
+        return agent if keep is None else Leaving(agent, keep)
+
+    size = Size(workers, concurrency)
+    return run(store, tasks, make_leaving, executor="threads", size=size, listeners=[listen])
+
+
 def kept(store: RunDirectory) -> list[str]:
     return sorted(each.task_id for each in store.episodes())
 
@@ -140,7 +172,7 @@ def test_what_is_played_is_what_is_played_here(store, tasks, monkeypatch):
     assert {thread for *_, thread in seen} == {threading.main_thread()}
     assert threading.main_thread() not in {thread for *_, thread in talks}
 
-    monkeypatch.setattr(together, "EnvPool", None)  # no process is started
+    monkeypatch.setattr(thread_executor, "EnvPool", None)  # no process is started
     assert run_threaded(store, tasks, at_random) == Outcome(0, 7, ())
 
 
@@ -380,7 +412,8 @@ import os, socket
 from pathlib import Path
 from agents import Decision
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.thread_executor import run_threaded
+from er_gym.rollout.executor import Size
+from er_gym.rollout.runner import run
 from er_gym.tasks.paper_format import read_tasks
 
 folder = Path({folder!r})
@@ -408,12 +441,12 @@ class Agent:
         return Decision(Sleep(str(file)) if self.waits == "paper-4" else "end")
 
 if __name__ == "__main__":
-    run_threaded(
+    run(
         RunDirectory.open(folder / "run"),
         read_tasks(folder / "tasks.json"),
         lambda task, seed: Agent(task),
-        workers=2,
-        concurrency=2,
+        executor="threads",
+        size=Size(workers=2, concurrency=2),
     )
 """
 

@@ -16,7 +16,7 @@ from agents.vlm.chat import Message, Reply, Usage
 from agents.vlm.clients.watch import AGAIN, Watch
 from agents.vlm.settings import Prices
 from er_gym.rollout.agent import CannotGoOn
-from er_gym.rollout.json_lines import Lines
+from er_gym.rollout.json_lines import JsonLines
 
 if TYPE_CHECKING:
     from agents.vlm.clients.reply_cache import Identified
@@ -140,7 +140,7 @@ class Ledger:
         self._budget = budget
         self._lock = threading.Lock()
         self._spent = Spent()
-        self._lines: Lines | None = None
+        self._lines: JsonLines | None = None
 
     def open(self, path: Path) -> None:
         """Keep it in a file.
@@ -152,7 +152,7 @@ class Ledger:
             ValueError: it is a link.
             OSError: it cannot be written.
         """
-        self._lines = Lines(path)
+        self._lines = JsonLines(path)
 
     @property
     def spent(self) -> Spent:

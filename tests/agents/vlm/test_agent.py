@@ -14,10 +14,12 @@ from agents.vlm.chat import LEFT_OUT, Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients.scripted import RecordedClient, ScriptedClient
 from agents.vlm.matching import Matcher
 from agents.vlm.prompts import load_prompts
+from agents.vlm.record import ConversationRecord
 from agents.vlm.settings import AgentSettings
 from er_gym import EmbodiedEnv
 from er_gym.rollout.play import play_episode
-from er_gym.rollout.run_directory import picture_folder
+from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.run_directory import file_stem
 from er_gym.tasks import Task, load_suite
 
 PICKUP = next(
@@ -70,6 +72,13 @@ def agent_of(client: Any, options: AgentSettings) -> VLMAgent:
 def play(env: EmbodiedEnv, script: Any, options: AgentSettings, task: Task = PICKUP) -> Any:
     agent = agent_of(ScriptedClient(script), options)
     return agent, play_episode(env, agent, task, 0)
+
+
+def left_by(agent: VLMAgent, episode: EpisodeRecord) -> tuple[ConversationRecord, dict[str, bytes]]:
+    """The conversation that an agent leaves, and its pictures."""
+    files = agent.attachments(episode, file_stem(episode.task_id))
+    *_, last = files
+    return ConversationRecord.model_validate_json(files.pop(last)), files
 
 
 def texts(message: Message) -> str:
@@ -144,10 +153,10 @@ def test_thoughts_of_reasoning_models_go_back_if_asked(
     env: Callable[..., EmbodiedEnv], given_back: bool
 ) -> None:
     script = Script(*(Reply(text, reasoning="hm") for text in decided("observe", "end")))
-    agent, _ = play(env(), script, settings(reasoning={"in_history": given_back}))
+    agent, episode = play(env(), script, settings(reasoning={"in_history": given_back}))
     said = [message for message in script.sent[1] if message.role == "assistant"]
     assert [message.reasoning for message in said] == ["hm" if given_back else ""]
-    record, _ = agent.conversation("pictures/x")
+    record, _ = left_by(agent, episode)
     assert [m.reasoning for m in record.messages if m.role == "assistant"] == ["hm", "hm"]
 
 
@@ -183,7 +192,7 @@ def test_names_are_matched_to_types(env: Callable[..., EmbodiedEnv]) -> None:
     script = Script(*decided("go to the refrigerator", "navigate to Unobtainium", "end"))
     agent, episode = play(env(), script, settings())
     assert episode.steps[1].text == "navigate to Fridge"
-    record, _ = agent.conversation("pictures/x")
+    record, _ = left_by(agent, episode)
     first, second, _ = record.rounds
     assert (first.name, first.matched, first.action) == (
         "refrigerator",
@@ -211,7 +220,7 @@ def test_unusable_replies_reach_the_paper_protocol_as_its_runner_sees_them(
         *("error", "error", "error", "end"),
     ]
     assert "One cannot open an Apple." in texts(script.sent[1][-1])
-    record, _ = agent.conversation("pictures/x")
+    record, _ = left_by(agent, episode)
     assert [each.action for each in record.rounds] == [""] * 5
 
 
@@ -224,7 +233,7 @@ def test_an_object_that_only_the_paper_protocol_knows_is_no_problem(
     task = replace(PICKUP, navigable_objects=("Fridge",), scene="FloorPlan1", target_objects=())
     agent, episode = play(env(protocol="paper"), script, fuzzy, task)
     assert episode.steps[1].success
-    record, _ = agent.conversation("pictures/x")
+    record, _ = left_by(agent, episode)
     first = record.rounds[0]
     assert (first.matched, first.action, first.problem) == ("none", "navigate to Fridge", "")
 
@@ -246,7 +255,7 @@ def test_a_model_that_gives_no_reply_fails_the_episode(env: Callable[..., Embodi
 
     agent, episode = play(env(), silent, settings())
     assert episode.error.startswith("agents.vlm.chat.ModelError: no reply after 6 tries")
-    record, _ = agent.conversation("pictures/x", error=episode.error)
+    record, _ = left_by(agent, episode)
     assert record.rounds == []
     assert record.error == episode.error
 
@@ -261,10 +270,7 @@ def test_the_record_has_it_all(env: Callable[..., EmbodiedEnv]) -> None:
         sees="pictures", server={"base_url": "http://user:secret@127.0.0.1:1/v1?key=secret"}
     )
     agent, episode = play(env("rgb"), Script(*replies), options)
-    last = episode.steps[-1]
-    record, files = agent.conversation(
-        picture_folder(PICKUP.id), feedback=last.feedback, success=last.success
-    )
+    record, files = left_by(agent, episode)
     assert [each.action for each in record.rounds] == WAY
     assert [each.feedback for each in record.rounds] == [s.feedback for s in episode.steps[1:]]
     assert all(each.success for each in record.rounds)
@@ -288,7 +294,7 @@ def test_a_recorded_conversation_is_replayed(
 ) -> None:
     options = settings(sees="pictures", pictures={"keep": keep})
     agent, episode = play(env("rgb"), Script("Nothing.", *decided("observe", *WAY)), options)
-    record, _ = agent.conversation("pictures/x")
+    record, _ = left_by(agent, episode)
     (tmp_path / "conversations").mkdir()
     (tmp_path / "conversations" / "x.json").write_text(record.model_dump_json())
 

@@ -16,7 +16,8 @@ from agents import configs, make_agent
 from agents.vlm.agent import VLMAgent
 from agents.vlm.chat import Message
 from agents.vlm.clients.budget import Budget
-from agents.vlm.factory import REPLIES, SPENDING, AgentFactory, consequential, load_settings, speaks
+from agents.vlm.factory import AgentFactory, consequential, load_settings, speaks
+from er_gym.rollout.run_directory import REPLIES, SPENDING
 from agents.vlm.settings import AgentSettings
 
 HELLO = [Message("user", ("Hello.",))]
@@ -72,7 +73,7 @@ def test_replies_are_kept_and_counted_in_the_run_directory(tmp_path: Path) -> No
             speaker = AgentFactory("openai:naughty-1", settings, tmp_path, Budget(max_usd=1))
             reply = speaker.client.reply(HELLO, 0)
             assert (reply.text, reply.kept) == ("Good day.", kept)
-            assert "tokens in 1 replies, $" in speaker.spent
+            assert "tokens in 1 replies, $" in str(speaker.cost)
             speaker.close()
         assert server.count == 1
     assert (tmp_path / SPENDING).read_text().count("\n") == 1

@@ -1,0 +1,65 @@
+"""Which of a suite's tasks a run plays."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from er_gym.tasks.errors import SetAside, in_short
+from er_gym.tasks.task import Task
+
+
+@dataclass(frozen=True)
+class Shard:
+    """One of ``count`` parts of a suite, ``index`` counting from 1."""
+
+    index: int
+    count: int
+
+    @classmethod
+    def parse(cls, text: str) -> Shard:
+        """Read ``"2/8"``.
+
+        Raises:
+            ValueError: it is not of that form, or there is no such part.
+        """
+        index, slash, count = text.partition("/")
+        if slash and index.isdecimal() and count.isdecimal() and 1 <= int(index) <= int(count):
+            return cls(int(index), int(count))
+        raise ValueError(f"{text!r} is no shard: give i/n with 1 <= i <= n, such as 2/8")
+
+    def __contains__(self, task_id: str) -> bool:
+        """Whether a task belongs to it: by a hash of its id, the same everywhere and for good."""
+        digest = hashlib.sha256(task_id.encode()).digest()
+        return int.from_bytes(digest[:8], "big") % self.count == self.index - 1
+
+
+def select(
+    tasks: Sequence[Task],
+    *,
+    task_ids: Iterable[str] = (),
+    shard: Shard | None = None,
+    limit: int | None = None,
+    set_aside: Iterable[SetAside] = (),
+) -> list[Task]:
+    """The tasks to play, in the suite's order: those named, of these the shard's, of these the
+    first ``limit``. Of tasks that were set aside none is played, named or not.
+
+    Raises:
+        ValueError: the suite has no task of a given id, or all that were named are set aside.
+    """
+    wanted = set(task_ids)
+    aside = [one for one in set_aside if one.task in wanted]
+    unknown = wanted.difference((task.id for task in tasks), (one.task for one in aside))
+    if aside and len(aside) == len(wanted):
+        raise ValueError(f"no task to play: {in_short(aside)}")
+    if unknown:
+        some = ", ".join(task.id for task in tasks[:3])
+        raise ValueError(f"no task with the id {min(unknown)!r}; ids here are such as {some}")
+    chosen = [
+        task
+        for task in tasks
+        if (not wanted or task.id in wanted) and (shard is None or task.id in shard)
+    ]
+    return chosen[:limit]
