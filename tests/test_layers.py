@@ -11,8 +11,11 @@ import pytest
 _BASE = {"er_gym.writing", "er_gym.locking", "er_gym.plugins"}
 _TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
-_AGENTS = {*_ENVS, "er_gym", "agents"}
-_BENCHMARKS = {*_AGENTS, "benchmarks"}
+_ROLLOUT = {*_ENVS, "er_gym", "er_gym.rollout"}
+_AGENTS = {*_ROLLOUT, "agents"}
+_SCORING = {*_ROLLOUT, "benchmarks.scoring", "benchmarks.cli.terminal"}
+_COMMAND = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.cli"}
+_SCRIPTS = {*_COMMAND, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "benchmarks.pages"}
 ALLOWED = {
     "er_gym.plugins": {"er_gym.plugins"},
     "er_gym.writing": set(),
@@ -22,12 +25,16 @@ ALLOWED = {
     "er_gym.tasks": _TASKS,
     "er_gym.envs": _ENVS,
     "er_gym": _ENVS,
+    "er_gym.rollout": _ROLLOUT,
     "agents": _AGENTS,
-    "benchmarks": _BENCHMARKS,
+    "benchmarks.scoring": _SCORING,
+    "benchmarks.cli.terminal": {*_ENVS, "benchmarks.cli.terminal"},
+    "benchmarks.cli": _COMMAND,
+    "benchmarks": _COMMAND,
     # Scripts that measure or check look at the engine itself.
-    "benchmarks.perf": {*_BENCHMARKS, "benchmarks.perf", "er_gym.sim"},
-    "benchmarks.checks": {*_BENCHMARKS, "benchmarks.checks", "er_gym.sim"},
-    "benchmarks.pages.gallery": {*_BENCHMARKS, "benchmarks.pages.gallery", "er_gym.sim"},
+    "benchmarks.perf": _SCRIPTS,
+    "benchmarks.checks": _SCRIPTS,
+    "benchmarks.pages": _SCRIPTS,
 }
 """Layer to the layers that it may import; ``er_gym`` alone is its own top-level modules."""
 

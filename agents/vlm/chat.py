@@ -129,7 +129,7 @@ class Client(Protocol):
 
         Raises:
             ModelError: there is none, though others may be had.
-            er_gym.rollout.agent.CannotGoOn: no further reply can be had: the key is refused, there is no
+            CannotGoOn: no further reply can be had: the key is refused, there is no
                 such model, the budget is spent.
         """
 

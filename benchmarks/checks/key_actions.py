@@ -1,7 +1,7 @@
 """Compare the generator's key actions with the paper's, task by task.
 
-``python -m benchmarks.checks.key_actions ../shared/data/paper_tasks_dev.json`` asks the generator for
-a task of the same scene and type about the same objects as each task of the file, and compares
+``python -m benchmarks.checks.key_actions ../shared/data/paper_tasks_dev.json`` asks the generator
+for a task of the same scene and type about the same objects as each task of the file, and compares
 verbs and object types in order. Long-range tasks, which follow no rule, are left out. It also says
 how many of the tasks the generator makes of its own accord.
 """

@@ -1,6 +1,7 @@
 """Whether the picture shows what the metadata calls visible, and the other way round.
 
-    python -m benchmarks.checks.picture_agreement [--poses 300] [--seed 0] [--opened 0.3] [--json FILE]
+    python -m benchmarks.checks.picture_agreement [--poses 300] [--seed 0] [--opened 0.3]
+                                                  [--json FILE]
 
 Everything goes through the official client's Controller: random scenes of all kinds of room, random
 places of GetReachablePositions, headings of any degree or of multiples of 45 and 90, any horizon

@@ -1,6 +1,7 @@
 """Whether things can be told apart in the pictures, as far as that can be measured.
 
-    python -m benchmarks.checks.recognisability [--seed 0] [--epochs 10] [--json FILE] [--sheet FILE.png]
+    python -m benchmarks.checks.recognisability [--seed 0] [--epochs 10] [--json FILE]
+                                                [--sheet FILE.png]
 
 A small convolutional network learns the 40 commonest object types from crops of the pictures of 90
 scenes, and is asked about crops of the 30 others. It needs torch: pip install -e '.[rl]'.

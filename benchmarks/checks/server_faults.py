@@ -33,10 +33,10 @@ from agents.vlm.chat import Message, ModelError, Picture, Reply
 from agents.vlm.clients.budget import Budget
 from agents.vlm.clients.watch import Notice
 from agents.vlm.factory import AgentFactory
-from er_gym.rollout.run_directory import SPENDING
 from agents.vlm.settings import AgentSettings
 from benchmarks.checks.faulty_server import CASES, KEY, Case, FaultyServer
 from er_gym.rollout.agent import CannotGoOn
+from er_gym.rollout.run_directory import SPENDING
 
 _KEY_FROM = "ER_GYM_CHECK_KEY"
 _TIMEOUT = 0.7

@@ -4,8 +4,8 @@
 
 ``env`` plays random legal actions through the environment; ``engine`` sends random AI2-THOR
 actions, legal or not, to the controller. After each step the invariants of
-:mod:`benchmarks.checks.invariants` are checked. Ends with one line, and exit code 1 if one of them is
-broken; what is printed says how to see that again.
+:mod:`benchmarks.checks.invariants` are checked. It ends with one line, and with exit code 1 if one
+of them is broken; what is printed says how to see that again.
 """
 
 from __future__ import annotations

@@ -9,7 +9,8 @@ from typing import Any
 import click
 
 SCORER_CHOICES = ("both", "paper", "corrected")
-"""As in ``benchmarks.scoring.report``, which is too heavy to import for ``--help``; a test compares."""
+"""As in ``benchmarks.scoring.report``, which is too slow to import for ``--help``; a test
+compares."""
 
 scorer_option = click.option(
     "--scorer",

@@ -34,8 +34,8 @@ class ServerError(Exception):
 class ServerProcess:
     """A context manager that runs a server; it has ended when the context has.
 
-    It runs under :mod:`benchmarks.cli.process_guard`, so that it ends too, and all it has started, if this
-    process is killed.
+    It runs under :mod:`benchmarks.cli.process_guard`: if this process is killed, it ends too, with
+    all that it has started.
 
     Args:
         argv: the command.

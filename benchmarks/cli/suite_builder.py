@@ -20,7 +20,8 @@ from itertools import islice
 from pathlib import Path
 
 from er_gym import __version__
-from er_gym.envs.verify import Verifier, unwanted, with_difficulty
+from er_gym.envs.verify import unwanted, with_difficulty
+from er_gym.rollout.verification import make_verifier
 from er_gym.rollout.worker_pool import Lost, do_jobs
 from er_gym.tasks import jsonl_format
 from er_gym.tasks.arrangement import Start
@@ -58,7 +59,7 @@ class Maker:
     def __init__(self, making: Making, seed: int) -> None:
         self._making, self._seed = making, seed
         self._controller = make_controller(headless=True)
-        self._verify = Verifier()
+        self._verify = make_verifier()
 
     def __call__(self, scene: str) -> Made:
         """The tasks of a room, in all its arrangements."""

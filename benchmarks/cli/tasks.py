@@ -38,7 +38,7 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
     from contextlib import closing
 
     from benchmarks.cli.progress import Progress
-    from er_gym.envs.verify import Verifier
+    from er_gym.rollout.verification import make_verifier
     from er_gym.rollout.worker_pool import Lost, do_jobs
     from er_gym.tasks.errors import in_short
     from er_gym.tasks.resolve import resolve_tasks
@@ -58,7 +58,7 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
         solved = 0
         with (
             Progress(console, suite.name, len(todo)) as progress,
-            closing(do_jobs(Verifier, todo, workers=workers)) as results,
+            closing(do_jobs(make_verifier, todo, workers=workers)) as results,
         ):
             for task, verdict in results:
                 problem = "the engine died" if isinstance(verdict, Lost) else verdict.problem

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.vlm.agent import VLMAgent
 from agents.vlm.clients.budget import Budget
 from agents.vlm.factory import AgentFactory, consequential, load_settings
 from agents.vlm.prompts import load_prompts

@@ -135,7 +135,7 @@ class Player:
         before = finished(store, tasks)
         progress = Progress(self._console, f"{where}, {name}", len(tasks), len(before), 0)
         with progress:
-            make, size = NamedAgent(agent, trust=self._trust), Size(self._workers)
+            make, size = NamedAgent(store.manifest.agent, trust=self._trust), Size(self._workers)
             run(store, tasks, make, size=size, listeners=[progress])
         wanted = {task.id for task in tasks}
         return [
@@ -311,8 +311,9 @@ def _page(parts: Sequence[str], pictures: Sequence[Path]) -> str:
     return f"""# Baselines
 
 What policies learn on the embedded engine, beside agents that do not learn. This page is made by
-`python -m benchmarks.pages.baselines` from run directories. Everything is under `instances="explore"`,
-where a type name says nothing of the task's objects, and with the corrected scorer. A trained
+`python -m benchmarks.pages.baselines` from run directories. Everything is under
+`instances="explore"`, where a type name says nothing of the task's objects, and with the corrected
+scorer. A trained
 policy plays what it thinks best; it is the one at the end of training, none is chosen by how it
 did in an evaluation. Success in %: the mean over seeds with the least and the most; where there is
 one run only, Wilson's 95 % interval. The rooms of the unseen tasks (`er-1k`) are the paper's twelve

@@ -1,9 +1,10 @@
 """What an episode is worth: pure functions over :class:`~er_gym.rollout.records.EpisodeRecord`.
 
 The definitions are those of the Embodied-Reasoner benchmark (arXiv 2503.21696) as its released
-program computes them, so that numbers compare with its table. A scorer (:mod:`benchmarks.scoring.scorers`)
-walks through an episode once; every metric is one small function of its tally and the episode;
-:func:`score_episode` puts them side by side, and :func:`summarise` takes their means.
+program computes them, so the numbers compare with its table. A scorer
+(:mod:`benchmarks.scoring.scorers`) walks through an episode once. Every metric is one small
+function of its tally and the episode. :func:`score_episode` puts them side by side, and
+:func:`summarise` takes their means.
 """
 
 from __future__ import annotations

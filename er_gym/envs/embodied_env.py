@@ -451,9 +451,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _from(self, source: Source) -> EpisodeSource:
         """Where to draw from; the generator is made once for an environment, which closes it."""
         if not isinstance(source, str) or source != GENERATE:
-            return make_source(source)
+            return make_source(source, _env_to_verify_in)
         if self._live is None:
-            self._live = make_source(GENERATE)
+            self._live = make_source(GENERATE, _env_to_verify_in)
         return self._live
 
     def _choose(
@@ -625,3 +625,8 @@ def _feedback(action: Action, outcome: skills.Outcome) -> str:
     if outcome.success:
         return f"Done: {action}."
     return f"You could not {action}: {outcome.problem}"
+
+
+def _env_to_verify_in() -> EmbodiedEnv:
+    """The environment in which the generator tries its tasks."""
+    return EmbodiedEnv((), obs_mode="state")

@@ -8,7 +8,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from er_gym.envs.arguments import shown
-from er_gym.envs.verify import Verifier, unwanted, with_difficulty
+from er_gym.envs.verify import PlayableEnv, Verifier, unwanted, with_difficulty
 from er_gym.tasks.generate import Generator, arranged
 from er_gym.tasks.suite_spec import Making
 from er_gym.tasks.task import Task
@@ -25,7 +25,7 @@ _KEPT = 32
 """How many arranged rooms are remembered."""
 
 
-class Live:
+class GeneratedSource:
     """Makes tasks as they are asked for; needs no files and never runs out.
 
     A draw takes a room, an arrangement of it and a task at random, and plays the task on an
@@ -33,22 +33,23 @@ class Live:
     random generator alone, not on earlier draws.
 
     Args:
+        env: in which tasks are tried; it is closed with the source.
         making: in which rooms, of which types, how many arrangements of a room there are to draw
             beside the recorded one, how difficult; its ``total`` and ``per_layout`` mean nothing
             here.
     """
 
-    def __init__(self, making: Making = TRAINING) -> None:
-        self._making = making
+    def __init__(self, env: PlayableEnv, making: Making = TRAINING) -> None:
+        self._env, self._making = env, making
         self._kinds = [BY_NAME[name] for name in making.types or BY_NAME]
         self._controller = make_controller(headless=True)
-        self._verify = Verifier()
+        self._verify = Verifier(env)
         self._room: Callable[[str, int], Generator]
         self._room = lru_cache(_KEPT)(partial(arranged, self._controller))
 
-    def __reduce__(self) -> tuple[type[Live], tuple[Making]]:
+    def __reduce__(self) -> tuple[type[GeneratedSource], tuple[PlayableEnv, Making]]:
         # A copy has engines of its own; what is drawn depends on the random generator alone.
-        return Live, (self._making,)
+        return GeneratedSource, (self._env, self._making)
 
     def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
         """A task that the solver has just done."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import warnings
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite, suite_file, suite_from_file, suite_names
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TaskType
+
+if TYPE_CHECKING:
+    from er_gym.envs.verify import PlayableEnv
 
 _LONGEST_NAME = 80
 """No message quotes more of a name."""
@@ -103,7 +106,7 @@ class TaskList:
         raise ValueError(f"no task {shown(task_id)} among the {len(self.tasks)} of {self._name}")
 
 
-def make_source(source: Source) -> EpisodeSource:
+def make_source(source: Source, make_env: Callable[[], PlayableEnv]) -> EpisodeSource:
     """What :class:`~er_gym.envs.embodied_env.EmbodiedEnv` draws from.
 
     Of a file, tasks that cannot be used, or that do not fit their scenes, are not drawn; a warning
@@ -112,15 +115,15 @@ def make_source(source: Source) -> EpisodeSource:
     Args:
         source: a list of tasks, the name of a suite, the path of a task file (``.json``, ``.jsonl``
             or ``.jsonl.gz``), ``"generate"``, or an :class:`EpisodeSource`.
+        make_env: makes the environment in which generated tasks are tried.
 
     Raises:
         ValueError: there is no such suite, or the file cannot be used.
     """
     if isinstance(source, str) and source == GENERATE:
-        # Late: what verifies tasks is made of environments, which are made of sources.
-        from er_gym.envs.generated_source import Live
+        from er_gym.envs.generated_source import GeneratedSource  # late: few need the generator
 
-        return Live()
+        return GeneratedSource(make_env())
     if isinstance(source, str | Path):
         name = str(source)
         is_file = "/" in name or name.endswith((".json", ".jsonl", ".jsonl.gz"))

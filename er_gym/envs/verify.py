@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any, Protocol
 
-from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.solver import Solver
 from er_gym.tasks import verbs
 from er_gym.tasks.difficulty import difficulty
@@ -13,7 +14,7 @@ from er_gym.tasks.generate.generator import DONE_ALREADY
 from er_gym.tasks.goal import unmet
 from er_gym.tasks.splits import UNSEEN_TYPES, subject_types
 from er_gym.tasks.suite_spec import Making
-from er_gym.tasks.task import Task
+from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import TASK_TYPES
 
 REASONS = (
@@ -49,15 +50,41 @@ class Verdict:
         return not self.problem
 
 
+class PlayableEnv(Protocol):
+    """What a verifier asks of the environment that it is handed: an ``EmbodiedEnv`` has it."""
+
+    @property
+    def agent_pose(self) -> AgentPose:
+        """Where the agent is."""
+
+    @property
+    def objects(self) -> Sequence[Mapping[str, Any]]:
+        """AI2-THOR's metadata of all objects, as they are now."""
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Begin an episode."""
+
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Do an action."""
+
+    def close(self) -> None:
+        """Stop the engine."""
+
+
 class Verifier:
-    """Plays tasks, one after another, in an environment of its own; close it in the end.
+    """Plays tasks, one after another, in an environment that it owns; close it in the end.
 
     A task passes if the solver succeeds within the step limit, earns all of the reward, and has
     something to do: the goal must not hold from the start.
+
+    Args:
+        env: of any tasks and any ``obs_mode``; ``"state"`` is the quickest.
     """
 
-    def __init__(self) -> None:
-        self._env = EmbodiedEnv((), obs_mode="state")
+    def __init__(self, env: PlayableEnv) -> None:
+        self._env = env
         self._starts: dict[str, tuple[float, float]] = {}
 
     def start_of(self, scene: str) -> tuple[float, float]:

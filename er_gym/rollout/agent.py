@@ -75,7 +75,7 @@ class MakeAgent(Protocol):
 
 
 Attachments: TypeAlias = Mapping[str, bytes]
-"""Files that an agent leaves beside an episode's record: bytes by path from the run directory on."""
+"""Files that an agent leaves beside an episode's record: bytes by path in the run directory."""
 
 
 @runtime_checkable

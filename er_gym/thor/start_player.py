@@ -1,4 +1,4 @@
-"""Starts the player: what the launcher that ``er_gym.thor.player_install`` writes runs, by its path.
+"""Starts the player: the launcher that ``player_install`` writes runs this file by its path.
 
 It is no module to import. Importing ``er_gym`` would register the environments, which takes as long
 as all else; so a bare package of that name goes first, in which only the engine is looked up.

@@ -20,6 +20,7 @@ import pytest
 from benchmarks.cli.main import main as cli
 from benchmarks.cli.suite_builder import Made, make_suite, parts_of
 from er_gym.envs.verify import Verifier
+from er_gym.rollout.verification import make_verifier
 from er_gym.tasks import TASK_TYPES, Task, jsonl_format, load_suite, suites, verbs
 from er_gym.tasks.arrangement import begin
 from er_gym.tasks.difficulty import Difficulty, difficulty
@@ -232,7 +233,7 @@ def of_all_types(tmp_path_factory: pytest.TempPathFactory) -> tuple[Task, ...]:
 
 @pytest.fixture(scope="module")
 def verifier() -> Iterator[Verifier]:
-    with closing(Verifier()) as verifier:
+    with closing(make_verifier()) as verifier:
         yield verifier
 
 

@@ -16,9 +16,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.generated_source import TRAINING, Live
+from er_gym.envs.generated_source import TRAINING, GeneratedSource
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
-from er_gym.envs.verify import Verifier
+from er_gym.rollout.verification import make_verifier
 from er_gym.tasks import TASK_TYPES, Task, TaskType, jsonl_format, load_suite, paper_format
 from er_gym.tasks.splits import TRAINING_SCENES, UNSEEN_TYPES, subject_types
 from er_gym.tasks.suite_spec import Making
@@ -281,7 +281,7 @@ def test_live_tasks_differ_and_can_be_done(live_tasks: list[Task]) -> None:
     assert len({task.scene for task in live_tasks}) > 3
     assert len({task.type for task in live_tasks}) > 2
     assert any(task.start.poses for task in live_tasks)
-    with closing(Verifier()) as verifier:
+    with closing(make_verifier()) as verifier:
         for task in live_tasks:
             verdict = verifier(task)
             assert verdict.solved, (task.id, verdict)
@@ -313,7 +313,7 @@ def test_live_tasks_are_of_the_type_and_in_the_room_that_are_asked_for() -> None
 
 def test_live_tasks_are_about_what_training_may_see(make: Callable[..., EmbodiedEnv]) -> None:
     def abouts(making: Making) -> set[str]:
-        with closing(Live(making)) as source:
+        with closing(GeneratedSource(EmbodiedEnv((), obs_mode="state"), making)) as source:
             env = make(source, task_type="single_pickup")
             tasks = [drawn(env, seed, scene=ROOM) for seed in range(8)]
         return {name for task in tasks for name in subject_types(task)}
@@ -331,7 +331,7 @@ def test_a_live_source_keeps_to_its_making(make: Callable[..., EmbodiedEnv]) -> 
         layouts=2,
         distance=(2, 4.5),
     )
-    with closing(Live(making)) as source:
+    with closing(GeneratedSource(EmbodiedEnv((), obs_mode="state"), making)) as source:
         env = make(source)
         tasks = [drawn(env, seed) for seed in range(8)]
         # Nothing opens in this bathroom.

@@ -1,7 +1,8 @@
 """The task generator: from AI2-THOR object metadata to tasks of all eleven types.
 
-A kind of task is a :class:`~er_gym.tasks.generate.task_plan.Row`: a task type, which objects qualify,
-which key actions follow, and its instructions. Each family has a module with its rows: ``search``,
+A kind of task is a :class:`~er_gym.tasks.generate.task_plan.Row`: a task type, which objects
+qualify, which key actions follow, and its instructions.
+Each family has a module with its rows: ``search``,
 ``manipulate``, ``transport``, ``composite``; long-range tasks have recipes, which are data
 (``recipes.yaml``). A plan is acted out on paper (``script``), so that key actions and goal agree.
 

@@ -17,8 +17,8 @@ from agents.vlm.agent import VLMAgent
 from agents.vlm.chat import Message
 from agents.vlm.clients.budget import Budget
 from agents.vlm.factory import AgentFactory, consequential, load_settings, speaks
-from er_gym.rollout.run_directory import REPLIES, SPENDING
 from agents.vlm.settings import AgentSettings
+from er_gym.rollout.run_directory import REPLIES, SPENDING
 
 HELLO = [Message("user", ("Hello.",))]
 

@@ -1,0 +1,11 @@
+"""A verifier with the environment that it plays in, for worker processes."""
+
+from __future__ import annotations
+
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.verify import Verifier
+
+
+def make_verifier() -> Verifier:
+    """A verifier on an embedded engine of its own."""
+    return Verifier(EmbodiedEnv((), obs_mode="state"))
