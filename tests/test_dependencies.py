@@ -36,6 +36,7 @@ MAY_USE = {
     "benchmarks/inspect_task.py": ("inspect",),
     "benchmarks/perf": ("dev",),
     "benchmarks/checks": ("dev",),
+    "benchmarks/pages": ("dev",),
     "examples": ("trl",),
     "tests": ("dev", "inspect"),
 }

@@ -86,9 +86,9 @@ def test_imports_only_from_layers_below(path: Path) -> None:
 
 
 def test_sees_late_and_relative_imports() -> None:
-    source = "def f():\n    from ..sim import scene\n    import er_gym.rollout.agent\n"
+    source = "def f():\n    from ..sim import scene\n    import agents.vlm\n"
     found = list(imported_modules(source, "er_gym.envs"))
-    assert found == [(2, "er_gym.sim.scene"), (3, "er_gym.rollout.agent")]
+    assert found == [(2, "er_gym.sim.scene"), (3, "agents.vlm")]
     assert [layer(module) for _, module in found] == ["er_gym.sim", "agents"]
 
 

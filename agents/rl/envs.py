@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from agents.rl.config import Episodes
 from agents.rl.demonstrations import Demonstrations, demonstrate
 from agents.rl.policy_observation import Obs, Perception
-from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.embodied_env import EmbodiedEnv, verification_env
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.envs.wrappers import KeyActionShaping
 from er_gym.tasks.task import Task
@@ -141,7 +141,7 @@ def make_env(
     )
     if options.shaping:
         env = KeyActionShaping(env, gamma, options.shaping)
-    source = make_source(options.episodes)
+    source = make_source(options.episodes, verification_env)
     if isinstance(source, TaskList):
         source = source.share(*share)
     return LearningEnv(env, source, options.types, Perception(options, with_mask))

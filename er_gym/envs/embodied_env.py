@@ -451,9 +451,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _from(self, source: Source) -> EpisodeSource:
         """Where to draw from; the generator is made once for an environment, which closes it."""
         if not isinstance(source, str) or source != GENERATE:
-            return make_source(source, _env_to_verify_in)
+            return make_source(source, verification_env)
         if self._live is None:
-            self._live = make_source(GENERATE, _env_to_verify_in)
+            self._live = make_source(GENERATE, verification_env)
         return self._live
 
     def _choose(
@@ -627,6 +627,6 @@ def _feedback(action: Action, outcome: skills.Outcome) -> str:
     return f"You could not {action}: {outcome.problem}"
 
 
-def _env_to_verify_in() -> EmbodiedEnv:
-    """The environment in which the generator tries its tasks."""
+def verification_env() -> EmbodiedEnv:
+    """An environment in which a verifier plays generated tasks; nothing is drawn in it."""
     return EmbodiedEnv((), obs_mode="state")

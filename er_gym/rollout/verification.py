@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.embodied_env import verification_env
 from er_gym.envs.verify import Verifier
 
 
 def make_verifier() -> Verifier:
     """A verifier on an embedded engine of its own."""
-    return Verifier(EmbodiedEnv((), obs_mode="state"))
+    return Verifier(verification_env())

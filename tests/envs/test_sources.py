@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.embodied_env import EmbodiedEnv, verification_env
 from er_gym.envs.generated_source import TRAINING, GeneratedSource
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.rollout.verification import make_verifier
@@ -67,7 +67,7 @@ def test_an_id_draws_tasks_of_its_type_by_seed(env_id: str) -> None:
 
 
 def test_every_type_is_drawn_where_none_is_asked_for() -> None:
-    source, rng = make_source("mini"), np.random.default_rng(0)
+    source, rng = make_source("mini", verification_env), np.random.default_rng(0)
     drawn_types = {source.draw(rng, None, None).type for _ in range(200)}
     assert drawn_types == set(TASK_TYPES)
 

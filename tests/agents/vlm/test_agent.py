@@ -296,7 +296,9 @@ def test_a_recorded_conversation_is_replayed(
     agent, episode = play(env("rgb"), Script("Nothing.", *decided("observe", *WAY)), options)
     record, _ = left_by(agent, episode)
     (tmp_path / "conversations").mkdir()
-    (tmp_path / "conversations" / "x.json").write_text(record.model_dump_json())
+    (tmp_path / "conversations" / f"{file_stem(PICKUP.id)}.json").write_text(
+        record.model_dump_json()
+    )
 
     replay = agent_of(RecordedClient(tmp_path), options)
     again = play_episode(env("rgb"), replay, PICKUP, 0)
