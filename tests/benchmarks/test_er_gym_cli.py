@@ -353,9 +353,8 @@ def test_an_ended_run_continues(tasks_file, tmp_path, signum):
 def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, episode):
     crashed = episode(("end",), (), task_id="paper-2", error="ValueError: no")
 
-    def run(store, tasks, *, workers, on_episode):
+    def run(store, tasks, make_agent, **how):
         store.write(crashed)
-        on_episode(crashed)
         return Outcome(played=7, kept=0, crashed=(crashed,))
 
     monkeypatch.setattr(runner, "run", run)
@@ -372,7 +371,7 @@ def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, epi
 
 
 def test_a_full_disk_is_told_in_one_line(tasks_file, tmp_path, er_gym, monkeypatch):
-    def run(store, tasks, *, workers, on_episode):
+    def run(store, tasks, make_agent, **how):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(runner, "run", run)
