@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 
-from benchmarks.cli.main import process_guard as guard
+from benchmarks.cli import process_guard as guard
 
 LINES = 20
 """How many of its last lines are kept."""

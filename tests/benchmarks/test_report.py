@@ -7,7 +7,7 @@ import json
 import pytest
 from rich.console import Console
 
-from benchmarks.cli.main import options as cli_options
+from benchmarks.cli import options as cli_options
 from benchmarks.scoring import report
 from benchmarks.scoring.report import load_run
 from benchmarks.scoring.tables import as_markdown, print_tables, tables

@@ -19,7 +19,7 @@ import pytest
 from click.testing import CliRunner
 
 from agents.vlm.serving import ENGINES, Command, Machine, Wanted, command_for, look_around
-from benchmarks.cli.main import serve as cli_serve
+from benchmarks.cli import serve as cli_serve
 from benchmarks.cli.serve import ENGINE_CHOICES, run_server, serve
 from benchmarks.cli.server_process import LINES, ServerError, ServerProcess
 
