@@ -32,7 +32,7 @@ from typing import NoReturn
 import benchmarks.cli.vlm_run  # noqa: F401  # imported once, not in each fork
 from benchmarks.checks.bad_commands import Line, lines
 from benchmarks.checks.bad_files import make
-from benchmarks.cli.main import main as cli
+from benchmarks.cli import main as cli
 
 _AT_ONCE = 2
 _REAL_EVERY = 10

@@ -9,8 +9,8 @@ import sys
 import pytest
 
 from benchmarks.cli import diagnosis as doctor
+from benchmarks.cli import main as cli
 from benchmarks.cli.extras import extras, state_of
-from benchmarks.cli.main import main as cli
 from er_gym.thor import player_install as players
 from er_gym.thor.places import GpuMapping, Release
 

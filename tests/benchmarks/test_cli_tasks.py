@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from benchmarks.cli.main import main as cli
+from benchmarks.cli import main as cli
 from er_gym.tasks import TASK_TYPES, Task, TaskFileError, load_suite, suite_from_file
 from er_gym.tasks.describe import describe
 from er_gym.tasks.goal import Condition
@@ -452,7 +452,10 @@ BAD = {
     "folder": (("generate", "--out", "."), ["--out", "directory"]),
     "no spec": ((*GENERATE, "--paraphraser", "nowhere"), ["'nowhere'", "package.module:Name"]),
     "no module": ((*GENERATE, "--paraphraser", "no_such_module:ask"), ["no_such_module"]),
-    "no function": ((*GENERATE, "--paraphraser", "json:asks"), ["'asks'", "a function from a prompt to a reply"]),
+    "no function": (
+        (*GENERATE, "--paraphraser", "json:asks"),
+        ["'asks'", "a function from a prompt to a reply"],
+    ),
     "show what is not there": (("show", "mini", "nope"), ["'nope'", "mini", "ids are such as"]),
     "show a suite that is not there": (("show", "maxi"), ["'maxi'", "mini"]),
     "show a type that is not there": (("show", "mini", "--types", "cook"), ["'cook'"]),

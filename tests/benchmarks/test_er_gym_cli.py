@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.cli.main import main as cli
+from benchmarks.cli import main as cli
 from er_gym.rollout import runner
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.runner import Outcome

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.cli.main import main as cli
+from benchmarks.cli import main as cli
 from benchmarks.cli.suite_builder import Made, make_suite, parts_of
 from er_gym.envs.verify import Verifier
 from er_gym.rollout.verification import make_verifier
