@@ -136,17 +136,24 @@ def _applies(requirement: Requirement, extra: str, *, with_core: bool) -> bool:
 
 
 def _unsupported(extra: str, requires: Requires) -> Iterator[str]:
-    """What the extra names for other Pythons or machines than this one."""
+    """What the extra names for newer Pythons or other machines than this.
+
+    What it names for older Pythons is left out: it stands in there for what this Python has itself.
+    """
     own = {extra}
     for _, requirement in closure(extra, requires):
         if canonicalize_name(requirement.name) == PROJECT:
             own |= requirement.extras
     for requirement in map(Requirement, requires(PROJECT)):
-        condition = str(requirement.marker)
-        named_by = [each for each in own if f'extra == "{each}"' in condition]
-        if any(not _applies(requirement, each, with_core=False) for each in named_by):
-            without = condition.partition(" and extra == ")[0]
-            yield f"{requirement.name} (for {without})"
+        marker = requirement.marker
+        if marker is None:
+            continue
+        for each in sorted(own):
+            older = {"extra": each, "python_version": "3.0", "python_full_version": "3.0.0"}
+            for_it = f'extra == "{each}"' in str(marker)
+            if for_it and not marker.evaluate({"extra": each}) and not marker.evaluate(older):
+                yield f"{requirement.name} (for {str(marker).partition(' and extra == ')[0]})"
+                break
 
 
 @cache
