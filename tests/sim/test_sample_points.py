@@ -50,9 +50,10 @@ def test_next_to_nothing_built_in_is_visible_from_behind(name: str) -> None:
     assert behind < 0.05 * before  # round the corner of the last one of a row
 
 
-@pytest.mark.parametrize(("name", "i"), COUNTERS)
+@pytest.mark.parametrize(("name", "i"), [each for each in COUNTERS if [*fronts(*each)]])
 def test_no_carcass_stands_before_what_is_built_into_it(name: str, i: int) -> None:
     found = carcass(name, i)
+    assert len(found.footprint)
     for front in fronts(name, i):
         across = (front.low + front.high) / 2
         for x0, z0, x1, z1 in found.footprint:

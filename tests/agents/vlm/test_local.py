@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
 import io
 import json
 import re
 import shutil
 import socket
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -160,26 +158,6 @@ def same(replies: Sequence[Reply], others: Sequence[Reply]) -> bool:
 
 
 # -- pictures --------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def qwen_vl_utils() -> ModuleType:
-    """The package itself. It wants torchvision, of which it uses nothing for pictures; where that
-    is not installed, an empty one will do."""
-    if importlib.util.find_spec("qwen_vl_utils") is None:
-        pytest.skip("needs qwen-vl-utils")
-    with pytest.MonkeyPatch.context() as patch:
-        if importlib.util.find_spec("torchvision") is None:
-            empty = {
-                name: ModuleType(name)
-                for name in ("torchvision", "torchvision.io", "torchvision.transforms")
-            }
-            empty["torchvision"].io = empty["torchvision.io"]  # type: ignore[attr-defined]
-            empty["torchvision"].transforms = empty["torchvision.transforms"]  # type: ignore[attr-defined]
-            empty["torchvision.transforms"].InterpolationMode = None  # type: ignore[attr-defined]
-            for name, module in empty.items():
-                patch.setitem(sys.modules, name, module)
-        return importlib.import_module("qwen_vl_utils")
 
 
 SIZES = [(800, 450), (300, 300), (900, 600), (57, 33), (28, 28), (20, 400), (333, 77)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from io import BytesIO
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -69,15 +70,14 @@ def test_what_is_scaled_is_scaled_once(bounds: tuple[int, int]) -> None:
 
 
 @pytest.mark.parametrize("bounds", BOUNDS)
-def test_sizes_are_those_of_qwen(bounds: tuple[int, int]) -> None:
+def test_sizes_are_those_of_qwen(bounds: tuple[int, int], qwen_vl_utils: ModuleType) -> None:
     """Where they are scaled; Qwen's processor itself rounds the others."""
-    qwen = pytest.importorskip("qwen_vl_utils")
     settings = Pictures(min_pixels=bounds[0], max_pixels=bounds[1])
     compared = 0
     for width, height in SIZES:
         if bounds[0] <= width * height <= bounds[1]:
             continue
-        theirs = qwen.smart_resize(height, width, FACTOR, *bounds)[::-1]
+        theirs = qwen_vl_utils.smart_resize(height, width, FACTOR, *bounds)[::-1]
         if min(theirs) > 0:
             assert fitted(width, height, settings) == theirs
             compared += 1
