@@ -183,7 +183,7 @@ def test_a_directory_that_cannot_be_made(er_gym, tasks_file, tmp_path):
 
 def test_help_imports_nothing_heavy():
     code = (
-        "import sys; from benchmarks import cli\n"
+        "import sys; from benchmarks.cli import main as cli\n"
         "try: cli.main(['bench', '--help'])\n"
         "except SystemExit: pass\n"
         "heavy = {'gymnasium', 'numpy', 'pydantic', 'rich', 'ai2thor', 'er_gym', 'agents'}\n"
@@ -295,7 +295,9 @@ def test_a_run_is_played_and_continued_under_one_protocol(
         assert words in one_line(err)
 
     played = []
-    monkeypatch.setattr(runner, "run", lambda store, tasks, **_: played.extend(tasks) or NOTHING)
+    monkeypatch.setattr(
+        runner, "run", lambda store, tasks, make_agent, **_: played.extend(tasks) or NOTHING
+    )
     for protocol, states in (("paper", True), ("default", False)):
         code, _, err = er_gym(
             *command, "--out", tmp_path / protocol, "--limit", "1", "--protocol", protocol
