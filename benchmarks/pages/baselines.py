@@ -1,11 +1,10 @@
-"""docs/baselines.md: what trained policies achieve, from their run directories.
-
+"""Make docs/baselines.md, the results of trained policies, from their run directories.
 
     python -m benchmarks.pages.baselines runs/rl/*
 
-Plays every run, and beside it the searcher, the random agent and the oracle, on tasks of the types
-that it was trained on: those of er-1k, in rooms that training has never seen, and as many of a type
-of the suite that it was trained on. What has been played is not played again (``--work``).
+Plays every policy, and the searcher, the random agent and the oracle, on tasks of the types that the
+policy was trained on: those of er-1k, in rooms that training has never seen, and as many of each
+type from the suite that it was trained on. Episodes in ``--work`` are not played again.
 """
 
 from __future__ import annotations
@@ -279,7 +278,7 @@ def _section(name: str, members: Sequence[Trained], results: Results) -> str:
     n = results["unseen"]["trained"][0]["all"][1], results["training"]["trained"][0]["all"][1]
     lines += [
         "",
-        f"{n[1]} tasks in training rooms, {n[0]} in unseen ones. Made by",
+        f"{n[1]} tasks in training rooms, {n[0]} in unseen ones. These commands train the policies:",
         "",
         "```sh",
         *(f"er-gym train-rl --config {name} --seed {each.config.seed}" for each in members),
@@ -310,18 +309,18 @@ def _page(parts: Sequence[str], pictures: Sequence[Path]) -> str:
     tables = "\n".join(parts)
     return f"""# Baselines
 
-What policies learn on the embedded engine, beside agents that do not learn. This page is made by
-`python -m benchmarks.pages.baselines` from run directories. Everything is under
-`instances="explore"`, where a type name says nothing of the task's objects, and with the corrected
-scorer. A trained
-policy plays what it thinks best; it is the one at the end of training, none is chosen by how it
-did in an evaluation. Success in %: the mean over seeds with the least and the most; where there is
-one run only, Wilson's 95 % interval. The rooms of the unseen tasks (`er-1k`) are the paper's twelve
-test rooms, none of them in training; some of their tasks are about types of things that training
-has never named. Training tasks are a sample of those that were trained on.
+This page shows what policies learn on the embedded engine, beside agents that do not learn.
+`python -m benchmarks.pages.baselines` makes it from run directories. All episodes use
+`instances="explore"`, where the environment does not look at the task to choose which object a type
+name means, and the corrected scorer. Each policy is the one at the end of training; none was chosen
+by its evaluations. It plays its most probable action. Success is in %: the mean over seeds, with
+the lowest and the highest; for a single run, Wilson's 95 % interval. The rooms of the unseen tasks
+(`er-1k`) are the paper's twelve test rooms, and training uses none of them. Some of their tasks are
+about object types that training never names. Training tasks are a sample of those that the policy
+was trained on.
 
-Times are from the beginning of training to its end, evaluations included, on {machine()}.
-The suite `train` is made once: `er-gym tasks generate --suite train`, about 3 minutes.
+Times are from the start of training to its end, evaluations included, on {machine()}.
+`er-gym tasks generate --suite train` makes the suite `train` once, in about 3 minutes.
 
 {shown}
 
