@@ -2,9 +2,9 @@
 
     python -m benchmarks.pages.baselines runs/rl/*
 
-Plays every policy, and the searcher, the random agent and the oracle, on tasks of the types that the
-policy was trained on: those of er-1k, in rooms that training has never seen, and as many of each
-type from the suite that it was trained on. Episodes in ``--work`` are not played again.
+Plays every policy, and the searcher, the random agent and the oracle, on tasks of the types that
+the policy was trained on: those of er-1k, in rooms that training has never seen, and as many of
+each type from the suite that it was trained on. Episodes in ``--work`` are not played again.
 """
 
 from __future__ import annotations
@@ -278,7 +278,8 @@ def _section(name: str, members: Sequence[Trained], results: Results) -> str:
     n = results["unseen"]["trained"][0]["all"][1], results["training"]["trained"][0]["all"][1]
     lines += [
         "",
-        f"{n[1]} tasks in training rooms, {n[0]} in unseen ones. These commands train the policies:",
+        f"{n[1]} tasks in training rooms, {n[0]} in unseen ones. "
+        "These commands train the policies:",
         "",
         "```sh",
         *(f"er-gym train-rl --config {name} --seed {each.config.seed}" for each in members),
