@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from benchmarks.cli.errors import CRASHED, BadInput, bad_input, complain
+from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import agent_config_option, overrides_option, seed_option
 from benchmarks.cli.terminal import echo
 
@@ -86,5 +86,5 @@ def _say(log: EvalLog) -> int:
     if log.status == "success":
         return 0
     why = log.error.message if log.error else "cancelled"
-    complain(f"the evaluation ended early: {why}")
+    print_problem(f"the evaluation ended early: {why}")
     return CRASHED

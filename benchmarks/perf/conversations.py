@@ -125,18 +125,18 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
     )
     process.start()
     theirs.close()
-    voice = VLMRun.of(
+    vlm_run = VLMRun.of(
         "openai:answering-server",
         base_url=ours.recv(),
         overrides=[f"pictures.width={size}", f"pictures.height={size}"],
         concurrency=concurrency,
     )
-    env = {**suite.env, **voice.env}
+    env = {**suite.env, **vlm_run.env}
     ended: list[tuple[float, int]] = []
     with tempfile.TemporaryDirectory() as place:
         manifest = Manifest(
             suite=suite.name, suite_digest=suite.digest, suite_size=len(suite.tasks),
-            agent=voice.name, env=env, seed=0, er_gym=__version__,
+            agent=vlm_run.name, env=env, seed=0, er_gym=__version__,
         )  # fmt: skip
         store = RunDirectory.create(Path(place), manifest)
         began = time.perf_counter()
@@ -145,8 +145,8 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
             if isinstance(event, EpisodeEnded):
                 ended.append((time.perf_counter(), event.steps))
 
-        with closing(voice.factory(store.path)) as factory:
-            outcome = voice.play(factory, store, tasks, workers, [note])
+        with closing(vlm_run.factory(store.path)) as factory:
+            outcome = vlm_run.play(factory, store, tasks, workers, [note])
     ours.close()
     process.join(5)
     whole = ended[-1][0] - began
