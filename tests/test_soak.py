@@ -261,13 +261,15 @@ def test_other_scenes_are_bad_input(asked):
 
 def test_steps_are_counted_over_episodes():
     env = EmbodiedEnv(obs_mode="state")
-    walker = steps_script.Walker([env, env], seed=0)
-    assert walker.steps_per_second(0.2) > 5
-    assert walker.resets
+    player = steps_script.RandomPlayer([env, env], seed=0)
+    assert player.steps_per_second(0.2) > 5
+    assert player.resets
     env.close()
 
 
 def test_the_table_names_what_was_measured():
     console = Console(record=True, width=120)
-    steps_script.show([steps_script.Figure.of("steps, none", [3.0, 1.0, 2.0], "steps/s")], console)
+    steps_script.show(
+        [steps_script.Measurement.of("steps, none", [3.0, 1.0, 2.0], "steps/s")], console
+    )
     assert re.search(r"steps, none\W+2\.00\W+steps/s\W+3\.00  1\.00  2\.00", console.export_text())
