@@ -18,7 +18,7 @@ from benchmarks.checks.invariants import (
     floor_of,
     stands_on_the_floor,
 )
-from benchmarks.checks.soak import Report, choose_scenes, soak, soak_scene, verdict
+from benchmarks.checks.soak import SoakReport, choose_scenes, soak, soak_scene, verdict
 from benchmarks.perf import steps as steps_script
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.thor import SCENE_NAMES, make_controller
@@ -227,8 +227,8 @@ def test_what_is_raised_is_a_problem_with_its_step(monkeypatch):
 
 def test_the_verdict_says_how_to_see_it_again(capsys):
     reports = [
-        Report("FloorPlan2", 7, 5, 0.1, "after action 7, Pass {}: wrong"),
-        Report("FloorPlan1", 10, 9, 0.1),
+        SoakReport("FloorPlan2", 7, 5, 0.1, "after action 7, Pass {}: wrong"),
+        SoakReport("FloorPlan1", 10, 9, 0.1),
     ]
     assert verdict(reports, level="engine", actions=10, seed=4) == 1
     said = capsys.readouterr()
