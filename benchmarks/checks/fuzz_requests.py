@@ -1,7 +1,7 @@
 """Random requests: what a program would ask of the engine, and much that none should.
 
 A request is drawn sane, parameter by parameter from the table :data:`SANE`, so that a good share of
-them can be done. One in four is then bent by :data:`MUTATIONS`, mostly with a value of
+them can be done. One in four is then changed by :data:`MUTATIONS`, mostly with a value of
 :data:`EXTREMES`.
 """
 
@@ -319,7 +319,7 @@ def _sane(room: Room, name: str) -> Request:
     return request
 
 
-# -- bends -----------------------------------------------------------------------------------------
+# -- mutations -------------------------------------------------------------------------------------
 
 
 def _extreme(room: Room) -> Any:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from benchmarks.cli.errors import BadInput, bad_input
+from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import MOST_SEED, Span, force_option, split, workers_option
 from benchmarks.cli.terminal import echo, terminal
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from er_gym.tasks.task import Task
 
 _DEFAULT_TOTAL = 100
-_INTERRUPTED = 130
 
 
 @click.command()
@@ -35,26 +34,32 @@ _INTERRUPTED = 130
 @click.option(
     "--total", type=click.IntRange(min=1), help=f"How many tasks.  [default: {_DEFAULT_TOTAL}]"
 )
-@click.option("--scenes", metavar="NAMES", help="all, training, evaluation, or rooms with commas.")
-@click.option("--types", metavar="NAMES", help="Types of tasks, with commas.  [default: all]")
+@click.option(
+    "--scenes", metavar="NAMES", help="all, training, evaluation, or scenes separated by commas."
+)
+@click.option("--types", metavar="NAMES", help="Task types, separated by commas.  [default: all]")
 @click.option("--layouts", type=click.IntRange(0, 10_000), help="Rearrangements of each room.")
-@click.option("--per-layout", type=click.IntRange(min=1), help="Tasks of a type in each of them.")
+@click.option(
+    "--per-layout", type=click.IntRange(min=1), help="Tasks of each type in each arrangement."
+)
 @click.option("--hidden-depth", type=Span(), help="How many containers must be opened.")
-@click.option("--distractors", type=Span(), help="How many other objects of the types named.")
-@click.option("--distance", type=Span(), help="How far it is, metres.")
+@click.option(
+    "--distractors", type=Span(), help="How many other objects of the named types there are."
+)
+@click.option("--distance", type=Span(), help="How far the agent has to go, metres.")
 @click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the suite's, or 0]")
 @click.option(
     "--paraphraser",
     metavar="MODULE:FUNCTION",
-    help="A function from a prompt to a language model's reply; its wordings join the templates'.",
+    help="A function from a prompt to a language model's reply; adds to the templates' wordings.",
 )
 @force_option
 @workers_option
 def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -> int:
     """Generate tasks, play each of them, and write those that can be done.
 
-    What has been made when it is interrupted is kept: the same command goes on. The same seed gives
-    the same file. Beside the file comes a card, in Markdown.
+    The same command continues after an interruption. The same seed gives the same file. A card in
+    Markdown is written beside the file.
     """
     from benchmarks.cli.suite_builder import parts_folder, remove_parts
     from benchmarks.scoring.task_counts import print_counts
@@ -84,12 +89,11 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
         raise BadInput(f"{error}; what is done is in {parts}") from error
     except KeyboardInterrupt:
         done = len(list(parts.glob("*.jsonl")))
-        echo(
-            f"er-gym: interrupted: {done} of {len(order.spec.rooms)} rooms are in {parts}; "
-            "the same command goes on",
-            err=True,
+        print_problem(
+            f"interrupted: {done} of {len(order.spec.rooms)} rooms are in {parts}; "
+            "the same command continues"
         )
-        return _INTERRUPTED
+        return INTERRUPTED
     remove_parts(parts)
     print_counts(chosen, made.dropped)
     echo(f"{len(chosen)} tasks of {verified} verified: {order.out}")
@@ -166,7 +170,7 @@ def _order(
 
 
 def _option_value(value: Any) -> str:
-    """A value as it is given on the command line."""
+    """A value as an option of the command line takes it."""
     if not isinstance(value, tuple):
         return str(value)
     low, high = value
@@ -174,14 +178,14 @@ def _option_value(value: Any) -> str:
 
 
 def _build(order: _Order, parts: Path, workers: int, console: Console) -> tuple[BuildResult, int]:
-    """Make it, showing how far it is; returns what is chosen, and of how many."""
+    """Build the tasks and show progress; returns the chosen ones, and how many were verified."""
     from benchmarks.cli.progress import bar
     from benchmarks.cli.suite_builder import build_suite
 
     rooms = len(order.spec.rooms)
     verified = done = 0
     with bar(console) as progress:
-        shown = progress.add_task("spec tasks", total=rooms, status="")
+        shown = progress.add_task("generating tasks", total=rooms, status="")
 
         def on_room(scene: str, made: BuildResult) -> None:
             nonlocal verified, done
@@ -195,7 +199,7 @@ def _build(order: _Order, parts: Path, workers: int, console: Console) -> tuple[
 
 
 def _drop_reasons(made: BuildResult) -> str:
-    """Why tasks were dropped, the commonest first."""
+    """Why tasks were dropped, the most frequent reason first."""
     common = made.dropped.most_common(3)
     return "; ".join(f"{reason} ({count})" for reason, count in common) or "the rooms have none"
 
@@ -228,7 +232,7 @@ def _paraphraser(spec: str, order: _Order) -> Any:
     def asked(prompt: str) -> str:
         try:
             reply = ask(prompt)
-        except (Exception, SystemExit) as error:  # it is the user's, and may raise anything
+        except (Exception, SystemExit) as error:  # the user's function may raise anything
             raise RuntimeError(f"{spec} raised {type(error).__name__}: {error}") from error
         if not isinstance(reply, str):
             raise RuntimeError(
@@ -241,7 +245,7 @@ def _paraphraser(spec: str, order: _Order) -> Any:
 
 
 def _paraphrased(task: Task, paraphrase: Any) -> Task:
-    """A task in a language model's words, or in the template's: each is as likely."""
+    """The task with a wording drawn from the template's and the language model's."""
     from dataclasses import replace
 
     from er_gym.tasks.paraphrase import choose, names_in
@@ -254,7 +258,7 @@ def _paraphrased(task: Task, paraphrase: Any) -> Task:
 
 
 def _switch_words(task: Task) -> set[str]:
-    """What a task's words say of switches: "on", "off"."""
+    """The words "on" and "off" where the instruction uses them of a goal."""
     states: Mapping[object, str] = {True: "on", False: "off"}
     ways = {
         states[value]

@@ -1,8 +1,8 @@
-"""Make a suite: rooms rearranged, tasks generated, each one verified, a balanced choice taken.
+"""Build a suite: rearrange rooms, generate tasks, verify each one, choose a balanced set.
 
-Each room is made by itself, from the suite's seed and its own name, so that the suite is the same
-whatever the number of workers. What a room gives is kept in a file until the suite is whole: a run
-that is interrupted or killed goes on from there.
+Each room is built on its own, from the suite's seed and the room's name, so the suite does not
+depend on the number of workers. The tasks of a room go to a file until the suite is complete. A run
+that was interrupted or killed continues from these files.
 """
 
 from __future__ import annotations
@@ -33,28 +33,28 @@ from er_gym.thor import make_controller
 from er_gym.writing import make_folder
 
 _TRIES = 3
-"""How many tasks of a type and arrangement are played for each that is wanted."""
+"""How many tasks of a type and arrangement are played at most, for each task to build."""
 
 
 @dataclass(frozen=True)
 class BuildResult:
-    """What came of some rooms.
+    """The tasks of some rooms.
 
     Attributes:
-        tasks: verified.
-        dropped: how many were not taken, by why.
+        tasks: the verified ones.
+        dropped: reason to how many tasks were dropped for it.
     """
 
     tasks: tuple[Task, ...] = ()
     dropped: Counter[str] = field(default_factory=Counter)
 
     def plus(self, other: BuildResult) -> BuildResult:
-        """Both together."""
+        """The sum of both."""
         return BuildResult((*self.tasks, *other.tasks), self.dropped + other.dropped)
 
 
 class RoomBuilder:
-    """Makes the tasks of one room after another."""
+    """Builds the tasks of one room after another."""
 
     def __init__(self, spec: Making, seed: int) -> None:
         self._spec, self._seed = spec, seed
@@ -72,7 +72,7 @@ class RoomBuilder:
         return made
 
     def _of(self, room: Generator, rng: random.Random) -> BuildResult:
-        """The tasks of a room as it is arranged."""
+        """The tasks of a room in its present arrangement."""
         kept: list[Task] = []
         for kind in TASK_TYPES:
             if not self._spec.types or kind.name in self._spec.types:
@@ -82,7 +82,7 @@ class RoomBuilder:
         return BuildResult(tuple(kept), room.dropped)
 
     def _verified(self, candidates: Iterable[Task], room: Generator) -> Iterator[Task]:
-        """The tasks that are wanted and can be done; not too many are played."""
+        """The tasks that fit the spec and can be done; plays a limited number of them."""
         tries = self._spec.per_layout * _TRIES
         for task in candidates:
             problem = unwanted(task, room, self._spec, self._verify)
@@ -111,12 +111,12 @@ def build_suite(
     workers: int = 1,
     on_room: Callable[[str, BuildResult], None] = lambda scene, made: None,
 ) -> BuildResult:
-    """Make a suite's tasks; the same for the same spec and seed.
+    """Build the tasks of a suite; the same spec and seed give the same tasks.
 
     Args:
-        parts: a folder for what rooms give, which need not be there; what is there is used.
+        parts: the folder of finished rooms; made if missing, used if it has some.
         workers: how many processes.
-        on_room: called with each room and what it gave.
+        on_room: called with each room and its tasks.
 
     Raises:
         RuntimeError: a room's worker died again and again.
@@ -144,18 +144,18 @@ def build_suite(
 
 
 def parts_folder(out: Path, spec: Making, seed: int) -> Path:
-    """Where the parts of a suite are kept until it is whole: beside it, for this spec alone."""
+    """The folder of a suite's unfinished parts: beside it, and for this spec alone."""
     told = json.dumps([spec.model_dump(mode="json"), seed, __version__])
     return out.with_name(f".{out.name}.parts-{hashlib.sha256(told.encode()).hexdigest()[:8]}")
 
 
 def remove_parts(parts: Path) -> None:
-    """The suite is whole."""
+    """Remove the parts of a complete suite."""
     shutil.rmtree(parts, ignore_errors=True)
 
 
 def _layouts_together(tasks: Sequence[Task]) -> Iterable[Task]:
-    """The same tasks; arrangements that are equal become one object, which is written once."""
+    """The same tasks; equal arrangements become one object, which is written once."""
     starts: dict[str, Start] = {}
     for task in tasks:
         start = starts.setdefault(task.start.layout, task.start)
@@ -171,7 +171,7 @@ def _write(path: Path, made: BuildResult) -> None:
 
 
 def _read(path: Path) -> BuildResult | None:
-    """What a room gave; None where that is not known, or its file is damaged."""
+    """A finished room's tasks; None where its file is missing or damaged."""
     try:
         header = json.loads(path.read_text(encoding="utf-8").partition("\n")[0])
         return BuildResult(tuple(jsonl_format.read_tasks(path)), Counter(header["dropped"]))

@@ -98,20 +98,22 @@ def test_the_table_knows_no_parameter_that_nothing_takes():
     assert SANE.keys() <= taken
 
 
-@pytest.mark.parametrize("bend", MUTATIONS[::2] + MUTATIONS[1::2], ids=lambda bend: bend.__name__)
-def test_what_is_bent_is_a_request_still(room, bend):
+@pytest.mark.parametrize(
+    "mutation", MUTATIONS[::2] + MUTATIONS[1::2], ids=lambda mutation: mutation.__name__
+)
+def test_a_mutated_request_is_still_a_request(room, mutation):
     for _ in range(200):
         request = draw_request(room)
         before = repr(room.metadata["objects"][:3])
-        bend(room, request)
+        mutation(room, request)
         assert all(isinstance(name, str) for name in request)
         assert repr(room.metadata["objects"][:3]) == before
 
 
 def test_an_empty_request_can_be_bent(room):
-    for bend in MUTATIONS:
+    for mutation in MUTATIONS:
         for _ in range(10):
-            bend(room, {})
+            mutation(room, {})
 
 
 # -- what it finds ---------------------------------------------------------------------------------

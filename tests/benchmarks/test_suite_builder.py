@@ -213,7 +213,8 @@ def test_an_ended_command_goes_on(
     if signum == signal.SIGINT:
         assert process.returncode == 130
         assert complaint.splitlines()[-1] == (
-            f"er-gym: interrupted: {len(kept)} of 4 rooms are in {parts}; the same command goes on"
+            f"er-gym: interrupted: {len(kept)} of 4 rooms are in {parts}; "
+            "the same command continues"
         )
         assert "Traceback" not in complaint
 
