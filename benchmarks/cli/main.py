@@ -14,10 +14,11 @@ from typing import NoReturn
 import click
 
 from benchmarks.cli.bench import bench
+from benchmarks.cli.doctor import doctor
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.inspect import inspect
 from benchmarks.cli.options import scorer_option
-from benchmarks.cli.player import doctor, player
+from benchmarks.cli.player import player
 from benchmarks.cli.render import play, render
 from benchmarks.cli.serve import match_server, serve
 from benchmarks.cli.tasks import tasks
