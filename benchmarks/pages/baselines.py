@@ -51,7 +51,7 @@ _SCRIPTED = ("random", "searcher", "oracle")
 
 
 @dataclass(frozen=True)
-class Trained:
+class TrainedRun:
     """A run directory.
 
     Attributes:
@@ -63,7 +63,7 @@ class Trained:
     config: TrainConfig
 
     @staticmethod
-    def load(path: Path) -> Trained:
+    def load(path: Path) -> TrainedRun:
         """Read it.
 
         Raises:
@@ -71,7 +71,7 @@ class Trained:
         """
         if not any((path / name).exists() for name in (MODEL, FOREIGN)):
             raise ValueError(f"{path} has no {MODEL}; give run directories of er-gym train-rl")
-        trained = Trained(path, load_config(path / "config.yaml"))
+        trained = TrainedRun(path, load_config(path / "config.yaml"))
         if trained.steps < trained.config.total_steps:
             raise ValueError(
                 f"{path} has {trained.steps:,} of {trained.config.total_steps:,} steps; "
@@ -100,7 +100,7 @@ class Trained:
         return self.curve[-1]["seconds"] / 60
 
 
-class Player:
+class Evaluator:
     """Plays tasks with agents, once each.
 
     Args:
@@ -152,7 +152,7 @@ def _picture_size(agent: str) -> dict[str, int]:
     return {"width": options.width, "height": options.height} if "rgb" in options.obs_mode else {}
 
 
-def of_types(tasks: Iterable[Task], types: Sequence[str], each: int) -> list[Task]:
+def sample_of_types(tasks: Iterable[Task], types: Sequence[str], each: int) -> list[Task]:
     """So many tasks of each type, drawn the same way every time; all types where none is named."""
     by_type = defaultdict(list)
     for task in tasks:
@@ -212,30 +212,32 @@ def main(
     trust: bool,
 ) -> None:
     """Write docs/baselines.md and its pictures."""
-    families: defaultdict[str, list[Trained]] = defaultdict(list)
+    families: defaultdict[str, list[TrainedRun]] = defaultdict(list)
     for path in runs:
-        trained = Trained.load(path)
+        trained = TrainedRun.load(path)
         families[trained.name].append(trained)
     with bad_input():
         check_output(out, force=force)
-    player = Player(work, workers, trust)
+    evaluator = Evaluator(work, workers, trust)
     unseen = load_suite(UNSEEN).tasks
     parts = []
     for name, members in families.items():
         config = members[0].config
         tasks = {
-            "training": of_types(load_suite(config.env.episodes).tasks, config.env.types, each),
-            "unseen": of_types(unseen, config.env.types, each),
+            "training": sample_of_types(
+                load_suite(config.env.episodes).tasks, config.env.types, each
+            ),
+            "unseen": sample_of_types(unseen, config.env.types, each),
         }
         results = {
             where: {
                 "trained": [
-                    rates(player.play(f"rl:{member.path}", of, where, member.path.name))
+                    rates(evaluator.play(f"rl:{member.path}", of, where, member.path.name))
                     for member in members
                 ]
             }
             | {
-                agent: [rates(player.play(agent, of, where, f"{name}-{agent}"))]
+                agent: [rates(evaluator.play(agent, of, where, f"{name}-{agent}"))]
                 for agent in _SCRIPTED
             }
             for where, of in tasks.items()
@@ -252,7 +254,7 @@ def main(
 Results = Mapping[str, Mapping[str, Sequence[Mapping[str, tuple[int, int]]]]]
 
 
-def _section(name: str, members: Sequence[Trained], results: Results) -> str:
+def _section(name: str, members: Sequence[TrainedRun], results: Results) -> str:
     config = members[0].config
     minutes = [each.minutes for each in members]
     groups = [group for group in GROUPS if group in results["unseen"]["trained"][0]]
