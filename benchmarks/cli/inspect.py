@@ -52,7 +52,7 @@ def inspect(
         from inspect_ai import eval as evaluate
         from inspect_ai._util.error import PrerequisiteError  # a key or a package is missing
 
-        from benchmarks.inspect_secrets import model_at
+        from benchmarks.inspect_secrets import model_at_url
         from benchmarks.inspect_task import er_gym
     except ImportError as error:
         raise BadInput(
@@ -63,7 +63,7 @@ def inspect(
         try:
             logs = evaluate(
                 asked,
-                model=model_at(model, model_base_url),
+                model=model_at_url(model, model_base_url),
                 log_dir=log_dir,
                 max_samples=concurrency,
             )
