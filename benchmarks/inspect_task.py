@@ -113,7 +113,7 @@ def _sample(each: Task) -> Sample:
 
 
 def _generation(settings: AgentSettings) -> GenerateConfig:
-    """How words are chosen, where the command exchange says nothing of it."""
+    """Sampling arguments, where the command line does not set them."""
     sampling = settings.sampling
     return GenerateConfig(
         temperature=sampling.temperature,

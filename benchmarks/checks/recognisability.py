@@ -84,7 +84,7 @@ class Classification:
 
     @property
     def top1(self) -> float:
-        """Share of the crops that are told share_correct."""
+        """Share of the crops whose type is told correctly."""
         return float((self.said == self.truth).mean())
 
     def share_correct(self, kind: int) -> float:
@@ -273,10 +273,8 @@ def train_and_classify(
 
 
 def _table(result: Classification, figures: dict[str, float]) -> Table:
-    crops, share_correct = (Column(name, justify="share_correct") for name in ("crops", "top-1"))
-    table = Table(
-        "type", crops, share_correct, "taken for", title="types told apart in unseen scenes"
-    )
+    crops, correct = (Column(name, justify="right") for name in ("crops", "top-1"))
+    table = Table("type", crops, correct, "taken for", title="types told apart in unseen scenes")
     for kind in result.worst_first()[:10]:
         others = ", ".join(f"{name} {share:.0%}" for name, share in result.taken_for(kind)[:3])
         count = str(int((result.truth == kind).sum()))

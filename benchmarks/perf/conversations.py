@@ -116,7 +116,7 @@ def serve(pipe: Connection, tasks: list[Task], latency: float) -> None:
 @click.option("--concurrency", default=8, show_default=True)
 @click.option("--workers", default=2, show_default=True)
 @click.option("--latency", default=0.1, show_default=True, help="Seconds.")
-@click.option("--size", default=300, show_default=True, help="Pixels, both actions.")
+@click.option("--size", default=300, show_default=True, help="Pixels, width and height.")
 def main(episodes: int, concurrency: int, workers: int, latency: float, size: int) -> None:
     """Measure, and print."""
     suite = load_suite("er-1k")

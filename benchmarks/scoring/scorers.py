@@ -34,7 +34,7 @@ class Tally:
         scored: those that were done, in the order of the episode. ``end`` is left out where the
             task's name decides about it, which it does in the paper's reading only.
         points: how many scored, that ``end`` included.
-        navigations_done: key actions done besides, which score nothing: navigations that the task lists.
+        navigations_done: navigations of the task that were done; these key actions score nothing.
         navigated_to: the types that navigations named, failed ones too.
         steps: how many steps the episode took, ``init`` and ``end`` included.
         success: whether the task was done.

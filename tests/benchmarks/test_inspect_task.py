@@ -234,7 +234,7 @@ def test_the_command(tmp_path, monkeypatch, capsys):
     assert run_command("mute/model", tmp_path) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "success: 0.000"
-    assert [exchange.split(":")[0] for exchange in lines[:-1]] == list(METRICS)
+    assert [line.split(":")[0] for line in lines[:-1]] == list(METRICS)
     log = read_eval_log(lines[-1])
     assert log.eval.task == "er_gym"
     assert log.eval.task_args["suite"] == "mini"
