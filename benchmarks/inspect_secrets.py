@@ -15,14 +15,14 @@ from agents.vlm.record import plain_url
 _DONE = "_er_gym_discreet"
 
 
-def model_at(name: str, address: str | None) -> Model:
+def model_at_url(name: str, address: str | None) -> Model:
     """A model of Inspect behind an address, whose query is sent with each request and not logged.
 
     Raises:
         ValueError: the address holds a password, or a query that the provider cannot send.
     """
     if not address:
-        return discreet(get_model(name))
+        return without_secrets(get_model(name))
     import httpx2
 
     url = httpx2.URL(address)
@@ -37,10 +37,10 @@ def model_at(name: str, address: str | None) -> Model:
         if not hasattr(client, "with_options"):
             raise ValueError(f"{name} takes no query in --model-base-url; give the address alone")
         model.api.client = client.with_options(default_query=dict(url.params))
-    return discreet(model, address)
+    return without_secrets(model, address)
 
 
-def discreet(model: Model, address: str = "") -> Model:
+def without_secrets(model: Model, address: str = "") -> Model:
     """The model, whose answers and errors no longer hold its key."""
     api: Any = model.api
     if getattr(api, _DONE, False):
@@ -52,35 +52,35 @@ def discreet(model: Model, address: str = "") -> Model:
         try:
             result = await ask(*args, **named)
         except Exception as error:
-            _strike_error(error, secrets)
+            _redact_error(error, secrets)
             raise
         if isinstance(result, tuple):
             output, call = result
-            return _plain(output, secrets), _plain_call(call, secrets)
-        return _plain(result, secrets)
+            return _redact_output(output, secrets), _redact_call(call, secrets)
+        return _redact_output(result, secrets)
 
     api.generate = generate
     setattr(api, _DONE, True)
     return model
 
 
-def _plain(output: ModelOutput | Exception, secrets: Secrets) -> ModelOutput | Exception:
+def _redact_output(output: ModelOutput | Exception, secrets: Secrets) -> ModelOutput | Exception:
     if isinstance(output, Exception):
-        _strike_error(output, secrets)
+        _redact_error(output, secrets)
         return output
     said = output.model_dump()
     plain = secrets.strike_all(said)
     return output if plain == said else ModelOutput.model_validate(plain)
 
 
-def _plain_call(call: ModelCall | None, secrets: Secrets) -> ModelCall | None:
+def _redact_call(call: ModelCall | None, secrets: Secrets) -> ModelCall | None:
     # In place: Inspect may hold it already.
     if call is not None and call.response is not None:
         call.response = secrets.strike_all(call.response)
     return call
 
 
-def _strike_error(error: BaseException | None, secrets: Secrets) -> None:
+def _redact_error(error: BaseException | None, secrets: Secrets) -> None:
     """Strike secrets out of an exception, and of those that it came of."""
     while error is not None:
         error.args = tuple(secrets.strike_all(each) for each in error.args)

@@ -48,7 +48,7 @@ from agents.vlm.factory import load_settings
 from agents.vlm.matching import Matcher
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import AgentSettings
-from benchmarks.inspect_secrets import discreet
+from benchmarks.inspect_secrets import without_secrets
 from benchmarks.scoring.metrics import METRICS, score_episode
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.env_pool import EnvPool
@@ -113,7 +113,7 @@ def _sample(each: Task) -> Sample:
 
 
 def _generation(settings: AgentSettings) -> GenerateConfig:
-    """How words are chosen, where the command line says nothing of it."""
+    """Sampling arguments, where the command line does not set them."""
     sampling = settings.sampling
     return GenerateConfig(
         temperature=sampling.temperature,
@@ -137,12 +137,12 @@ def episode(
     matcher.prepare()
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
-        model, line = discreet(get_model()), _Line()
+        model, exchange = without_secrets(get_model()), _ReplyExchange()
         played = tasks[str(state.sample_id)]
         number = episode_seed(seed + state.epoch - 1, played.id)
 
         def play() -> EpisodeRecord:
-            agent = VLMAgent(line, settings, prompts, matcher, seed=number, name=str(model))
+            agent = VLMAgent(exchange, settings, prompts, matcher, seed=number, name=str(model))
             try:
                 with EnvPool(1, 1, env) as engines:
                     return play_episode(
@@ -154,17 +154,17 @@ def episode(
                         max_steps=env.get("max_steps"),
                     )
             finally:
-                line.questions.put(None)
+                exchange.questions.put(None)
 
         conversation = _Conversation(model, state, settings)
         with ThreadPoolExecutor(1) as thread:
             playing = thread.submit(play)
             try:
-                while (question := await _in_thread(line.questions.get)) is not None:
+                while (question := await _in_thread(exchange.questions.get)) is not None:
                     # Whatever ends a sample, a limit or the model's failure, is raised here.
-                    line.answers.put(await conversation.reply(*question))
+                    exchange.answers.put(await conversation.reply(*question))
             finally:
-                line.answers.put(None)
+                exchange.answers.put(None)
                 with anyio.CancelScope(shield=True):
                     record = await _in_thread(playing.result)
                 state.store.set(EPISODE, record.model_dump(mode="json"))
@@ -181,7 +181,7 @@ async def _in_thread(wait: Callable[[], _Result]) -> _Result:
     return await anyio.to_thread.run_sync(wait, limiter=anyio.CapacityLimiter(1))
 
 
-class _Line:
+class _ReplyExchange:
     """A :class:`agents.vlm.chat.Client` whose replies come from another thread.
 
     Attributes:
@@ -229,7 +229,7 @@ class _Conversation:
         """
         start = time.monotonic()
         sent = [self._message(place, message) for place, message in enumerate(messages)]
-        how = _ASKING[self._settings.decide]()
+        how = _GENERATE_ARGUMENTS[self._settings.decide]()
         if self._settings.seed is not None:
             how["config"].seed = (self._settings.seed + seed) % 2**31
         output = await self._model.generate(sent, **how)
@@ -248,8 +248,8 @@ class _Conversation:
         """
         if place < len(self._known):
             before, known = self._known[place]
-            return known if before == message else _inspects(message)
-        made = _inspects(message)
+            return known if before == message else _inspect_message(message)
+        made = _inspect_message(message)
         if message.role != "assistant":
             self._state.messages.append(made)
         elif self._said is not None and not self._said.tool_calls:
@@ -267,7 +267,7 @@ _KINDS: Mapping[str, Callable[..., ChatMessage]] = {
 }
 
 
-def _inspects(message: Message) -> ChatMessage:
+def _inspect_message(message: Message) -> ChatMessage:
     texts = [part for part in message.parts if isinstance(part, str)]
     if len(texts) == len(message.parts):
         return _KINDS[message.role](content="\n".join(texts))
@@ -301,11 +301,11 @@ def _reply(output: ModelOutput, seconds: float) -> Reply:
 # -- how a decision is asked for: arguments of Model.generate --------------------------------------
 
 
-def _in_tags() -> dict[str, Any]:
+def _tags_arguments() -> dict[str, Any]:
     return {"config": GenerateConfig()}
 
 
-def _by_tool() -> dict[str, Any]:
+def _tool_arguments() -> dict[str, Any]:
     function = REQUEST_FIELDS["tools"]["tools"][0]["function"]
     return {
         "tools": [ToolInfo.model_validate(function)],
@@ -314,7 +314,7 @@ def _by_tool() -> dict[str, Any]:
     }
 
 
-def _in_json() -> dict[str, Any]:
+def _json_arguments() -> dict[str, Any]:
     form = REQUEST_FIELDS["json"]["response_format"]["json_schema"]
     schema = ResponseSchema(
         name=form["name"],
@@ -324,7 +324,7 @@ def _in_json() -> dict[str, Any]:
     return {"config": GenerateConfig(response_schema=schema)}
 
 
-_ASKING = {"tags": _in_tags, "tools": _by_tool, "json": _in_json}
+_GENERATE_ARGUMENTS = {"tags": _tags_arguments, "tools": _tool_arguments, "json": _json_arguments}
 
 
 # -- scoring -------------------------------------------------------------------------------------

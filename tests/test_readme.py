@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+import pkgutil
 import re
 import shlex
 import subprocess
@@ -41,13 +43,18 @@ def commands(page: str) -> list[str]:
     return [re.split(r" [|>&;]", command)[0] for command in found]
 
 
-def test_commands_and_their_options_exist(repository: Path) -> None:
-    pages = [
+def pages(repository: Path) -> list[Path]:
+    return [
         repository / "README.md",
         repository / "CONTRIBUTING.md",
         *repository.glob("docs/*.md"),
     ]
-    found = [(page.name, command) for page in pages for command in commands(page.read_text())]
+
+
+def test_commands_and_their_options_exist(repository: Path) -> None:
+    found = [
+        (page.name, command) for page in pages(repository) for command in commands(page.read_text())
+    ]
     assert len(found) > 50
     for page, command in found:
         context, parsed, rest = click.Context(cli, info_name="er-gym"), cli, shlex.split(command)
@@ -56,3 +63,35 @@ def test_commands_and_their_options_exist(repository: Path) -> None:
             assert parsed is not None, f"{page}: er-gym {command}"
             context = click.Context(parsed, parent=context)
         parsed.make_parser(context).parse_args(rest)  # raises what a user would be told
+
+
+def test_files_and_modules_exist(repository: Path) -> None:
+    """Every path and every dotted name that a page has in backticks or runs with ``python -m``."""
+    text = {page.name: page.read_text() for page in pages(repository)}
+    groups = re.findall(r"\| `(er_gym\.\w+)` \|", text["extending.md"])  # of entry points
+    files = [
+        (page, found)
+        for page, words in text.items()
+        for found in re.findall(
+            r"`((?:er_gym|agents|benchmarks|configs|examples|tests)/[\w./-]+)`", words
+        )
+    ]
+    names = [
+        (page, found)
+        for page, words in text.items()
+        for found in re.findall(r"`((?:er_gym|agents|benchmarks)(?:\.\w+)+)", words)
+        if found not in groups
+    ]
+    scripts = [
+        (page, found)
+        for page, words in text.items()
+        for found in re.findall(r"python -m ((?:er_gym|benchmarks)[\w.]+)", words)
+    ]
+    assert min(len(files), len(names), len(scripts)) > 10
+    assert [each for each in files if not (repository / each[1]).exists()] == []
+    assert [each for each in scripts if importlib.util.find_spec(each[1]) is None] == []
+    for page, name in names:
+        try:
+            pkgutil.resolve_name(name)
+        except (ImportError, AttributeError) as error:
+            raise AssertionError(f"{page}: {name}") from error

@@ -18,7 +18,7 @@ from benchmarks.checks.invariants import (
     floor_of,
     stands_on_the_floor,
 )
-from benchmarks.checks.soak import Report, choose_scenes, soak, soak_scene, verdict
+from benchmarks.checks.soak import SoakReport, choose_scenes, soak, soak_scene, verdict
 from benchmarks.perf import steps as steps_script
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.thor import SCENE_NAMES, make_controller
@@ -227,8 +227,8 @@ def test_what_is_raised_is_a_problem_with_its_step(monkeypatch):
 
 def test_the_verdict_says_how_to_see_it_again(capsys):
     reports = [
-        Report("FloorPlan2", 7, 5, 0.1, "after action 7, Pass {}: wrong"),
-        Report("FloorPlan1", 10, 9, 0.1),
+        SoakReport("FloorPlan2", 7, 5, 0.1, "after action 7, Pass {}: wrong"),
+        SoakReport("FloorPlan1", 10, 9, 0.1),
     ]
     assert verdict(reports, level="engine", actions=10, seed=4) == 1
     said = capsys.readouterr()
@@ -261,13 +261,15 @@ def test_other_scenes_are_bad_input(asked):
 
 def test_steps_are_counted_over_episodes():
     env = EmbodiedEnv(obs_mode="state")
-    walker = steps_script.Walker([env, env], seed=0)
-    assert walker.steps_per_second(0.2) > 5
-    assert walker.resets
+    player = steps_script.RandomPlayer([env, env], seed=0)
+    assert player.steps_per_second(0.2) > 5
+    assert player.resets
     env.close()
 
 
 def test_the_table_names_what_was_measured():
     console = Console(record=True, width=120)
-    steps_script.show([steps_script.Figure.of("steps, none", [3.0, 1.0, 2.0], "steps/s")], console)
+    steps_script.show(
+        [steps_script.Measurement.of("steps, none", [3.0, 1.0, 2.0], "steps/s")], console
+    )
     assert re.search(r"steps, none\W+2\.00\W+steps/s\W+3\.00  1\.00  2\.00", console.export_text())

@@ -27,10 +27,10 @@ from typing import Any
 import click
 from rich.console import Console
 
-from benchmarks.checks.fuzz_checks import Pictures, Witness, floor, scene_of
-from benchmarks.checks.fuzz_report import Plan, Report, Step, show
+from benchmarks.checks.fuzz_checks import Pictures, RoomChecker, floor, scene_of
+from benchmarks.checks.fuzz_report import FuzzPlan, FuzzReport, FuzzStep, show
 from benchmarks.checks.fuzz_requests import Request, Room, draw_request
-from benchmarks.checks.scene_jobs import choose_scenes, do_all
+from benchmarks.checks.scene_jobs import choose_scenes, run_jobs
 from benchmarks.cli.progress import bar
 from er_gym.rollout.worker_pool import Lost
 from er_gym.sim.controller import EmbeddedController
@@ -45,7 +45,7 @@ _INTERRUPTED = 130
 
 
 @dataclass
-class Answer:
+class Outcome:
     """What came back: plain metadata, the pictures drawn, and what is wrong with the call."""
 
     metadata: dict[str, Any]
@@ -53,7 +53,7 @@ class Answer:
     problems: list[str] = field(default_factory=list)
 
 
-class ByEngine:
+class EngineDriver:
     """Plays the engine itself, which never raises."""
 
     def __init__(self) -> None:
@@ -63,15 +63,15 @@ class ByEngine:
     def world(self) -> World:
         return self._engine.world
 
-    def step(self, request: Request) -> Answer:
+    def step(self, request: Request) -> Outcome:
         """Do an action."""
         metadata, view = self._engine.step(request)
         views = () if view is None else (view, *view.third_party)
         drawn = [p for v in views for p in (v.rgb, v.depth, v.instances, v.classes)]
-        return Answer(dict(metadata), [picture for picture in drawn if picture is not None])
+        return Outcome(dict(metadata), [picture for picture in drawn if picture is not None])
 
 
-class ByClient:
+class ClientDriver:
     """Plays the official controller's face, which raises where the official one does."""
 
     def __init__(self) -> None:
@@ -82,7 +82,7 @@ class ByClient:
         assert self._controller.server is not None
         return self._controller.server._engine.world  # the fuzz looks behind the face
 
-    def step(self, request: Request) -> Answer:
+    def step(self, request: Request) -> Outcome:
         """Do an action, and see that exactly the failed ones raise what they should."""
         raised: Exception | None = None
         try:
@@ -102,15 +102,15 @@ class ByClient:
             problems.append(f"raised {raised!r}, not {due}, at {metadata['errorMessage']!r}")
         # Not the depth, which the client squeezes: a picture a pixel high has no height.
         drawn = (event.frame, event.instance_segmentation_frame)
-        return Answer(metadata, [picture for picture in drawn if picture is not None], problems)
+        return Outcome(metadata, [picture for picture in drawn if picture is not None], problems)
 
 
-class Game:
+class FuzzRun:
     """A scene being played in: who does it, who looks, and what has been seen there."""
 
-    def __init__(self, by: type[ByEngine] | type[ByClient]) -> None:
+    def __init__(self, by: type[EngineDriver] | type[ClientDriver]) -> None:
         self._player = by()
-        self._witness = Witness()
+        self._checker = RoomChecker()
         self._ids: dict[str, None] = {}
         self.metadata: dict[str, Any] = {}
         self.seconds = 0.0
@@ -122,7 +122,7 @@ class Game:
         self.seconds = time.perf_counter() - start
         self.metadata = answer.metadata
         self._ids.update(dict.fromkeys(entry["objectId"] for entry in self.metadata["objects"]))
-        seen = self._witness.sees(request, answer.metadata, answer.pictures, self._player.world)
+        seen = self._checker.sees(request, answer.metadata, answer.pictures, self._player.world)
         return [*answer.problems, *seen]
 
     def room(self, random: Random, scenes: Sequence[str]) -> Room:
@@ -132,12 +132,12 @@ class Game:
         return Room(random, scenes, self.metadata, floor(scene_of(self.metadata), 0.25), gone)
 
 
-def play(plan: Plan, run: int) -> Iterator[Step]:
+def play(plan: FuzzPlan, run: int) -> Iterator[FuzzStep]:
     """The steps of a run. A game in which something was raised is begun anew."""
     random = Random(f"{plan.seed} {run}")
     scene = random.choice(plan.scenes)
-    by = ByClient if run % _THROUGH_THE_CLIENT == _THROUGH_THE_CLIENT - 1 else ByEngine
-    game: Game | None = None
+    by = ClientDriver if run % _THROUGH_THE_CLIENT == _THROUGH_THE_CLIENT - 1 else EngineDriver
+    game: FuzzRun | None = None
     for number in range(plan.steps(run)):
         request: Request = {"action": "Reset", "sceneName": scene, "renderImage": False}
         problems, seconds = [], 0.0
@@ -145,7 +145,7 @@ def play(plan: Plan, run: int) -> Iterator[Step]:
             warnings.simplefilter("always")
             try:
                 if game is None:
-                    game = Game(by)
+                    game = FuzzRun(by)
                     problems += game.do(request)
                 scene = scene_of(game.metadata)
                 request = draw_request(game.room(random, plan.scenes))
@@ -155,7 +155,7 @@ def play(plan: Plan, run: int) -> Iterator[Step]:
                 error, game = f"{type(failure).__name__}: {failure}", None
                 problems.append(f"raised at {_place(failure)}: {error}")
         problems += [f"warned at {Path(w.filename).name}:{w.lineno}: {w.message}" for w in warned]
-        yield Step(run, number, scene, request, error, problems, seconds)
+        yield FuzzStep(run, number, scene, request, error, problems, seconds)
 
 
 def _place(error: Exception) -> str:
@@ -165,24 +165,24 @@ def _place(error: Exception) -> str:
     return f"{Path(ours[-1].filename).name}:{ours[-1].lineno}"
 
 
-def play_run(run: int, *, plan: Plan) -> Report:
+def play_run(run: int, *, plan: FuzzPlan) -> FuzzReport:
     """A whole run, counted."""
-    report = Report()
+    report = FuzzReport()
     for step in play(plan, run):
         report.count(step)
     return report
 
 
-def _player(plan: Plan) -> Callable[[int], Report]:
+def _player(plan: FuzzPlan) -> Callable[[int], FuzzReport]:
     return partial(play_run, plan=plan)
 
 
-def fuzz(plan: Plan, workers: int) -> Iterator[Report]:
+def fuzz(plan: FuzzPlan, workers: int) -> Iterator[FuzzReport]:
     """Every run's report, as they are done, in so many processes (1: in this one)."""
-    for run, report in do_all(partial(_player, plan), range(plan.runs), workers):
+    for run, report in run_jobs(partial(_player, plan), range(plan.runs), workers):
         if isinstance(report, Lost):
             died = f"the process died, exit code {report.exitcode}"
-            report = Report(wrong=[Step(run, 0, "?", {}, "", [died], 0.0)])
+            report = FuzzReport(wrong=[FuzzStep(run, 0, "?", {}, "", [died], 0.0)])
         yield report
 
 
@@ -195,11 +195,11 @@ def fuzz(plan: Plan, workers: int) -> Iterator[Report]:
 def main(actions: int, seed: int, workers: int, scenes: str, run: int | None) -> None:
     """Play random actions, sane and absurd, and check what must always hold."""
     try:
-        plan = Plan(seed, actions, tuple(choose_scenes(scenes)))
+        plan = FuzzPlan(seed, actions, tuple(choose_scenes(scenes)))
     except ValueError as error:
         raise click.UsageError(str(error)) from None
     console = Console(width=None if sys.stdout.isatty() else 120)
-    total, start = Report(), time.perf_counter()
+    total, start = FuzzReport(), time.perf_counter()
     if run is not None:
         if run >= plan.runs:
             raise click.UsageError(f"--run is one of 0 to {plan.runs - 1}, not {run}")
@@ -216,7 +216,7 @@ def main(actions: int, seed: int, workers: int, scenes: str, run: int | None) ->
     raise SystemExit(show(total, plan, time.perf_counter() - start, console) or code)
 
 
-def _play_all(plan: Plan, workers: int, total: Report) -> None:
+def _play_all(plan: FuzzPlan, workers: int, total: FuzzReport) -> None:
     """Every run, with a bar; what is done is counted at once, for whoever interrupts."""
     start = time.perf_counter()
     with bar(Console(stderr=True)) as progress:

@@ -68,7 +68,7 @@ def scene_of(metadata: Metadata) -> str:
     return str(metadata["sceneName"]).removesuffix("_physics")
 
 
-def says_why(metadata: Metadata) -> Iterator[str]:
+def failure_has_a_message(metadata: Metadata) -> Iterator[str]:
     """What is said of a refusal is one line that can be read, and nothing is returned."""
     message = metadata["errorMessage"]
     if len(message) > LONGEST_MESSAGE:
@@ -80,14 +80,14 @@ def says_why(metadata: Metadata) -> Iterator[str]:
         yield "a refused action returned something"
 
 
-def the_rest_is_the_same(before: Metadata, after: Metadata) -> Iterator[str]:
+def nothing_else_changed(before: Metadata, after: Metadata) -> Iterator[str]:
     """Nothing in the metadata has changed but what they say of the last action."""
     for name in sorted({*before, *after} - OF_THE_ACTION):
         if name not in before or name not in after or before[name] != after[name]:
             yield f"{after['lastAction']}, which changes nothing, changed {name}"
 
 
-def goes_over_the_wire(metadata: Metadata) -> Iterator[str]:
+def can_be_serialised(metadata: Metadata) -> Iterator[str]:
     """Packs as msgpack and as JSON, of plain types, with no NaN and no infinity anywhere."""
     try:
         _packed(metadata)
@@ -130,7 +130,7 @@ def pictures_fit(pictures: Pictures, metadata: Metadata) -> Iterator[str]:
             yield "a picture has a pixel that is NaN"
 
 
-def is_worked_out_anew(world: World, metadata: Metadata) -> Iterator[str]:
+def cache_is_consistent(world: World, metadata: Metadata) -> Iterator[str]:
     """What the engine keeps of the world is what it would work out without."""
     untouched = world.untouched
     world.untouched = False  # an untouched world's entries are those of its scene
@@ -143,7 +143,7 @@ def is_worked_out_anew(world: World, metadata: Metadata) -> Iterator[str]:
                 yield f"{new['objectId']}.{name} is {new[name]}, and {old[name]} was kept"
 
 
-class Witness:
+class RoomChecker:
     """Sees every event of one room, in order, and says what is wrong with each."""
 
     def __init__(self) -> None:
@@ -158,20 +158,20 @@ class Witness:
         """Everything that is wrong after this request."""
         before, self._before = self._before, metadata
         self.seen += 1
-        yield from says_why(metadata)
+        yield from failure_has_a_message(metadata)
         yield from pictures_fit(pictures, metadata)
         if before is None or before["objects"] != metadata["objects"]:
             # Else they were found to be well the last time.
             for invariant in _OF_THE_OBJECTS:
                 yield from invariant(metadata)
             yield from values_are_plain({"objects": metadata["objects"]})
-        yield from goes_over_the_wire({**metadata, "objects": []})
+        yield from can_be_serialised({**metadata, "objects": []})
         if before is not None:
             yield from self._compared(request, before, metadata, world)
         if self.seen % _ODD_TIMES == 0:
-            yield from goes_over_the_wire(metadata)
-            yield from is_worked_out_anew(world, metadata)
-            yield from self._compared_with_long_ago(metadata)
+            yield from can_be_serialised(metadata)
+            yield from cache_is_consistent(world, metadata)
+            yield from self._kept_metadata_unchanged(metadata)
         self._settings = world.settings
 
     def _compared(
@@ -180,7 +180,7 @@ class Witness:
         name = request.get("action")
         if not after["lastActionSuccess"] or (isinstance(name, str) and name in QUESTIONS):
             yield from a_refusal_changed_nothing(before, after)
-            yield from the_rest_is_the_same(before, after)
+            yield from nothing_else_changed(before, after)
             if self._settings != world.settings:
                 yield f"{name}, which changes nothing, changed {self._settings}"
         # Whoever forces a teleport may stand in a wall.
@@ -188,7 +188,7 @@ class Witness:
         if before["agent"]["position"] != after["agent"]["position"] and not forced:
             yield from stands_on_the_floor(after, _floor_points(scene_of(after)))
 
-    def _compared_with_long_ago(self, metadata: dict[str, Any]) -> Iterator[str]:
+    def _kept_metadata_unchanged(self, metadata: dict[str, Any]) -> Iterator[str]:
         """Metadata that somebody has kept say what they said."""
         if self._kept is not None and _packed(self._kept[0]) != self._kept[1]:
             yield f"the metadata of {_ODD_TIMES} actions ago have changed since"

@@ -25,7 +25,7 @@ _OTHER = "(none of them)"
 
 
 @dataclass(frozen=True)
-class Plan:
+class FuzzPlan:
     """What is played; the runs of a plan do not depend on each other."""
 
     seed: int = 0
@@ -42,7 +42,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Step:
+class FuzzStep:
     """An action of a run, and what came of it."""
 
     run: int
@@ -71,7 +71,7 @@ def _short(text: str) -> str:
 
 
 @dataclass
-class Tally:
+class ActionCounts:
     """How it went with the actions of one name."""
 
     tries: int = 0
@@ -80,7 +80,7 @@ class Tally:
     seconds: float = 0.0
     slowest: float = 0.0
 
-    def add(self, other: Tally) -> None:
+    def add(self, other: ActionCounts) -> None:
         """Count another tally too."""
         self.tries += other.tries
         self.successes += other.successes
@@ -90,39 +90,39 @@ class Tally:
 
 
 @dataclass
-class Report:
+class FuzzReport:
     """What came of one or several runs; ``wrong`` are the steps with problems."""
 
-    tallies: dict[str, Tally] = field(default_factory=dict)
-    wrong: list[Step] = field(default_factory=list)
+    tallies: dict[str, ActionCounts] = field(default_factory=dict)
+    wrong: list[FuzzStep] = field(default_factory=list)
     fingerprint: int = 0
 
-    def add(self, other: Report) -> None:
+    def add(self, other: FuzzReport) -> None:
         """Count another report too, in whatever order they come."""
         for name, tally in other.tallies.items():
-            self.tallies.setdefault(name, Tally()).add(tally)
+            self.tallies.setdefault(name, ActionCounts()).add(tally)
         self.wrong += other.wrong
         self.fingerprint ^= other.fingerprint
 
-    def count(self, step: Step) -> None:
+    def count(self, step: FuzzStep) -> None:
         """Count a step."""
-        one = Tally(1, not step.error, len(step.problems), step.seconds, step.seconds)
-        self.tallies.setdefault(step.name, Tally()).add(one)
+        one = ActionCounts(1, not step.error, len(step.problems), step.seconds, step.seconds)
+        self.tallies.setdefault(step.name, ActionCounts()).add(one)
         if step.problems:
             self.wrong.append(step)
         said = f"{step.run} {step.request!r} {step.error}".encode(errors="replace")
         self.fingerprint = zlib.crc32(said, self.fingerprint)
 
     @property
-    def total(self) -> Tally:
+    def total(self) -> ActionCounts:
         """Of all names together."""
-        total = Tally()
+        total = ActionCounts()
         for tally in self.tallies.values():
             total.add(tally)
         return total
 
 
-def show(report: Report, plan: Plan, seconds: float, console: Console) -> int:
+def show(report: FuzzReport, plan: FuzzPlan, seconds: float, console: Console) -> int:
     """Print the problems, the table and a line that sums it up; returns the exit code."""
     kinds: Counter[str] = Counter()
     for step in sorted(report.wrong, key=lambda step: (step.run, step.number)):
@@ -150,7 +150,7 @@ def _kind(problem: str) -> str:
     return re.sub(r"\S+\|\S+|\b\d+(?= )", "…", problem).partition(": ")[0][:100]
 
 
-def again(plan: Plan, run: int) -> str:
+def again(plan: FuzzPlan, run: int) -> str:
     """The command that plays a run once more."""
     every = tuple(plan.scenes) == tuple(SCENE_NAMES)
     scenes = "" if every else f" --scenes {','.join(plan.scenes)}"
@@ -160,7 +160,7 @@ def again(plan: Plan, run: int) -> str:
     )
 
 
-def _table(report: Report) -> Table:
+def _table(report: FuzzReport) -> Table:
     table = Table(title="Actions played")
     table.add_column("action")
     for heading in ("tries", "successes", "refusals", "problems", "mean ms", "slowest ms"):

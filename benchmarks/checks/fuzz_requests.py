@@ -1,7 +1,7 @@
 """Random requests: what a program would ask of the engine, and much that none should.
 
 A request is drawn sane, parameter by parameter from the table :data:`SANE`, so that a good share of
-them can be done. One in four is then bent by :data:`BENDS`, mostly with a value of
+them can be done. One in four is then changed by :data:`MUTATIONS`, mostly with a value of
 :data:`EXTREMES`.
 """
 
@@ -68,16 +68,16 @@ _ODD_PARAMETERS = (
         "x" * 5000,
     ),
 )
-_BENT = 0.25
-_APT = 0.4
+_MUTATION_RATE = 0.25
+_FOLLOW_UP_RATE = 0.4
 """How often the last answer decides which action is next."""
-_OPTIONAL = 0.5
+_OPTIONAL_RATE = 0.5
 """How often a parameter is given that need not be."""
-_BY_ID = 0.8
+_BY_ID_RATE = 0.8
 """How often an object is named by its id, not by a point of the picture."""
-_PICTURES = 0.03
+_PICTURE_RATE = 0.03
 """How often pictures are asked for, which take most of the time."""
-_FORGOTTEN = 0.15
+_ANY_OBJECT_RATE = 0.15
 """How often an object is drawn from all, rather than from those that suit the action."""
 
 
@@ -135,7 +135,7 @@ def _object(has: str = "", lacks: str = "") -> Draw:
     def draw(room: Room) -> str:
         suited = [e for e in room.objects if (not has or e[has]) and not (lacks and e[lacks])]
         seen = [entry for entry in suited if entry["visible"]]
-        anyhow = room.random.random() < _FORGOTTEN
+        anyhow = room.random.random() < _ANY_OBJECT_RATE
         chosen: str = room.random.choice(
             room.objects if anyhow else seen or suited or room.objects
         )["objectId"]
@@ -157,7 +157,7 @@ def _object_type(room: Room) -> str:
 def _position(room: Room) -> dict[str, float]:
     """Somewhere on the floor, now and then beside it."""
     position = dict(room.random.choice(room.positions))
-    if room.random.random() < _FORGOTTEN:
+    if room.random.random() < _ANY_OBJECT_RATE:
         position["x"] += room.random.gauss(0.0, 0.5)
     return position
 
@@ -193,7 +193,7 @@ def _arrangement(room: Room) -> list[Request]:
     """Poses for what is loose: as they are, but for a few; sometimes some are left out or twice."""
     random = room.random
     loose = [entry for entry in room.objects if entry["pickupable"] or entry["moveable"]]
-    if random.random() < _FORGOTTEN:
+    if random.random() < _ANY_OBJECT_RATE:
         loose = random.choices(loose, k=random.randint(0, len(loose))) if loose else []
     poses = [
         {
@@ -209,7 +209,7 @@ def _arrangement(room: Room) -> list[Request]:
     return poses
 
 
-SUITED = {
+OBJECT_CONDITIONS = {
     "PickupObject": ("pickupable", "isPickedUp"),
     "PutObject": ("receptacle", "isPickedUp"),
     "OpenObject": ("openable", "isOpen"),
@@ -225,13 +225,13 @@ SUITED = {
     "EmptyLiquidFromObject": ("isFilledWithLiquid",),
 }
 """What an object must be for an action, and what it must not be yet."""
-AIMED = (
-    *(*SUITED, "UseUpObject", "GetObjectInFrame", "GetCoordinateFromRaycast"),
+PICTURE_POINT_ACTIONS = (
+    *(*OBJECT_CONDITIONS, "UseUpObject", "GetObjectInFrame", "GetCoordinateFromRaycast"),
     *("DirectionalPush", "PushObject", "PullObject", "TouchThenApplyForce"),
 )
 """What is also done to whatever a point of the picture shows."""
 SANE: dict[str, Draw] = {
-    **{f"{action}.objectId": _object(*suits) for action, suits in SUITED.items()},
+    **{f"{action}.objectId": _object(*suits) for action, suits in OBJECT_CONDITIONS.items()},
     "UseUpObject.objectId": _used_up,
     **{
         f"{action}.objectId": _object("pickupable")
@@ -260,7 +260,7 @@ SANE: dict[str, Draw] = {
     "z": _coordinate("z"),
     "ChangeResolution.x": lambda room: room.random.randint(1, 40),
     "ChangeResolution.y": lambda room: room.random.randint(1, 40),
-    **{f"{action}.{axis}": _between(0.0, 1.0) for action in AIMED for axis in "xy"},
+    **{f"{action}.{axis}": _between(0.0, 1.0) for action in PICTURE_POINT_ACTIONS for axis in "xy"},
     "degrees": _among(1.0, 15.0, 30.0, 45.0, 90.0, -90.0, 360.0),
     "moveMagnitude": _among(0.0, 0.1, 0.25, 0.25, 0.5, 1.0),
     "ThrowObject.moveMagnitude": _between(0.0, 300.0),
@@ -309,15 +309,17 @@ def _sane(room: Room, name: str) -> Request:
     if name in ("Teleport", "TeleportFull") and (room.poses or room.random.random() < 0.5):
         return {**request, **_pose(room)}
     ways, chance = WAYS[name], room.random.random
-    way = ways[0] if chance() < _BY_ID else room.random.choice(ways)
+    way = ways[0] if chance() < _BY_ID_RATE else room.random.choice(ways)
     for parameter, about in way.items():
-        if about.required or chance() < (_BY_ID if parameter == "objectId" else _OPTIONAL):
+        if about.required or chance() < (
+            _BY_ID_RATE if parameter == "objectId" else _OPTIONAL_RATE
+        ):
             draw = SANE.get(f"{name}.{parameter}") or SANE.get(parameter)
             request[parameter] = draw(room) if draw else _of_type(room, about.annotation)
     return request
 
 
-# -- bends -----------------------------------------------------------------------------------------
+# -- mutations -------------------------------------------------------------------------------------
 
 
 def _extreme(room: Room) -> Any:
@@ -386,7 +388,7 @@ def _holders(values: Sequence[Any]) -> Iterator[dict[str, Any] | list[Any]]:
             yield from _holders(list(value.values()) if isinstance(value, dict) else value)
 
 
-BENDS: tuple[Callable[[Room, Request], None], ...] = (
+MUTATIONS: tuple[Callable[[Room, Request], None], ...] = (
     *3 * (_another_value,),
     *2 * (_inside,),
     *(_no_such_thing, _missing, _one_too_many, _for_any_action, _another_action),
@@ -405,12 +407,14 @@ def _next(room: Room) -> Sequence[str]:
 def draw_request(room: Room) -> Request:
     """The next request; it shares nothing with the metadata or with another request."""
     random = room.random
-    request = _sane(room, random.choice(_next(room) if random.random() < _APT else NAMES))
-    if random.random() < _PICTURES:
+    request = _sane(
+        room, random.choice(_next(room) if random.random() < _FOLLOW_UP_RATE else NAMES)
+    )
+    if random.random() < _PICTURE_RATE:
         request["renderImage"] = True
         for flag in ("renderInstanceSegmentation", "renderSemanticSegmentation"):
             request[flag] = random.random() < 0.5
-    if random.random() < _BENT:
+    if random.random() < _MUTATION_RATE:
         for _ in range(random.choice((1, 1, 2))):
-            random.choice(BENDS)(room, request)
+            random.choice(MUTATIONS)(room, request)
     return request

@@ -71,11 +71,11 @@ def by_the_whole(action: Action, info: Mapping[str, Any]) -> Action:
     return action
 
 
-class ShuffledOracle:
-    """Does a task's key actions, the transfers in another order, and says Sink for SinkBasin.
+class _SeededOracle:
+    """An oracle with random choices of its own.
 
     Args:
-        seed: of the order.
+        seed: of these choices.
     """
 
     obs_mode = "text"
@@ -84,8 +84,16 @@ class ShuffledOracle:
         self._draw = random.Random(seed)
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """Choose an order."""
+        """Begin an episode."""
         self._solver = Solver()
+
+
+class ShuffledOracle(_SeededOracle):
+    """Does the key actions with the transfers in another order, and says Sink for SinkBasin."""
+
+    def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        """Choose an order."""
+        super().reset(task, obs, info)
         self._progress = Progress.start(Criteria(shuffled(task.key_actions, self._draw)))
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
@@ -102,21 +110,8 @@ class ShuffledOracle:
         return Decision(by_the_whole(self._solver.next({**info, **to_come})[0], info))
 
 
-class CarelessOracle:
-    """Does the key actions, and any legal thing now and then.
-
-    Args:
-        seed: of what it does.
-    """
-
-    obs_mode = "text"
-
-    def __init__(self, seed: int = 0) -> None:
-        self._draw = random.Random(seed)
-
-    def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """Begin an episode."""
-        self._solver = Solver()
+class CarelessOracle(_SeededOracle):
+    """Does the key actions, and now and then a random legal action."""
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """The solver's next step, or any."""
@@ -125,23 +120,16 @@ class CarelessOracle:
         return Decision(self._solver.next(info)[0])
 
 
-class UndoingOracle:
-    """Does the key actions, then one more thing to what is in reach, and says ``end``.
+class UndoingOracle(_SeededOracle):
+    """Does the key actions, then one more action, then says ``end``.
 
-    The goal may hold no longer: what was taken is put down, what was switched on is switched off.
-
-    Args:
-        seed: of what it does.
+    That action can undo the goal: it puts down an object, or switches one off.
     """
-
-    obs_mode = "text"
-
-    def __init__(self, seed: int = 0) -> None:
-        self._draw = random.Random(seed)
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Begin an episode."""
-        self._solver, self._undone = Solver(), False
+        super().reset(task, obs, info)
+        self._undone = False
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """The solver's next step; before ``end``, one of :data:`_UNDOING`."""

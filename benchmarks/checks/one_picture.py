@@ -62,7 +62,7 @@ Digests = dict[str, str]
 """Name of a picture, such as ``"300x300 rgb"``, to a digest of its bytes."""
 
 
-class Player:
+class Replayer:
     """An engine, and what the check does with it.
 
     Args:
@@ -149,11 +149,11 @@ def recipe(number: int) -> Recipe:
     random = np.random.default_rng([15, number])
     kinds = list(SCENE_NUMBERS)
     scene = f"FloorPlan{random.choice(SCENE_NUMBERS[kinds[number % len(kinds)]])}"
-    player, requests = Player(), []
-    player.do({"action": "Reset", "sceneName": scene})
+    replayer, requests = Replayer(), []
+    replayer.do({"action": "Reset", "sceneName": scene})
 
     def try_out(request: Request) -> bool:
-        done = player.do(request)
+        done = replayer.do(request)
         if done:
             requests.append(request)
         return done
@@ -165,15 +165,15 @@ def recipe(number: int) -> Recipe:
     if random.random() < 0.5:
         try_out({"action": "InitialRandomSpawn", "randomSeed": int(random.integers(1000))})
     for _ in range(_CHANGES):
-        try_out(_change(random, player.objects))
-    try_out(_pose(random, scene, player))
+        try_out(_change(random, replayer.objects))
+    try_out(_pose(random, scene, replayer))
     if random.random() < 0.4:
-        carried = [each["objectId"] for each in player.objects if each["pickupable"]]
+        carried = [each["objectId"] for each in replayer.objects if each["pickupable"]]
         chosen = str(random.choice(carried))
         try_out({"action": "PickupObject", "objectId": chosen, "forceAction": True})
-        try_out(_pose(random, scene, player))
+        try_out(_pose(random, scene, replayer))
     if random.random() < 0.3:
-        x, y, z = player.engine.world.agent.position.tolist()
+        x, y, z = replayer.engine.world.agent.position.tolist()
         try_out(
             {
                 "action": "AddThirdPartyCamera",
@@ -200,13 +200,13 @@ def _change(random: np.random.Generator, objects: list[dict[str, Any]]) -> Reque
     return request
 
 
-def _pose(random: np.random.Generator, scene: str, player: Player) -> Request:
-    floor = player.engine.world.scene.reachable
+def _pose(random: np.random.Generator, scene: str, replayer: Replayer) -> Request:
+    floor = replayer.engine.world.scene.reachable
     x, z = floor[random.integers(len(floor))].tolist()
     return {
         "action": "TeleportFull",
         "x": x,
-        "y": float(player.engine.world.standing_height),
+        "y": float(replayer.engine.world.standing_height),
         "z": z,
         "rotation": {"x": 0.0, "y": float(random.choice([0, 45, 90, 180, 270, 33.3])), "z": 0.0},
         "horizon": float(random.choice([-30, 0, 30, 60])),
@@ -215,10 +215,10 @@ def _pose(random: np.random.Generator, scene: str, player: Player) -> Request:
     }
 
 
-def follow(wanted: Recipe, player: Player, draw: bool = False) -> None:
-    """Bring a player into a state from a fresh world of its scene."""
+def follow(wanted: Recipe, replayer: Replayer, draw: bool = False) -> None:
+    """Bring a replayer into a state from a fresh world of its scene."""
     for request in ({"action": "Reset", "sceneName": wanted.scene}, *wanted.requests):
-        done = player.do(request, draw)
+        done = replayer.do(request, draw)
         if not done:
             raise AssertionError(f"state {wanted.number}: {request} was done before, and not now")
 
@@ -226,39 +226,39 @@ def follow(wanted: Recipe, player: Player, draw: bool = False) -> None:
 # -- histories -------------------------------------------------------------------------------------
 
 
-def straight(wanted: Recipe, player: Player) -> None:
+def straight(wanted: Recipe, replayer: Replayer) -> None:
     """Nothing is drawn on the way."""
-    follow(wanted, player)
+    follow(wanted, replayer)
 
 
-def after_another_room(wanted: Recipe, player: Player) -> None:
+def after_another_room(wanted: Recipe, replayer: Replayer) -> None:
     """A walk in another room first, with pictures; then each action is drawn."""
     random = np.random.default_rng([1, wanted.number])
-    player.do({"action": "Reset", "sceneName": str(random.choice(SCENE_NAMES))}, draw=True)
+    replayer.do({"action": "Reset", "sceneName": str(random.choice(SCENE_NAMES))}, draw=True)
     for _ in range(4):
-        player.do(_change(random, player.objects), draw=True)
+        replayer.do(_change(random, replayer.objects), draw=True)
         for action in random.choice(["MoveAhead", "RotateRight", "LookDown", "MoveBack"], 2):
-            player.do({"action": str(action)}, draw=True)
-    follow(wanted, player, draw=True)
+            replayer.do({"action": str(action)}, draw=True)
+    follow(wanted, replayer, draw=True)
 
 
-def after_another_arrangement(wanted: Recipe, player: Player) -> None:
+def after_another_arrangement(wanted: Recipe, replayer: Replayer) -> None:
     """The same room in another arrangement first, with pictures."""
     random = np.random.default_rng([2, wanted.number])
-    player.do({"action": "Reset", "sceneName": wanted.scene}, draw=True)
+    replayer.do({"action": "Reset", "sceneName": wanted.scene}, draw=True)
     seed = int(random.integers(1000))
-    player.do({"action": "InitialRandomSpawn", "randomSeed": seed}, draw=True)
+    replayer.do({"action": "InitialRandomSpawn", "randomSeed": seed}, draw=True)
     for _ in range(4):
-        player.do(_change(random, player.objects), draw=True)
-        player.do(_pose(random, wanted.scene, player), draw=True)
-    follow(wanted, player, draw=True)
+        replayer.do(_change(random, replayer.objects), draw=True)
+        replayer.do(_pose(random, wanted.scene, replayer), draw=True)
+    follow(wanted, replayer, draw=True)
 
 
-def there_and_back(wanted: Recipe, player: Player) -> None:
+def there_and_back(wanted: Recipe, replayer: Replayer) -> None:
     """From the state into others and back: walks, opens and shuts, switches, fills and empties."""
     random = np.random.default_rng([3, wanted.number])
-    follow(wanted, player, draw=True)
-    agent = player.engine.world.agent
+    follow(wanted, replayer, draw=True)
+    agent = replayer.engine.world.agent
     back = {
         "action": "TeleportFull",
         **dict(zip("xyz", agent.position.tolist(), strict=True)),
@@ -269,10 +269,10 @@ def there_and_back(wanted: Recipe, player: Player) -> None:
     }
     undone: list[Request] = []
     for _ in range(6):
-        openness = {each["objectId"]: each["openness"] for each in player.objects}
-        change = _change(random, player.objects)
+        openness = {each["objectId"]: each["openness"] for each in replayer.objects}
+        change = _change(random, replayer.objects)
         other = _UNDO.get(change["action"])
-        if other is None or not player.do(change, draw=True):
+        if other is None or not replayer.do(change, draw=True):
             continue
         name = change["objectId"]
         undo = {"action": other, "objectId": name, "forceAction": True}
@@ -280,14 +280,14 @@ def there_and_back(wanted: Recipe, player: Player) -> None:
             undo |= {"action": "OpenObject", "openness": openness[name]}
         undone.append(undo)
         for action in random.choice(["MoveAhead", "RotateLeft", "LookUp", "MoveLeft"], 2):
-            player.do({"action": str(action)}, draw=True)
+            replayer.do({"action": str(action)}, draw=True)
     for undo in reversed(undone):
-        player.do(undo, draw=True)
-    if not player.do(back, draw=True):
+        replayer.do(undo, draw=True)
+    if not replayer.do(back, draw=True):
         raise AssertionError(f"state {wanted.number}: no way back to {back}")
 
 
-HISTORIES: tuple[Callable[[Recipe, Player], None], ...] = (
+HISTORIES: tuple[Callable[[Recipe, Replayer], None], ...] = (
     straight,
     after_another_room,
     after_another_arrangement,
@@ -297,17 +297,17 @@ HISTORIES: tuple[Callable[[Recipe, Player], None], ...] = (
 
 
 def set_down(
-    wanted: Recipe, player: Player, by: Callable[[Recipe, Player], None], away: float
+    wanted: Recipe, replayer: Replayer, by: Callable[[Recipe, Replayer], None], away: float
 ) -> None:
     """A state, then all that can be carried ``away`` metres, turned, and back where it was.
 
     What has been set down is in another state than what was recorded there: AI2-THOR's boxes are
     not quite those of its own poses. So two ways there are compared with each other.
     """
-    by(wanted, player)
+    by(wanted, replayer)
     poses = [
         {"objectName": each["name"], "position": each["position"], "rotation": each["rotation"]}
-        for each in player.objects
+        for each in replayer.objects
         if each["pickupable"] or each["moveable"]
     ]
     moved = [
@@ -319,26 +319,26 @@ def set_down(
         for pose in poses
     ]
     for several in (moved, poses):
-        if not player.do({"action": "SetObjectPoses", "objectPoses": several}, draw=True):
+        if not replayer.do({"action": "SetObjectPoses", "objectPoses": several}, draw=True):
             raise AssertionError(f"state {wanted.number}: things cannot be set down")
-        player.do({"action": "RotateRight"}, draw=True)
-        player.do({"action": "RotateLeft"}, draw=True)
+        replayer.do({"action": "RotateRight"}, draw=True)
+        replayer.do({"action": "RotateLeft"}, draw=True)
 
 
 # -- comparing -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class Reached:
+class Snapshot:
     """A state as it was reached: a digest of its metadata, and its pictures by name."""
 
     state: str
     pictures: Mapping[str, np.ndarray]
 
     @staticmethod
-    def by(player: Player) -> Reached:
-        """Where a player is."""
-        return Reached(player.state(), player.pictures())
+    def by(replayer: Replayer) -> Snapshot:
+        """Where a replayer is."""
+        return Snapshot(replayer.state(), replayer.pictures())
 
     @property
     def digests(self) -> Digests:
@@ -348,7 +348,7 @@ class Reached:
             **{name: _digest(picture.tobytes()) for name, picture in self.pictures.items()},
         }
 
-    def differences(self, other: Reached) -> Iterator[tuple[str, int]]:
+    def differences(self, other: Snapshot) -> Iterator[tuple[str, int]]:
         """The pictures that differ, and in how many pixels."""
         for name, picture in self.pictures.items():
             if picture.tobytes() != other.pictures[name].tobytes():
@@ -370,7 +370,7 @@ def _fresh(states: list[int], hash_seed: int) -> dict[int, Digests]:
     return {int(number): found for number, found in json.loads(result.stdout).items()}
 
 
-class Findings:
+class Differences:
     """What has been compared, and what differed."""
 
     def __init__(self, console: Console) -> None:
@@ -378,7 +378,7 @@ class Findings:
         self.counts = Counter[str]()
         self.apart = 0
 
-    def compare(self, what: str, wanted: Recipe, one: Reached, other: Reached) -> None:
+    def compare(self, what: str, wanted: Recipe, one: Snapshot, other: Snapshot) -> None:
         """Two ways to a state; where they led to different ones, the pictures may differ."""
         if one.state != other.state:
             self.counts[f"{what}: another state"] += 1
@@ -404,21 +404,21 @@ def main(states: int, processes: int, say: bool) -> None:
         _say()
         return
     console = Console()
-    found, said = Findings(console), {}
-    players = {by: Player() for by in HISTORIES}
+    found, said = Differences(console), {}
+    players = {by: Replayer() for by in HISTORIES}
     for number in range(states):
         wanted = recipe(number)
         reached = {}
-        for by, player in players.items():
-            by(wanted, player)
-            reached[by] = Reached.by(player)
+        for by, replayer in players.items():
+            by(wanted, replayer)
+            reached[by] = Snapshot.by(replayer)
             if by is not straight:
                 found.compare(by.__name__, wanted, reached[straight], reached[by])
         said[number] = reached[straight].digests
         ends = []
         for by, away in ((straight, 0.3), (after_another_arrangement, -0.7)):
             set_down(wanted, players[by], by, away)
-            ends.append(Reached.by(players[by]))
+            ends.append(Snapshot.by(players[by]))
         found.compare("set down", wanted, *ends)
     for hash_seed in range(1, processes + 1):
         for number, told in _fresh(list(range(states)), hash_seed).items():
@@ -434,10 +434,10 @@ def main(states: int, processes: int, say: bool) -> None:
 
 def _say() -> None:
     """What a fresh process is for: states by number in, their digests out, as JSON."""
-    found, player = {}, Player()
+    found, replayer = {}, Replayer()
     for number in json.load(sys.stdin):
-        follow(recipe(number), player)
-        found[number] = Reached.by(player).digests
+        follow(recipe(number), replayer)
+        found[number] = Snapshot.by(replayer).digests
     print(json.dumps(found))
 
 

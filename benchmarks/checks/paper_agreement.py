@@ -92,7 +92,7 @@ def _noise(types_there: Sequence[str], draw: random.Random) -> str:
     return draw.choice(_NO_ACTIONS)
 
 
-class Recorded:
+class ScriptedAgent:
     """An agent that says what is written; then that it is done."""
 
     obs_mode = "text"
@@ -111,7 +111,7 @@ class Recorded:
 # -- theirs ----------------------------------------------------------------------------------------
 
 
-class Theirs:
+class PaperProgram:
     """The paper's program, imported from its folder, with scripted replies for a model.
 
     Args:
@@ -198,7 +198,7 @@ def _match(description: str, objects: Sequence[str], *_: Any) -> str | None:
 
 
 @dataclass
-class Agreement:
+class PaperAgreement:
     """What was counted.
 
     Attributes:
@@ -266,12 +266,12 @@ def as_record(ours: EpisodeRecord, theirs: list[dict[str, Any]]) -> EpisodeRecor
 
 
 def compare(
-    theirs: Theirs, records: Sequence[dict[str, Any]], tasks: Sequence[Task], episodes: int,
+    theirs: PaperProgram, records: Sequence[dict[str, Any]], tasks: Sequence[Task], episodes: int,
     seed: int, console: Console,
-) -> Agreement:  # fmt: skip
+) -> PaperAgreement:  # fmt: skip
     """Play and count; ``records``: the same tasks as their file has them."""
     env = EmbodiedEnv((), obs_mode="state", protocol=PAPER.name)
-    found, kinds = Agreement(), dict[str, list[str]]()
+    found, kinds = PaperAgreement(), dict[str, list[str]]()
     for number in track(range(episodes), "episodes", console=console):
         draw = random.Random(f"{seed}/{number}")
         place = (number * 7919 + seed) % len(tasks)
@@ -283,7 +283,7 @@ def compare(
         if trajectory is None:
             found.unfinished += 1
             continue
-        ours = play_episode(env, Recorded(replies), task, seed)
+        ours = play_episode(env, ScriptedAgent(replies), task, seed)
         if ours.error:
             raise RuntimeError(f"{task.id}: {ours.error}")
         found.add(trajectory, ours)
@@ -321,7 +321,7 @@ def main(
     """Compare, and print the shares."""
     records = json.loads(tasks_file.read_text(encoding="utf-8"))
     tasks = with_every_pose(read_tasks(tasks_file), read_poses(poses))
-    program = Theirs(theirs, poses)
+    program = PaperProgram(theirs, poses)
     try:
         found = compare(program, records, tasks, episodes, seed, Console(stderr=True))
     finally:

@@ -70,7 +70,7 @@ class Crops:
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class Classification:
     """What the network said of the held-out crops.
 
     Attributes:
@@ -84,19 +84,19 @@ class Verdict:
 
     @property
     def top1(self) -> float:
-        """Share of the crops that are told right."""
+        """Share of the crops whose type is told correctly."""
         return float((self.said == self.truth).mean())
 
-    def right(self, kind: int) -> float:
+    def share_correct(self, kind: int) -> float:
         """The same of the crops of one type."""
         return float((self.said[self.truth == kind] == kind).mean())
 
     @property
     def mean_of_types(self) -> float:
-        return float(np.mean([self.right(kind) for kind in self.worst_first()]))
+        return float(np.mean([self.share_correct(kind) for kind in self.worst_first()]))
 
     def worst_first(self) -> list[int]:
-        return sorted(set(self.truth.tolist()), key=self.right)
+        return sorted(set(self.truth.tolist()), key=self.share_correct)
 
     def taken_for(self, kind: int) -> list[tuple[str, float]]:
         """What a type is wrongly taken for and how often, most often first."""
@@ -208,7 +208,7 @@ def crop(picture: NDArray[np.uint8], box: Sequence[int]) -> NDArray[np.uint8]:
 # -- the network -----------------------------------------------------------------------------------
 
 
-def learn_and_tell(
+def train_and_classify(
     learnt: Crops, asked: Crops, classes: int, epochs: int, seed: int, console: Console
 ) -> NDArray[np.int64]:
     """Train a network of 0.4 million weights on some crops; what it says of others, (N,)."""
@@ -272,13 +272,13 @@ def learn_and_tell(
 # -- what is printed -------------------------------------------------------------------------------
 
 
-def _table(verdict: Verdict, figures: dict[str, float]) -> Table:
-    crops, right = (Column(name, justify="right") for name in ("crops", "top-1"))
-    table = Table("type", crops, right, "taken for", title="types told apart in unseen scenes")
-    for kind in verdict.worst_first()[:10]:
-        others = ", ".join(f"{name} {share:.0%}" for name, share in verdict.taken_for(kind)[:3])
-        count = str(int((verdict.truth == kind).sum()))
-        table.add_row(verdict.types[kind], count, f"{verdict.right(kind):.1%}", others)
+def _table(result: Classification, figures: dict[str, float]) -> Table:
+    crops, correct = (Column(name, justify="right") for name in ("crops", "top-1"))
+    table = Table("type", crops, correct, "taken for", title="types told apart in unseen scenes")
+    for kind in result.worst_first()[:10]:
+        others = ", ".join(f"{name} {share:.0%}" for name, share in result.taken_for(kind)[:3])
+        count = str(int((result.truth == kind).sum()))
+        table.add_row(result.types[kind], count, f"{result.share_correct(kind):.1%}", others)
     table.add_section()
     for name, value in figures.items():
         text = f"{value:.1%}" if value <= 1 else f"{value:.0f}"
@@ -286,20 +286,20 @@ def _table(verdict: Verdict, figures: dict[str, float]) -> Table:
     return table
 
 
-def draw_sheet(verdict: Verdict, images: NDArray[np.uint8], file: Path) -> None:
+def draw_sheet(result: Classification, images: NDArray[np.uint8], file: Path) -> None:
     """A contact sheet: a row of wrong crops for a type, worst first; truth above, said below."""
     columns, tile, line = 12, 120, 14
     rows = []
-    for kind in verdict.worst_first():
-        wrong = np.flatnonzero((verdict.truth == kind) & (verdict.said != kind))
+    for kind in result.worst_first():
+        wrong = np.flatnonzero((result.truth == kind) & (result.said != kind))
         chosen = wrong[:: max(1, -(-len(wrong) // columns))].tolist()
         row = np.full((tile + 2 * line, columns * tile, 3), 255, np.uint8)
         for column, j in enumerate(chosen):
             x = column * tile
             big = cv2.resize(images[j], (tile - 4, tile - 4), interpolation=cv2.INTER_NEAREST)
             row[line : line + tile - 4, x : x + tile - 4] = big
-            for name, y in ((kind, line - 4), (verdict.said[j], tile + 2 * line - 5)):
-                text = verdict.types[name]
+            for name, y in ((kind, line - 4), (result.said[j], tile + 2 * line - 5)):
+                text = result.types[name]
                 cv2.putText(row, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (0, 0, 0))
         rows.extend([row] if chosen else [])
     write_picture(file, Image.fromarray(np.concatenate(rows)))
@@ -325,26 +325,26 @@ def main(seed: int, epochs: int, most: int, file: Path | None, sheet: Path | Non
         parts[name] = crops_of(name, types, most, random)
     learnt, asked = (Crops.joined([parts[name] for name in names]) for names in (learning, held))
     drawn = time.perf_counter()
-    said = learn_and_tell(learnt, asked, len(types), epochs, seed, console)
-    verdict = Verdict(types, asked.labels, said)
+    said = train_and_classify(learnt, asked, len(types), epochs, seed, console)
+    result = Classification(types, asked.labels, said)
     figures: dict[str, float] = {
-        "top-1": verdict.top1,
-        "top-1, mean of the types": verdict.mean_of_types,
+        "top-1": result.top1,
+        "top-1, mean of the types": result.mean_of_types,
         "crops learnt from": len(learnt.labels),
         "crops asked about": len(asked.labels),
         "seconds to draw": drawn - start,
         "seconds to learn": time.perf_counter() - drawn,
     }
-    Console(width=None if sys.stdout.isatty() else 110).print(_table(verdict, figures))
+    Console(width=None if sys.stdout.isatty() else 110).print(_table(result, figures))
     if sheet is not None:
-        draw_sheet(verdict, asked.images, sheet)
+        draw_sheet(result, asked.images, sheet)
     if file is not None:
         told: dict[str, Any] = {**figures, "types": {}}
-        for kind in verdict.worst_first():
+        for kind in result.worst_first():
             told["types"][types[kind]] = {
-                "crops": int((verdict.truth == kind).sum()),
-                "top-1": verdict.right(kind),
-                "taken for": dict(verdict.taken_for(kind)),
+                "crops": int((result.truth == kind).sum()),
+                "top-1": result.share_correct(kind),
+                "taken for": dict(result.taken_for(kind)),
             }
         write_figures(file, told)
 

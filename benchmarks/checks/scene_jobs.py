@@ -35,7 +35,7 @@ def choose_scenes(asked: str) -> list[str]:
     return names
 
 
-def do_all(
+def run_jobs(
     make: Callable[[], Callable[[Job], Result]], jobs: Sequence[Job], workers: int
 ) -> Iterator[tuple[Job, Result | Lost]]:
     """Do every job once, each whole in one of so many processes (1: in this one)."""

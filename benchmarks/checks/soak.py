@@ -27,7 +27,7 @@ from benchmarks.checks.invariants import (
     broken,
     stands_on_the_floor,
 )
-from benchmarks.checks.scene_jobs import choose_scenes, do_all
+from benchmarks.checks.scene_jobs import choose_scenes, run_jobs
 from benchmarks.cli.progress import bar
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.worker_pool import Lost
@@ -43,7 +43,7 @@ _ANY_OBJECT = 0.2
 
 
 @dataclass(frozen=True)
-class Report:
+class SoakReport:
     """What came of a scene.
 
     Attributes:
@@ -233,7 +233,7 @@ LEVELS: dict[str, Callable[[str, int], Iterator[Step]]] = {
 }
 
 
-def soak_scene(scene: str, *, level: str, actions: int, seed: int) -> Report:
+def soak_scene(scene: str, *, level: str, actions: int, seed: int) -> SoakReport:
     """Play in one scene until the actions are done or something is wrong."""
     start = time.perf_counter()
     done = succeeded = 0
@@ -251,20 +251,20 @@ def soak_scene(scene: str, *, level: str, actions: int, seed: int) -> Report:
         problem = f"at action {done + 1}: {type(error).__name__}: {error}"
     finally:
         player.close()  # type: ignore[attr-defined]  # a generator, which an Iterator need not be
-    return Report(scene, done, succeeded, time.perf_counter() - start, problem)
+    return SoakReport(scene, done, succeeded, time.perf_counter() - start, problem)
 
 
-def _player(level: str, actions: int, seed: int) -> Callable[[str], Report]:
+def _player(level: str, actions: int, seed: int) -> Callable[[str], SoakReport]:
     return partial(soak_scene, level=level, actions=actions, seed=seed)
 
 
 def soak(
     scenes: Sequence[str], *, level: str, actions: int, seed: int, workers: int
-) -> Iterator[Report]:
+) -> Iterator[SoakReport]:
     """Play in all scenes, each whole in one of so many processes (1: in this one)."""
-    for scene, report in do_all(partial(_player, level, actions, seed), scenes, workers):
+    for scene, report in run_jobs(partial(_player, level, actions, seed), scenes, workers):
         if isinstance(report, Lost):
-            report = Report(scene, 0, 0, 0.0, f"the process died, exit code {report.exitcode}")
+            report = SoakReport(scene, 0, 0, 0.0, f"the process died, exit code {report.exitcode}")
         yield report
 
 
@@ -281,7 +281,7 @@ def main(scenes: str, actions: int, seed: int, workers: int, level: str) -> None
     except ValueError as error:
         raise click.UsageError(str(error)) from None
     console = Console(stderr=True)
-    reports: list[Report] = []
+    reports: list[SoakReport] = []
     start = time.perf_counter()
     with bar(console) as progress:
         task = progress.add_task(f"soak, {level}", total=len(chosen), status="starting")
@@ -295,7 +295,7 @@ def main(scenes: str, actions: int, seed: int, workers: int, level: str) -> None
     raise SystemExit(verdict(reports, level=level, actions=actions, seed=seed))
 
 
-def verdict(reports: Sequence[Report], *, level: str, actions: int, seed: int) -> int:
+def verdict(reports: Sequence[SoakReport], *, level: str, actions: int, seed: int) -> int:
     """Say what came of it in one line, after a line for each scene that is not well."""
     bad = sorted((r for r in reports if r.problem), key=lambda r: SCENE_NAMES.index(r.scene))
     for report in bad:

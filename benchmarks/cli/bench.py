@@ -17,8 +17,8 @@ from benchmarks.cli.errors import (
     STOPPED,
     BadInput,
     bad_input,
-    complain,
-    tell_left_out,
+    print_problem,
+    report_set_aside,
 )
 from benchmarks.cli.options import (
     Finite,
@@ -47,8 +47,8 @@ _directory = click.Path(file_okay=False, path_type=Path)
 
 
 @dataclass(frozen=True)
-class Spoken:
-    """The options of agents that speak, as they are on the command line."""
+class VLMOptions:
+    """The options of ``er-gym bench`` for vision-language agents."""
 
     agent_config: str | None
     overrides: tuple[str, ...]
@@ -60,10 +60,10 @@ class Spoken:
     max_minutes: float | None
 
 
-_SPOKEN_OPTIONS = (
+_VLM_OPTIONS = (
     agent_config_option,
     overrides_option("sampling.temperature=0.7"),
-    click.option("--base-url", metavar="URL", help="Where its server is."),
+    click.option("--base-url", metavar="URL", help="The address of the model's server."),
     click.option(
         "--prompts-from",
         type=_existing_file,
@@ -75,44 +75,54 @@ _SPOKEN_OPTIONS = (
         type=click.IntRange(1, 1000),
         help="How many conversations at once.  [default: 8]",
     ),
-    click.option("--max-usd", type=Finite(), help="Stop when so much is spent."),
-    click.option("--max-tokens", type=int, help="Stop at so many tokens."),
-    click.option("--max-minutes", type=Finite(), help="Stop after so long, requests included."),
+    click.option("--max-usd", type=Finite(), help="Stop after spending this much."),
+    click.option("--max-tokens", type=int, help="Stop after this many tokens."),
+    click.option(
+        "--max-minutes", type=Finite(), help="Stop after this many minutes, even within a request."
+    ),
 )
-"""For agents that speak; the budgets are of the run, however often it is continued, and the minutes
-of this command."""
+"""For vision-language agents. The budgets limit the whole run, however often it is continued; the
+minutes limit this command."""
 
 
-def _spoken_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Gives a command these options; it gets them as one ``spoken``."""
+def _with_vlm_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add these options to a command, which gets them as one argument ``vlm_options``."""
 
-    def with_spoken(**given: Any) -> Any:
-        spoken = Spoken(**{name: given.pop(name) for name in Spoken.__dataclass_fields__})
-        return command(spoken=spoken, **given)
+    def with_options(**given: Any) -> Any:
+        vlm_options = VLMOptions(
+            **{name: given.pop(name) for name in VLMOptions.__dataclass_fields__}
+        )
+        return command(vlm_options=vlm_options, **given)
 
-    with_spoken.__doc__ = command.__doc__
-    return reduce(lambda made, option: option(made), reversed(_SPOKEN_OPTIONS), with_spoken)
+    with_options.__doc__ = command.__doc__
+    return reduce(lambda made, option: option(made), reversed(_VLM_OPTIONS), with_options)
 
 
 @click.command(name="bench")
 @click.option("--suite", help="A bundled suite; `er-gym suites` lists them.")
-@click.option("--tasks-file", type=_existing_file, help="Tasks in the paper's file format.")
-@click.option("--poses", type=_existing_file, help="Exact poses, in the paper's file format.")
+@click.option("--tasks-file", type=_existing_file, help="A task file in the paper's format.")
+@click.option("--poses", type=_existing_file, help="Exact poses, a file in the paper's format.")
 @click.option(
-    "--agent", required=True, help="Who plays: oracle, random, searcher, rl:RUN, openai:MODEL …"
+    "--agent",
+    required=True,
+    help="Who plays: oracle, random, searcher, rl:RUN, openai:MODEL, package.module:Class …",
 )
 @click.option("--out", type=_directory, help="The run directory.  [default: runs/SUITE-AGENT]")
 @click.option("--workers", type=workers_type, default=1, show_default=True)
 @click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
-@click.option("--task-ids", multiple=True, metavar="ID,…", help="Play these; may be repeated.")
+@click.option(
+    "--task-ids", multiple=True, metavar="ID,…", help="Play these tasks; may be repeated."
+)
 @click.option("--shard", metavar="I/N", help="Play the I-th of N parts, such as 2/8.")
 @seed_option
 @click.option("--backend", help="The engine: embedded or unity.  [default: the suite's]")
 @trust_option
-@click.option("--instances", help="What a type name stands for.  [default: the suite's]")
+@click.option(
+    "--instances", help="Which object a name means: target, explore.  [default: the suite's]"
+)
 @protocol_option
 @scorer_option
-@_spoken_options
+@_with_vlm_options
 def bench(
     suite: str | None,
     tasks_file: Path | None,
@@ -129,13 +139,13 @@ def bench(
     instances: str | None,
     protocol: str,
     scorer: str,
-    spoken: Spoken,
+    vlm_options: VLMOptions,
 ) -> int:
     """Play a suite with an agent and print the result table.
 
-    The same command again continues: episodes that are done are not played again. A task that
-    cannot be played is set aside and named; the others are played. The options from
-    --agent-config on are for agents that speak, such as openai:MODEL.
+    The same command continues a run: it plays only the episodes that are missing. A task that
+    cannot be played is set aside and named; the others are played. The options from --agent-config
+    on are for vision-language agents, such as openai:MODEL.
     """
     from agents import RL
     from benchmarks.cli.progress import Progress
@@ -156,11 +166,11 @@ def bench(
     with bad_input(BackendError):
         part = Shard.parse(shard) if shard is not None else None
         asked = _load_suite(suite, tasks_file, poses, protocol)
-        voice = _voice(agent, spoken)
+        vlm_run = _vlm_run(agent, vlm_options)
         if trust and not agent.startswith(RL):
             raise BadInput(f"--trust is for trained policies, {RL}RUN, not for {agent}")
         env = _env_kwargs(
-            asked, agent, seed, voice, protocol, trust, backend=backend, instances=instances
+            asked, agent, seed, vlm_run, protocol, trust, backend=backend, instances=instances
         )
         fitted = resolve_tasks(asked.tasks, env["backend"])
         aside = (*asked.set_aside, *fitted.set_aside)
@@ -175,26 +185,26 @@ def bench(
             suite_digest=asked.digest,
             suite_size=len(fitted.tasks),
             agent=agent,
-            agent_settings=voice.consequential if voice else {},
+            agent_settings=vlm_run.consequential if vlm_run else {},
             env=env,
             seed=seed,
             er_gym=__version__,
             set_aside=aside,
             taken=fitted.taken,
         )
-    tell_left_out(asked.name, aside, fitted.taken)
+    report_set_aside(asked.name, aside, fitted.taken)
     for note in fitted.notes:
         console.print(note, style="dim", soft_wrap=True)
 
     try:
         with _claimed(out, manifest) as store:
             for line in store.move_aside(task.id for task in chosen):
-                complain(line)
+                print_problem(line)
             before = finished(store, chosen)
             succeeded = sum(episode.success for episode in before)
             title = f"{asked.name}, {agent}"
             progress = Progress(console, title, len(chosen), len(before), succeeded)
-            with _player(store, chosen, workers, agent, voice, trust) as (play, cost):
+            with _prepared_run(store, chosen, workers, agent, vlm_run, trust) as (play, cost):
                 with progress:
                     outcome = play(progress)
                 bill = cost()
@@ -204,14 +214,14 @@ def bench(
         raise BadInput(f"{error}; {_left_in(out, chosen)}") from error
     except (KeyboardInterrupt, CannotGoOn) as error:
         why = str(error) if isinstance(error, CannotGoOn) else "interrupted"
-        complain(f"{why}: {_left_in(out, chosen)}")
+        print_problem(f"{why}: {_left_in(out, chosen)}")
         return STOPPED if isinstance(error, CannotGoOn) else INTERRUPTED
     print_tables(tables([load_run(out)], scorer=scorer), stdout())
     if bill:
         console.print(str(bill))
     if outcome.crashed:
         first = outcome.crashed[0]
-        complain(
+        print_problem(
             f"{len(outcome.crashed)} of {outcome.played} episodes crashed, the first of them "
             f"{first.task_id}: {first.error}; the same command plays them again"
         )
@@ -221,7 +231,7 @@ def bench(
 
 @contextmanager
 def _claimed(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
-    """The run directory; what keeps it from being used is the user's to mend."""
+    """The run directory, for this process alone; a directory that cannot be used is bad input."""
     from er_gym.rollout.run_directory import claimed
 
     with ExitStack() as stack:
@@ -231,7 +241,7 @@ def _claimed(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
 
 
 def _left_in(out: Path, chosen: Sequence[Task]) -> str:
-    """What a run that ended early has left, in words."""
+    """Say in words what a run that ended early has left."""
     from er_gym.rollout.run_directory import MANIFEST, RunDirectory
     from er_gym.rollout.runner import finished
 
@@ -242,29 +252,29 @@ def _left_in(out: Path, chosen: Sequence[Task]) -> str:
 
 
 @contextmanager
-def _player(
+def _prepared_run(
     store: RunDirectory,
     chosen: Sequence[Task],
     workers: int,
     agent: str,
-    voice: VLMRun | None,
+    vlm_run: VLMRun | None,
     trust: bool,
 ) -> Iterator[tuple[Callable[[Progress], Outcome], Callable[[], Cost | None]]]:
-    """How the chosen tasks are played, and how to hear what that has cost."""
+    """A function that plays the chosen tasks, and one that says what that has cost."""
     from agents import NamedAgent
     from er_gym.rollout.agent import CannotGoOn
     from er_gym.rollout.executor import Size
     from er_gym.rollout.runner import run
 
-    if voice is None:
+    if vlm_run is None:
         make, size = NamedAgent(agent, trust), Size(workers)
         yield lambda shown: run(store, chosen, make, size=size, listeners=[shown]), lambda: None
         return
     with bad_input(CannotGoOn):  # no key, no such model
-        factory = voice.factory(store.path)
+        factory = vlm_run.factory(store.path)
     with closing(factory):
         yield (
-            lambda shown: voice.play(factory, store, chosen, workers, [shown], shown.say),
+            lambda shown: vlm_run.play(factory, store, chosen, workers, [shown], shown.say),
             lambda: factory.cost,
         )
 
@@ -272,7 +282,7 @@ def _player(
 def _load_suite(
     name: str | None, tasks_file: Path | None, poses: Path | None, protocol: str
 ) -> Suite:
-    """The suite; under the paper's protocol a stated pose is the object's in every task."""
+    """The suite; under the paper's protocol a pose holds for its object in every task."""
     from er_gym.envs.protocol import PAPER
     from er_gym.tasks.jsonl_format import digest
     from er_gym.tasks.paper_format import read_poses, with_every_pose, with_poses
@@ -300,21 +310,21 @@ def _env_kwargs(
     suite: Suite,
     agent: str,
     seed: int,
-    voice: VLMRun | None,
+    vlm_run: VLMRun | None,
     protocol: str,
     trust: bool,
     **given: str | None,
 ) -> dict[str, Any]:
-    """The environment's arguments: the suite's, overruled by the options that were given, and the
-    observations that the agent needs. Agent and environment are made once, to hear of what is wrong
-    with them before any worker is started."""
+    """The environment's arguments: the suite's, overridden by the options that were given, and the
+    observations that the agent needs. This makes agent and environment once, so that bad arguments
+    are found before any worker starts."""
     from agents import make_agent
     from er_gym.envs.embodied_env import EmbodiedEnv
     from er_gym.envs.protocol import DEFAULT, protocol_named
     from er_gym.thor import BACKENDS
 
     env = {"backend": "embedded", **suite.env}
-    if protocol != DEFAULT.name:  # runs of before, which say nothing of it, can be continued
+    if protocol != DEFAULT.name:  # so that older runs, without this entry, can be continued
         env["protocol"] = protocol
     if protocol_named(protocol).chooses_instances:
         env.pop("instances", None)
@@ -323,23 +333,25 @@ def _env_kwargs(
         raise ValueError(
             f"unknown backend {env['backend']!r}; choose one of: {', '.join(BACKENDS)}"
         )
-    if voice is None:
+    if vlm_run is None:
         env["obs_mode"] = make_agent(agent, seed=seed, trust=trust).obs_mode
     else:
-        env |= voice.env
+        env |= vlm_run.env
     EmbodiedEnv((), **env)
     return env
 
 
-def _voice(agent: str, spoken: Spoken) -> VLMRun | None:
-    """What an agent that speaks is made of; None for others, which take none of these options."""
+def _vlm_run(agent: str, vlm_options: VLMOptions) -> VLMRun | None:
+    """The run of a vision-language agent; None for other agents, which take none of its options."""
     from agents.vlm.factory import speaks
     from benchmarks.cli.vlm_run import VLMRun
 
     if speaks(agent):
-        return VLMRun.of(agent, **vars(spoken))
-    given = [name for name, value in vars(spoken).items() if value not in (None, ())]
+        return VLMRun.of(agent, **vars(vlm_options))
+    given = [name for name, value in vars(vlm_options).items() if value not in (None, ())]
     if given:
         option = "--set" if given[0] == "overrides" else f"--{given[0].replace('_', '-')}"
-        raise BadInput(f"{option} is for agents that speak, such as openai:MODEL, not for {agent}")
+        raise BadInput(
+            f"{option} is for vision-language agents, such as openai:MODEL, not for {agent}"
+        )
     return None

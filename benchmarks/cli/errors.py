@@ -1,4 +1,4 @@
-"""How the command says that something went wrong: one line on stderr, and its exit code."""
+"""Errors of the command: one line on stderr, and an exit code."""
 
 from __future__ import annotations
 
@@ -10,25 +10,24 @@ import click
 
 from benchmarks.cli.terminal import echo
 
-_LONGEST = 2_000  # characters of a complaint
+_LONGEST = 2_000  # characters of a line
 
 if TYPE_CHECKING:
     from er_gym.tasks.errors import SetAside, Taken
 
 CRASHED, STOPPED, INTERRUPTED = 1, 3, 130
-"""Exit codes: episodes crashed; a run stopped before its end, as it was told to; Ctrl-C. And 2 is
-for what the user gave wrongly."""
+"""Exit codes: episodes crashed; a budget or the server stopped the run; Ctrl-C. Bad input is 2."""
 
 
 class BadInput(click.ClickException):
-    """Something that the user gave; the message says what, what is allowed and what to do."""
+    """Bad input of the user; the message says what was given, what is allowed and what to do."""
 
     exit_code = 2
 
 
 @contextlib.contextmanager
 def bad_input(*more: type[Exception]) -> Iterator[None]:
-    """What the code within raises of these, ValueError and OSError is the user's to mend."""
+    """Turn these errors, ValueError and OSError of the code within into :class:`BadInput`."""
     known: tuple[type[Exception], ...] = (ValueError, OSError, *more)
     try:
         yield
@@ -36,19 +35,21 @@ def bad_input(*more: type[Exception]) -> Iterator[None]:
         raise BadInput(str(error)) from error
 
 
-def complain(message: str) -> None:
-    """Say something in one line on stderr."""
+def print_problem(message: str) -> None:
+    """Print an error or a warning as one line on stderr."""
     text = " ".join(message.split())
     if len(text) > _LONGEST:
         text = f"{text[:_LONGEST]}… ({len(text) - _LONGEST:,} characters more)"
     echo(f"er-gym: {text}", err=True)
 
 
-def tell_left_out(suite: str, set_aside: Iterable[SetAside], taken: Iterable[Taken] = ()) -> None:
-    """Say which of a suite's tasks are left out, and what is taken for what the scenes lack."""
+def report_set_aside(
+    suite: str, set_aside: Iterable[SetAside], taken: Iterable[Taken] = ()
+) -> None:
+    """Print which tasks of a suite are set aside, and which objects stand for missing ones."""
     from er_gym.tasks.errors import told_once
 
     for line in told_once(taken):
-        complain(f"{suite}: {line}")
+        print_problem(f"{suite}: {line}")
     for one in set_aside:
-        complain(f"{suite}: set aside: {one}")
+        print_problem(f"{suite}: set aside: {one}")

@@ -10,19 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from benchmarks.cli.errors import BadInput, bad_input
+from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import MOST_SEED, Span, force_option, split, workers_option
 from benchmarks.cli.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from benchmarks.cli.suite_builder import Made
+    from benchmarks.cli.suite_builder import BuildResult
     from er_gym.tasks.suite_spec import Making
     from er_gym.tasks.task import Task
 
 _DEFAULT_TOTAL = 100
-_INTERRUPTED = 130
 
 
 @click.command()
@@ -35,28 +34,34 @@ _INTERRUPTED = 130
 @click.option(
     "--total", type=click.IntRange(min=1), help=f"How many tasks.  [default: {_DEFAULT_TOTAL}]"
 )
-@click.option("--scenes", metavar="NAMES", help="all, training, evaluation, or rooms with commas.")
-@click.option("--types", metavar="NAMES", help="Types of tasks, with commas.  [default: all]")
+@click.option(
+    "--scenes", metavar="NAMES", help="all, training, evaluation, or scenes separated by commas."
+)
+@click.option("--types", metavar="NAMES", help="Task types, separated by commas.  [default: all]")
 @click.option("--layouts", type=click.IntRange(0, 10_000), help="Rearrangements of each room.")
-@click.option("--per-layout", type=click.IntRange(min=1), help="Tasks of a type in each of them.")
+@click.option(
+    "--per-layout", type=click.IntRange(min=1), help="Tasks of each type in each arrangement."
+)
 @click.option("--hidden-depth", type=Span(), help="How many containers must be opened.")
-@click.option("--distractors", type=Span(), help="How many other objects of the types named.")
-@click.option("--distance", type=Span(), help="How far it is, metres.")
+@click.option(
+    "--distractors", type=Span(), help="How many other objects of the named types there are."
+)
+@click.option("--distance", type=Span(), help="How far the agent has to go, metres.")
 @click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the suite's, or 0]")
 @click.option(
     "--paraphraser",
     metavar="MODULE:FUNCTION",
-    help="A function from a prompt to a language model's reply; its wordings join the templates'.",
+    help="A function from a prompt to a language model's reply; adds to the templates' wordings.",
 )
 @force_option
 @workers_option
 def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -> int:
     """Generate tasks, play each of them, and write those that can be done.
 
-    What has been made when it is interrupted is kept: the same command goes on. The same seed gives
-    the same file. Beside the file comes a card, in Markdown.
+    The same command continues after an interruption. The same seed gives the same file. A card in
+    Markdown is written beside the file.
     """
-    from benchmarks.cli.suite_builder import parts_of, remove_parts
+    from benchmarks.cli.suite_builder import parts_folder, remove_parts
     from benchmarks.scoring.task_counts import print_counts
     from er_gym.rollout.worker_pool import WorkerSetupError
     from er_gym.tasks import jsonl_format
@@ -69,12 +74,12 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
         make_folder(order.out.parent)
         for file in (order.out, order.card):
             check_output(file, force=force)
-    parts = parts_of(order.out, order.making, order.seed)
+    parts = parts_folder(order.out, order.spec, order.seed)
     try:
-        made, verified = _make(order, parts, workers, console)
+        made, verified = _build(order, parts, workers, console)
         chosen = made.tasks
         if not chosen:
-            raise click.ClickException(f"no task could be made: {_reasons(made)}")
+            raise click.ClickException(f"no task could be made: {_drop_reasons(made)}")
         if paraphrase:
             chosen = tuple(_paraphrased(task, paraphrase) for task in chosen)
         _write(order, chosen, force)
@@ -84,18 +89,17 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
         raise BadInput(f"{error}; what is done is in {parts}") from error
     except KeyboardInterrupt:
         done = len(list(parts.glob("*.jsonl")))
-        echo(
-            f"er-gym: interrupted: {done} of {len(order.making.rooms)} rooms are in {parts}; "
-            "the same command goes on",
-            err=True,
+        print_problem(
+            f"interrupted: {done} of {len(order.spec.rooms)} rooms are in {parts}; "
+            "the same command continues"
         )
-        return _INTERRUPTED
+        return INTERRUPTED
     remove_parts(parts)
     print_counts(chosen, made.dropped)
     echo(f"{len(chosen)} tasks of {verified} verified: {order.out}")
     echo(f"sha256 of the tasks {jsonl_format.digest(chosen)}; card: {order.card}")
-    if len(chosen) < order.making.total:
-        console.print(f"{order.making.total} were asked for; more layouts or rooms give more")
+    if len(chosen) < order.spec.total:
+        console.print(f"{order.spec.total} were asked for; more layouts or rooms give more")
     return 0
 
 
@@ -110,7 +114,7 @@ class _Order:
 
     name: str
     description: str
-    making: Making
+    spec: Making
     seed: int
     out: Path
     command: str
@@ -146,7 +150,7 @@ def _order(
     stem = out.name.removesuffix(".gz").removesuffix(".jsonl")
     parts = ["er-gym", "tasks", "generate", *(["--suite", suite] if suite else ["--out", out.name])]
     for name, value in told.items():
-        parts += [f"--{name.replace('_', '-')}", _spoken(value)]
+        parts += [f"--{name.replace('_', '-')}", _option_value(value)]
     if "scenes" in told and told["scenes"] not in SCENES:
         told["scenes"] = tuple(split(told["scenes"]))
     if "types" in told:
@@ -157,7 +161,7 @@ def _order(
     return _Order(
         name=suite if suite and plain else stem,
         description=config.description if config and plain else "Generated tasks.",
-        making=validated(Making, {**base, **told}, "what to make"),
+        spec=validated(Making, {**base, **told}, "what to make"),
         seed=seed,
         out=out,
         command=shlex.join(parts),
@@ -165,37 +169,37 @@ def _order(
     )
 
 
-def _spoken(value: Any) -> str:
-    """A value as it is given on the command line."""
+def _option_value(value: Any) -> str:
+    """A value as an option of the command line takes it."""
     if not isinstance(value, tuple):
         return str(value)
     low, high = value
     return f"{low:g}-{'' if high is None else f'{high:g}'}"
 
 
-def _make(order: _Order, parts: Path, workers: int, console: Console) -> tuple[Made, int]:
-    """Make it, showing how far it is; returns what is chosen, and of how many."""
+def _build(order: _Order, parts: Path, workers: int, console: Console) -> tuple[BuildResult, int]:
+    """Build the tasks and show progress; returns the chosen ones, and how many were verified."""
     from benchmarks.cli.progress import bar
-    from benchmarks.cli.suite_builder import make_suite
+    from benchmarks.cli.suite_builder import build_suite
 
-    rooms = len(order.making.rooms)
+    rooms = len(order.spec.rooms)
     verified = done = 0
     with bar(console) as progress:
-        shown = progress.add_task("making tasks", total=rooms, status="")
+        shown = progress.add_task("generating tasks", total=rooms, status="")
 
-        def on_room(scene: str, made: Made) -> None:
+        def on_room(scene: str, made: BuildResult) -> None:
             nonlocal verified, done
             verified, done = verified + len(made.tasks), done + 1
             progress.update(shown, advance=1, status=f"{verified} verified, last {scene}")
             if not console.is_terminal and done * 10 // rooms > (done - 1) * 10 // rooms:
                 console.print(f"{done}/{rooms} rooms, {verified} tasks verified")
 
-        made = make_suite(order.making, order.seed, parts=parts, workers=workers, on_room=on_room)
+        made = build_suite(order.spec, order.seed, parts=parts, workers=workers, on_room=on_room)
     return made, verified
 
 
-def _reasons(made: Made) -> str:
-    """Why tasks were dropped, the commonest first."""
+def _drop_reasons(made: BuildResult) -> str:
+    """Why tasks were dropped, the most frequent reason first."""
     common = made.dropped.most_common(3)
     return "; ".join(f"{reason} ({count})" for reason, count in common) or "the rooms have none"
 
@@ -211,7 +215,7 @@ def _write(order: _Order, chosen: tuple[Task, ...], force: bool) -> None:
         "suite": order.name,
         "seed": order.seed,
         "er_gym": __version__,
-        **order.making.model_dump(mode="json", exclude_defaults=True),
+        **order.spec.model_dump(mode="json", exclude_defaults=True),
         **({"paraphraser": order.paraphraser} if order.paraphraser else {}),
     }
     check_output(order.card, force=force)  # before one of the two is written
@@ -228,7 +232,7 @@ def _paraphraser(spec: str, order: _Order) -> Any:
     def asked(prompt: str) -> str:
         try:
             reply = ask(prompt)
-        except (Exception, SystemExit) as error:  # it is the user's, and may raise anything
+        except (Exception, SystemExit) as error:  # the user's function may raise anything
             raise RuntimeError(f"{spec} raised {type(error).__name__}: {error}") from error
         if not isinstance(reply, str):
             raise RuntimeError(
@@ -241,20 +245,20 @@ def _paraphraser(spec: str, order: _Order) -> Any:
 
 
 def _paraphrased(task: Task, paraphrase: Any) -> Task:
-    """A task in a language model's words, or in the template's: each is as likely."""
+    """The task with a wording drawn from the template's and the language model's."""
     from dataclasses import replace
 
     from er_gym.tasks.paraphrase import choose, names_in
 
-    kept = {*names_in(task.instruction), *_ways(task)}
+    kept = {*names_in(task.instruction), *_switch_words(task)}
     variants = paraphrase(task.instruction, kept)
     return replace(
         task, instruction=choose((task.instruction, *variants), f"{task.id} in other words")
     )
 
 
-def _ways(task: Task) -> set[str]:
-    """What a task's words say of switches: "on", "off"."""
+def _switch_words(task: Task) -> set[str]:
+    """The words "on" and "off" where the instruction uses them of a goal."""
     states: Mapping[object, str] = {True: "on", False: "off"}
     ways = {
         states[value]

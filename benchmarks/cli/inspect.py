@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from benchmarks.cli.errors import CRASHED, BadInput, bad_input, complain
+from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import agent_config_option, overrides_option, seed_option
 from benchmarks.cli.terminal import echo
 
@@ -52,7 +52,7 @@ def inspect(
         from inspect_ai import eval as evaluate
         from inspect_ai._util.error import PrerequisiteError  # a key or a package is missing
 
-        from benchmarks.inspect_secrets import model_at
+        from benchmarks.inspect_secrets import model_at_url
         from benchmarks.inspect_task import er_gym
     except ImportError as error:
         raise BadInput(
@@ -63,7 +63,7 @@ def inspect(
         try:
             logs = evaluate(
                 asked,
-                model=model_at(model, model_base_url),
+                model=model_at_url(model, model_base_url),
                 log_dir=log_dir,
                 max_samples=concurrency,
             )
@@ -86,5 +86,5 @@ def _say(log: EvalLog) -> int:
     if log.status == "success":
         return 0
     why = log.error.message if log.error else "cancelled"
-    complain(f"the evaluation ended early: {why}")
+    print_problem(f"the evaluation ended early: {why}")
     return CRASHED

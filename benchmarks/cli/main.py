@@ -14,10 +14,11 @@ from typing import NoReturn
 import click
 
 from benchmarks.cli.bench import bench
-from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, complain
+from benchmarks.cli.doctor import doctor
+from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.inspect import inspect
 from benchmarks.cli.options import scorer_option
-from benchmarks.cli.player import doctor, player
+from benchmarks.cli.player import player
 from benchmarks.cli.render import play, render
 from benchmarks.cli.serve import match_server, serve
 from benchmarks.cli.tasks import tasks
@@ -35,26 +36,26 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         code = cli.main(args=args, prog_name="er-gym", standalone_mode=False)
     except click.UsageError as error:
         help_command = f"{error.ctx.command_path if error.ctx else 'er-gym'} --help"
-        complain(f"{error.format_message().rstrip('.')}; see {help_command}")
+        print_problem(f"{error.format_message().rstrip('.')}; see {help_command}")
         sys.exit(error.exit_code)
     except click.ClickException as error:
-        complain(error.format_message())
+        print_problem(error.format_message())
         sys.exit(error.exit_code)
     except ValueError as error:
         from er_gym.plugins import PluginError  # late: it takes half a second
 
         if not isinstance(error, PluginError):
             raise
-        complain(str(error))
+        print_problem(str(error))
         sys.exit(BadInput.exit_code)
     except (click.Abort, KeyboardInterrupt):
-        complain("interrupted")
+        print_problem("interrupted")
         sys.exit(INTERRUPTED)
     except OSError as error:  # a full disk, a directory that has gone
-        complain(str(error))
+        print_problem(str(error))
         sys.exit(1)
     except MemoryError as error:
-        complain(f"the memory does not suffice: {error}".rstrip(": "))
+        print_problem(f"the memory does not suffice: {error}".rstrip(": "))
         sys.exit(1)
     sys.exit(code if isinstance(code, int) else 0)
 

@@ -1,4 +1,4 @@
-"""``er-gym player`` and ``er-gym doctor``: AI2-THOR programs on our engine, and what works here."""
+"""``er-gym player``: AI2-THOR programs on the embedded engine."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def player() -> None:
 
 @player.command()
 def path() -> None:
-    """Print what Controller(local_executable_path=…, x_display=":0") is to launch."""
+    """Print the path for Controller(local_executable_path=…, x_display=":0")."""
     from er_gym.thor import thor_executable
 
     echo(thor_executable())
@@ -34,11 +34,11 @@ def install(force: bool, python: str | None) -> None:
     """Make Controller(scene=…) start the player: offline, without a GPU or an X server.
 
     The player takes the place of Unity's builds in ~/.ai2thor, for the platforms Linux64 (the
-    client's default) and CloudRendering, and of the file in which the client looks up GPUs. In the
-    site-packages of Python a hook spares programs the client's tests for an X server and Vulkan.
-    Repeat it after moving Python, and for each Python that runs AI2-THOR programs.
+    client's default) and CloudRendering, and of the file in which the client looks up GPUs. A hook
+    in Python's site-packages skips the client's tests for an X server and Vulkan. Install again
+    after moving Python, and for each Python that runs AI2-THOR programs.
     """
-    from benchmarks.cli.diagnosis import version_of_client
+    from benchmarks.cli.doctor_checks import version_of_client
     from er_gym.thor import player_install as players
     from er_gym.thor.places import PlayerError
 
@@ -46,13 +46,13 @@ def install(force: bool, python: str | None) -> None:
         installed = players.install(force=force, python=python or sys.executable)
     for release in installed.releases:
         echo(f"{release.platform}: {release.path}")
-    echo(f"for {version_of_client()}; programs on another version of it are not served")
+    echo(f"for {version_of_client()}; programs with another version do not use it")
     if installed.hook is not None:
         echo(f"hook: {installed.hook}")
     else:
         echo(
-            "no hook, for the site-packages of Python cannot be written: AI2-THOR's client "
-            "still asks for an X server or a Vulkan library; er-gym doctor says what to do"
+            "no hook, since the site-packages of Python cannot be written: AI2-THOR's client "
+            "still needs an X server or a Vulkan library; er-gym doctor says what to do"
         )
     for build in installed.pruned:
         echo(f"AI2-THOR's client keeps three builds: at its next start it deletes {build}")
@@ -60,7 +60,7 @@ def install(force: bool, python: str | None) -> None:
 
 @player.command()
 def uninstall() -> None:
-    """Remove what install has put there, and bring back what it has set aside."""
+    """Remove what install wrote, and restore what it set aside."""
     from er_gym.thor import player_install as players
     from er_gym.thor.places import PlayerError, client_home
 
@@ -70,18 +70,4 @@ def uninstall() -> None:
     for release in unity:
         echo(f"Unity's build is there again: {release.path}")
     for path in players.still_aside():
-        echo(f"left where it is, for its place is taken: {path}")
-
-
-@click.command()
-def doctor() -> int:
-    """Say what works on this machine, and what would mend the rest."""
-    from benchmarks.cli.diagnosis import examine
-
-    findings = examine()
-    widest = max(len(finding.what) for finding in findings)
-    for finding in findings:
-        mark = "ok" if finding.works else "--"
-        mend = f"; {finding.mend}" if finding.mend else ""
-        echo(f"{mark}  {finding.what:{widest}}  {finding.says}{mend}")
-    return 0 if all(finding.works for finding in findings if finding.needed) else 1
+        echo(f"not restored, since another file has its place: {path}")

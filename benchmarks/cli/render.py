@@ -22,7 +22,7 @@ _ENDINGS_OF_DEPTH = (".png", ".tif", ".tiff")
 """Those that hold 16 bits."""
 _DEPTH_UNIT = 1000.0
 """Depth pictures are 16 bit, so many steps a metre."""
-_ABOVE = 60.0
+_TOP_VIEW_FOV = 60.0
 """Vertical field of view of the camera that looks down on the whole room, degrees."""
 
 
@@ -71,10 +71,10 @@ def render(
         snapToGrid=False,
     )
     if stand is not None:
-        _stand(controller, stand)
+        _teleport(controller, stand)
     event = controller.last_event
     if what == "map":
-        event = _from_above(controller)
+        event = _top_view(controller)
         frame = event.third_party_camera_frames[-1]
     elif what == "depth":
         frame = (event.depth_frame * _DEPTH_UNIT).clip(0, 65535).astype("uint16")
@@ -112,7 +112,7 @@ def _pose(text: str) -> tuple[float, float, float, float]:
     return x, z, rotation, tilt
 
 
-def _stand(controller: Any, pose: tuple[float, float, float, float]) -> None:
+def _teleport(controller: Any, pose: tuple[float, float, float, float]) -> None:
     """Put the agent at a pose."""
     x, z, rotation, tilt = pose
     agent = controller.last_event.metadata["agent"]["position"]
@@ -124,19 +124,19 @@ def _stand(controller: Any, pose: tuple[float, float, float, float]) -> None:
         raise BadInput(event.metadata["errorMessage"])
 
 
-def _from_above(controller: Any) -> Any:
+def _top_view(controller: Any) -> Any:
     """An event with a picture of the whole room from above, which has no ceiling from there."""
     from math import radians, tan
 
     bounds = controller.last_event.metadata["sceneBounds"]
     middle, size = bounds["center"], bounds["size"]
     aspect = controller.last_event.screen_width / controller.last_event.screen_height
-    up = max(size["z"], size["x"] / aspect) / 2 / tan(radians(_ABOVE) / 2)
+    up = max(size["z"], size["x"] / aspect) / 2 / tan(radians(_TOP_VIEW_FOV) / 2)
     return controller.step(
         action="AddThirdPartyCamera",
         position={"x": middle["x"], "y": middle["y"] + size["y"] / 2 + up, "z": middle["z"]},
         rotation={"x": 90, "y": 0, "z": 0},
-        fieldOfView=_ABOVE,
+        fieldOfView=_TOP_VIEW_FOV,
     )
 
 
@@ -175,7 +175,7 @@ def play(
     obs, _ = env.reset(seed=seed)
     step = 0
     while True:
-        _keep(obs["rgb"], frames / f"{step:03d}.png", show, force)
+        _write_frame(obs["rgb"], frames / f"{step:03d}.png", show, force)
         echo(f"\n{obs['text']}")
         try:
             said = click.prompt("What do you do", default="quit", show_default=True)
@@ -188,7 +188,7 @@ def play(
         if reward:
             echo(f"reward {reward:g}")
         if terminated or truncated:
-            _keep(obs["rgb"], frames / f"{step:03d}.png", show, force)
+            _write_frame(obs["rgb"], frames / f"{step:03d}.png", show, force)
             outcome = "solved" if info["success"] else f"not solved ({info['end_reason']})"
             echo(f"\n{obs['text']}\n{outcome} after {info['steps']} steps")
             break
@@ -196,7 +196,7 @@ def play(
     echo(f"pictures in {frames}")
 
 
-def _keep(frame: NDArray[np.uint8], file: Path, show: Any, force: bool) -> None:
+def _write_frame(frame: NDArray[np.uint8], file: Path, show: Any, force: bool) -> None:
     from PIL import Image
 
     from er_gym.writing import write_picture

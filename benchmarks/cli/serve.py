@@ -1,4 +1,4 @@
-"""``er-gym serve`` and ``er-gym match-server``: what agents that speak talk to."""
+"""``er-gym serve`` and ``er-gym match-server``: servers for vision-language agents."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, complain
+from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import Finite, agent_config_option, overrides_option
 from benchmarks.cli.terminal import echo, terminal
 
@@ -26,18 +26,18 @@ ENGINE_CHOICES = ("vllm", "transformers", "llama_cpp")
 _TERMINATED = 143
 
 
-@click.command(epilog="What follows -- is handed to the server as it is.")
+@click.command(epilog="Arguments after -- go to the server unchanged.")
 @click.argument("model")
 @click.argument("more", nargs=-1, metavar="[-- ARGUMENTS...]", type=click.UNPROCESSED)
 @click.option("--engine", type=click.Choice(ENGINE_CHOICES), help="[default: the one that fits]")
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="0: a free one."
 )
-@click.option("--name", default="", help="What requests call the model.")
+@click.option("--name", default="", help="The model's name in requests.")
 @click.option(
     "--context",
     type=click.IntRange(min=1),
-    help="Tokens of a conversation; not transformers.",
+    help="Tokens of a conversation; not for transformers.",
 )
 @click.option(
     "--pictures",
@@ -46,7 +46,7 @@ _TERMINATED = 143
     show_default=True,
     help="Pictures of a conversation at most; vllm only.",
 )
-@click.option("--gpus", type=click.IntRange(min=0), help="Over how many.  [default: all]")
+@click.option("--gpus", type=click.IntRange(min=0), help="How many GPUs to use.  [default: all]")
 @click.option(
     "--python",
     default=sys.executable,
@@ -113,10 +113,9 @@ def serve(
 @agent_config_option
 @overrides_option("matching.fuzzy=90")
 def match_server(port: int, agent_config: str | None, overrides: tuple[str, ...]) -> int:
-    """Tell over HTTP what object types names stand for, at /match.
+    """Match names to object types over HTTP, at /match.
 
-    Names are matched as an agent of these settings has them matched. The server listens on
-    127.0.0.1 only.
+    The server matches as an agent with these settings does. It listens on 127.0.0.1 only.
     """
     from agents.vlm.factory import load_settings
     from agents.vlm.match_server import serve as serve_matches
@@ -129,12 +128,12 @@ def match_server(port: int, agent_config: str | None, overrides: tuple[str, ...]
 
 
 def run_server(command: Command, *, patience: float, verbose: bool = False) -> int:
-    """Run a server until it or this command is ended, and say how to play with it once it is ready.
+    """Run a server until it or this command ends; print how to play with it once it is ready.
 
     Args:
         command: the server's.
-        patience: seconds until it has to be ready.
-        verbose: whether to show all that it writes.
+        patience: seconds that it may take to get ready.
+        verbose: whether to show everything that it writes.
 
     Returns:
         130, after Ctrl-C.
@@ -161,14 +160,14 @@ def run_server(command: Command, *, patience: float, verbose: bool = False) -> i
                     show("\n".join(server.last_lines))
                 raise click.ClickException(f"{command.engine}: {error}") from error
     except KeyboardInterrupt:
-        complain("the server has ended")
+        print_problem("the server has ended")
     finally:
         signal.signal(signal.SIGTERM, before)
     return INTERRUPTED
 
 
 def _wait(server: ServerProcess, command: Command, patience: float, verbose: bool) -> float:
-    """Wait with a line that tells how it goes, where there is a terminal to show it on."""
+    """Wait until the server is ready; show its progress where there is a terminal."""
     from rich.text import Text
 
     console = terminal(stderr=True)
@@ -196,7 +195,7 @@ def _as_shell(command: Command) -> str:
 
 
 def _must_be_there(model: str) -> None:
-    """A model's name may be a hub's, but some can only be paths."""
+    """Refuse a model that can only be a path and does not exist."""
     path = Path(model)
     if model.lower().endswith(".gguf") and not path.is_file():
         raise BadInput(f"{model} is no file; give the path of one, or another kind of model")
@@ -209,13 +208,13 @@ def _usable_port(port: int) -> int:
     from agents.vlm.serving import HOST
 
     with socket.socket() as probe:
-        # As servers do, so that one that has just ended is not in the way.
+        # As servers do: a port that has just been closed can be used.
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((HOST, port))
         except OSError as error:
             raise BadInput(
-                f"port {port} of {HOST} cannot be had ({error.strerror}); choose another --port, "
+                f"port {port} of {HOST} cannot be used ({error.strerror}); choose another --port, "
                 "or 0 for a free one"
             ) from error
         return int(probe.getsockname()[1])

@@ -1,8 +1,8 @@
-"""Make a suite: rooms rearranged, tasks generated, each one verified, a balanced choice taken.
+"""Build a suite: rearrange rooms, generate tasks, verify each one, choose a balanced set.
 
-Each room is made by itself, from the suite's seed and its own name, so that the suite is the same
-whatever the number of workers. What a room gives is kept in a file until the suite is whole: a run
-that is interrupted or killed goes on from there.
+Each room is built on its own, from the suite's seed and the room's name, so the suite does not
+depend on the number of workers. The tasks of a room go to a file until the suite is complete. A run
+that was interrupted or killed continues from these files.
 """
 
 from __future__ import annotations
@@ -33,59 +33,59 @@ from er_gym.thor import make_controller
 from er_gym.writing import make_folder
 
 _TRIES = 3
-"""How many tasks of a type and arrangement are played for each that is wanted."""
+"""How many tasks of a type and arrangement are played at most, for each task to build."""
 
 
 @dataclass(frozen=True)
-class Made:
-    """What came of some rooms.
+class BuildResult:
+    """The tasks of some rooms.
 
     Attributes:
-        tasks: verified.
-        dropped: how many were not taken, by why.
+        tasks: the verified ones.
+        dropped: reason to how many tasks were dropped for it.
     """
 
     tasks: tuple[Task, ...] = ()
     dropped: Counter[str] = field(default_factory=Counter)
 
-    def and_also(self, other: Made) -> Made:
-        """Both together."""
-        return Made((*self.tasks, *other.tasks), self.dropped + other.dropped)
+    def plus(self, other: BuildResult) -> BuildResult:
+        """The sum of both."""
+        return BuildResult((*self.tasks, *other.tasks), self.dropped + other.dropped)
 
 
-class Maker:
-    """Makes the tasks of one room after another."""
+class RoomBuilder:
+    """Builds the tasks of one room after another."""
 
-    def __init__(self, making: Making, seed: int) -> None:
-        self._making, self._seed = making, seed
+    def __init__(self, spec: Making, seed: int) -> None:
+        self._spec, self._seed = spec, seed
         self._controller = make_controller(headless=True)
         self._verify = make_verifier()
 
-    def __call__(self, scene: str) -> Made:
+    def __call__(self, scene: str) -> BuildResult:
         """The tasks of a room, in all its arrangements."""
         rng = random.Random(f"{self._seed}/{scene}")
         # Drawn too, so that two suites do not share arrangements; 0 is the recorded one.
-        layouts = [0, *rng.sample(range(1, 10**6), self._making.layouts)]
-        made = Made()
+        layouts = [0, *rng.sample(range(1, 10**6), self._spec.layouts)]
+        made = BuildResult()
         for layout in layouts:
-            made = made.and_also(self._of(arranged(self._controller, scene, layout), rng))
+            made = made.plus(self._of(arranged(self._controller, scene, layout), rng))
         return made
 
-    def _of(self, room: Generator, rng: random.Random) -> Made:
-        """The tasks of a room as it is arranged."""
+    def _of(self, room: Generator, rng: random.Random) -> BuildResult:
+        """The tasks of a room in its present arrangement."""
         kept: list[Task] = []
         for kind in TASK_TYPES:
-            if not self._making.types or kind.name in self._making.types:
+            if not self._spec.types or kind.name in self._spec.types:
                 candidates = list(room.tasks([kind.name]))
                 rng.shuffle(candidates)
-                kept += islice(self._verified(candidates, room), self._making.per_layout)
-        return Made(tuple(kept), room.dropped)
+                kept += islice(self._verified(candidates, room), self._spec.per_layout)
+        return BuildResult(tuple(kept), room.dropped)
 
     def _verified(self, candidates: Iterable[Task], room: Generator) -> Iterator[Task]:
-        """The tasks that are wanted and can be done; not too many are played."""
-        tries = self._making.per_layout * _TRIES
+        """The tasks that fit the spec and can be done; plays a limited number of them."""
+        tries = self._spec.per_layout * _TRIES
         for task in candidates:
-            problem = unwanted(task, room, self._making, self._verify)
+            problem = unwanted(task, room, self._spec, self._verify)
             if not problem:
                 if not tries:
                     return
@@ -103,30 +103,30 @@ class Maker:
         self._verify.close()
 
 
-def make_suite(
-    making: Making,
+def build_suite(
+    spec: Making,
     seed: int,
     *,
     parts: Path,
     workers: int = 1,
-    on_room: Callable[[str, Made], None] = lambda scene, made: None,
-) -> Made:
-    """Make a suite's tasks; the same for the same making and seed.
+    on_room: Callable[[str, BuildResult], None] = lambda scene, made: None,
+) -> BuildResult:
+    """Build the tasks of a suite; the same spec and seed give the same tasks.
 
     Args:
-        parts: a folder for what rooms give, which need not be there; what is there is used.
+        parts: the folder of finished rooms; made if missing, used if it has some.
         workers: how many processes.
-        on_room: called with each room and what it gave.
+        on_room: called with each room and its tasks.
 
     Raises:
         RuntimeError: a room's worker died again and again.
     """
     make_folder(parts)
-    done = {scene: part for scene in making.rooms if (part := _read(_file(parts, scene)))}
+    done = {scene: part for scene in spec.rooms if (part := _read(_file(parts, scene)))}
     for scene, part in done.items():
         on_room(scene, part)
-    todo = [scene for scene in making.rooms if scene not in done]
-    with closing(do_jobs(partial(Maker, making, seed), todo, workers=workers)) as results:
+    todo = [scene for scene in spec.rooms if scene not in done]
+    with closing(do_jobs(partial(RoomBuilder, spec, seed), todo, workers=workers)) as results:
         for scene, made in results:
             if isinstance(made, Lost):
                 raise RuntimeError(
@@ -136,26 +136,26 @@ def make_suite(
             _write(_file(parts, scene), made)
             done[scene] = made
             on_room(scene, made)
-    every = Made()
-    for scene in making.rooms:
-        every = every.and_also(done[scene])
-    chosen = select_balanced(every.tasks, making.total, random.Random(seed))
-    return Made(tuple(_layouts_together(chosen)), every.dropped)
+    every = BuildResult()
+    for scene in spec.rooms:
+        every = every.plus(done[scene])
+    chosen = select_balanced(every.tasks, spec.total, random.Random(seed))
+    return BuildResult(tuple(_layouts_together(chosen)), every.dropped)
 
 
-def parts_of(out: Path, making: Making, seed: int) -> Path:
-    """Where the parts of a suite are kept until it is whole: beside it, for this making alone."""
-    told = json.dumps([making.model_dump(mode="json"), seed, __version__])
+def parts_folder(out: Path, spec: Making, seed: int) -> Path:
+    """The folder of a suite's unfinished parts: beside it, and for this spec alone."""
+    told = json.dumps([spec.model_dump(mode="json"), seed, __version__])
     return out.with_name(f".{out.name}.parts-{hashlib.sha256(told.encode()).hexdigest()[:8]}")
 
 
 def remove_parts(parts: Path) -> None:
-    """The suite is whole."""
+    """Remove the parts of a complete suite."""
     shutil.rmtree(parts, ignore_errors=True)
 
 
 def _layouts_together(tasks: Sequence[Task]) -> Iterable[Task]:
-    """The same tasks; arrangements that are equal become one object, which is written once."""
+    """The same tasks; equal arrangements become one object, which is written once."""
     starts: dict[str, Start] = {}
     for task in tasks:
         start = starts.setdefault(task.start.layout, task.start)
@@ -166,14 +166,14 @@ def _file(parts: Path, scene: str) -> Path:
     return parts / f"{scene}.jsonl"
 
 
-def _write(path: Path, made: Made) -> None:
+def _write(path: Path, made: BuildResult) -> None:
     jsonl_format.write_tasks(path, made.tasks, dropped=dict(made.dropped))
 
 
-def _read(path: Path) -> Made | None:
-    """What a room gave; None where that is not known, or its file is damaged."""
+def _read(path: Path) -> BuildResult | None:
+    """A finished room's tasks; None where its file is missing or damaged."""
     try:
         header = json.loads(path.read_text(encoding="utf-8").partition("\n")[0])
-        return Made(tuple(jsonl_format.read_tasks(path)), Counter(header["dropped"]))
+        return BuildResult(tuple(jsonl_format.read_tasks(path)), Counter(header["dropped"]))
     except (OSError, ValueError, TypeError, KeyError):
         return None

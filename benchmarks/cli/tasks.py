@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from benchmarks.cli.errors import BadInput, bad_input, tell_left_out
+from benchmarks.cli.errors import BadInput, bad_input, report_set_aside
 from benchmarks.cli.generate import generate
 from benchmarks.cli.options import force_option, split, workers_option
 from benchmarks.cli.terminal import echo, terminal
@@ -52,7 +52,7 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
             todo, aside = fitted.tasks, (*suite.set_aside, *fitted.set_aside)
             if aside and not todo:
                 raise BadInput(f"{suite.name}: no task can be played: {in_short(aside)}")
-        tell_left_out(suite.name, (), fitted.taken)
+        report_set_aside(suite.name, (), fitted.taken)
         for one in aside:
             echo(f"{suite.name}: set aside: {one}")
         solved = 0
@@ -115,7 +115,7 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
         aside += fitted.set_aside
         if aside and not fitted.tasks:
             raise BadInput(f"{suite}: no task to show: {in_short(aside)}")
-    tell_left_out(suite, aside, fitted.taken)
+    report_set_aside(suite, aside, fitted.taken)
     names = [field.name for field in fields(Difficulty)]
     pages = []
     for task in fitted.tasks:
@@ -143,7 +143,7 @@ def stats(suite: str, out: Path | None, force: bool) -> None:
 
     with bad_input(ImportError):
         found = _suite(suite)
-        tell_left_out(found.name, found.set_aside)
+        report_set_aside(found.name, found.set_aside)
         print_counts(found.tasks, {}, by_scene=True)
         if out is not None:
             from benchmarks.scoring.charts import draw_charts
@@ -172,7 +172,7 @@ def convert(suite: str, out: Path, force: bool) -> None:
         found, aside = list(read.tasks), read.set_aside
         if aside and not found:
             raise BadInput(f"{suite}: no task can be read: {in_short(aside)}")
-        tell_left_out(suite, aside)
+        report_set_aside(suite, aside)
         if out.name.endswith((".jsonl", ".jsonl.gz")):
             jsonl_format.write_tasks(out, found, force=force)
         elif out.suffix == ".json":

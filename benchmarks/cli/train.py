@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, complain
+from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import MOST_SEED, overrides_option, trust_option
 from benchmarks.cli.terminal import echo
 
@@ -56,7 +56,9 @@ def train_rl(
     except KeyboardInterrupt:
         kept = run.exists()
         left = f"what has been learnt is in {run}, the same command continues" if kept else ""
-        complain(f"interrupted; {left or 'nothing had been learnt, and nothing is left behind'}")
+        print_problem(
+            f"interrupted; {left or 'nothing had been learnt, and nothing is left behind'}"
+        )
         return INTERRUPTED
     _say_result(run, model)
     return 0

@@ -1,11 +1,10 @@
-"""docs/baselines.md: what trained policies achieve, from their run directories.
-
+"""Make docs/baselines.md, the results of trained policies, from their run directories.
 
     python -m benchmarks.pages.baselines runs/rl/*
 
-Plays every run, and beside it the searcher, the random agent and the oracle, on tasks of the types
-that it was trained on: those of er-1k, in rooms that training has never seen, and as many of a type
-of the suite that it was trained on. What has been played is not played again (``--work``).
+Plays every policy, and the searcher, the random agent and the oracle, on tasks of the types that
+the policy was trained on: those of er-1k, in rooms that training has never seen, and as many of
+each type from the suite that it was trained on. Episodes in ``--work`` are not played again.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ _SCRIPTED = ("random", "searcher", "oracle")
 
 
 @dataclass(frozen=True)
-class Trained:
+class TrainedRun:
     """A run directory.
 
     Attributes:
@@ -64,7 +63,7 @@ class Trained:
     config: TrainConfig
 
     @staticmethod
-    def load(path: Path) -> Trained:
+    def load(path: Path) -> TrainedRun:
         """Read it.
 
         Raises:
@@ -72,7 +71,7 @@ class Trained:
         """
         if not any((path / name).exists() for name in (MODEL, FOREIGN)):
             raise ValueError(f"{path} has no {MODEL}; give run directories of er-gym train-rl")
-        trained = Trained(path, load_config(path / "config.yaml"))
+        trained = TrainedRun(path, load_config(path / "config.yaml"))
         if trained.steps < trained.config.total_steps:
             raise ValueError(
                 f"{path} has {trained.steps:,} of {trained.config.total_steps:,} steps; "
@@ -101,7 +100,7 @@ class Trained:
         return self.curve[-1]["seconds"] / 60
 
 
-class Player:
+class Evaluator:
     """Plays tasks with agents, once each.
 
     Args:
@@ -153,7 +152,7 @@ def _picture_size(agent: str) -> dict[str, int]:
     return {"width": options.width, "height": options.height} if "rgb" in options.obs_mode else {}
 
 
-def of_types(tasks: Iterable[Task], types: Sequence[str], each: int) -> list[Task]:
+def sample_of_types(tasks: Iterable[Task], types: Sequence[str], each: int) -> list[Task]:
     """So many tasks of each type, drawn the same way every time; all types where none is named."""
     by_type = defaultdict(list)
     for task in tasks:
@@ -213,30 +212,32 @@ def main(
     trust: bool,
 ) -> None:
     """Write docs/baselines.md and its pictures."""
-    families: defaultdict[str, list[Trained]] = defaultdict(list)
+    families: defaultdict[str, list[TrainedRun]] = defaultdict(list)
     for path in runs:
-        trained = Trained.load(path)
+        trained = TrainedRun.load(path)
         families[trained.name].append(trained)
     with bad_input():
         check_output(out, force=force)
-    player = Player(work, workers, trust)
+    evaluator = Evaluator(work, workers, trust)
     unseen = load_suite(UNSEEN).tasks
     parts = []
     for name, members in families.items():
         config = members[0].config
         tasks = {
-            "training": of_types(load_suite(config.env.episodes).tasks, config.env.types, each),
-            "unseen": of_types(unseen, config.env.types, each),
+            "training": sample_of_types(
+                load_suite(config.env.episodes).tasks, config.env.types, each
+            ),
+            "unseen": sample_of_types(unseen, config.env.types, each),
         }
         results = {
             where: {
                 "trained": [
-                    rates(player.play(f"rl:{member.path}", of, where, member.path.name))
+                    rates(evaluator.play(f"rl:{member.path}", of, where, member.path.name))
                     for member in members
                 ]
             }
             | {
-                agent: [rates(player.play(agent, of, where, f"{name}-{agent}"))]
+                agent: [rates(evaluator.play(agent, of, where, f"{name}-{agent}"))]
                 for agent in _SCRIPTED
             }
             for where, of in tasks.items()
@@ -253,7 +254,7 @@ def main(
 Results = Mapping[str, Mapping[str, Sequence[Mapping[str, tuple[int, int]]]]]
 
 
-def _section(name: str, members: Sequence[Trained], results: Results) -> str:
+def _section(name: str, members: Sequence[TrainedRun], results: Results) -> str:
     config = members[0].config
     minutes = [each.minutes for each in members]
     groups = [group for group in GROUPS if group in results["unseen"]["trained"][0]]
@@ -279,7 +280,8 @@ def _section(name: str, members: Sequence[Trained], results: Results) -> str:
     n = results["unseen"]["trained"][0]["all"][1], results["training"]["trained"][0]["all"][1]
     lines += [
         "",
-        f"{n[1]} tasks in training rooms, {n[0]} in unseen ones. Made by",
+        f"{n[1]} tasks in training rooms, {n[0]} in unseen ones. "
+        "These commands train the policies:",
         "",
         "```sh",
         *(f"er-gym train-rl --config {name} --seed {each.config.seed}" for each in members),
@@ -310,6 +312,7 @@ def _page(parts: Sequence[str], pictures: Sequence[Path]) -> str:
     tables = "\n".join(parts)
     return f"""# Baselines
 
+<<<<<<< HEAD
 What policies learn on the embedded engine, beside agents that do not learn. This page is made by
 `python -m benchmarks.pages.baselines` from run directories. Everything is under
 `instances="explore"`, where a type name says nothing of the task's objects, and with the corrected
@@ -318,9 +321,20 @@ did in an evaluation. Success in %: the mean over seeds with the least and the m
 one run only, Wilson's 95 % interval. The rooms of the unseen tasks (`er-1k`) are the paper's twelve
 test rooms, none of them in training; some of their tasks are about types of things that training
 has never named. Training tasks are a sample of those that were trained on.
+=======
+This page shows what policies learn on the embedded engine, beside agents that do not learn.
+`python -m benchmarks.pages.baselines` makes it from run directories. All episodes use
+`instances="explore"`, where the environment does not look at the task to choose which object a type
+name means, and the corrected scorer. Each policy is the one at the end of training; none was chosen
+by its evaluations. It plays its most probable action. Success is in %: the mean over seeds, with
+the lowest and the highest; for a single run, Wilson's 95 % interval. The rooms of the unseen tasks
+(`er-1k`) are the paper's twelve test rooms, and training uses none of them. Some of their tasks are
+about object types that training never names. Training tasks are a sample of those that the policy
+was trained on.
+>>>>>>> p4
 
-Times are from the beginning of training to its end, evaluations included, on {machine()}.
-The suite `train` is made once: `er-gym tasks generate --suite train`, about 3 minutes.
+Times are from the start of training to its end, evaluations included, on {machine()}.
+`er-gym tasks generate --suite train` makes the suite `train` once, in about 3 minutes.
 
 {shown}
 

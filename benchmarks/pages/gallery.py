@@ -168,7 +168,7 @@ def make_gallery() -> None:
     lines = [
         "# Gallery",
         "",
-        "What the embedded engine draws, made by `python -m benchmarks.pages.gallery`.",
+        "Pictures of the embedded engine, made by `python -m benchmarks.pages.gallery`.",
         "",
         f"## Things: the {len(things)} types",
         "",

@@ -2,7 +2,7 @@
 
     python -m benchmarks.perf.conversations [--concurrency 8 --workers 2 --latency 0.1]
 
-The server runs in a process of its own on the same machine: it answers after the given time with
+The server runs in a process of its own on the same machine: it replies after the given time with
 the tasks' key actions. Nothing but this machine's cores and that time is in the
 figure, whose upper bound is concurrency / latency.
 """
@@ -29,11 +29,11 @@ from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks import Task, load_suite
 
 
-class Answers:
+class KeyActionReplies:
     """Says the next key action of the task that a conversation is about."""
 
     def __init__(self, tasks: list[Task]) -> None:
-        self._ways = {
+        self._actions = {
             task.instruction: [f"{key.verb} {key.actual_type}".strip() for key in task.key_actions]
             for task in tasks
         }
@@ -41,21 +41,23 @@ class Answers:
     def __call__(self, messages: list[dict[str, Any]]) -> str:
         first = next(message["content"] for message in messages if message["role"] == "user")
         told = first if isinstance(first, str) else "".join(part.get("text", "") for part in first)
-        way = next(way for instruction, way in self._ways.items() if instruction in told)
+        actions = next(
+            actions for instruction, actions in self._actions.items() if instruction in told
+        )
         said = sum(message["role"] == "assistant" for message in messages)
-        action = way[min(said, len(way) - 1)]
+        action = actions[min(said, len(actions) - 1)]
         return f"<Thinking>Next.</Thinking><DecisionMaking>{action}</DecisionMaking>"
 
 
 class Server(ThreadingHTTPServer):
-    """An OpenAI-compatible server that always answers, ``latency`` seconds after a request."""
+    """An OpenAI-compatible server that always replies, ``latency`` seconds after a request."""
 
     daemon_threads = True
     request_queue_size = 128
 
-    def __init__(self, answers: Answers, latency: float) -> None:
+    def __init__(self, replies: KeyActionReplies, latency: float) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
-        self.answers = answers
+        self.replies = replies
         self.latency = latency
 
     @property
@@ -72,7 +74,7 @@ class _Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         arrived = time.monotonic()
         asked = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        said = self.server.answers(asked["messages"])
+        said = self.server.replies(asked["messages"])
         body = json.dumps(
             {
                 "id": "answer",
@@ -102,7 +104,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 def serve(pipe: Connection, tasks: list[Task], latency: float) -> None:
     """The server's process."""
-    server = Server(Answers(tasks), latency)
+    server = Server(KeyActionReplies(tasks), latency)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     pipe.send(server.url)
     with suppress(EOFError):
@@ -114,7 +116,7 @@ def serve(pipe: Connection, tasks: list[Task], latency: float) -> None:
 @click.option("--concurrency", default=8, show_default=True)
 @click.option("--workers", default=2, show_default=True)
 @click.option("--latency", default=0.1, show_default=True, help="Seconds.")
-@click.option("--size", default=300, show_default=True, help="Pixels, both ways.")
+@click.option("--size", default=300, show_default=True, help="Pixels, width and height.")
 def main(episodes: int, concurrency: int, workers: int, latency: float, size: int) -> None:
     """Measure, and print."""
     suite = load_suite("er-1k")
@@ -125,18 +127,18 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
     )
     process.start()
     theirs.close()
-    voice = VLMRun.of(
+    vlm_run = VLMRun.of(
         "openai:answering-server",
         base_url=ours.recv(),
         overrides=[f"pictures.width={size}", f"pictures.height={size}"],
         concurrency=concurrency,
     )
-    env = {**suite.env, **voice.env}
+    env = {**suite.env, **vlm_run.env}
     ended: list[tuple[float, int]] = []
     with tempfile.TemporaryDirectory() as place:
         manifest = Manifest(
             suite=suite.name, suite_digest=suite.digest, suite_size=len(suite.tasks),
-            agent=voice.name, env=env, seed=0, er_gym=__version__,
+            agent=vlm_run.name, env=env, seed=0, er_gym=__version__,
         )  # fmt: skip
         store = RunDirectory.create(Path(place), manifest)
         began = time.perf_counter()
@@ -145,8 +147,8 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
             if isinstance(event, EpisodeEnded):
                 ended.append((time.perf_counter(), event.steps))
 
-        with closing(voice.factory(store.path)) as factory:
-            outcome = voice.play(factory, store, tasks, workers, [note])
+        with closing(vlm_run.factory(store.path)) as factory:
+            outcome = vlm_run.play(factory, store, tasks, workers, [note])
     ours.close()
     process.join(5)
     whole = ended[-1][0] - began

@@ -41,7 +41,7 @@ from rich.table import Table
 from benchmarks.checks.output import Output, write_figures
 from benchmarks.checks.scene_jobs import choose_scenes
 from benchmarks.checks.soak import free_play
-from benchmarks.perf.steps import Walker
+from benchmarks.perf.steps import RandomPlayer
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.scene_graph import scene_graph_of
@@ -93,7 +93,7 @@ os._exit(0)  # OSMesa's renderer cannot be taken down
 
 
 @dataclass(frozen=True)
-class Figure:
+class FrameRate:
     """One figure: the median of what each round gave.
 
     Attributes:
@@ -116,7 +116,7 @@ class Memory:
     megabytes: float
 
 
-def resident() -> float:
+def resident_megabytes() -> float:
     """Megabytes."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
@@ -237,18 +237,18 @@ class MuJoCo:
         except subprocess.TimeoutExpired:
             raise RuntimeError(f"it was not done after {_MUJOCO_TIMEOUT:.0f} s") from None
         except subprocess.CalledProcessError as error:
-            raise RuntimeError(_first_cause(error.stderr)) from None
+            raise RuntimeError(_first_error(error.stderr)) from None
         return float(result.stdout.split()[-1])
 
 
-def _first_cause(said: str) -> str:
+def _first_error(said: str) -> str:
     """The exception that came first, out of what Python printed."""
     lines = [line for line in said.splitlines() if line and not line.startswith(" ")]
     errors = [line for line in lines if "Error" in line.split(":")[0]]
     return (errors or lines or ["it said nothing"])[0]
 
 
-def those_that_run(scenes: list[str], console: Console) -> list[MuJoCo]:
+def available_renderers(scenes: list[str], console: Console) -> list[MuJoCo]:
     """MuJoCo's renderers that run here; of the others it is said why not."""
     if importlib.util.find_spec("mujoco") is None:
         console.print("nothing to compare with: pip install mujoco", style="yellow")
@@ -270,20 +270,20 @@ def those_that_run(scenes: list[str], console: Console) -> list[MuJoCo]:
 # -- what is measured ------------------------------------------------------------------------------
 
 
-def rates(scenes: list[str], rounds: int, seconds: float, console: Console) -> list[Figure]:
+def rates(scenes: list[str], rounds: int, seconds: float, console: Console) -> list[FrameRate]:
     """Pictures and steps per second at each size, timed in turns."""
     timers: dict[tuple[str, tuple[int, int]], Callable[[float], float]] = {}
     with ExitStack() as stack:
-        rivals = those_that_run(scenes, console)
+        mujoco_renderers = available_renderers(scenes, console)
         for size in SIZES:
             env = environment(scenes, size)
             stack.callback(env.close)
             for depth in (False, True):
                 name = f"renderer: rgb, instances{', depth' if depth else ''}"
                 timers[name, size] = Pictures(scenes, size, depth).per_second
-            timers[STEP, size] = Walker([env], seed=0).steps_per_second
-            for rival in rivals:
-                timers[rival.name, size] = partial(rival.per_second, scenes, size)
+            timers[STEP, size] = RandomPlayer([env], seed=0).steps_per_second
+            for renderer in mujoco_renderers:
+                timers[renderer.name, size] = partial(renderer.per_second, scenes, size)
         found: dict[tuple[str, tuple[int, int]], list[float]] = {what: [] for what in timers}
         for (name, _), timer in timers.items():
             if "MuJoCo" not in name:  # what is loaded once is loaded now
@@ -292,7 +292,7 @@ def rates(scenes: list[str], rounds: int, seconds: float, console: Console) -> l
         for what, timer in track(turns, "rates", console=console, disable=not console.is_terminal):
             found[what].append(timer(seconds))
     return [
-        Figure(name, size, statistics.median(values), tuple(values))
+        FrameRate(name, size, statistics.median(values), tuple(values))
         for (name, size), values in found.items()
     ]
 
@@ -313,7 +313,7 @@ def soak(console: Console) -> list[Memory]:
                 )
                 if ended or cut:
                     _, info = env.reset(options={"task": free_play(name)})
-        return resident()
+        return resident_megabytes()
 
     found = [Memory(f"soak: {SCENES} scenes seen", play(few, 20))]
     for part in (1, 2):
@@ -330,7 +330,7 @@ def soak(console: Console) -> list[Memory]:
 # -- what is printed -------------------------------------------------------------------------------
 
 
-def show(figures: list[Figure], memory: list[Memory], console: Console) -> None:
+def show(figures: list[FrameRate], memory: list[Memory], console: Console) -> None:
     """Print the rates and the memory."""
     cores = f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
     table = Table(title=f"pictures a second in one process ({cores})")
@@ -362,7 +362,9 @@ def main(seconds: float, rounds: int, soaked: bool, file: Path | None) -> None:
     """Measure, and print two tables."""
     log = Console(stderr=True)
     figures = rates(choose_scenes(str(SCENES)), rounds, seconds, log)
-    memory = [Memory(f"{SCENES} scenes drawn and played at {len(SIZES)} sizes", resident())]
+    memory = [
+        Memory(f"{SCENES} scenes drawn and played at {len(SIZES)} sizes", resident_megabytes())
+    ]
     if soaked:
         memory += soak(log)
     show(figures, memory, Console(width=None if sys.stdout.isatty() else 110))

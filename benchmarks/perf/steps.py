@@ -62,7 +62,7 @@ print(open("/proc/self/statm").read().split()[1])
 
 
 @dataclass(frozen=True)
-class Figure:
+class Measurement:
     """One row of the table.
 
     Attributes:
@@ -78,11 +78,11 @@ class Figure:
     rounds: tuple[float, ...] = ()
 
     @staticmethod
-    def of(name: str, rounds: list[float], unit: str) -> Figure:
-        return Figure(name, statistics.median(rounds), unit, tuple(rounds))
+    def of(name: str, rounds: list[float], unit: str) -> Measurement:
+        return Measurement(name, statistics.median(rounds), unit, tuple(rounds))
 
 
-class Walker:
+class RandomPlayer:
     """Random legal actions in some environments, an episode of each in turn."""
 
     def __init__(self, envs: list[gymnasium.Env[Any, Any]], seed: int) -> None:
@@ -138,12 +138,12 @@ def environments(**arguments: Any) -> Iterator[list[gymnasium.Env[Any, Any]]]:
         yield envs
 
 
-def step_rates(rounds: int, seconds: float, console: Console) -> list[Figure]:
+def step_rates(rounds: int, seconds: float, console: Console) -> list[Measurement]:
     """Steps per second of each variant and of MiniGrid, and reset times, timed in turns."""
     with ExitStack() as stack:
         # Each plays other episodes: the engine remembers what it has seen, for all in the process.
-        walkers = {
-            name: Walker(stack.enter_context(environments(**arguments)), seed)
+        players = {
+            name: RandomPlayer(stack.enter_context(environments(**arguments)), seed)
             for seed, (name, arguments) in enumerate(VARIANTS.items())
         }
         if importlib.util.find_spec("minigrid") is not None:
@@ -151,24 +151,24 @@ def step_rates(rounds: int, seconds: float, console: Console) -> list[Figure]:
 
             env = gymnasium.make(MINIGRID)
             stack.callback(env.close)
-            walkers[MINIGRID] = Walker([env], seed=0)
-        rates: dict[str, list[float]] = {name: [] for name in walkers}
-        for walker in walkers.values():
-            walker.steps_per_second(min(0.3, seconds))  # what is loaded once is loaded now
-            walker.resets.clear()
-        turns = [(name, walker) for _ in range(rounds) for name, walker in walkers.items()]
-        for name, walker in track(turns, "steps", console=console, disable=not console.is_terminal):
-            rates[name].append(walker.steps_per_second(seconds))
-    figures = [Figure.of(f"steps, {name}", found, "steps/s") for name, found in rates.items()]
+            players[MINIGRID] = RandomPlayer([env], seed=0)
+        rates: dict[str, list[float]] = {name: [] for name in players}
+        for player in players.values():
+            player.steps_per_second(min(0.3, seconds))  # what is loaded once is loaded now
+            player.resets.clear()
+        turns = [(name, player) for _ in range(rounds) for name, player in players.items()]
+        for name, player in track(turns, "steps", console=console, disable=not console.is_terminal):
+            rates[name].append(player.steps_per_second(seconds))
+    figures = [Measurement.of(f"steps, {name}", found, "steps/s") for name, found in rates.items()]
     for name in VARIANTS:
-        times = 1000 * np.array(walkers[name].resets)
+        times = 1000 * np.array(players[name].resets)
         if len(times):
-            figures.append(Figure(f"reset p50, {name}", float(np.percentile(times, 50)), "ms"))
-            figures.append(Figure(f"reset p95, {name}", float(np.percentile(times, 95)), "ms"))
+            figures.append(Measurement(f"reset p50, {name}", float(np.percentile(times, 50)), "ms"))
+            figures.append(Measurement(f"reset p95, {name}", float(np.percentile(times, 95)), "ms"))
     return figures
 
 
-def interactable_poses(rounds: int) -> Figure:
+def interactable_poses(rounds: int) -> Measurement:
     """Mean time of GetInteractablePoses over every object of a kitchen but the first asked for."""
     found = []
     for _ in range(rounds):
@@ -180,10 +180,10 @@ def interactable_poses(rounds: int) -> Figure:
             times.append(1000 * (time.perf_counter() - start))
         controller.stop()
         found.append(float(np.mean(times[1:])))
-    return Figure.of(f"GetInteractablePoses at 0.25 m, {KITCHEN}'s objects, mean", found, "ms")
+    return Measurement.of(f"GetInteractablePoses at 0.25 m, {KITCHEN}'s objects, mean", found, "ms")
 
 
-def fresh_start(rounds: int) -> list[Figure]:
+def fresh_start(rounds: int) -> list[Measurement]:
     """Seconds to the first observation in a new process, import included."""
     figures = []
     for obs_mode in ("state", "rgb"):
@@ -196,13 +196,13 @@ def fresh_start(rounds: int) -> list[Figure]:
             found.append([float(word) for word in result.stdout.split()])
         imported, ready = zip(*found, strict=True)
         if obs_mode == "state":
-            figures.append(Figure.of("fresh process: import", list(imported), "s"))
+            figures.append(Measurement.of("fresh process: import", list(imported), "s"))
         name = f"fresh process: import, make, reset, first observation ({obs_mode})"
-        figures.append(Figure.of(name, list(ready), "s"))
+        figures.append(Measurement.of(name, list(ready), "s"))
     return figures
 
 
-def resident_memory() -> list[Figure]:
+def resident_memory() -> list[Measurement]:
     """What a new process with one environment, after 50 steps, keeps in memory."""
     figures = []
     for obs_mode in ("state", "rgb"):
@@ -212,11 +212,11 @@ def resident_memory() -> list[Figure]:
         )  # fmt: skip
         pages = int(result.stdout) * os.sysconf("SC_PAGE_SIZE")
         name = f"resident memory, one environment ({obs_mode})"
-        figures.append(Figure(name, pages / 2**20, "MiB"))
+        figures.append(Measurement(name, pages / 2**20, "MiB"))
     return figures
 
 
-def show(figures: list[Figure], console: Console) -> None:
+def show(figures: list[Measurement], console: Console) -> None:
     """Print the one table."""
     table = Table(title=f"er-gym, {os.cpu_count()} cores, Python {sys.version.split()[0]}")
     table.add_column("what")
@@ -238,7 +238,7 @@ def main(seconds: float, rounds: int, file: Path | None) -> None:
     """Measure, and print one table."""
     console = Console(width=None if sys.stdout.isatty() else 140)
     figures = step_rates(rounds, seconds, Console(stderr=True))
-    parts: list[Callable[[], list[Figure]]] = [
+    parts: list[Callable[[], list[Measurement]]] = [
         lambda: [interactable_poses(rounds)],
         lambda: fresh_start(rounds),
         resident_memory,

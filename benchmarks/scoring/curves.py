@@ -22,7 +22,7 @@ _PANELS = {
 }
 
 
-class Curved(Protocol):
+class HasCurve(Protocol):
     """What has a learning curve."""
 
     @property
@@ -31,7 +31,7 @@ class Curved(Protocol):
 
 
 def draw_curves(
-    families: Mapping[str, Sequence[Curved]], out: Path, *, force: bool = True
+    families: Mapping[str, Sequence[HasCurve]], out: Path, *, force: bool = True
 ) -> list[Path]:
     """Draw success over steps and over minutes, a line a family: mean, least and most of its seeds.
 
@@ -53,8 +53,8 @@ def draw_curves(
             figure.subplots(1, 2, sharey=True), _PANELS.items(), strict=True
         ):
             for color, (name, runs) in zip(_COLORS, families.items(), strict=False):
-                _family(axes, runs, key, over, scale, color, name)
-            _dress(axes, title, label)
+                _draw_family(axes, runs, key, over, scale, color, name)
+            _style_axes(axes, title, label)
         figure.axes[0].set_ylabel("success, %", color=_MUTED)
         figure.axes[1].legend(frameon=False, labelcolor=_INK, loc="lower right")
         file = out / f"learning_{over}.png"
@@ -63,9 +63,9 @@ def draw_curves(
     return made
 
 
-def _family(
+def _draw_family(
     axes: Axes,
-    runs: Sequence[Curved],
+    runs: Sequence[HasCurve],
     key: str,
     over: str,
     scale: float,
@@ -88,7 +88,7 @@ def _family(
         )
 
 
-def _dress(axes: Axes, title: str, label: str) -> None:
+def _style_axes(axes: Axes, title: str, label: str) -> None:
     axes.set_title(title, loc="left", fontsize=11, color=_INK)
     axes.set_xlabel(label, color=_MUTED)
     axes.set_ylim(0, 100)

@@ -54,7 +54,7 @@ def ordered_completeness(episode: EpisodeRecord, counted: Tally) -> float:
 
 def repeat_rate(counted: Tally) -> float:
     """The share of navigations, failed ones too, that name a type navigated to before."""
-    targets = counted.gone_to
+    targets = counted.navigated_to
     return (len(targets) - len(set(targets))) / len(targets) if targets else 0.0
 
 
@@ -72,7 +72,7 @@ def key_action_precision(episode: EpisodeRecord, counted: Tally) -> float:
     The completeness of the paper's text; its scorer computes :func:`completeness`.
     """
     predicted = len(episode.predicted)
-    return (counted.points + counted.routes) / predicted if predicted else 0.0
+    return (counted.points + counted.navigations_done) / predicted if predicted else 0.0
 
 
 def _longest_common(first: Sequence[str], second: Sequence[str]) -> int:

@@ -34,8 +34,8 @@ class Tally:
         scored: those that were done, in the order of the episode. ``end`` is left out where the
             task's name decides about it, which it does in the paper's reading only.
         points: how many scored, that ``end`` included.
-        routes: key actions done besides, which score nothing: navigations that the task lists.
-        gone_to: the types that navigations named, failed ones too.
+        navigations_done: navigations of the task that were done; these key actions score nothing.
+        navigated_to: the types that navigations named, failed ones too.
         steps: how many steps the episode took, ``init`` and ``end`` included.
         success: whether the task was done.
     """
@@ -43,8 +43,8 @@ class Tally:
     expected: tuple[str, ...]
     scored: tuple[str, ...]
     points: int
-    routes: int
-    gone_to: tuple[str, ...]
+    navigations_done: int
+    navigated_to: tuple[str, ...]
     steps: int
     success: bool
 
@@ -93,19 +93,19 @@ def _paper(episode: EpisodeRecord) -> Tally:
     expected = [key for key in keys if not any(verb in key for verb in _NOT_EXPECTED)]
     left, name = Counter(keys), episode.name.lower()
     scored: list[str] = []
-    points = routes = 0
+    points = navigations_done = 0
     last = ""
-    gone_to: list[str] = []
+    navigated_to: list[str] = []
     for step in episode.steps:
         if step.verb == NAVIGATE:
-            gone_to.append(step.object_type)
+            navigated_to.append(step.object_type)
         if not step.success:
             continue
         verb, label = step.verb, _label(step.verb, step.object_type)
         if verb in _PASSED_OVER:
             if left[label] > 0:
                 left[label] -= 1
-                routes += 1
+                navigations_done += 1
         elif END in verb:
             if episode.task_type != JUDGED_BY_NAME:
                 scored.append(verb)
@@ -126,8 +126,8 @@ def _paper(episode: EpisodeRecord) -> Tally:
         tuple(expected),
         tuple(scored),
         points,
-        routes,
-        tuple(gone_to),
+        navigations_done,
+        tuple(navigated_to),
         len(episode.steps),
         success=bool(expected) and points >= len(expected),
     )
@@ -181,8 +181,8 @@ def _corrected(episode: EpisodeRecord) -> Tally:
         expected=labels(progress.criteria.key_actions),
         scored=scored,
         points=len(scored),
-        routes=len(progress.done) - len(scored),
-        gone_to=tuple(step.object_type for step in episode.steps if step.verb == NAVIGATE),
+        navigations_done=len(progress.done) - len(scored),
+        navigated_to=tuple(step.object_type for step in episode.steps if step.verb == NAVIGATE),
         steps=episode.num_steps,
         success=progress.success,
     )

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from benchmarks.cli import diagnosis as doctor
+from benchmarks.cli import doctor_checks
 from benchmarks.cli import main as cli
 from benchmarks.cli.extras import extras, state_of
 from er_gym.thor import player_install as players
@@ -124,8 +124,10 @@ def the_client(monkeypatch):
 
     def misses(*what: str) -> None:
         missing = {platform: list(what) for platform in ("Linux64", "CloudRendering")}
-        monkeypatch.setattr(doctor, "_missed_by_the_client", lambda: missing)
-        monkeypatch.setattr(doctor, "find_library", lambda name: None if what else f"lib{name}.so")
+        monkeypatch.setattr(doctor_checks, "_missing_for_client", lambda: missing)
+        monkeypatch.setattr(
+            doctor_checks, "find_library", lambda name: None if what else f"lib{name}.so"
+        )
 
     return misses
 
@@ -187,7 +189,7 @@ def test_doctor_finds_builds_that_can_run(er_gym, the_client):
 def test_doctor_says_that_the_client_is_of_another_version(er_gym, the_client, monkeypatch):
     the_client()
     er_gym("player", "install")
-    monkeypatch.setattr(doctor, "_CLIENT", "4.3.0")
+    monkeypatch.setattr(doctor_checks, "_CLIENT", "4.3.0")
     assert "er-gym was written for 4.3.0" in lines(er_gym("doctor")[1])["Controller(scene=…)"]
 
 
@@ -195,7 +197,7 @@ def test_doctor_fails_where_er_gym_does(er_gym, monkeypatch):
     def broken(**arguments):
         raise OSError("no room")
 
-    monkeypatch.setattr(doctor, "make_controller", broken)
+    monkeypatch.setattr(doctor_checks, "make_controller", broken)
     code, out, _ = er_gym("doctor")
     assert code == 1
     assert "--  embedded engine" in out
@@ -216,9 +218,9 @@ def test_a_gpu_is_named(er_gym, monkeypatch, home):
 def test_doctor_says_that_er_gym_is_not_installed(monkeypatch):
     """As when the command runs from a checkout by PYTHONPATH alone."""
     monkeypatch.setattr("benchmarks.cli.extras.PROJECT", "er-gym-that-nobody-installed")
-    (finding,) = doctor._extras()
-    assert (finding.what, finding.works) == ("extras", False)
-    assert "pip install" in finding.mend
+    (check,) = doctor_checks._extras()
+    assert (check.part, check.works) == ("extras", False)
+    assert "pip install" in check.fix
 
 
 def test_help_imports_nothing_heavy():

@@ -1,4 +1,4 @@
-"""Agents that speak, end to end: the command, a server that misbehaves, engines in processes."""
+"""Vision-language agents, end to end: the command, a faulty server, engines in processes."""
 
 from __future__ import annotations
 
@@ -274,7 +274,10 @@ def test_a_key_that_is_repeated_is_nowhere(tmp_path: Path, monkeypatch: Any) -> 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--agent", "oracle", "--concurrency", "4"), "--concurrency is for agents that speak"),
+        (
+            ("--agent", "oracle", "--concurrency", "4"),
+            "--concurrency is for vision-language agents",
+        ),
         (("--agent", "openai:m", "--agent-config", "genius"), "there is no agent 'genius'"),
         (("--agent", "openai:m", "--set", "sees=nothing"), "wrong field 'sees'"),
         (("--agent", "openai:m"), "there is no key: set OPENAI_API_KEY"),
@@ -287,7 +290,7 @@ def test_a_key_that_is_repeated_is_nowhere(tmp_path: Path, monkeypatch: Any) -> 
             for what in ("usd", "tokens", "minutes")
             for given in ("0", "-1", "nan", "inf")
         ),
-        (("--agent", "oracle", "--max-usd", "0"), "--max-usd is for agents that speak"),
+        (("--agent", "oracle", "--max-usd", "0"), "--max-usd is for vision-language agents"),
         (("--agent", "openai:m", "--set", "prices.prompt=.nan"), "'prices.prompt'"),
         (("--agent", "openai:m", "--set", "prices.prompt=.inf"), "'prices.prompt'"),
         (("--agent", "openai:m", "--set", "prices.completion=-1"), "'prices.completion'"),

@@ -178,8 +178,8 @@ def install_beside(folder: Path, distribution: str, package: str) -> None:
 def packages_here(*path: Path) -> dict[str, tuple[bool, bool, str]]:
     """What doctor says of the top-level packages: works, needed, says; in a Python with a path."""
     program = (
-        "import json; from benchmarks.cli.diagnosis import _packages\n"
-        "print(json.dumps({f.what: (f.works, f.needed, f.says + f.mend) for f in _packages()}))"
+        "import json; from benchmarks.cli.doctor_checks import _packages\n"
+        "print(json.dumps({c.part: (c.works, c.required, c.detail + c.fix) for c in _packages()}))"
     )
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, path))}
     asked = [sys.executable, "-c", program]  # which puts the working directory before the path

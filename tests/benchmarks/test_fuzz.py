@@ -14,9 +14,9 @@ from rich.console import Console
 
 from benchmarks.checks import fuzz as fuzz_script
 from benchmarks.checks.fuzz import fuzz, main, play, play_run
-from benchmarks.checks.fuzz_checks import QUESTIONS, floor, goes_over_the_wire, pictures_fit
-from benchmarks.checks.fuzz_report import Plan, Report, show
-from benchmarks.checks.fuzz_requests import BENDS, PARAMETERS, SANE, Room, draw_request
+from benchmarks.checks.fuzz_checks import QUESTIONS, can_be_serialised, floor, pictures_fit
+from benchmarks.checks.fuzz_report import FuzzPlan, FuzzReport, show
+from benchmarks.checks.fuzz_requests import MUTATIONS, PARAMETERS, SANE, Room, draw_request
 from er_gym.sim import engine as engine_module
 from er_gym.sim.actions import ACTIONS
 from er_gym.sim.engine import Engine
@@ -28,7 +28,7 @@ KITCHENS = ("FloorPlan1", "FloorPlan2", "FloorPlan3", "FloorPlan4")
 
 def played(plan, runs=None):
     """One report of all runs of a plan, in this process."""
-    total = Report()
+    total = FuzzReport()
     for run in range(plan.runs) if runs is None else runs:
         total.add(play_run(run, plan=plan))
     return total
@@ -36,25 +36,25 @@ def played(plan, runs=None):
 
 @pytest.fixture(scope="module")
 def long_play():
-    return played(Plan(seed=1, actions=1600, scenes=KITCHENS))
+    return played(FuzzPlan(seed=1, actions=1600, scenes=KITCHENS))
 
 
 def test_a_short_play_has_no_problem():
-    total = played(Plan(seed=3, actions=300, scenes=SCENES))
+    total = played(FuzzPlan(seed=3, actions=300, scenes=SCENES))
     assert [str(step) for step in total.wrong] == []
     assert total.total.tries == 300
     assert total.total.successes > 100
 
 
 def test_through_the_client_too(monkeypatch):
-    monkeypatch.setattr(fuzz_script, "ByEngine", None)
-    total = played(Plan(seed=2, actions=2000, scenes=SCENES), [9])
+    monkeypatch.setattr(fuzz_script, "EngineDriver", None)
+    total = played(FuzzPlan(seed=2, actions=2000, scenes=SCENES), [9])
     assert total.total.tries == 200
 
 
 def test_the_same_seed_asks_the_same():
     def requests(seed, run):
-        plan = Plan(seed, actions=400, scenes=SCENES)
+        plan = FuzzPlan(seed, actions=400, scenes=SCENES)
         return [repr(step.request) for step, _ in zip(play(plan, run), range(60), strict=False)]
 
     assert requests(0, 1) == requests(0, 1)
@@ -63,8 +63,8 @@ def test_the_same_seed_asks_the_same():
 
 
 def test_workers_make_no_difference():
-    plan = Plan(seed=0, actions=250, scenes=SCENES)
-    shared, alone = Report(), played(plan)
+    plan = FuzzPlan(seed=0, actions=250, scenes=SCENES)
+    shared, alone = FuzzReport(), played(plan)
     for report in fuzz(plan, workers=2):
         shared.add(report)
     assert shared.total.tries == alone.total.tries == 250
@@ -98,20 +98,22 @@ def test_the_table_knows_no_parameter_that_nothing_takes():
     assert SANE.keys() <= taken
 
 
-@pytest.mark.parametrize("bend", BENDS[::2] + BENDS[1::2], ids=lambda bend: bend.__name__)
-def test_what_is_bent_is_a_request_still(room, bend):
+@pytest.mark.parametrize(
+    "mutation", MUTATIONS[::2] + MUTATIONS[1::2], ids=lambda mutation: mutation.__name__
+)
+def test_a_mutated_request_is_still_a_request(room, mutation):
     for _ in range(200):
         request = draw_request(room)
         before = repr(room.metadata["objects"][:3])
-        bend(room, request)
+        mutation(room, request)
         assert all(isinstance(name, str) for name in request)
         assert repr(room.metadata["objects"][:3]) == before
 
 
 def test_an_empty_request_can_be_bent(room):
-    for bend in BENDS:
+    for mutation in MUTATIONS:
         for _ in range(10):
-            bend(room, {})
+            mutation(room, {})
 
 
 # -- what it finds ---------------------------------------------------------------------------------
@@ -191,7 +193,7 @@ def changes_behind_the_cache(world):
 def test_a_broken_engine_is_found(monkeypatch, broken, action, found):
     run_instead(monkeypatch, action, broken)
     monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", [action, "Done"])
-    total = played(Plan(seed=0, actions=60, scenes=("FloorPlan402",)))
+    total = played(FuzzPlan(seed=0, actions=60, scenes=("FloorPlan402",)))
     assert any(re.search(found, problem) for step in total.wrong for problem in step.problems)
 
 
@@ -202,7 +204,7 @@ def test_a_failed_action_that_leaves_a_trace_is_found(monkeypatch):
 
     run_instead(monkeypatch, "OpenObject", half_done)
     monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", ["OpenObject"])
-    total = played(Plan(seed=0, actions=10, scenes=("FloorPlan402",)))
+    total = played(FuzzPlan(seed=0, actions=10, scenes=("FloorPlan402",)))
     problems = [problem for step in total.wrong for problem in step.problems]
     assert any("a refused action changed" in problem for problem in problems)
 
@@ -215,7 +217,7 @@ def test_a_client_that_raises_the_wrong_thing_is_found(monkeypatch):
 
     monkeypatch.setattr(fuzz_script, "EmbeddedController", Timid)
     monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", ["Stand"])
-    total = played(Plan(seed=0, actions=2000, scenes=("FloorPlan402",)), [9])
+    total = played(FuzzPlan(seed=0, actions=2000, scenes=("FloorPlan402",)), [9])
     assert any("raised None, not <class 'RuntimeError'>" in str(step) for step in total.wrong)
 
 
@@ -229,17 +231,17 @@ def test_the_game_goes_on_after_an_exception(monkeypatch):
 
     monkeypatch.setattr(engine_module, "metadata", sometimes)
     monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", ["Done", "Pass"])
-    total = played(Plan(seed=0, actions=40, scenes=("FloorPlan402",)))
+    total = played(FuzzPlan(seed=0, actions=40, scenes=("FloorPlan402",)))
     assert total.total.tries == 40
     assert total.tallies["Pass"].successes > 5
     assert total.tallies["Done"].problems > 5
 
 
 def test_bad_values_are_told_by_where_they_are():
-    told = list(goes_over_the_wire({"a": [{"b": float("inf")}], "c": 10**30}))
+    told = list(can_be_serialised({"a": [{"b": float("inf")}], "c": 10**30}))
     assert any(".a[0].b = inf" in problem for problem in told)
     assert any("OverflowError" in problem for problem in told)
-    assert list(goes_over_the_wire({"name": "\ud800", "n": [1, 2.5, None, True]})) == []
+    assert list(can_be_serialised({"name": "\ud800", "n": [1, 2.5, None, True]})) == []
 
 
 def test_bad_pictures_are_found():
@@ -260,7 +262,7 @@ def test_questions_are_actions():
 def test_problems_are_shown_with_the_way_to_see_them_again(monkeypatch):
     run_instead(monkeypatch, "Pass", raises)
     monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", ["Pass"])
-    plan = Plan(seed=5, actions=8, scenes=("FloorPlan402",))
+    plan = FuzzPlan(seed=5, actions=8, scenes=("FloorPlan402",))
     console = Console(record=True, width=120)
     assert show(played(plan), plan, 1.0, console) == 1
     shown = console.export_text()

@@ -104,7 +104,7 @@ def their_figures(result: dict[str, Any]) -> dict[str, float]:
         for key in keys
         if "observe" not in key and "move forward" not in key and "navigate to" not in key
     ]
-    gone_to = [entry["object"] for entry in looked_at if entry["action"] == "navigate to"]
+    navigated_to = [entry["object"] for entry in looked_at if entry["action"] == "navigate to"]
     share = count / len(counted) if counted else 0.0
     return {
         "success": share >= 1,
@@ -113,7 +113,9 @@ def their_figures(result: dict[str, Any]) -> dict[str, float]:
         "ordered_completeness": share
         if search or not counted
         else _in_common(tuple(earned), tuple(counted)) / len(counted),
-        "repeat_rate": (len(gone_to) - len({*gone_to})) / len(gone_to) if gone_to else 0.0,
+        "repeat_rate": (len(navigated_to) - len({*navigated_to})) / len(navigated_to)
+        if navigated_to
+        else 0.0,
     }
 
 

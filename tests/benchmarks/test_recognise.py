@@ -9,7 +9,7 @@ import pytest
 from benchmarks.checks.recognisability import (
     SIDE,
     TYPES,
-    Verdict,
+    Classification,
     commonest_types,
     crop,
     crops_of,
@@ -67,7 +67,7 @@ def test_what_the_edge_cuts_off_is_known():
 
 
 def test_the_verdict_counts_and_shows_what_is_wrong(tmp_path):
-    said = Verdict(
+    said = Classification(
         ("Cup", "Mug", "Pan"), np.array([0, 0, 0, 0, 1, 1]), np.array([0, 1, 1, 2, 1, 1])
     )
     assert said.top1 == pytest.approx(0.5)

@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from benchmarks.cli import main as cli
-from benchmarks.cli.suite_builder import Made, make_suite, parts_of
+from benchmarks.cli.suite_builder import BuildResult, build_suite, parts_folder
 from er_gym.envs.verify import Verifier
 from er_gym.rollout.verification import make_verifier
 from er_gym.tasks import TASK_TYPES, Task, jsonl_format, load_suite, suites, verbs
@@ -55,17 +55,17 @@ KITCHENS = Making(
 """Rooms that are some work each, so that there is time to end the command between two of them."""
 
 
-def options(making: Making, seed: int) -> list[str]:
-    """The options of the command that say the same as a making."""
-    given = ["--seed", str(seed), "--total", str(making.total), "--layouts", str(making.layouts)]
-    given += ["--per-layout", str(making.per_layout), "--scenes", ",".join(making.rooms)]
-    return [*given, *(["--types", ",".join(making.types)] if making.types else [])]
+def options(spec: Making, seed: int) -> list[str]:
+    """The options of the command that say the same as a spec."""
+    given = ["--seed", str(seed), "--total", str(spec.total), "--layouts", str(spec.layouts)]
+    given += ["--per-layout", str(spec.per_layout), "--scenes", ",".join(spec.rooms)]
+    return [*given, *(["--types", ",".join(spec.types)] if spec.types else [])]
 
 
-def generated(out: Path, making: Making, seed: int, workers: int = 1, **environment: str) -> bytes:
+def generated(out: Path, spec: Making, seed: int, workers: int = 1, **environment: str) -> bytes:
     """The file that the command makes, in a process of its own."""
     done = subprocess.run(
-        [*COMMAND, "--out", str(out), "--workers", str(workers), *options(making, seed)],
+        [*COMMAND, "--out", str(out), "--workers", str(workers), *options(spec, seed)],
         env={**ENVIRONMENT, **environment},
         capture_output=True,
         text=True,
@@ -86,7 +86,7 @@ def header(file: Path) -> dict[str, Any]:
 def test_a_seed_gives_the_same_bytes_whatever_the_process_and_the_workers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    making = Making(
+    spec = Making(
         total=14,
         scenes=("FloorPlan401", "FloorPlan410"),
         types=("single_pickup", "pickup_and_put"),
@@ -95,21 +95,21 @@ def test_a_seed_gives_the_same_bytes_whatever_the_process_and_the_workers(
     here = tmp_path / "here" / "suite.jsonl.gz"
     with pytest.raises(SystemExit) as ended:
         cli.main(
-            ["tasks", "generate", "--out", str(here), "--workers", "2", *options(making, seed=3)]
+            ["tasks", "generate", "--out", str(here), "--workers", "2", *options(spec, seed=3)]
         )
     assert ended.value.code == 0, capsys.readouterr().err
     there = tmp_path / "there" / "suite.jsonl.gz"
-    assert generated(there, making, 3, PYTHONHASHSEED="1") == here.read_bytes()
+    assert generated(there, spec, 3, PYTHONHASHSEED="1") == here.read_bytes()
     tasks = read_tasks(here)
-    assert len(tasks) == making.total
+    assert len(tasks) == spec.total
     assert len({task.start.layout for task in tasks}) == 3  # as recorded, and each room's own
     parts = tmp_path / "parts"
-    assert [make_suite(making, 3, parts=parts).tasks] == [tuple(tasks)]
+    assert [build_suite(spec, 3, parts=parts).tasks] == [tuple(tasks)]
 
 
 def test_another_seed_gives_other_tasks_and_other_arrangements(tmp_path: Path) -> None:
-    making = Making(total=8, scenes=("FloorPlan401",), types=("single_pickup",), layouts=1)
-    one, other = (make_suite(making, seed, parts=tmp_path / str(seed)).tasks for seed in (0, 1))
+    spec = Making(total=8, scenes=("FloorPlan401",), types=("single_pickup",), layouts=1)
+    one, other = (build_suite(spec, seed, parts=tmp_path / str(seed)).tasks for seed in (0, 1))
     layouts = [{task.start.layout for task in tasks} for tasks in (one, other)]
     assert [len(names) for names in layouts] == [2, 2]
     assert layouts[0] & layouts[1] == {""}
@@ -119,13 +119,13 @@ def test_another_seed_gives_other_tasks_and_other_arrangements(tmp_path: Path) -
 def test_each_seed_and_each_making_has_parts_of_its_own(tmp_path: Path) -> None:
     out = tmp_path / "suite.jsonl"
     folders = [
-        parts_of(out, PICKUPS, 0),
-        parts_of(out, PICKUPS, 1),
-        parts_of(out, PICKUPS.model_copy(update={"per_layout": 1}), 0),
-        parts_of(tmp_path / "other.jsonl", PICKUPS, 0),
+        parts_folder(out, PICKUPS, 0),
+        parts_folder(out, PICKUPS, 1),
+        parts_folder(out, PICKUPS.model_copy(update={"per_layout": 1}), 0),
+        parts_folder(tmp_path / "other.jsonl", PICKUPS, 0),
     ]
     assert len(set(folders)) == 4
-    assert parts_of(out, PICKUPS, 0) == folders[0]
+    assert parts_folder(out, PICKUPS, 0) == folders[0]
     assert {folder.parent for folder in folders} == {tmp_path}
 
 
@@ -142,23 +142,23 @@ def test_an_interrupted_making_goes_on(tmp_path: Path) -> None:
     parts = tmp_path / "parts"
     before: list[str] = []
 
-    def interrupt(scene: str, made: Made) -> None:
+    def interrupt(scene: str, made: BuildResult) -> None:
         before.append(scene)
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        make_suite(PICKUPS, 5, parts=parts, on_room=interrupt)
+        build_suite(PICKUPS, 5, parts=parts, on_room=interrupt)
     assert before == ["FloorPlan401"]
     kept = stamps(parts)
     assert list(kept) == ["FloorPlan401.jsonl"]
 
-    heard: list[tuple[str, Made]] = []
-    made = make_suite(PICKUPS, 5, parts=parts, on_room=lambda *room: heard.append(room))
+    heard: list[tuple[str, BuildResult]] = []
+    made = build_suite(PICKUPS, 5, parts=parts, on_room=lambda *room: heard.append(room))
     after = stamps(parts)
     assert len(after) == 3
     assert after["FloorPlan401.jsonl"] == kept["FloorPlan401.jsonl"]
     assert [scene for scene, _ in heard] == list(PICKUPS.rooms)  # of the one that was kept, too
-    undisturbed = make_suite(PICKUPS, 5, parts=tmp_path / "undisturbed")
+    undisturbed = build_suite(PICKUPS, 5, parts=tmp_path / "undisturbed")
     assert made == undisturbed
     assert made.dropped  # why tasks were dropped is kept with them
     assert made.dropped == sum((room.dropped for _, room in heard), Counter())
@@ -166,12 +166,12 @@ def test_an_interrupted_making_goes_on(tmp_path: Path) -> None:
 
 def test_what_a_part_says_is_taken_as_it_is(tmp_path: Path) -> None:
     parts = tmp_path / "parts"
-    whole = make_suite(PICKUPS, 0, parts=parts)
+    whole = build_suite(PICKUPS, 0, parts=parts)
     file = parts / "FloorPlan410.jsonl"
     mine = read_tasks(file)
     assert len(mine) > 1
     jsonl_format.write_tasks(file, mine[:1], dropped={"on a whim": 7})
-    again = make_suite(PICKUPS, 0, parts=parts)
+    again = build_suite(PICKUPS, 0, parts=parts)
     assert {task.id for task in whole.tasks} - {task.id for task in again.tasks} == {
         task.id for task in mine[1:]
     }
@@ -189,7 +189,7 @@ def test_an_ended_command_goes_on(
     signum: signal.Signals, undisturbed: bytes, tmp_path: Path
 ) -> None:
     out = tmp_path / "ended" / "suite.jsonl.gz"
-    parts = parts_of(out, KITCHENS, 2)
+    parts = parts_folder(out, KITCHENS, 2)
     process = subprocess.Popen(
         [*COMMAND, "--out", str(out), "--workers", "1", *options(KITCHENS, 2)],
         env=ENVIRONMENT,
@@ -213,7 +213,8 @@ def test_an_ended_command_goes_on(
     if signum == signal.SIGINT:
         assert process.returncode == 130
         assert complaint.splitlines()[-1] == (
-            f"er-gym: interrupted: {len(kept)} of 4 rooms are in {parts}; the same command goes on"
+            f"er-gym: interrupted: {len(kept)} of 4 rooms are in {parts}; "
+            "the same command continues"
         )
         assert "Traceback" not in complaint
 
@@ -227,8 +228,8 @@ def test_an_ended_command_goes_on(
 @pytest.fixture(scope="module")
 def of_all_types(tmp_path_factory: pytest.TempPathFactory) -> tuple[Task, ...]:
     """Everything that a kitchen and a bathroom give, as recorded and rearranged."""
-    making = Making(total=10_000, scenes=("FloorPlan5", "FloorPlan410"), layouts=1, per_layout=2)
-    return make_suite(making, 0, parts=tmp_path_factory.mktemp("all") / "parts", workers=2).tasks
+    spec = Making(total=10_000, scenes=("FloorPlan5", "FloorPlan410"), layouts=1, per_layout=2)
+    return build_suite(spec, 0, parts=tmp_path_factory.mktemp("all") / "parts", workers=2).tasks
 
 
 @pytest.fixture(scope="module")
@@ -278,8 +279,8 @@ LIMITS = {"hidden_depth": (1, 1), "distractors": (2, 6), "distance": (4, 9.5)}
 def test_limits_of_difficulty_are_kept(limited: str, verifier: Verifier, tmp_path: Path) -> None:
     low, high = LIMITS[limited]
     types = ("single_pickup", "single_pickup_from_closerep", "pickup_and_put", "single_toggle")
-    making = Making(total=100, scenes=("FloorPlan5",), types=types, **{limited: (low, high)})
-    made = make_suite(making, 0, parts=tmp_path / "parts")
+    spec = Making(total=100, scenes=("FloorPlan5",), types=types, **{limited: (low, high)})
+    made = build_suite(spec, 0, parts=tmp_path / "parts")
     assert made.tasks
     assert made.dropped["it is not as difficult as asked"]
     for task, figures in measured(made.tasks, verifier):
@@ -287,13 +288,13 @@ def test_limits_of_difficulty_are_kept(limited: str, verifier: Verifier, tmp_pat
 
 
 def test_no_task_is_about_what_training_never_sees(tmp_path: Path) -> None:
-    making = Making(
+    spec = Making(
         total=500, scenes=("FloorPlan212",), types=("single_search", "single_pickup"), per_layout=9
     )
-    every = make_suite(making, 0, parts=tmp_path / "every").tasks
+    every = build_suite(spec, 0, parts=tmp_path / "every").tasks
     assert any(UNSEEN_TYPES & subject_types(task) for task in every)
-    seen = make_suite(
-        making.model_copy(update={"unseen_objects": False}), 0, parts=tmp_path / "seen"
+    seen = build_suite(
+        spec.model_copy(update={"unseen_objects": False}), 0, parts=tmp_path / "seen"
     )
     assert seen.tasks
     assert {split(task) for task in seen.tasks} == {"seen"}
@@ -305,10 +306,10 @@ def test_no_task_is_about_what_training_never_sees(tmp_path: Path) -> None:
 
 
 def test_only_the_types_and_rooms_that_are_asked_for(tmp_path: Path) -> None:
-    heard: list[Made] = []
-    making = PICKUPS.model_copy(update={"total": 7, "per_layout": 2})
-    made = make_suite(
-        making, 0, parts=tmp_path / "parts", on_room=lambda scene, room: heard.append(room)
+    heard: list[BuildResult] = []
+    spec = PICKUPS.model_copy(update={"total": 7, "per_layout": 2})
+    made = build_suite(
+        spec, 0, parts=tmp_path / "parts", on_room=lambda scene, room: heard.append(room)
     )
     assert len(made.tasks) == 7
     assert {task.scene for task in made.tasks} == set(PICKUPS.rooms)

@@ -11,8 +11,8 @@ from benchmarks.checks.comparisons.reachable import (
     BEFORE,
     LARGER,
     POSITIONS,
-    Agreement,
     Reachable,
+    ReachableAgreement,
     agreements,
     by_kind,
     held_out,
@@ -66,8 +66,8 @@ def test_they_are_in_scenes_that_chose_no_rule(given) -> None:
 
 
 def test_a_set_that_is_everywhere_agrees_badly() -> None:
-    everywhere = Agreement(given=50, found=50, ours=4000, theirs=1000.0)
-    fair = Agreement(given=50, found=46, ours=1000, theirs=1000.0)
+    everywhere = ReachableAgreement(given=50, found=50, ours=4000, theirs=1000.0)
+    fair = ReachableAgreement(given=50, found=46, ours=1000, theirs=1000.0)
     assert everywhere.f1 < 0.5 < fair.f1
 
 

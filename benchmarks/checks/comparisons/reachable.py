@@ -118,7 +118,7 @@ def pieces(points: np.ndarray, step: float) -> int:
 
 
 @dataclass(frozen=True)
-class Agreement:
+class ReachableAgreement:
     """How far the positions of some scenes agree with AI2-THOR's.
 
     Attributes:
@@ -132,8 +132,8 @@ class Agreement:
     ours: int = 0
     theirs: float = 0.0
 
-    def __add__(self, other: Agreement) -> Agreement:
-        return Agreement(
+    def __add__(self, other: ReachableAgreement) -> ReachableAgreement:
+        return ReachableAgreement(
             self.given + other.given,
             self.found + other.found,
             self.ours + other.ours,
@@ -162,37 +162,37 @@ def sample(positions_file: Path) -> Sample:
     return {name: np.array(places) for name, places in positions.items()}
 
 
-def agreement(name: str, given: np.ndarray, rules: Rules) -> Agreement:
+def agreement(name: str, given: np.ndarray, rules: Rules) -> ReachableAgreement:
     """Compare one scene under some rules."""
     ours = compute_floor(name, rules).grid(FINE, (0.0, 0.0))
     found = _nodes(given) & _nodes(ours)
     if len(given) < _DENSE:
-        return Agreement(len(given), len(found))
+        return ReachableAgreement(len(given), len(found))
     floor = floor_of(name)
     agreed = _nodes(ours[floor.is_certain(ours)])
     theirs = len(given) * len(agreed) / len(agreed & _nodes(given))
-    return Agreement(len(given), len(found), len(ours), theirs)
+    return ReachableAgreement(len(given), len(found), len(ours), theirs)
 
 
 def _nodes(points: np.ndarray) -> set[tuple[int, ...]]:
     return {tuple(node) for node in np.round(points / FINE).astype(int).tolist()}
 
 
-def by_kind(agreed: Mapping[str, Agreement]) -> dict[str, Agreement]:
+def by_kind(agreed: Mapping[str, ReachableAgreement]) -> dict[str, ReachableAgreement]:
     """Sums over the scenes of each kind of room, and over all as ``"all"``."""
-    found = dict.fromkeys([*SCENE_NUMBERS, "all"], Agreement())
+    found = dict.fromkeys([*SCENE_NUMBERS, "all"], ReachableAgreement())
     for name, of_scene in agreed.items():
         for kind in (_KINDS[name], "all"):
             found[kind] += of_scene
     return found
 
 
-def agreements(given: Sample, rules: Rules) -> dict[str, Agreement]:
+def agreements(given: Sample, rules: Rules) -> dict[str, ReachableAgreement]:
     """Compare all sampled scenes under some rules."""
     return {name: agreement(name, places, rules) for name, places in given.items()}
 
 
-def held_out(given: Sample) -> dict[str, Agreement]:
+def held_out(given: Sample) -> dict[str, ReachableAgreement]:
     """Compare each scene under the rules that do best in the other folds' scenes."""
     tried = [agreements(given, rules) for rules in _TRIED]
     names = list(given)
@@ -204,5 +204,5 @@ def held_out(given: Sample) -> dict[str, Agreement]:
     return found
 
 
-def _total(agreed: Mapping[str, Agreement], names: Iterable[str]) -> Agreement:
-    return sum((agreed[name] for name in names), Agreement())
+def _total(agreed: Mapping[str, ReachableAgreement], names: Iterable[str]) -> ReachableAgreement:
+    return sum((agreed[name] for name in names), ReachableAgreement())

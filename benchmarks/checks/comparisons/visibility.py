@@ -10,7 +10,7 @@ from er_gym.thor import make_controller
 
 
 @dataclass(frozen=True)
-class Agreement:
+class VisibilityAgreement:
     """Counts of objects: claimed and recorded, claimed only, recorded only."""
 
     right: int
@@ -32,7 +32,7 @@ class Agreement:
 
 def visible_objects(
     captures: Mapping[str, Any], scenes: Iterable[str] | None = None, turn: float = 0.0
-) -> Agreement:
+) -> VisibilityAgreement:
     """Compare over some scenes, all by default; objects that the scene tables lack do not count.
 
     Args:
@@ -60,4 +60,4 @@ def visible_objects(
         false += len(seen - recorded)
         missed += len(recorded - seen)
     controller.stop()
-    return Agreement(right, false, missed)
+    return VisibilityAgreement(right, false, missed)

@@ -1,4 +1,4 @@
-"""Settings of agents that speak, and what is made of them."""
+"""Settings of vision-language agents, and what is made of them."""
 
 from __future__ import annotations
 

@@ -404,7 +404,7 @@ def test_a_port_that_is_taken():
         port = str(taken.getsockname()[1])
         result = CliRunner().invoke(serve, ["x/y", "--port", port])
     assert result.exit_code == 2
-    assert f"port {port} of 127.0.0.1 cannot be had" in result.stderr
+    assert f"port {port} of 127.0.0.1 cannot be used" in result.stderr
     assert "--port" in result.stderr
 
 
