@@ -27,6 +27,7 @@ from rich.console import Console
 from agents import NamedAgent, make_agent
 from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig, load_config
+from agents.rl.policy_observation import IMAGES
 from agents.rl.saved import FOREIGN, MODEL
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option, trust_option
@@ -150,7 +151,8 @@ def _picture_size(agent: str) -> dict[str, int]:
     if not agent.startswith("rl:"):
         return {}
     options = load_config(Path(agent.removeprefix("rl:")) / "config.yaml").env
-    return {"width": options.width, "height": options.height} if "rgb" in options.obs_mode else {}
+    sees = IMAGES.keys() & options.obs_mode.split("+")
+    return {"width": options.width, "height": options.height} if sees else {}
 
 
 def of_types(tasks: Iterable[Task], types: Sequence[str], each: int) -> list[Task]:
