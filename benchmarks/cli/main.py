@@ -149,10 +149,10 @@ def suites() -> None:
 @cli.command()
 def envs() -> None:
     """List the registered environments, one for each task type."""
-    from er_gym.tasks.types import TASK_TYPES
+    from er_gym.tasks.types import BY_NAME
 
-    widest = max(len(kind.env_id) for kind in TASK_TYPES)
-    for kind in TASK_TYPES:
+    widest = max(len(kind.env_id) for kind in BY_NAME.values())
+    for kind in BY_NAME.values():
         echo(f"{kind.env_id:{widest}}  {kind.group}: {kind.title}, {kind.max_steps} steps")
 
 

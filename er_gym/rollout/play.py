@@ -58,8 +58,8 @@ def play_episode(
         task: what to play.
         seed: passed to ``env.reset``.
         agent_name: how the record names the agent; its class name by default.
-        max_steps: the step limit that ``env`` was made with, for the record of an episode that
-            crashes before ``env`` tells it; the task's own by default.
+        max_steps: the step limit for the record of an episode whose ``reset`` crashes; the task's
+            own by default. Of an episode that begins, ``info["max_steps"]`` is recorded.
         emit: called with the beginning of the episode, each reply of a model, and each step.
 
     Raises:
