@@ -41,9 +41,9 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         complain(error.format_message())
         sys.exit(error.exit_code)
     except ValueError as error:
-        from er_gym.plugins import PluginError  # late: it takes half a second
-
-        if not isinstance(error, PluginError):
+        # Not imported here: where a package that adds to er-gym is broken, er_gym cannot be.
+        plugins = sys.modules.get("er_gym.plugins")
+        if plugins is None or not isinstance(error, plugins.PluginError):
             raise
         complain(str(error))
         sys.exit(BadInput.exit_code)

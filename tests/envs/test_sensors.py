@@ -69,7 +69,7 @@ def test_an_observation_names_the_sensors_there_are() -> None:
         return spaces.Discrete(2)
 
     for wrong in (("sonar",), "depth", ["depth"], (["depth"],)):
-        with pytest.raises(ValueError, match="needs .*; give a tuple of sensors, of frame, depth"):
+        with pytest.raises(ValueError, match=r"needs .*; give a tuple of sensors, of frame, depth"):
             Observation(space, lambda situation: 0, needs=wrong)  # type: ignore[arg-type]
 
 
@@ -118,7 +118,7 @@ def test_far_is_where_the_engine_stops_drawing() -> None:
 
 def test_what_simulators_say_of_nothing_fits_into_the_space() -> None:
     class Situation:
-        class percept:  # noqa: N801
+        class percept:
             depth = np.array([[np.inf, 99.0, -1.0, 2.5]], dtype=np.float32)
 
     assert observations._depth(Situation).tolist() == [[FAR, FAR, 0.0, 2.5]]  # type: ignore[arg-type]
