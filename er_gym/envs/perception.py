@@ -70,7 +70,9 @@ class Percept:
         room; None without instance masks. Read-only."""
         if self.masks is None:
             return None
-        return _rows_of_pixels(self.masks, self.objects.row)
+        assert self.frame is not None  # masks come with a frame
+        found = _rows_of_pixels(self.masks, self.objects.row)
+        return found.reshape(self.frame.shape[:2])  # the client squeezes them, as it does depth
 
     @cached_property
     def visible_names(self) -> tuple[str, ...]:
@@ -109,7 +111,10 @@ def perceive(event: Any) -> Percept:
         interactable=interactable,
         pose=pose,
         frame=event.frame,
-        depth=event.depth_frame,
+        # The client squeezes it, so that a picture of one row would lose a dimension.
+        depth=None
+        if event.depth_frame is None
+        else event.depth_frame.reshape(event.frame.shape[:2]),
         masks=None if boxes is None else event.instance_masks,
         classes=event.semantic_segmentation_frame,
         boxes=boxes,
@@ -117,13 +122,12 @@ def perceive(event: Any) -> Percept:
 
 
 def _rows_of_pixels(masks: Any, row: Mapping[str, int]) -> NDArray[np.int32]:
-    """1 + the row of the object at each pixel, from the colours by which masks tell objects apart.
+    """(P,) 1 + the row of the object at each pixel, from the colours by which masks tell objects apart.
 
     Neighbouring pixels mostly have one colour, so a colour is looked up once for each run of equal
     pixels: masks of all objects, one after another, take twenty times as long.
     """
-    colours = masks.instance_segmentation_frame_uint32
-    pixels = np.ascontiguousarray(colours).ravel()
+    pixels = np.ascontiguousarray(masks.instance_segmentation_frame_uint32).ravel()
     starts = np.flatnonzero(np.concatenate(([True], pixels[1:] != pixels[:-1])))
     number_of = {
         red | green << 8 | blue << 16: row[object_id] + 1
@@ -132,7 +136,7 @@ def _rows_of_pixels(masks: Any, row: Mapping[str, int]) -> NDArray[np.int32]:
     }
     keys = (pixels[starts] & _WITHOUT_ALPHA).tolist()
     numbers = np.array([number_of.get(key, 0) for key in keys], dtype=np.int32)
-    found = np.repeat(numbers, np.diff(starts, append=pixels.size)).reshape(colours.shape)
+    found = np.repeat(numbers, np.diff(starts, append=pixels.size))
     found.setflags(write=False)
     return found
 

@@ -146,6 +146,13 @@ def test_observations_are_the_callers_own() -> None:
     env.close()
 
 
+@pytest.mark.parametrize(("width", "height"), [(1, 1), (1, 5), (5, 1)])
+def test_the_smallest_pictures_keep_their_shape(width: int, height: int) -> None:
+    env = EmbodiedEnv(obs_mode="rgb+depth+instance", width=width, height=height)
+    assert env.reset(seed=0)[0] in env.observation_space
+    env.close()
+
+
 def test_vector_environments_stack_them() -> None:
     vec = gymnasium.make_vec(
         "ER-SinglePickup-v0",
