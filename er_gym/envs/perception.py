@@ -104,7 +104,7 @@ def perceive(event: Any) -> Percept:
         agent["cameraHorizon"],
         agent["isStanding"],
     )
-    boxes = event.instance_detections2D
+    boxes, depth = event.instance_detections2D, event.depth_frame
     return Percept(
         objects=objects,
         visible=visible,
@@ -112,9 +112,7 @@ def perceive(event: Any) -> Percept:
         pose=pose,
         frame=event.frame,
         # The client squeezes it, so that a picture of one row would lose a dimension.
-        depth=None
-        if event.depth_frame is None
-        else event.depth_frame.reshape(event.frame.shape[:2]),
+        depth=None if depth is None else depth.reshape(event.frame.shape[:2]),
         masks=None if boxes is None else event.instance_masks,
         classes=event.semantic_segmentation_frame,
         boxes=boxes,
