@@ -151,7 +151,6 @@ def episode(
                         played,
                         number,
                         agent_name=str(model),
-                        max_steps=env.get("max_steps"),
                     )
             finally:
                 exchange.questions.put(None)

@@ -7,6 +7,7 @@ There are two ways to name a thing that er-gym does not bring itself:
   ``er_gym.agents``.
 
 A :class:`Registry` looks a name up among er-gym's own things, then in both of these ways.
+Tables that are complete before anything is looked up take everything that :func:`added` finds.
 ``docs/extending.md`` has a walk-through for each registry.
 """
 
@@ -14,7 +15,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
@@ -122,6 +123,36 @@ def load_entry_point(entry: metadata.EntryPoint, kind: str) -> Any:
         ) from error
 
 
+def added(
+    kind: str, group: str, variable: str, expected: str, *, registers: bool = False
+) -> Iterator[tuple[Any, str]]:
+    """What an environment variable names and installed packages declare, each with its origin.
+
+    Args:
+        kind: what it is, for messages: ``"verb"``.
+        group: the group of entry points.
+        variable: the environment variable; it holds dotted names, separated by commas.
+        expected: what one has to be, for messages.
+        registers: whether a module registers its things itself when it is imported. Then a module
+            is left out that is being imported now, and is what made er-gym look: it goes on
+            afterwards.
+
+    Raises:
+        PluginError: something cannot be loaded.
+    """
+    for name in filter(None, map(str.strip, os.environ.get(variable, "").split(","))):
+        if not (registers and _being_imported(name.partition(":")[0])):
+            yield load_dotted(name, kind, expected), f"{name} in ${variable}"
+    for name, entry in sorted(entry_points(group).items()):
+        if not (registers and _being_imported(entry.module)):
+            yield load_entry_point(entry, kind), f"entry point {name!r} of {group}"
+
+
+def _being_imported(module: str) -> bool:
+    spec = getattr(sys.modules.get(module), "__spec__", None)
+    return bool(getattr(spec, "_initializing", False))
+
+
 def is_dotted(name: str) -> bool:
     """Whether a name is spelled as ``package.module:Name``, or ``package.module:Class.method``."""
     module, colon, attributes = name.partition(":")
@@ -178,7 +209,7 @@ def _package(entry: metadata.EntryPoint) -> str:
     return entry.dist.name if entry.dist else "unknown"
 
 
-def reason(error: Exception) -> str:
+def reason(error: BaseException) -> str:
     """What was raised, in one line."""
     first_line = (str(error).strip().splitlines() or [""])[0]
     return f"{type(error).__name__}: {first_line}"

@@ -21,6 +21,21 @@ from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks import load_suite
 from er_gym.tasks.paraphrase import load_ask
 
+import gymnasium
+from er_gym.sim.render.shapes import SHAPES
+
+tasks = gymnasium.make("Household-Open-v0", episode_source="generate", obs_mode="state")
+assert tasks.reset(seed=0)[1]["task"].type.title == "Opening"
+tasks.close()
+seeing = EmbodiedEnv(obs_mode="household.nearest:NEAREST", width=60, height=40)
+obs, info = seeing.reset(seed=0)
+assert obs in seeing.observation_space and 0 < obs["household.nearest:NEAREST"][0] < 40
+assert info["holding"] == ""
+polished = seeing._controller.step("PolishObject", objectId="none").metadata
+assert not polished["lastActionSuccess"] and "none" in polished["errorMessage"]
+assert SHAPES["LavaLamp"].__module__ == "household.shapes"
+seeing.close()
+
 observations = "household.observations:HAND+text"
 env = EmbodiedEnv("household.suites:searches", obs_mode=observations)
 parrot = AgentFactory("household.clients:PARROT:observe", AgentSettings(sees="text")).agent(0)
@@ -50,6 +65,9 @@ def test_the_files_of_the_walk_throughs_work(page: str, repository: Path, tmp_pa
             **os.environ,
             "PYTHONPATH": os.pathsep.join((str(repository), str(tmp_path))),
             "ER_GYM_VERBS": "household.verbs:CLEAN",
+            "ER_GYM_TASK_TYPES": "household.tasks:OPEN",
+            "ER_GYM_ACTIONS": "household.actions:polish",
+            "ER_GYM_SHAPES": "household.shapes:lava_lamp",
         },
         capture_output=True,
         text=True,
@@ -65,10 +83,15 @@ def test_the_groups_are_those_that_are_looked_into(page: str) -> None:
     from agents import AGENTS
     from agents.vlm.clients.kinds import CLIENTS
     from er_gym.envs.observations import OBSERVATIONS
-    from er_gym.tasks import verbs
+    from er_gym.sim.actions import registry as actions
+    from er_gym.sim.render.shapes import registry as shapes
+    from er_gym.tasks import types, verbs
     from er_gym.tasks.paraphrase import PARAPHRASERS
     from er_gym.tasks.suites import suite_registry
 
     registries = (AGENTS, CLIENTS, OBSERVATIONS, PARAPHRASERS, suite_registry())
-    groups = {verbs.GROUP, *(registry.group for registry in registries)}
+    tables = (types, verbs, actions, shapes)
+    groups = {*(table.GROUP for table in tables), *(registry.group for registry in registries)}
+    for table in tables:
+        assert f"`{table.VARIABLE}=…,…` | `{table.GROUP}`" in page
     assert groups == set(re.findall(r"\| `(er_gym\.\w+)` \|", page))

@@ -39,7 +39,8 @@ class Episodes(_Model):
     Attributes:
         episodes: a suite's name, a task file, or ``generate`` for the live generator.
         types: of these task types, each as often as any other; all that there are where empty.
-        obs_mode: ``state``, or ``rgb+state``.
+        obs_mode: ``state``, with ``rgb`` or ``depth`` or both before it. (The numbers of
+            ``instance`` are names, nothing that a network could reckon with.)
         instruction: the encoder of the instruction, as
             :func:`er_gym.envs.wrappers.make_encoder` has it; "" for none, since ``state`` says
             which types it names.
@@ -56,7 +57,7 @@ class Episodes(_Model):
 
     episodes: str = "train"
     types: tuple[str, ...] = ()
-    obs_mode: Literal["state", "rgb+state"] = "state"
+    obs_mode: Literal["state", "rgb+state", "depth+state", "rgb+depth+state"] = "state"
     instruction: str = ""
     width: Annotated[int, Field(gt=0, le=2048)] = 128
     height: Annotated[int, Field(gt=0, le=2048)] = 72

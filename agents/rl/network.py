@@ -17,6 +17,7 @@ from gymnasium import spaces
 from torch import Tensor, nn
 from torch.nn import functional
 
+from agents.rl.policy_observation import IMAGES
 from er_gym.envs.actions import ACTIONS, INDEX, INDICES, Action
 from er_gym.envs.observations import FEATURES, SCALARS
 from er_gym.tasks import verbs
@@ -39,8 +40,8 @@ class TypeNetwork(nn.Module):
     """Numbers for every action, and a summary for a value.
 
     Args:
-        space: with a key ``state``; optionally ``instruction`` (E,) and ``rgb`` (channels, H, W),
-            as Stable-Baselines3 turns pictures; a ``mask`` is not looked at.
+        space: with a key ``state``; optionally ``instruction`` (E,), and ``rgb`` and ``depth``
+            (channels, H, W), as Stable-Baselines3 turns pictures; a ``mask`` is not looked at.
         width: of the layers.
         kind: length of the learnt vector of a type.
         outputs: how many numbers an action gets: 1 for a logit or a value, more for quantiles.
@@ -72,10 +73,11 @@ class TypeNetwork(nn.Module):
             for key, box in space.spaces.items()
             if key not in ("state", "mask") and isinstance(box, spaces.Box)
         }
-        told = sum(int(box.shape[0]) for key, box in extras.items() if key != "rgb")
-        self.eye = _eye(width, extras["rgb"].shape[0]) if "rgb" in extras else None
-        told += width if self.eye is not None else 0
-        self._told = [key for key in extras if key != "rgb"]
+        self._images = [key for key in extras if key in IMAGES]
+        self._told = [key for key in extras if key not in IMAGES]
+        channels = sum(int(extras[key].shape[0]) for key in self._images)
+        self.eye = _eye(width, channels) if channels else None
+        told = sum(int(extras[key].shape[0]) for key in self._told) + width * bool(channels)
         self.is_a = nn.Linear(known, width, bias=False)
         self.offers = nn.Linear(known, kind)
         self.asks = nn.Linear(2 * known, kind)
@@ -108,7 +110,7 @@ class TypeNetwork(nn.Module):
         )
         told = [obs[key] for key in self._told]
         if self.eye is not None:
-            told.append(self.eye(obs["rgb"]))
+            told.append(self.eye(torch.cat([obs[key] for key in self._images], dim=1)))
         room = self.room(torch.cat([scalars, *told, wanted], dim=1))  # (B, W)
         row = self.row(torch.cat([table[at, :, which], fit], dim=1))  # (M, W)
         row = row + functional.embedding(which, self.is_a(kinds))

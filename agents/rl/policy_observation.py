@@ -17,6 +17,10 @@ from er_gym.envs.observations import STATE_LAYOUT
 from er_gym.envs.wrappers import make_encoder
 
 Obs = dict[str, NDArray[Any]]
+IMAGES = {"rgb": 3, "depth": 1}
+"""The observations that a network sees as images, with their numbers of channels."""
+DEPTH_RANGE = 10.0
+"""Metres; few rooms are longer."""
 
 
 class Perception:
@@ -26,12 +30,13 @@ class Perception:
     - ``instruction``: (E,) float32 in [-1, 1], with an encoder.
     - ``rgb``: (height, width, 3 × frames) uint8, the last pictures, the newest last; at the
       beginning the first is repeated.
+    - ``depth``: (height, width, frames) uint8, the same of the last depths; 255 is
+      :data:`DEPTH_RANGE` and beyond.
     - ``mask``: (A,) int8, the legal actions, for learners that have no other way to be told.
     """
 
     def __init__(self, options: Episodes, with_mask: bool = False) -> None:
         self._size = (options.width, options.height)
-        self._frames: deque[NDArray[np.uint8]] = deque(maxlen=options.frames)
         self._encode = make_encoder(options.instruction) if options.instruction else None
         self._with_mask = with_mask
         entries: dict[str, spaces.Space[Any]] = {
@@ -39,17 +44,22 @@ class Perception:
         }
         if self._encode is not None:
             entries["instruction"] = spaces.Box(-1.0, 1.0, (self._encode.dimension,), np.float32)
-        self._sees = "rgb" in options.obs_mode.split("+")
-        if self._sees:
-            shape = (options.height, options.width, 3 * options.frames)
-            entries["rgb"] = spaces.Box(0, 255, shape, np.uint8)
+        self._images: dict[str, deque[NDArray[np.uint8]]] = {
+            name: deque(maxlen=options.frames)
+            for name in options.obs_mode.split("+")
+            if name in IMAGES
+        }
+        for name in self._images:
+            shape = (options.height, options.width, IMAGES[name] * options.frames)
+            entries[name] = spaces.Box(0, 255, shape, np.uint8)
         if with_mask:
             entries["mask"] = spaces.Box(0, 1, (len(ACTIONS),), np.int8)
         self.space = spaces.Dict(entries)
 
     def begin(self, obs: Mapping[str, Any], info: Mapping[str, Any], instruction: str) -> Obs:
         """The first observation of an episode."""
-        self._frames.clear()
+        for images in self._images.values():
+            images.clear()
         self._told = self._encode(instruction) if self._encode is not None else None
         return self.see(obs, info)
 
@@ -58,15 +68,20 @@ class Perception:
         made: Obs = {"state": obs["state"]}
         if self._told is not None:
             made["instruction"] = self._told
-        if self._sees:
-            picture = obs["rgb"]
-            if picture.shape[1::-1] != self._size:
-                small = Image.fromarray(picture).resize(self._size, Image.Resampling.BOX)
-                picture = np.asarray(small)
-            while len(self._frames) < (self._frames.maxlen or 1) - 1:
-                self._frames.append(picture)
-            self._frames.append(picture)
-            made["rgb"] = np.concatenate(self._frames, axis=2)
+        for name, images in self._images.items():
+            image = self._image(obs[name])
+            while len(images) < (images.maxlen or 1) - 1:
+                images.append(image)
+            images.append(image)
+            made[name] = np.concatenate(images, axis=2)
         if self._with_mask:
             made["mask"] = info["action_mask"]
         return made
+
+    def _image(self, seen: NDArray[Any]) -> NDArray[np.uint8]:
+        """A picture or a depth as (height, width, channels) uint8 of the learner's size."""
+        if seen.ndim == 2:
+            seen = (np.minimum(seen / DEPTH_RANGE, 1.0) * 255).round().astype(np.uint8)
+        if seen.shape[1::-1] != self._size:
+            seen = np.asarray(Image.fromarray(seen).resize(self._size, Image.Resampling.BOX))
+        return seen.reshape(*self._size[::-1], -1)

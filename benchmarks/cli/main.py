@@ -42,9 +42,9 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         print_problem(error.format_message())
         sys.exit(error.exit_code)
     except ValueError as error:
-        from er_gym.plugins import PluginError  # late: it takes half a second
-
-        if not isinstance(error, PluginError):
+        # Not imported here: where a package that adds to er-gym is broken, er_gym cannot be.
+        plugins = sys.modules.get("er_gym.plugins")
+        if plugins is None or not isinstance(error, plugins.PluginError):
             raise
         print_problem(str(error))
         sys.exit(BadInput.exit_code)
@@ -150,10 +150,10 @@ def suites() -> None:
 @cli.command()
 def envs() -> None:
     """List the registered environments, one for each task type."""
-    from er_gym.tasks.types import TASK_TYPES
+    from er_gym.tasks.types import BY_NAME
 
-    widest = max(len(kind.env_id) for kind in TASK_TYPES)
-    for kind in TASK_TYPES:
+    widest = max(len(kind.env_id) for kind in BY_NAME.values())
+    for kind in BY_NAME.values():
         echo(f"{kind.env_id:{widest}}  {kind.group}: {kind.title}, {kind.max_steps} steps")
 
 

@@ -28,7 +28,7 @@ from er_gym.tasks.arrangement import Start
 from er_gym.tasks.generate import Generator, arranged, select_balanced
 from er_gym.tasks.suite_spec import Making
 from er_gym.tasks.task import Task
-from er_gym.tasks.types import TASK_TYPES
+from er_gym.tasks.types import BY_NAME
 from er_gym.thor import make_controller
 from er_gym.writing import make_folder
 
@@ -74,7 +74,7 @@ class RoomBuilder:
     def _of(self, room: Generator, rng: random.Random) -> BuildResult:
         """The tasks of a room in its present arrangement."""
         kept: list[Task] = []
-        for kind in TASK_TYPES:
+        for kind in BY_NAME.values():
             if not self._spec.types or kind.name in self._spec.types:
                 candidates = list(room.tasks([kind.name]))
                 rng.shuffle(candidates)

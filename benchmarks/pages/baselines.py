@@ -26,6 +26,7 @@ from rich.console import Console
 from agents import NamedAgent, make_agent
 from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig, load_config
+from agents.rl.policy_observation import IMAGES
 from agents.rl.saved import FOREIGN, MODEL
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option, trust_option
@@ -149,7 +150,8 @@ def _picture_size(agent: str) -> dict[str, int]:
     if not agent.startswith("rl:"):
         return {}
     options = load_config(Path(agent.removeprefix("rl:")) / "config.yaml").env
-    return {"width": options.width, "height": options.height} if "rgb" in options.obs_mode else {}
+    sees = IMAGES.keys() & options.obs_mode.split("+")
+    return {"width": options.width, "height": options.height} if sees else {}
 
 
 def sample_of_types(tasks: Iterable[Task], types: Sequence[str], each: int) -> list[Task]:
@@ -316,8 +318,8 @@ def _page(parts: Sequence[str], pictures: Sequence[Path]) -> str:
 What policies learn on the embedded engine, beside agents that do not learn. This page is made by
 `python -m benchmarks.pages.baselines` from run directories. Everything is under
 `instances="explore"`, where a type name says nothing of the task's objects, and with the corrected
-scorer. A trained policy plays what it thinks best; it is the one at the end of training, none is chosen by how it
-did in an evaluation. Success in %: the mean over seeds with the least and the most; where there is
+scorer. A trained policy plays what it thinks best; it is the one at the end of training, none is
+chosen by how it did in an evaluation. Success in %: the mean over seeds with the least and the most; where there is
 one run only, Wilson's 95 % interval. The rooms of the unseen tasks (`er-1k`) are the paper's twelve
 test rooms, none of them in training; some of their tasks are about types of things that training
 has never named. Training tasks are a sample of those that were trained on.

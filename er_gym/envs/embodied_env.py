@@ -28,8 +28,9 @@ from er_gym.envs.observations import (
     Situation,
     goal_row,
     parse_obs_mode,
+    sensors_of,
 )
-from er_gym.envs.perception import Percept
+from er_gym.envs.perception import SENSORS, Percept
 from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.tasks import verbs
@@ -89,6 +90,11 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     ``Dict`` of what ``obs_mode`` asks for, joined with ``+``:
 
     - ``rgb``: the agent's view, ``(height, width, 3)`` uint8.
+    - ``depth``: ``(height, width)`` float32, how far what is seen at each pixel is from the camera,
+      along its axis, metres; :data:`er_gym.envs.observations.FAR`, 40, where there is nothing.
+    - ``instance``: ``(height, width)`` int32, the number of the object at each pixel, 0 for the
+      room. ``info["instance_ids"][number]`` is its object id. The numbers are those of this step:
+      they can change when something is sliced.
     - ``state``: ``(D,)`` float32 in [-1, 1], see :data:`er_gym.envs.observations.STATE_LAYOUT`.
     - ``text``: the task, what is seen, held and possible, and feedback, in words.
     - the name of another package's, or ``package.module:ROW`` (docs/extending.md).
@@ -202,7 +208,10 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         if task_type is not None:
             self._task_type = look_up_type(task_type)
         self._obs = parse_obs_mode(obs_mode)
-        self._draws = any(kind.draws for kind in self._obs.values())
+        self._annotate = annotate
+        sensors = sensors_of(self._obs.values())
+        if annotate and sensors:
+            sensors |= {"instances"}
         self._instances = instances
         self.render_mode = render_mode
         self._controller_arguments: dict[str, Any] = {
@@ -212,11 +221,11 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             "gridSize": self._grid_size,
             "visibilityDistance": number("visibility_distance", visibility_distance, 0, above=True),
             "snapToGrid": False,
-            "headless": not self._draws,
-            "renderInstanceSegmentation": annotate and self._draws,
+            "headless": not sensors,
+            **{name: on for sensor in sensors for name, on in SENSORS[sensor].items()},
         }
         one_of("render_device", render_device, RENDER_DEVICES)
-        if self._draws and backend == "embedded":
+        if sensors and backend == "embedded":
             self._controller_arguments["render_device"] = render_device
         self._live: EpisodeSource | None = None
         self._generates = isinstance(episode_source, str) and episode_source == GENERATE
@@ -308,7 +317,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                 frame = self._controller.step(action="Pass").frame
                 self._controller.headless = headless
                 self._percept = replace(self._percept, frame=frame)
-            return np.array(self._percept.picture)
+            return np.array(self._picture(self._percept))
 
     def close(self) -> None:
         """Stop the controller, and the generator if there is one; ``reset`` opens them again."""
@@ -395,7 +404,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._take_in(placed)
         feedback = "You look around the room."
         info = self._info(None, "", placed.success, "", feedback)
-        answer = self._observation(feedback, True), cast(dict[str, Any], info)
+        answer = self._observation(feedback, True, info), cast(dict[str, Any], info)
         self._missing = ""
         return answer
 
@@ -555,13 +564,17 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         if views:
             # Copies: a view's frame may be what the next observation is made of.
             info["views"] = {
-                name: None if view.picture is None else np.array(view.picture)
+                name: None if view.frame is None else np.array(self._picture(view))
                 for name, view in views.items()
             }
-        obs = self._observation(feedback, success)
+        obs = self._observation(feedback, success, info)
         return obs, reward, terminated, truncated, cast(dict[str, Any], info)
 
-    def _observation(self, feedback: str, success: bool) -> dict[str, Any]:
+    def _picture(self, percept: Percept) -> NDArray[np.uint8] | None:
+        return percept.annotated if self._annotate else percept.frame
+
+    def _observation(self, feedback: str, success: bool, info: Info) -> dict[str, Any]:
+        """The observation; what explains it is added to ``info``."""
         situation = Situation(
             percept=self._percept,
             around=self._around,
@@ -573,7 +586,10 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             success=success,
             steps=self._steps,
             max_steps=self._limit,
+            annotate=self._annotate,
         )
+        for kind in self._obs.values():
+            cast(dict[str, Any], info).update(kind.info(situation))
         return {name: kind.build(situation) for name, kind in self._obs.items()}
 
     def _info(

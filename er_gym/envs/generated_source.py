@@ -9,7 +9,7 @@ import numpy as np
 
 from er_gym.envs.arguments import shown
 from er_gym.envs.verify import PlayableEnv, Verifier, unwanted, with_difficulty
-from er_gym.tasks.generate import Generator, arranged
+from er_gym.tasks.generate import Generator, arranged, generated_types
 from er_gym.tasks.suite_spec import Making
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, TaskType
@@ -41,7 +41,7 @@ class GeneratedSource:
 
     def __init__(self, env: PlayableEnv, making: Making = TRAINING) -> None:
         self._env, self._making = env, making
-        self._kinds = [BY_NAME[name] for name in making.types or BY_NAME]
+        self._kinds = [BY_NAME[name] for name in making.types] or list(generated_types())
         self._controller = make_controller(headless=True)
         self._verify = Verifier(env)
         self._room: Callable[[str, int], Generator]

@@ -110,3 +110,6 @@ class Info(_Always, total=False):
     views: dict[str, NDArray[np.uint8] | None]
     """After ``observe``: the picture of each view by its direction, (height, width, 3) uint8; None
     where none is drawn."""
+    instance_ids: tuple[str, ...]
+    """With the observation ``instance``: the object id for each of its numbers, ``""`` for 0 and
+    for what is not in the picture."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import string
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import cos, radians, sin
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from er_gym.envs.actions import Action
 from er_gym.envs.arguments import shown
 from er_gym.envs.legality import Known, Surroundings
-from er_gym.envs.perception import Percept
+from er_gym.envs.perception import SENSORS, Percept
 from er_gym.plugins import PluginError, Registry, is_dotted
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
@@ -86,6 +86,8 @@ _OFTEN = 4
 _ROOM_SCALE = 10.0
 """Offsets from the start are divided by so many metres."""
 _TEXT_LENGTH = 20_000
+_MOST_OBJECTS = 2**31 - 1
+"""No scene has more: AI2-THOR sets no limit."""
 MAX_REPEATS = 3
 """The same action once more than this in a row ends the episode, unexecuted."""
 
@@ -155,6 +157,7 @@ class Situation:
 
     Attributes:
         at: index of the type of what was last navigated to, None before that.
+        annotate: whether the types of things are written into pictures.
     """
 
     percept: Percept
@@ -167,6 +170,13 @@ class Situation:
     success: bool
     steps: int
     max_steps: int
+    annotate: bool = False
+
+    @property
+    def picture(self) -> NDArray[np.uint8] | None:
+        """The agent's view as an observation shows it, (height, width, 3) uint8; None where nothing
+        is drawn. Read-only."""
+        return self.percept.annotated if self.annotate else self.percept.frame
 
 
 @lru_cache(maxsize=4096)
@@ -285,19 +295,67 @@ def _text(situation: Situation) -> str:
     return _plain("\n".join(lines))
 
 
+FAR = 40.0
+"""The greatest ``depth``, metres: what is farther, and where there is nothing, has this value. The
+embedded engine draws as far as this."""
+
+
+def _depth(situation: Situation) -> NDArray[np.float32]:
+    return np.clip(situation.percept.depth, 0.0, FAR, dtype=np.float32)  # a copy
+
+
+def _instance(situation: Situation) -> NDArray[np.int32]:
+    return np.array(situation.percept.instances)
+
+
+def _instance_ids(situation: Situation) -> dict[str, Any]:
+    percept = situation.percept
+    ids = [""] * (len(percept.objects) + 1)
+    for number in np.unique(percept.instances).tolist():
+        if number:
+            ids[number] = percept.objects.ids[number - 1]
+    return {"instance_ids": tuple(ids)}
+
+
+def _nothing_to_tell(situation: Situation) -> Mapping[str, Any]:
+    return {}
+
+
 @dataclass(frozen=True)
 class Observation:
     """A kind of observation.
 
     Attributes:
         space: its space, given the width and height of frames, pixels.
-        build: makes it.
-        draws: whether ``situation.percept`` must have a picture.
+        build: makes it; the array must be its own, because images are shared.
+        needs: the sensors that it reads, keys of :data:`er_gym.envs.perception.SENSORS`:
+            ``"frame"`` (``situation.picture``), ``"depth"``, ``"instances"``, ``"classes"`` (each
+            an attribute of ``situation.percept``). Without them nothing is drawn.
+        info: what it adds to ``info``, such as what its numbers mean.
+
+    Raises:
+        ValueError: there is no such sensor.
     """
 
     space: Callable[[int, int], spaces.Space[Any]]
     build: Callable[[Situation], Any]
-    draws: bool = False
+    needs: tuple[str, ...] = ()
+    info: Callable[[Situation], Mapping[str, Any]] = _nothing_to_tell
+
+    def __post_init__(self) -> None:
+        known = isinstance(self.needs, tuple) and all(
+            isinstance(name, str) and name in SENSORS for name in self.needs
+        )
+        if not known:
+            raise ValueError(
+                f"an observation needs {shown(self.needs)}; give a tuple of sensors, of "
+                f"{', '.join(SENSORS)}"
+            )
+
+
+def sensors_of(rows: Iterable[Observation]) -> frozenset[str]:
+    """All sensors that some observations need."""
+    return frozenset(name for row in rows for name in row.needs)
 
 
 OBSERVATIONS: Registry[Observation] = Registry(
@@ -307,8 +365,19 @@ OBSERVATIONS: Registry[Observation] = Registry(
         "rgb": Observation(
             lambda width, height: spaces.Box(0, 255, (height, width, 3), np.uint8),
             # A copy: after an illegal action the percept is that of the step before.
-            lambda situation: np.array(situation.percept.picture),
-            draws=True,
+            lambda situation: np.array(situation.picture),
+            needs=("frame",),
+        ),
+        "depth": Observation(
+            lambda width, height: spaces.Box(0.0, FAR, (height, width), np.float32),
+            _depth,
+            needs=("depth",),
+        ),
+        "instance": Observation(
+            lambda width, height: spaces.Box(0, _MOST_OBJECTS, (height, width), np.int32),
+            _instance,
+            needs=("instances",),
+            info=_instance_ids,
         ),
         "state": Observation(
             lambda width, height: spaces.Box(-1.0, 1.0, (len(STATE_LAYOUT),), np.float32), _state

@@ -18,6 +18,17 @@ from er_gym.envs.annotate import annotated
 from er_gym.tasks.task import AgentPose
 from er_gym.thor.objects import TYPES, ObjectTable, objects_of
 
+SENSORS: Mapping[str, Mapping[str, bool]] = {
+    "frame": {},
+    "depth": {"renderDepthImage": True},
+    "instances": {"renderInstanceSegmentation": True},
+    "classes": {"renderSemanticSegmentation": True},
+}
+"""The sensors by the attribute of :class:`Percept` that holds their image, each with the arguments
+of the AI2-THOR controller that switch it on. A frame is there whenever anything is drawn."""
+
+_WITHOUT_ALPHA = 0xFFFFFF
+
 
 @dataclass(frozen=True, eq=False)
 class Percept:
@@ -28,8 +39,12 @@ class Percept:
         visible, interactable: (N,) bool, as the simulator has them.
         pose: the agent's.
         frame: its view, (height, width, 3) uint8; None when none was drawn.
-        boxes: object id to what is seen of it, in pixels (left, upper, right, lower); None unless
-            the picture is to name things.
+        depth: (height, width) float32 metres along the view axis; None unless that was asked for.
+        masks: AI2-THOR's instance masks by object id; None unless these were asked for.
+        classes: (height, width, 3) uint8, a colour for each object type; None unless that was
+            asked for.
+        boxes: object id to what is seen of it, in pixels (left, upper, right, lower); None without
+            instance masks.
     """
 
     objects: ObjectTable
@@ -37,14 +52,27 @@ class Percept:
     interactable: NDArray[np.bool_]
     pose: AgentPose
     frame: NDArray[np.uint8] | None
+    depth: NDArray[np.float32] | None = None
+    masks: Any = None
+    classes: NDArray[np.uint8] | None = None
     boxes: Mapping[str, tuple[int, int, int, int]] | None = None
 
     @cached_property
-    def picture(self) -> NDArray[np.uint8] | None:
-        """The frame, with things named in it if they are to be."""
+    def annotated(self) -> NDArray[np.uint8] | None:
+        """The frame with the types of things written into it; the plain frame without masks."""
         if self.frame is None or self.boxes is None:
             return self.frame
         return annotated(self.frame, self.boxes)
+
+    @cached_property
+    def instances(self) -> NDArray[np.int32] | None:
+        """(height, width) int32: 1 + the row in ``objects`` of the object at each pixel, 0 for the
+        room; None without instance masks. Read-only."""
+        if self.masks is None:
+            return None
+        assert self.frame is not None  # masks come with a frame
+        found = _rows_of_pixels(self.masks, self.objects.row)
+        return found.reshape(self.frame.shape[:2])  # the client squeezes them, as it does depth
 
     @cached_property
     def visible_names(self) -> tuple[str, ...]:
@@ -76,7 +104,39 @@ def perceive(event: Any) -> Percept:
         agent["cameraHorizon"],
         agent["isStanding"],
     )
-    return Percept(objects, visible, interactable, pose, event.frame, event.instance_detections2D)
+    boxes, depth = event.instance_detections2D, event.depth_frame
+    return Percept(
+        objects=objects,
+        visible=visible,
+        interactable=interactable,
+        pose=pose,
+        frame=event.frame,
+        # The client squeezes it, so that a picture of one row would lose a dimension.
+        depth=None if depth is None else depth.reshape(event.frame.shape[:2]),
+        masks=None if boxes is None else event.instance_masks,
+        classes=event.semantic_segmentation_frame,
+        boxes=boxes,
+    )
+
+
+def _rows_of_pixels(masks: Any, row: Mapping[str, int]) -> NDArray[np.int32]:
+    """(P,) 1 + the row of the object at each pixel, from the colours by which masks tell objects apart.
+
+    Neighbouring pixels mostly have one colour, so a colour is looked up once for each run of equal
+    pixels: masks of all objects, one after another, take twenty times as long.
+    """
+    pixels = np.ascontiguousarray(masks.instance_segmentation_frame_uint32).ravel()
+    starts = np.flatnonzero(np.concatenate(([True], pixels[1:] != pixels[:-1])))
+    number_of = {
+        red | green << 8 | blue << 16: row[object_id] + 1
+        for object_id, (red, green, blue) in masks.instance_colors.items()
+        if object_id in row
+    }
+    keys = (pixels[starts] & _WITHOUT_ALPHA).tolist()
+    numbers = np.array([number_of.get(key, 0) for key in keys], dtype=np.int32)
+    found = np.repeat(numbers, np.diff(starts, append=pixels.size))
+    found.setflags(write=False)
+    return found
 
 
 def marked(kinds: NDArray[np.intp]) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ from typing import Protocol
 from er_gym.rollout.agent import Agent, Attachments, LeavesAttachments, MakeAgent
 from er_gym.rollout.play import episode_seed
 from er_gym.rollout.records import EpisodeRecord, record_episode
-from er_gym.rollout.run_directory import RunDirectory
+from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.rollout.worker_pool import Lost
 from er_gym.tasks.task import Task
 from er_gym.writing import file_stem
@@ -84,12 +84,18 @@ class Executor(Protocol):
         """
 
 
-def lost_episode(task: Task, lost: Lost, directory: RunDirectory) -> EpisodeRecord:
-    """The record of an episode whose worker died every time."""
+def unbegun_episode(task: Task, manifest: Manifest, error: str) -> EpisodeRecord:
+    """The record of an episode that crashed before its environment could tell the step limit."""
     return record_episode(
         task,
-        agent=directory.manifest.agent,
-        seed=episode_seed(directory.manifest.seed, task.id),
-        max_steps=directory.manifest.env.get("max_steps"),
-        error=f"the worker process died {lost.tries} times, last with exit code {lost.exitcode}",
+        agent=manifest.agent,
+        seed=episode_seed(manifest.seed, task.id),
+        max_steps=manifest.env.get("max_steps"),
+        error=error,
     )
+
+
+def lost_episode(task: Task, lost: Lost, manifest: Manifest) -> EpisodeRecord:
+    """The record of an episode whose worker died every time."""
+    error = f"the worker process died {lost.tries} times, last with exit code {lost.exitcode}"
+    return unbegun_episode(task, manifest, error)

@@ -58,8 +58,8 @@ def play_episode(
         task: what to play.
         seed: passed to ``env.reset``.
         agent_name: how the record names the agent; its class name by default.
-        max_steps: the step limit that ``env`` was made with, for the record of an episode that
-            crashes before ``env`` tells it; the task's own by default.
+        max_steps: the step limit for the record of an episode whose ``reset`` crashes; the task's
+            own by default. Of an episode that begins, ``info["max_steps"]`` is recorded.
         emit: called with the beginning of the episode, each reply of a model, and each step.
 
     Raises:
@@ -74,7 +74,7 @@ def play_episode(
         obs, info = env.reset(seed=seed, options={"task": task})
         steps.append(_placed(info))
         agent.reset(task, obs, info)
-        emit(_begun(task, max_steps))
+        emit(_begun(task, info["max_steps"]))
         for each in transitions(env, agent, obs, info):
             info = each.info
             steps.append(_stepped(info, each.reward, each.decision.thought))
@@ -106,13 +106,13 @@ def one_line(error: BaseException) -> str:
     return f"{text} ({frames[-1].filename}:{frames[-1].lineno})" if frames else text
 
 
-def _begun(task: Task, max_steps: int | None) -> EpisodeBegun:
+def _begun(task: Task, max_steps: int) -> EpisodeBegun:
     return EpisodeBegun(
         task_id=task.id,
         task_type=task.type.name,
         scene=task.scene,
         instruction=task.instruction,
-        max_steps=task.max_steps if max_steps is None else max_steps,
+        max_steps=max_steps,
     )
 
 

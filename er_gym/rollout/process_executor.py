@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
 from er_gym.rollout.events import EventLog
-from er_gym.rollout.executor import Played, Sink, Size, lost_episode
+from er_gym.rollout.executor import Played, Sink, Size, lost_episode, unbegun_episode
 from er_gym.rollout.play import episode_seed, one_line, play_episode
-from er_gym.rollout.records import record_episode
-from er_gym.rollout.run_directory import RunDirectory
+from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.rollout.worker_pool import Lost, do_jobs
 from er_gym.tasks.task import Task
 
@@ -29,15 +27,13 @@ def play_in_processes(
 ) -> None:
     """Play each task in one of ``size.workers`` processes; see :class:`.executor.Executor`."""
     manifest = directory.manifest
-    worker = partial(
-        EpisodeWorker, make_agent, manifest.agent, manifest.env, manifest.seed, directory.path
-    )
+    worker = partial(EpisodeWorker, make_agent, manifest, directory.path)
     with closing(do_jobs(worker, tasks, workers=size.workers)) as results:
         for task, result in results:
             if isinstance(result, _Stop):
                 raise CannotGoOn(result.message)
             lost = isinstance(result, Lost)
-            played = Played(lost_episode(task, result, directory)) if lost else result
+            played = Played(lost_episode(task, result, manifest)) if lost else result
             sink.save(played)
             sink.ended(played)
 
@@ -57,32 +53,21 @@ class EpisodeWorker:
 
     Args:
         make_agent: makes it.
-        agent: how records name it.
-        env: the keyword arguments of :class:`~er_gym.envs.embodied_env.EmbodiedEnv`.
-        seed: the run's.
+        manifest: the run's.
         directory: the run's, whose event stream is written to.
     """
 
-    def __init__(
-        self,
-        make_agent: MakeAgent,
-        agent: str,
-        env: Mapping[str, Any],
-        seed: int,
-        directory: Path,
-    ) -> None:
+    def __init__(self, make_agent: MakeAgent, manifest: Manifest, directory: Path) -> None:
         self._make_agent = make_agent
-        self._name = agent
-        self._kwargs = dict(env)
-        self._seed = seed
+        self._manifest = manifest
         self._events = EventLog(directory)
         self._env: EmbodiedEnv | None = self._make_env()
 
     def _make_env(self) -> EmbodiedEnv:
-        return EmbodiedEnv((), **self._kwargs)
+        return EmbodiedEnv((), **self._manifest.env)
 
     def __call__(self, task: Task) -> Played | _Stop:
-        seed = episode_seed(self._seed, task.id)
+        seed = episode_seed(self._manifest.seed, task.id)
         try:
             if self._env is None:
                 self._env = self._make_env()
@@ -90,23 +75,15 @@ class EpisodeWorker:
         except CannotGoOn as stop:
             return _Stop(str(stop))
         except Exception as error:  # as in play_episode, one must not end the run
-            return Played(
-                record_episode(
-                    task,
-                    agent=self._name,
-                    seed=seed,
-                    max_steps=self._kwargs.get("max_steps"),
-                    error=one_line(error),
-                )
-            )
+            return Played(unbegun_episode(task, self._manifest, one_line(error)))
         try:
             record = play_episode(
                 self._env,
                 agent,
                 task,
                 seed,
-                agent_name=self._name,
-                max_steps=self._kwargs.get("max_steps"),
+                agent_name=self._manifest.agent,
+                max_steps=self._manifest.env.get("max_steps"),
                 emit=self._events,
             )
         except CannotGoOn as stop:

@@ -15,9 +15,9 @@ from typing import Any
 from er_gym.rollout.agent import Agent, CannotGoOn, Decision, MakeAgent
 from er_gym.rollout.env_pool import EnvLost, EnvPool, RemoteEnv
 from er_gym.rollout.events import EventLog
-from er_gym.rollout.executor import Played, Sink, Size, lost_episode
+from er_gym.rollout.executor import Played, Sink, Size, lost_episode, unbegun_episode
 from er_gym.rollout.play import episode_seed, one_line, play_episode
-from er_gym.rollout.records import EpisodeRecord, record_episode
+from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.worker_pool import Lost
 from er_gym.tasks.task import Task
@@ -143,7 +143,7 @@ class _Threads:
                     if self.stopping.is_set():
                         raise _Stopping
                     continue
-                record = lost_episode(task, Lost(tries, lost.exitcode), self.directory)
+                record = lost_episode(task, Lost(tries, lost.exitcode), self.directory.manifest)
             return Played.by(agent, record)
 
     def _play(self, env: RemoteEnv, task: Task, seed: int) -> tuple[Agent | None, EpisodeRecord]:
@@ -154,13 +154,7 @@ class _Threads:
         except CannotGoOn:
             raise
         except Exception as error:  # as in play_episode, one must not end the run
-            return None, record_episode(
-                task,
-                agent=manifest.agent,
-                seed=seed,
-                max_steps=manifest.env.get("max_steps"),
-                error=one_line(error),
-            )
+            return None, unbegun_episode(task, manifest, one_line(error))
         record = play_episode(
             env,
             player,

@@ -1,13 +1,28 @@
 """The table of task types: one row each, and nothing about them is written down anywhere else.
 
 Names, groups and step limits are the paper's (Embodied-Reasoner, arXiv 2503.21696).
+
+Other packages add rows (``docs/extending.md``): what :func:`register` returns, named in the
+environment variable ``ER_GYM_TASK_TYPES`` or by entry points in the group ``er_gym.task_types``.
+``import er_gym`` looks for them.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
+from er_gym.plugins import PluginError, added
+
+if TYPE_CHECKING:
+    from er_gym.tasks.generate.task_plan import Row
+
+GROUP = "er_gym.task_types"
+"""The entry points in which packages declare task types."""
+VARIABLE = "ER_GYM_TASK_TYPES"
+"""The environment variable that names task types, such as ``my_package.tasks:OPEN``."""
 SEARCH, MANIPULATE, TRANSPORT, COMPOSITE = "Search", "Manipulate", "Transport", "Composite"
 GROUPS = (SEARCH, MANIPULATE, TRANSPORT, COMPOSITE)
 """In the order of the paper's result table."""
@@ -25,6 +40,8 @@ class TaskType:
         max_steps: an episode's step limit; placing the agent counts as the first step.
         ordered: whether key actions count only in the order in which they are listed.
         search: whether the task is done by finding, that is, ``end`` asks to see the target.
+        rows: how tasks of a type that another package adds are generated; er-gym's own rows are in
+            :mod:`er_gym.tasks.generate`.
     """
 
     name: str
@@ -34,6 +51,7 @@ class TaskType:
     max_steps: int
     ordered: bool = False
     search: bool = False
+    rows: tuple[Row, ...] = field(default=(), compare=False, repr=False)
 
     def __reduce__(self) -> tuple[Callable[[str], TaskType], tuple[str]]:
         # A row stays the row of the table when it goes to another process.
@@ -55,9 +73,72 @@ TASK_TYPES = (
     TaskType("long-range tasks with dependency relationships", "Long-Range Task with Dependencies", COMPOSITE, "ER-LongRange-v0", 36),
 )
 # fmt: on
+"""The rows that come with er-gym."""
 
 BY_NAME = {task_type.name: task_type for task_type in TASK_TYPES}
+"""Every row, those of other packages too: these come last."""
 BY_ENV_ID = {task_type.env_id: task_type for task_type in TASK_TYPES}
+_listeners: list[Callable[[TaskType], None]] = []
+_ENV_ID = re.compile(r"[\w.-]+-v\d+")
+
+
+def listen(tell: Callable[[TaskType], None]) -> None:
+    """Tell of every row: now of those there are, later of those that are added."""
+    for row in tuple(BY_NAME.values()):
+        tell(row)
+    _listeners.append(tell)
+
+
+def register(row: TaskType) -> TaskType:
+    """Add a type of task in this process, with its Gymnasium id; again is harmless.
+
+    Raises:
+        PluginError: the row cannot be used; the message says why.
+    """
+    known = BY_NAME.get(row.name)
+    if known is not None and (known, known.rows) == (row, row.rows):
+        return known
+    problem = _problem(row)
+    if problem:
+        raise PluginError(f"task type {row.name!r}: {problem}")
+    BY_NAME[row.name] = BY_ENV_ID[row.env_id] = row
+    for tell in _listeners:
+        tell(row)
+    return row
+
+
+def load_added() -> None:
+    """Register the rows of other packages.
+
+    Raises:
+        PluginError: one cannot be loaded or used.
+    """
+    expected = f"an {__name__}.TaskType"
+    for found, origin in added("task type", GROUP, VARIABLE, expected, registers=True):
+        if not isinstance(found, TaskType):
+            raise PluginError(f"{origin} is {found!r}; give {expected}")
+        register(found)
+
+
+def _problem(row: TaskType) -> str:
+    """What is wrong with a row, "" if nothing."""
+    for name in ("name", "title", "env_id"):
+        text = getattr(row, name)
+        if not isinstance(text, str) or not text.strip() or not text.isprintable():
+            return f"{name} is {text!r}; give a line of text"
+    if not _ENV_ID.fullmatch(row.env_id):
+        return f"env_id is {row.env_id!r}; give one such as 'My-Task-v0'"
+    for name in (row.name, row.env_id):
+        if name in BY_NAME or name in BY_ENV_ID:
+            return f"{name!r} is the name of another type; choose another"
+    if row.group not in GROUPS:
+        return f"group is {row.group!r}; choose one of: {', '.join(GROUPS)}"
+    if not isinstance(row.max_steps, int) or isinstance(row.max_steps, bool) or row.max_steps < 2:
+        return f"max_steps is {row.max_steps!r}; give a whole number from 2"
+    others = [each for each in row.rows if getattr(each, "type", None) != row.name]
+    if others:
+        return f"a row that generates tasks is {others[0]!r}; give a Row of type {row.name!r}"
+    return ""
 
 
 def task_type(name: str) -> TaskType:

@@ -18,7 +18,6 @@ module that defines a verb has to import this one first.
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -29,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from er_gym.plugins import PluginError, entry_points, load_dotted, load_entry_point
+from er_gym.plugins import PluginError, added
 from er_gym.thor.object_types import OBJECT_TYPES
 from er_gym.thor.objects import PROPERTY_OF_STATE
 
@@ -293,15 +292,10 @@ def table() -> tuple[Verb, ...]:
     Raises:
         PluginError: a verb cannot be loaded or used.
     """
-    named = [name.strip() for name in os.environ.get(VARIABLE, "").split(",") if name.strip()]
     expected = f"an {__name__}.Verb"
     given = [
         *((verb, "register()") for verb in _registered),
-        *((load_dotted(name, "verb", expected), f"{name} in ${VARIABLE}") for name in named),
-        *(
-            (load_entry_point(entry, "verb"), f"entry point {name!r} of {GROUP}")
-            for name, entry in sorted(entry_points(GROUP).items())
-        ),
+        *added("verb", GROUP, VARIABLE, expected),
     ]
     for verb, origin in given:
         if not isinstance(verb, Verb):

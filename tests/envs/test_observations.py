@@ -119,7 +119,7 @@ def test_text_keeps_to_its_characters(state_env: EmbodiedEnv) -> None:
     assert obs["text"] in state_env.observation_space["text"]
 
 
-@pytest.mark.parametrize("mode", ["", "rgb+rgb", "depth", "rgb,state"])
+@pytest.mark.parametrize("mode", ["", "rgb+rgb", "normals", "rgb,state"])
 def test_bad_obs_modes(mode: str) -> None:
     with pytest.raises(ValueError, match="unknown obs_mode"):
         parse_obs_mode(mode)

@@ -62,7 +62,13 @@ def percept_of(*entries: Entry) -> Percept:
         },
         "inventoryObjects": [{"objectId": e["objectId"]} for e in entries if e["isPickedUp"]],
     }
-    return perceive(SimpleNamespace(metadata=metadata, frame=None, instance_detections2D=None))
+    return perceive(undrawn(metadata))
+
+
+def undrawn(metadata: Any) -> Any:
+    """An event without images."""
+    images = ("frame", "depth_frame", "semantic_segmentation_frame", "instance_detections2D")
+    return SimpleNamespace(metadata=metadata, **dict.fromkeys(images))
 
 
 def box(x: float, y: float, z: float, distance: float, **fields: Any) -> Entry:
@@ -210,7 +216,7 @@ class Twin:
         metadata = dict(event.metadata)
         ours, plain = (
             perceive(event),
-            perceive(SimpleNamespace(metadata=metadata, frame=None, instance_detections2D=None)),
+            perceive(undrawn(metadata)),
         )
         assert ours.pose == plain.pose
         assert np.allclose(ours.objects.centre, plain.objects.centre)  # what is carried moves

@@ -31,6 +31,14 @@ def test_check_env_has_nothing_to_say(env_id: str, obs_mode: str) -> None:
         env.close()
 
 
+def test_check_env_has_nothing_to_say_of_depth_and_instances() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gymnasium.make(IDS[0], obs_mode="rgb+depth+instance", **SMALL)
+        check_env(env.unwrapped, skip_render_check=True)
+        env.close()
+
+
 def test_render_returns_the_frame() -> None:
     env = gymnasium.make(IDS[0], obs_mode="state", render_mode="rgb_array", **SMALL)
     env.reset(seed=0)

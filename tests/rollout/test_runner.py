@@ -201,7 +201,7 @@ def test_workers_play_what_is_played_here(new_store, tasks, short_env):
     for task in tasks:
         seed = episode_seed(0, task.id)
         agent = make_agent("random", seed=seed)
-        played = play_episode(short_env, agent, task, seed, agent_name="random", max_steps=8)
+        played = play_episode(short_env, agent, task, seed, agent_name="random")
         here.append(timeless(played))
     assert len({tuple(step.text for step in each.steps) for each in here}) == 7
 

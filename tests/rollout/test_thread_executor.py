@@ -149,7 +149,7 @@ def test_what_is_played_is_what_is_played_here(store, tasks, monkeypatch):
     for task in tasks:
         seed = episode_seed(0, task.id)
         agent = at_random(task, seed)
-        played = play_episode(env, agent, task, seed, agent_name="random", max_steps=4)
+        played = play_episode(env, agent, task, seed, agent_name="random")
         here.append(played.model_copy(update={"seconds": 0.0}))
     env.close()
 

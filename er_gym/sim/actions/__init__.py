@@ -16,6 +16,8 @@ from er_gym.sim.actions import (  # noqa: F401  (imported for their registration
     rotate_look,
     state_change,
 )
-from er_gym.sim.actions.registry import ACTIONS, perform
+from er_gym.sim.actions.registry import ACTIONS, load_added, perform
 
 __all__ = ["ACTIONS", "perform"]
+
+load_added()

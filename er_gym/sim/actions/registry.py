@@ -11,6 +11,9 @@ action's parameters. It returns the event's ``actionReturn`` or raises
 - An action that takes a *server action* gets a record of everything that any action may be told. It
   ignores keys that it does not read. The case of keys does not matter, and null means that nothing
   was given.
+
+Other packages add actions (``docs/extending.md``): functions under :func:`action`, which are named
+in the environment variable ``ER_GYM_ACTIONS`` or by entry points in the group ``er_gym.actions``.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ from typing import Any, get_type_hints
 
 from pydantic import BaseModel, ConfigDict
 
+from er_gym.plugins import PluginError, added
 from er_gym.sim.actions.conversion import Kind, Unconvertible, kind_of
 from er_gym.sim.errors import (
     INVALID_ACTION,
@@ -47,6 +51,10 @@ REFUSED = {
     "CreateHouse": "it has the recorded iTHOR rooms and no procedural houses; backend='unity' has"
 }
 """Actions of AI2-THOR that the embedded engine lacks, with the reason."""
+GROUP = "er_gym.actions"
+"""The entry points in which packages declare actions."""
+VARIABLE = "ER_GYM_ACTIONS"
+"""The environment variable that names actions, such as ``my_package.actions:polish``."""
 REQUIRED: Any = inspect.Parameter.empty
 """The default of a required parameter."""
 _LONGEST_QUOTE = 200
@@ -214,6 +222,18 @@ def add_signature(signature: Signature) -> None:
     """Add a signature to the table."""
     signatures = sorted((*ACTIONS.get(signature.action, ()), signature), key=lambda each: each.cost)
     ACTIONS[signature.action] = tuple(signatures)
+
+
+def load_added() -> None:
+    """Import the actions of other packages, which registers them.
+
+    Raises:
+        PluginError: one cannot be loaded, or is no registered function.
+    """
+    expected = f"a function under @{__name__}.action"
+    for found, origin in added("AI2-THOR action", GROUP, VARIABLE, expected, registers=True):
+        if not any(each.run is found for signatures in ACTIONS.values() for each in signatures):
+            raise PluginError(f"{origin} is {found!r}; give {expected}")
 
 
 def perform(world: World, request: Mapping[str, Any]) -> Any:

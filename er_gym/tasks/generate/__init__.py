@@ -23,7 +23,14 @@ Whether a task can be done is for an agent to show; :mod:`er_gym.envs.verify` as
 """
 
 from er_gym.tasks.generate.generator import Generator, arranged, generate_tasks
-from er_gym.tasks.generate.rules import GENERATED_TYPES
+from er_gym.tasks.generate.rules import GENERATED_TYPES, generated_types
 from er_gym.tasks.generate.select import select_balanced
 
-__all__ = ["GENERATED_TYPES", "Generator", "arranged", "generate_tasks", "select_balanced"]
+__all__ = [
+    "GENERATED_TYPES",
+    "Generator",
+    "arranged",
+    "generate_tasks",
+    "generated_types",
+    "select_balanced",
+]

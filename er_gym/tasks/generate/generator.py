@@ -11,7 +11,7 @@ from typing import Any
 
 from er_gym.tasks import verbs
 from er_gym.tasks.arrangement import Start, begin, shuffled
-from er_gym.tasks.generate.rules import ROWS
+from er_gym.tasks.generate.rules import all_rows
 from er_gym.tasks.generate.scene_graph import Accepts, Room, Thing, read_room
 from er_gym.tasks.generate.script import Impossible
 from er_gym.tasks.generate.task_plan import Plan, Row
@@ -50,7 +50,7 @@ class Generator:
     objects: Sequence[Mapping[str, Any]]
     start: Start = field(default_factory=Start)
     accepts: Accepts = thor_accepts
-    rows: Sequence[Row] = ROWS
+    rows: Sequence[Row] = field(default_factory=all_rows)
     dropped: Counter[str] = field(default_factory=Counter)
 
     @cached_property

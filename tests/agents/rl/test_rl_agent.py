@@ -8,11 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 from click.testing import CliRunner
+from gymnasium import spaces
 
 from agents import make_agent
 from agents.rl.agent import RLAgent
 from agents.rl.config import Episodes, TrainConfig
+from agents.rl.network import TypeNetwork
 from agents.rl.policy_observation import Perception
 from agents.rl.train import train
 from benchmarks.cli.main import cli
@@ -65,6 +68,35 @@ def test_the_benchmark_runner_takes_it(run: Path, tmp_path: Path) -> None:
 def test_a_run_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"there is no trained model .*; give rl: and a directory"):
         make_agent(f"rl:{tmp_path}")
+
+
+def test_depths_are_made_small_and_stacked() -> None:
+    options = Episodes(obs_mode="rgb+depth+state", width=32, height=18, frames=2)
+    env = EmbodiedEnv((), obs_mode=options.obs_mode, width=64, height=36)
+    obs, info = env.reset(options={"task": MINI[0]})
+    perception = Perception(options)
+    made = perception.begin(obs, info, MINI[0].instruction)
+    assert made in perception.space
+    assert made["depth"].shape == (18, 32, 2)
+    near = obs["depth"][:2, :2].mean()  # four pixels become one
+    assert made["depth"][0, 0] == pytest.approx(255 * min(near / 10, 1), abs=1)
+    network = TypeNetwork(turned(perception.space), width=16, kind=4)
+    seen = {name: torch.as_tensor(array)[None].float() for name, array in made.items()}
+    for name in ("rgb", "depth"):
+        seen[name] = seen[name].permute(0, 3, 1, 2) / 255
+    numbers, _ = network(seen)
+    other, _ = network({**seen, "depth": 1 - seen["depth"]})
+    assert not torch.equal(numbers, other)
+    env.close()
+
+
+def turned(space: spaces.Dict) -> spaces.Dict:
+    """With channels first, as Stable-Baselines3 has them."""
+    boxes = dict(space.spaces)
+    for name in ("rgb", "depth"):
+        height, width, channels = boxes[name].shape
+        boxes[name] = spaces.Box(0, 255, (channels, height, width), np.uint8)
+    return spaces.Dict(boxes)
 
 
 def test_pictures_are_made_small_and_stacked() -> None:

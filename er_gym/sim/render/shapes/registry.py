@@ -1,10 +1,15 @@
-"""The table of shapes by object type."""
+"""The table of shapes by object type.
+
+Other packages add shapes (``docs/extending.md``): functions under :func:`shape`, which are named in
+the environment variable ``ER_GYM_SHAPES`` or by entry points in the group ``er_gym.shapes``.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
 
+from er_gym.plugins import PluginError, added
 from er_gym.sim.render.appearance import Appearance
 from er_gym.sim.render.mesh import Mesh
 from er_gym.sim.render.patch import Patch
@@ -12,22 +17,42 @@ from er_gym.sim.render.patch import Patch
 Shape = Callable[[Appearance], Mesh]
 SHAPES: dict[str, Shape] = {}
 """The shape of each object type."""
+GROUP = "er_gym.shapes"
+"""The entry points in which packages declare shapes."""
+VARIABLE = "ER_GYM_SHAPES"
+"""The environment variable that names shapes, such as ``my_package.shapes:lava_lamp``."""
 UNSEEN = frozenset({"Floor"})
 """Types that are drawn with the room and not as objects."""
 _KEPT = 256
 
 
 def shape(*kinds: str) -> Callable[[Shape], Shape]:
-    """Register a function as the shape of some object types."""
+    """Register a function as the shape of some object types.
+
+    Raises:
+        ValueError: an object type has another shape already.
+    """
 
     def register(function: Shape) -> Shape:
         for kind in kinds:
             if kind in SHAPES:
-                raise ValueError(f"{kind} has two shapes")
+                raise ValueError(f"object type {kind!r} has a shape already; choose another name")
             SHAPES[kind] = function
         return function
 
     return register
+
+
+def load_added() -> None:
+    """Import the shapes of other packages, which registers them.
+
+    Raises:
+        PluginError: one cannot be loaded, or is no registered function.
+    """
+    expected = f"a function under @{__name__}.shape"
+    for found, origin in added("shape", GROUP, VARIABLE, expected, registers=True):
+        if not any(each is found for each in SHAPES.values()):
+            raise PluginError(f"{origin} is {found!r}; give {expected}")
 
 
 @lru_cache(maxsize=_KEPT)
