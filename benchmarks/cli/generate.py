@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from benchmarks.cli.suite_builder import Made
-    from er_gym.tasks.suite_spec import Making
+    from er_gym.tasks.suite_spec import SuiteSpec
     from er_gym.tasks.task import Task
 
 _DEFAULT_TOTAL = 100
@@ -69,7 +69,7 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
         make_folder(order.out.parent)
         for file in (order.out, order.card):
             check_output(file, force=force)
-    parts = parts_of(order.out, order.making, order.seed)
+    parts = parts_of(order.out, order.spec, order.seed)
     try:
         made, verified = _make(order, parts, workers, console)
         chosen = made.tasks
@@ -85,7 +85,7 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
     except KeyboardInterrupt:
         done = len(list(parts.glob("*.jsonl")))
         echo(
-            f"er-gym: interrupted: {done} of {len(order.making.rooms)} rooms are in {parts}; "
+            f"er-gym: interrupted: {done} of {len(order.spec.rooms)} rooms are in {parts}; "
             "the same command goes on",
             err=True,
         )
@@ -94,8 +94,8 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
     print_counts(chosen, made.dropped)
     echo(f"{len(chosen)} tasks of {verified} verified: {order.out}")
     echo(f"sha256 of the tasks {jsonl_format.digest(chosen)}; card: {order.card}")
-    if len(chosen) < order.making.total:
-        console.print(f"{order.making.total} were asked for; more layouts or rooms give more")
+    if len(chosen) < order.spec.total:
+        console.print(f"{order.spec.total} were asked for; more layouts or rooms give more")
     return 0
 
 
@@ -110,7 +110,7 @@ class _Order:
 
     name: str
     description: str
-    making: Making
+    spec: SuiteSpec
     seed: int
     out: Path
     command: str
@@ -128,7 +128,7 @@ def _order(
     """Work out what is to be made: as the suite says, overruled by the options that were given."""
     from er_gym.tasks.files import validated
     from er_gym.tasks.splits import SCENES
-    from er_gym.tasks.suite_spec import Making
+    from er_gym.tasks.suite_spec import SuiteSpec
     from er_gym.tasks.suites import suite_config, suite_file, suite_home
     from er_gym.tasks.types import task_type
 
@@ -157,7 +157,7 @@ def _order(
     return _Order(
         name=suite if suite and plain else stem,
         description=config.description if config and plain else "Generated tasks.",
-        making=validated(Making, {**base, **told}, "what to make"),
+        spec=validated(SuiteSpec, {**base, **told}, "what to make"),
         seed=seed,
         out=out,
         command=shlex.join(parts),
@@ -178,7 +178,7 @@ def _make(order: _Order, parts: Path, workers: int, console: Console) -> tuple[M
     from benchmarks.cli.progress import bar
     from benchmarks.cli.suite_builder import make_suite
 
-    rooms = len(order.making.rooms)
+    rooms = len(order.spec.rooms)
     verified = done = 0
     with bar(console) as progress:
         shown = progress.add_task("making tasks", total=rooms, status="")
@@ -190,7 +190,7 @@ def _make(order: _Order, parts: Path, workers: int, console: Console) -> tuple[M
             if not console.is_terminal and done * 10 // rooms > (done - 1) * 10 // rooms:
                 console.print(f"{done}/{rooms} rooms, {verified} tasks verified")
 
-        made = make_suite(order.making, order.seed, parts=parts, workers=workers, on_room=on_room)
+        made = make_suite(order.spec, order.seed, parts=parts, workers=workers, on_room=on_room)
     return made, verified
 
 
@@ -211,7 +211,7 @@ def _write(order: _Order, chosen: tuple[Task, ...], force: bool) -> None:
         "suite": order.name,
         "seed": order.seed,
         "er_gym": __version__,
-        **order.making.model_dump(mode="json", exclude_defaults=True),
+        **order.spec.model_dump(mode="json", exclude_defaults=True),
         **({"paraphraser": order.paraphraser} if order.paraphraser else {}),
     }
     check_output(order.card, force=force)  # before one of the two is written

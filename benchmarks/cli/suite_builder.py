@@ -26,7 +26,7 @@ from er_gym.rollout.worker_pool import Lost, do_jobs
 from er_gym.tasks import jsonl_format
 from er_gym.tasks.arrangement import Start
 from er_gym.tasks.generate import Generator, arranged, select_balanced
-from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TASK_TYPES
 from er_gym.thor import make_controller
@@ -56,8 +56,8 @@ class Made:
 class Maker:
     """Makes the tasks of one room after another."""
 
-    def __init__(self, making: Making, seed: int) -> None:
-        self._making, self._seed = making, seed
+    def __init__(self, spec: SuiteSpec, seed: int) -> None:
+        self._spec, self._seed = spec, seed
         self._controller = make_controller(headless=True)
         self._verify = make_verifier()
 
@@ -65,7 +65,7 @@ class Maker:
         """The tasks of a room, in all its arrangements."""
         rng = random.Random(f"{self._seed}/{scene}")
         # Drawn too, so that two suites do not share arrangements; 0 is the recorded one.
-        layouts = [0, *rng.sample(range(1, 10**6), self._making.layouts)]
+        layouts = [0, *rng.sample(range(1, 10**6), self._spec.layouts)]
         made = Made()
         for layout in layouts:
             made = made.and_also(self._of(arranged(self._controller, scene, layout), rng))
@@ -75,17 +75,17 @@ class Maker:
         """The tasks of a room as it is arranged."""
         kept: list[Task] = []
         for kind in TASK_TYPES:
-            if not self._making.types or kind.name in self._making.types:
+            if not self._spec.types or kind.name in self._spec.types:
                 candidates = list(room.tasks([kind.name]))
                 rng.shuffle(candidates)
-                kept += islice(self._verified(candidates, room), self._making.per_layout)
+                kept += islice(self._verified(candidates, room), self._spec.per_layout)
         return Made(tuple(kept), room.dropped)
 
     def _verified(self, candidates: Iterable[Task], room: Generator) -> Iterator[Task]:
         """The tasks that are wanted and can be done; not too many are played."""
-        tries = self._making.per_layout * _TRIES
+        tries = self._spec.per_layout * _TRIES
         for task in candidates:
-            problem = unwanted(task, room, self._making, self._verify)
+            problem = unwanted(task, room, self._spec, self._verify)
             if not problem:
                 if not tries:
                     return
@@ -104,14 +104,14 @@ class Maker:
 
 
 def make_suite(
-    making: Making,
+    spec: SuiteSpec,
     seed: int,
     *,
     parts: Path,
     workers: int = 1,
     on_room: Callable[[str, Made], None] = lambda scene, made: None,
 ) -> Made:
-    """Make a suite's tasks; the same for the same making and seed.
+    """Make a suite's tasks; the same for the same spec and seed.
 
     Args:
         parts: a folder for what rooms give, which need not be there; what is there is used.
@@ -122,11 +122,11 @@ def make_suite(
         RuntimeError: a room's worker died again and again.
     """
     make_folder(parts)
-    done = {scene: part for scene in making.rooms if (part := _read(_file(parts, scene)))}
+    done = {scene: part for scene in spec.rooms if (part := _read(_file(parts, scene)))}
     for scene, part in done.items():
         on_room(scene, part)
-    todo = [scene for scene in making.rooms if scene not in done]
-    with closing(do_jobs(partial(Maker, making, seed), todo, workers=workers)) as results:
+    todo = [scene for scene in spec.rooms if scene not in done]
+    with closing(do_jobs(partial(Maker, spec, seed), todo, workers=workers)) as results:
         for scene, made in results:
             if isinstance(made, Lost):
                 raise RuntimeError(
@@ -137,15 +137,15 @@ def make_suite(
             done[scene] = made
             on_room(scene, made)
     every = Made()
-    for scene in making.rooms:
+    for scene in spec.rooms:
         every = every.and_also(done[scene])
-    chosen = select_balanced(every.tasks, making.total, random.Random(seed))
+    chosen = select_balanced(every.tasks, spec.total, random.Random(seed))
     return Made(tuple(_layouts_together(chosen)), every.dropped)
 
 
-def parts_of(out: Path, making: Making, seed: int) -> Path:
-    """Where the parts of a suite are kept until it is whole: beside it, for this making alone."""
-    told = json.dumps([making.model_dump(mode="json"), seed, __version__])
+def parts_of(out: Path, spec: SuiteSpec, seed: int) -> Path:
+    """Where the parts of a suite are kept until it is whole: beside it, for this spec alone."""
+    told = json.dumps([spec.model_dump(mode="json"), seed, __version__])
     return out.with_name(f".{out.name}.parts-{hashlib.sha256(told.encode()).hexdigest()[:8]}")
 
 

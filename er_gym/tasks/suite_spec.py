@@ -16,7 +16,7 @@ Span = tuple[float, float | None]
 """From and to, both included; no end for None."""
 
 
-class Making(BaseModel):
+class SuiteSpec(BaseModel):
     """What to generate.
 
     Attributes:
@@ -79,7 +79,7 @@ class Making(BaseModel):
         return tuple(dict.fromkeys(self.scenes))
 
     @property
-    def is_any_difficulty(self) -> bool:
+    def allows_any_difficulty(self) -> bool:
         """Whether a task may be as difficult as it likes."""
         return self.hidden_depth == self.distractors == self.distance == (0, None)
 

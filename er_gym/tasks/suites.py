@@ -21,7 +21,7 @@ from er_gym.tasks import jsonl_format, paper_format
 from er_gym.tasks.errors import SetAside, TaskFileError, in_short
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import read_yaml
-from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import Task
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -74,7 +74,7 @@ class SuiteConfig(BaseModel):
     description: str
     tasks: str
     env: dict[str, Any] = {}
-    generate: Making | None = None
+    generate: SuiteSpec | None = None
     seed: int = 0
 
 

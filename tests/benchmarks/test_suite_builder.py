@@ -33,7 +33,7 @@ from er_gym.tasks.splits import (
     subject_types,
 )
 from er_gym.tasks.suite_card import card
-from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.thor import make_controller
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,13 +41,13 @@ COMMAND = [sys.executable, "-m", "benchmarks.cli", "tasks", "generate"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 LONG_RANGE = TASK_TYPES[-1]
-PICKUPS = Making(
+PICKUPS = SuiteSpec(
     total=40,
     scenes=("FloorPlan401", "FloorPlan410", "FloorPlan425"),
     types=("single_pickup", "single_toggle", "pickup_and_put"),
 )
 """Three bathrooms as recorded: made in a second or two."""
-KITCHENS = Making(
+KITCHENS = SuiteSpec(
     total=30,
     scenes=("FloorPlan5", "FloorPlan10", "FloorPlan6", "FloorPlan7"),
     types=("single_pickup", "pickup_from_closerep_and_put"),
@@ -55,17 +55,17 @@ KITCHENS = Making(
 """Rooms that are some work each, so that there is time to end the command between two of them."""
 
 
-def options(making: Making, seed: int) -> list[str]:
-    """The options of the command that say the same as a making."""
-    given = ["--seed", str(seed), "--total", str(making.total), "--layouts", str(making.layouts)]
-    given += ["--per-layout", str(making.per_layout), "--scenes", ",".join(making.rooms)]
-    return [*given, *(["--types", ",".join(making.types)] if making.types else [])]
+def options(spec: SuiteSpec, seed: int) -> list[str]:
+    """The options of the command that say the same as a spec."""
+    given = ["--seed", str(seed), "--total", str(spec.total), "--layouts", str(spec.layouts)]
+    given += ["--per-layout", str(spec.per_layout), "--scenes", ",".join(spec.rooms)]
+    return [*given, *(["--types", ",".join(spec.types)] if spec.types else [])]
 
 
-def generated(out: Path, making: Making, seed: int, workers: int = 1, **environment: str) -> bytes:
+def generated(out: Path, spec: SuiteSpec, seed: int, workers: int = 1, **environment: str) -> bytes:
     """The file that the command makes, in a process of its own."""
     done = subprocess.run(
-        [*COMMAND, "--out", str(out), "--workers", str(workers), *options(making, seed)],
+        [*COMMAND, "--out", str(out), "--workers", str(workers), *options(spec, seed)],
         env={**ENVIRONMENT, **environment},
         capture_output=True,
         text=True,
@@ -86,7 +86,7 @@ def header(file: Path) -> dict[str, Any]:
 def test_a_seed_gives_the_same_bytes_whatever_the_process_and_the_workers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    making = Making(
+    spec = SuiteSpec(
         total=14,
         scenes=("FloorPlan401", "FloorPlan410"),
         types=("single_pickup", "pickup_and_put"),
@@ -95,21 +95,21 @@ def test_a_seed_gives_the_same_bytes_whatever_the_process_and_the_workers(
     here = tmp_path / "here" / "suite.jsonl.gz"
     with pytest.raises(SystemExit) as ended:
         cli.main(
-            ["tasks", "generate", "--out", str(here), "--workers", "2", *options(making, seed=3)]
+            ["tasks", "generate", "--out", str(here), "--workers", "2", *options(spec, seed=3)]
         )
     assert ended.value.code == 0, capsys.readouterr().err
     there = tmp_path / "there" / "suite.jsonl.gz"
-    assert generated(there, making, 3, PYTHONHASHSEED="1") == here.read_bytes()
+    assert generated(there, spec, 3, PYTHONHASHSEED="1") == here.read_bytes()
     tasks = read_tasks(here)
-    assert len(tasks) == making.total
+    assert len(tasks) == spec.total
     assert len({task.start.layout for task in tasks}) == 3  # as recorded, and each room's own
     parts = tmp_path / "parts"
-    assert [make_suite(making, 3, parts=parts).tasks] == [tuple(tasks)]
+    assert [make_suite(spec, 3, parts=parts).tasks] == [tuple(tasks)]
 
 
 def test_another_seed_gives_other_tasks_and_other_arrangements(tmp_path: Path) -> None:
-    making = Making(total=8, scenes=("FloorPlan401",), types=("single_pickup",), layouts=1)
-    one, other = (make_suite(making, seed, parts=tmp_path / str(seed)).tasks for seed in (0, 1))
+    spec = SuiteSpec(total=8, scenes=("FloorPlan401",), types=("single_pickup",), layouts=1)
+    one, other = (make_suite(spec, seed, parts=tmp_path / str(seed)).tasks for seed in (0, 1))
     layouts = [{task.start.layout for task in tasks} for tasks in (one, other)]
     assert [len(names) for names in layouts] == [2, 2]
     assert layouts[0] & layouts[1] == {""}
@@ -227,8 +227,8 @@ def test_an_ended_command_goes_on(
 @pytest.fixture(scope="module")
 def of_all_types(tmp_path_factory: pytest.TempPathFactory) -> tuple[Task, ...]:
     """Everything that a kitchen and a bathroom give, as recorded and rearranged."""
-    making = Making(total=10_000, scenes=("FloorPlan5", "FloorPlan410"), layouts=1, per_layout=2)
-    return make_suite(making, 0, parts=tmp_path_factory.mktemp("all") / "parts", workers=2).tasks
+    spec = SuiteSpec(total=10_000, scenes=("FloorPlan5", "FloorPlan410"), layouts=1, per_layout=2)
+    return make_suite(spec, 0, parts=tmp_path_factory.mktemp("all") / "parts", workers=2).tasks
 
 
 @pytest.fixture(scope="module")
@@ -278,8 +278,8 @@ LIMITS = {"hidden_depth": (1, 1), "distractors": (2, 6), "distance": (4, 9.5)}
 def test_limits_of_difficulty_are_kept(limited: str, verifier: Verifier, tmp_path: Path) -> None:
     low, high = LIMITS[limited]
     types = ("single_pickup", "single_pickup_from_closerep", "pickup_and_put", "single_toggle")
-    making = Making(total=100, scenes=("FloorPlan5",), types=types, **{limited: (low, high)})
-    made = make_suite(making, 0, parts=tmp_path / "parts")
+    spec = SuiteSpec(total=100, scenes=("FloorPlan5",), types=types, **{limited: (low, high)})
+    made = make_suite(spec, 0, parts=tmp_path / "parts")
     assert made.tasks
     assert made.dropped["it is not as difficult as asked"]
     for task, figures in measured(made.tasks, verifier):
@@ -287,14 +287,12 @@ def test_limits_of_difficulty_are_kept(limited: str, verifier: Verifier, tmp_pat
 
 
 def test_no_task_is_about_what_training_never_sees(tmp_path: Path) -> None:
-    making = Making(
+    spec = SuiteSpec(
         total=500, scenes=("FloorPlan212",), types=("single_search", "single_pickup"), per_layout=9
     )
-    every = make_suite(making, 0, parts=tmp_path / "every").tasks
+    every = make_suite(spec, 0, parts=tmp_path / "every").tasks
     assert any(UNSEEN_TYPES & subject_types(task) for task in every)
-    seen = make_suite(
-        making.model_copy(update={"unseen_objects": False}), 0, parts=tmp_path / "seen"
-    )
+    seen = make_suite(spec.model_copy(update={"unseen_objects": False}), 0, parts=tmp_path / "seen")
     assert seen.tasks
     assert {split(task) for task in seen.tasks} == {"seen"}
     for task in seen.tasks:
@@ -306,9 +304,9 @@ def test_no_task_is_about_what_training_never_sees(tmp_path: Path) -> None:
 
 def test_only_the_types_and_rooms_that_are_asked_for(tmp_path: Path) -> None:
     heard: list[Made] = []
-    making = PICKUPS.model_copy(update={"total": 7, "per_layout": 2})
+    spec = PICKUPS.model_copy(update={"total": 7, "per_layout": 2})
     made = make_suite(
-        making, 0, parts=tmp_path / "parts", on_room=lambda scene, room: heard.append(room)
+        spec, 0, parts=tmp_path / "parts", on_room=lambda scene, room: heard.append(room)
     )
     assert len(made.tasks) == 7
     assert {task.scene for task in made.tasks} == set(PICKUPS.rooms)

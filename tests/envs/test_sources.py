@@ -21,7 +21,7 @@ from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.rollout.verification import make_verifier
 from er_gym.tasks import TASK_TYPES, Task, TaskType, jsonl_format, load_suite, paper_format
 from er_gym.tasks.splits import TRAINING_SCENES, UNSEEN_TYPES, subject_types
-from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.suite_spec import SuiteSpec
 
 IDS = [task_type.env_id for task_type in TASK_TYPES]
 MINI = load_suite("mini").tasks
@@ -312,8 +312,8 @@ def test_live_tasks_are_of_the_type_and_in_the_room_that_are_asked_for() -> None
 
 
 def test_live_tasks_are_about_what_training_may_see(make: Callable[..., EmbodiedEnv]) -> None:
-    def abouts(making: Making) -> set[str]:
-        with closing(GeneratedSource(EmbodiedEnv((), obs_mode="state"), making)) as source:
+    def abouts(spec: SuiteSpec) -> set[str]:
+        with closing(GeneratedSource(EmbodiedEnv((), obs_mode="state"), spec)) as source:
             env = make(source, task_type="single_pickup")
             tasks = [drawn(env, seed, scene=ROOM) for seed in range(8)]
         return {name for task in tasks for name in subject_types(task)}
@@ -324,14 +324,14 @@ def test_live_tasks_are_about_what_training_may_see(make: Callable[..., Embodied
 
 
 def test_a_live_source_keeps_to_its_making(make: Callable[..., EmbodiedEnv]) -> None:
-    making = Making(
+    spec = SuiteSpec(
         total=1,
         scenes=("FloorPlan301", "FloorPlan401"),
         types=("pickup_and_put", "single_pickup"),
         layouts=2,
         distance=(2, 4.5),
     )
-    with closing(GeneratedSource(EmbodiedEnv((), obs_mode="state"), making)) as source:
+    with closing(GeneratedSource(EmbodiedEnv((), obs_mode="state"), spec)) as source:
         env = make(source)
         tasks = [drawn(env, seed) for seed in range(8)]
         # Nothing opens in this bathroom.
@@ -342,10 +342,10 @@ def test_a_live_source_keeps_to_its_making(make: Callable[..., EmbodiedEnv]) -> 
                 seed=0, options={"scene": "FloorPlan401"}
             )
     assert "\n" not in str(e.value)
-    assert {task.scene for task in tasks} == set(making.rooms)
-    assert {task.type.name for task in tasks} == set(making.types)
+    assert {task.scene for task in tasks} == set(spec.rooms)
+    assert {task.type.name for task in tasks} == set(spec.types)
     assert all(2 <= task.extra["difficulty"]["distance"] <= 4.5 for task in tasks)
-    layouts = {f"{scene}-{number}" for scene in making.rooms for number in (1, 2)}
+    layouts = {f"{scene}-{number}" for scene in spec.rooms for number in (1, 2)}
     assert {task.start.layout for task in tasks} <= {"", *layouts}
 
 
