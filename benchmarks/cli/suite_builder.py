@@ -24,8 +24,8 @@ from er_gym.envs.verify import unwanted, with_difficulty
 from er_gym.rollout.verification import make_verifier
 from er_gym.rollout.worker_pool import Lost, do_jobs
 from er_gym.tasks import jsonl_format
-from er_gym.tasks.arrangement import Start
-from er_gym.tasks.generate import Generator, arranged, select_balanced
+from er_gym.tasks.arrangement import Arrangement
+from er_gym.tasks.generate import Generator, generator_for, select_balanced
 from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TASK_TYPES
@@ -68,7 +68,7 @@ class Maker:
         layouts = [0, *rng.sample(range(1, 10**6), self._spec.layouts)]
         made = Made()
         for layout in layouts:
-            made = made.and_also(self._of(arranged(self._controller, scene, layout), rng))
+            made = made.and_also(self._of(generator_for(self._controller, scene, layout), rng))
         return made
 
     def _of(self, room: Generator, rng: random.Random) -> Made:
@@ -156,10 +156,10 @@ def remove_parts(parts: Path) -> None:
 
 def _layouts_together(tasks: Sequence[Task]) -> Iterable[Task]:
     """The same tasks; arrangements that are equal become one object, which is written once."""
-    starts: dict[str, Start] = {}
+    starts: dict[str, Arrangement] = {}
     for task in tasks:
-        start = starts.setdefault(task.start.layout, task.start)
-        yield replace(task, start=replace(task.start, poses=start.poses))
+        arrangement = starts.setdefault(task.arrangement.layout, task.arrangement)
+        yield replace(task, arrangement=replace(task.arrangement, poses=arrangement.poses))
 
 
 def _file(parts: Path, scene: str) -> Path:

@@ -33,7 +33,7 @@ from er_gym.envs.perception import Percept
 from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import begin
+from er_gym.tasks.arrangement import set_up_scene
 from er_gym.tasks.goal import Condition, unmet
 from er_gym.tasks.judge import Criteria, Progress
 from er_gym.tasks.task import AgentPose, Task
@@ -377,7 +377,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._task = task
         self._done = []
         controller = self._started_controller(task.scene)
-        bounds = begin(controller, task.scene, task.start).metadata["sceneBounds"]
+        bounds = set_up_scene(controller, task.scene, task.arrangement).metadata["sceneBounds"]
         floor = skills.reachable(controller, (self._backend, task.scene, self._grid_size))
         pose = self._protocol.start(bounds, floor)
         self._memory = Memory(pose, goal_row(task.instruction))

@@ -9,7 +9,7 @@ import numpy as np
 
 from er_gym.envs.arguments import shown
 from er_gym.envs.verify import PlayableEnv, Verifier, unwanted, with_difficulty
-from er_gym.tasks.generate import Generator, arranged
+from er_gym.tasks.generate import Generator, generator_for
 from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, TaskType
@@ -45,7 +45,7 @@ class GeneratedSource:
         self._controller = make_controller(headless=True)
         self._verify = Verifier(env)
         self._room: Callable[[str, int], Generator]
-        self._room = lru_cache(_KEPT)(partial(arranged, self._controller))
+        self._room = lru_cache(_KEPT)(partial(generator_for, self._controller))
 
     def __reduce__(self) -> tuple[type[GeneratedSource], tuple[PlayableEnv, SuiteSpec]]:
         # A copy has engines of its own; what is drawn depends on the random generator alone.

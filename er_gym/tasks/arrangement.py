@@ -27,7 +27,7 @@ class ObjectPose:
 
 
 @dataclass(frozen=True)
-class Start:
+class Arrangement:
     """How a scene differs from the recorded one when an episode begins.
 
     Attributes:
@@ -43,28 +43,28 @@ class Start:
     dirty: tuple[str, ...] = ()
 
 
-def begin(controller: Any, scene: str, start: Start) -> Any:
+def set_up_scene(controller: Any, scene: str, arrangement: Arrangement) -> Any:
     """Load a scene and arrange it; returns the last event.
 
     Raises:
         ValueError: an object of the start is not in the scene.
     """
     event = controller.reset(scene)
-    if start.poses:
-        poses = _all_poses(_recorded_poses(controller, scene, event), start)
+    if arrangement.poses:
+        poses = _all_poses(_recorded_poses(controller, scene, event), arrangement)
         del event  # what nobody keeps, the embedded engine need not work out
         event = controller.step(action="SetObjectPoses", objectPoses=poses, placeStationary=True)
-        _check(event, scene, start)
-    for object_id in start.dirty:
+        _check(event, scene, arrangement)
+    for object_id in arrangement.dirty:
         event = controller.step(action="DirtyObject", objectId=object_id, forceAction=True)
-        _check(event, scene, start)
+        _check(event, scene, arrangement)
     return event
 
 
-def _check(event: Any, scene: str, start: Start) -> None:
+def _check(event: Any, scene: str, arrangement: Arrangement) -> None:
     if not event.metadata["lastActionSuccess"]:
         raise ValueError(
-            f"{scene} cannot be arranged as {start.layout or 'its task asks'!r}: "
+            f"{scene} cannot be arranged as {arrangement.layout or 'its task asks'!r}: "
             f"{event.metadata['errorMessage']}"
         )
 
@@ -85,7 +85,9 @@ def _recorded_poses(controller: Any, scene: str, event: Any) -> Mapping[str, Obj
     return _recorded[key]
 
 
-def _all_poses(recorded: Mapping[str, ObjectPose], start: Start) -> list[dict[str, Any]]:
+def _all_poses(
+    recorded: Mapping[str, ObjectPose], arrangement: Arrangement
+) -> list[dict[str, Any]]:
     """What SetObjectPoses needs: the pose of everything loose, for it takes away the rest."""
     return [
         {
@@ -93,7 +95,7 @@ def _all_poses(recorded: Mapping[str, ObjectPose], start: Start) -> list[dict[st
             "position": {"x": pose.x, "y": pose.y, "z": pose.z},
             "rotation": {"x": pose.pitch, "y": pose.yaw, "z": pose.roll},
         }
-        for name, pose in {**recorded, **start.poses}.items()
+        for name, pose in {**recorded, **arrangement.poses}.items()
     ]
 
 
@@ -102,7 +104,7 @@ def _pose(entry: Mapping[str, Any]) -> ObjectPose:
     return ObjectPose(*(position[axis] for axis in "xyz"), *(rotation[axis] for axis in "xyz"))
 
 
-def shuffled(controller: Any, scene: str, seed: int) -> Start:
+def random_arrangement(controller: Any, scene: str, seed: int) -> Arrangement:
     """A scene with everything that can be carried put somewhere else, by a seed.
 
     AI2-THOR's ``InitialRandomSpawn`` chooses the places, closed receptacles among them; the poses
@@ -111,7 +113,7 @@ def shuffled(controller: Any, scene: str, seed: int) -> Start:
     """
     objects = controller.reset(scene).metadata["objects"]
     recorded = {entry["name"]: _pose(entry) for entry in objects}
-    best, fewest = Start(), float("inf")
+    best, fewest = Arrangement(), float("inf")
     for attempt in range(_ATTEMPTS):
         if attempt:
             controller.reset(scene)
@@ -127,12 +129,12 @@ def shuffled(controller: Any, scene: str, seed: int) -> Start:
             for entry in spawned
             if (pose := _pose(entry)) != recorded.get(entry["name"], pose)
         }
-        start = Start(f"{scene}-{seed}", poses)
+        arrangement = Arrangement(f"{scene}-{seed}", poses)
         wanted = _holders(spawned)
-        arranged = _holders(begin(controller, scene, start).metadata["objects"])
+        arranged = _holders(set_up_scene(controller, scene, arrangement).metadata["objects"])
         doubtful = sum(holders != wanted[name] for name, holders in arranged.items())
         if doubtful < fewest:
-            best, fewest = start, doubtful
+            best, fewest = arrangement, doubtful
         if not doubtful:
             break
     return best

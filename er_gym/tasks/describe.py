@@ -59,7 +59,7 @@ class _Names:
                 *(other for action in task.key_actions for other in action.related_objects),
                 *(condition.object_id for condition in task.goal),
                 *task.related_objects,
-                *task.start.dirty,
+                *task.arrangement.dirty,
             ]
         )
         counts = Counter(type_of_id(object_id) for object_id in ids if object_id)
@@ -109,13 +109,13 @@ def describe(
 
 def _where(task: Task) -> str:
     where = f"{room_kind(task.scene)} {task.scene}"
-    if not task.start.poses:
+    if not task.arrangement.poses:
         return where
-    return f"{where}, rearranged as {task.start.layout or 'the task says'}"
+    return f"{where}, rearranged as {task.arrangement.layout or 'the task says'}"
 
 
 def _dirty(task: Task, names: _Names) -> list[str]:
-    made = _series(names.the(object_id) for object_id in task.start.dirty)
+    made = _series(names.the(object_id) for object_id in task.arrangement.dirty)
     return [_wrapped(f"dirty when it begins: {made}")] if made else []
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, field_validator
 
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import (
     Entry,
@@ -198,13 +198,15 @@ def _lines(tasks: Iterable[Task]) -> Iterator[str]:
     """A line for each task, and before the first that needs it one for each arrangement."""
     written: dict[str, Mapping[str, ObjectPose]] = {}
     for task in tasks:
-        start = task.start
-        if start.poses and start.layout not in written:
-            written[start.layout] = start.poses
-            poses = {name: astuple(pose) for name, pose in start.poses.items()}
-            yield _line(LayoutRecord(layout=start.layout, poses=poses))
-        if start.poses != written.get(start.layout, {}):
-            raise ValueError(f"task {task.id}: another arrangement is named {start.layout!r} too")
+        arrangement = task.arrangement
+        if arrangement.poses and arrangement.layout not in written:
+            written[arrangement.layout] = arrangement.poses
+            poses = {name: astuple(pose) for name, pose in arrangement.poses.items()}
+            yield _line(LayoutRecord(layout=arrangement.layout, poses=poses))
+        if arrangement.poses != written.get(arrangement.layout, {}):
+            raise ValueError(
+                f"task {task.id}: another arrangement is named {arrangement.layout!r} too"
+            )
         yield _line(_record(task))
 
 
@@ -254,7 +256,7 @@ def _task(record: TaskRecord, poses: Mapping[str, ObjectPose], where: str) -> Ta
         related_objects=record.related_objects,
         navigable_objects=record.navigable_objects,
         goal=tuple(condition.condition() for condition in record.goal),
-        start=Start(record.layout, poses, record.dirty),
+        arrangement=Arrangement(record.layout, poses, record.dirty),
         poses={key: AgentPose(**pose.model_dump()) for key, pose in record.poses.items()},
         extra=record.extra,
     )
@@ -283,8 +285,8 @@ def _record(task: Task) -> TaskRecord:
         related_objects=task.related_objects,
         navigable_objects=task.navigable_objects,
         goal=tuple(map(ConditionRecord.of, task.goal)),
-        layout=task.start.layout,
-        dirty=task.start.dirty,
+        layout=task.arrangement.layout,
+        dirty=task.arrangement.dirty,
         poses={key: PoseRecord(**asdict(pose)) for key, pose in task.poses.items()},
         extra=dict(task.extra),
     )

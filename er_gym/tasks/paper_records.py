@@ -20,7 +20,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.files import as_utf8, known_scene, known_type, known_verb
 from er_gym.tasks.jsonl_format import ConditionRecord, PoseRecord
 from er_gym.tasks.task import AgentPose, KeyAction, Task
@@ -171,9 +171,9 @@ def own_fields(task: Task, plain: Task) -> dict[str, Any]:
     record = OwnFields(
         **own,
         goal=tuple(map(ConditionRecord.of, task.goal)),
-        layout=task.start.layout,
-        layout_poses={name: astuple(pose) for name, pose in task.start.poses.items()},
-        dirty=task.start.dirty,
+        layout=task.arrangement.layout,
+        layout_poses={name: astuple(pose) for name, pose in task.arrangement.poses.items()},
+        dirty=task.arrangement.dirty,
         poses={key: PoseRecord(**asdict(pose)) for key, pose in task.poses.items()},
     )
     fields = record.model_dump(exclude_defaults=True)
@@ -191,7 +191,7 @@ def with_own_fields(plain: Task, own: OwnFields, where: str) -> Task:
         type=plain.type if own.type is None else known_type(own.type, where),
         scene=plain.scene if own.scene is None else known_scene(own.scene, where),
         goal=tuple(condition.condition() for condition in own.goal),
-        start=Start(
+        arrangement=Arrangement(
             own.layout,
             {name: ObjectPose(*pose) for name, pose in own.layout_poses.items()},
             own.dirty,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from math import dist, inf
 from typing import Any
 
-from er_gym.tasks.arrangement import Start, begin
+from er_gym.tasks.arrangement import Arrangement, set_up_scene
 from er_gym.tasks.errors import SetAside, Taken, TaskFileError
 from er_gym.tasks.task import Task, type_of_id
 from er_gym.thor import make_controller
@@ -111,7 +111,9 @@ class _Rooms:
     def recorded(self, scene: str) -> list[dict[str, Any]]:
         """Metadata of a scene's objects as they are recorded."""
         if scene not in self._recorded:
-            self._recorded[scene] = begin(self._controller, scene, Start()).metadata["objects"]
+            self._recorded[scene] = set_up_scene(self._controller, scene, Arrangement()).metadata[
+                "objects"
+            ]
         return self._recorded[scene]
 
     def names(self, scene: str) -> Mapping[str, str]:
@@ -120,11 +122,11 @@ class _Rooms:
 
     def objects(self, task: Task) -> Mapping[str, Position]:
         """Id to position, as the task begins."""
-        key = (task.scene, task.start.layout)
+        key = (task.scene, task.arrangement.layout)
         if key not in self._arranged:
-            if task.start.poses:
-                start = replace(task.start, dirty=())
-                metadata = begin(self._controller, task.scene, start).metadata
+            if task.arrangement.poses:
+                arrangement = replace(task.arrangement, dirty=())
+                metadata = set_up_scene(self._controller, task.scene, arrangement).metadata
                 entries = metadata["objects"]
             else:
                 entries = self.recorded(task.scene)
@@ -171,7 +173,7 @@ def _essential(task: Task) -> Iterator[str]:
     """The ids without which a task cannot be done; "" where none is stated."""
     yield from (action.object_id for action in task.key_actions)
     yield from (condition.object_id for condition in task.goal)
-    yield from task.start.dirty
+    yield from task.arrangement.dirty
 
 
 def _ids(task: Task) -> Iterator[str]:
@@ -209,7 +211,7 @@ def _with_ids(task: Task, instead: Mapping[str, str]) -> Task:
         target_objects=tuple(fit(i) for i in task.target_objects),
         related_objects=tuple(fit(i) for i in task.related_objects),
         goal=tuple(replace(one, object_id=fit(one.object_id)) for one in task.goal),
-        start=replace(task.start, dirty=tuple(fit(i) for i in task.start.dirty)),
+        arrangement=replace(task.arrangement, dirty=tuple(fit(i) for i in task.arrangement.dirty)),
         # What is stated for the object itself counts before what is stated for another.
         poses={fit(i): task.poses[i] for i in sorted(task.poses, key=lambda i: fit(i) == i)},
     )
@@ -330,7 +332,7 @@ def _lacking(
 
 def _with_names(task: Task, names: Mapping[str, str]) -> tuple[Task, list[Taken]]:
     """The task with a start that moves what the scene has: names end in what differs by build."""
-    poses = task.start.poses
+    poses = task.arrangement.poses
     taken = []
     instead: dict[str, str] = {}
     for name in poses:
@@ -338,7 +340,7 @@ def _with_names(task: Task, names: Mapping[str, str]) -> tuple[Task, list[Taken]
             alike = [n for n in names if _stem(n) == _stem(name) and n not in poses]
             if len(alike) != 1 or alike[0] in instead.values():
                 raise TaskFileError(
-                    f"its start moves {name!r}, which {task.scene} does not have; "
+                    f"its arrangement moves {name!r}, which {task.scene} does not have; "
                     + (f"it could be {' or '.join(alike)}" if alike else "nor any of that name")
                 )
             instead[name] = alike[0]
@@ -346,7 +348,7 @@ def _with_names(task: Task, names: Mapping[str, str]) -> tuple[Task, list[Taken]
     if not instead:
         return task, []
     moved = {instead.get(name, name): pose for name, pose in poses.items()}
-    return replace(task, start=replace(task.start, poses=moved)), taken
+    return replace(task, arrangement=replace(task.arrangement, poses=moved)), taken
 
 
 def _stem(name: str) -> str:
@@ -356,7 +358,7 @@ def _stem(name: str) -> str:
 def _all_there(task: Task, rooms: _Rooms) -> bool:
     """Whether a scene has all that a task names, as far as that can be told without arranging it:
     what is as recorded, and what has been moved to where its id says."""
-    poses = task.start.poses
+    poses = task.arrangement.poses
     still = {object_id for name, object_id in rooms.names(task.scene).items() if name not in poses}
     kinds = {name: type_of_id(object_id) for name, object_id in rooms.names(task.scene).items()}
 

@@ -83,7 +83,7 @@ def summarise(tasks: Iterable[Task]) -> Summary:
     scenes = Counter(task.scene for task in tasks)
     lengths = Counter(length(task) for task in tasks)
     depths = Counter(hidden_depth(task) for task in tasks)
-    rearranged = [task for task in tasks if task.start.poses]
+    rearranged = [task for task in tasks if task.arrangement.poses]
     return Summary(
         tasks=len(tasks),
         groups=_in_order(GROUPS, (task.type.group for task in tasks)),
@@ -95,7 +95,7 @@ def summarise(tasks: Iterable[Task]) -> Summary:
         lengths={number: lengths[number] for number in sorted(lengths)},
         depths={number: depths[number] for number in sorted(depths)},
         rearranged=len(rearranged),
-        layouts=len({(task.scene, task.start.layout) for task in rearranged}),
+        layouts=len({(task.scene, task.arrangement.layout) for task in rearranged}),
     )
 
 

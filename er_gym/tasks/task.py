@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import Start
+from er_gym.tasks.arrangement import Arrangement
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.types import TaskType
 
@@ -110,7 +110,7 @@ class Task:
     related_objects: tuple[str, ...] = ()
     navigable_objects: tuple[str, ...] = ()
     goal: tuple[Condition, ...] = ()
-    start: Start = field(default_factory=Start)
+    arrangement: Arrangement = field(default_factory=Arrangement)
     poses: Mapping[str, AgentPose] = field(default_factory=dict)
     extra: Mapping[str, object] = field(default_factory=dict)
 

@@ -363,7 +363,7 @@ def test_stats_draw(er_gym: Command, made: Path, tmp_path: Path) -> None:
 def test_tasks_are_converted_without_loss(er_gym: Command, tmp_path: Path) -> None:
     every = load_suite("er-1k").tasks
     tasks = [next(task for task in every if task.type is kind) for kind in TASK_TYPES]
-    tasks += [task for task in every if task.start.poses][:3]
+    tasks += [task for task in every if task.arrangement.poses][:3]
     tasks = list({task.id: task for task in tasks}.values())
     write_tasks(tmp_path / "0.jsonl", tasks)
     row = ["0.jsonl", "1.json", "2.jsonl.gz", "folder", "3.jsonl"]
@@ -526,7 +526,7 @@ def elsewhere(task: Task, metres: float) -> Task:
 def mixed(made: Path, tmp_path: Path) -> Path:
     """Two tasks as they should be, one that is 3 cm off, one about a ghost, and two that cannot be
     read: of an unknown type, and with an id that is there already."""
-    one, two, three, *_ = (task for task in read_tasks(made) if not task.start.poses)
+    one, two, three, *_ = (task for task in read_tasks(made) if not task.arrangement.poses)
     file = tmp_path / "mixed.jsonl"
     write_tasks(file, [one, elsewhere(two, 0.03), about_a_ghost(three, id="ghost"), three])
     header, *lines = file.read_text(encoding="utf-8").splitlines()

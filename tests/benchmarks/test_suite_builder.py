@@ -22,7 +22,7 @@ from benchmarks.cli.suite_builder import Made, make_suite, parts_of
 from er_gym.envs.verify import Verifier
 from er_gym.rollout.verification import make_verifier
 from er_gym.tasks import TASK_TYPES, Task, jsonl_format, load_suite, suites, verbs
-from er_gym.tasks.arrangement import begin
+from er_gym.tasks.arrangement import set_up_scene
 from er_gym.tasks.difficulty import Difficulty, difficulty
 from er_gym.tasks.jsonl_format import read_tasks
 from er_gym.tasks.splits import (
@@ -102,7 +102,7 @@ def test_a_seed_gives_the_same_bytes_whatever_the_process_and_the_workers(
     assert generated(there, spec, 3, PYTHONHASHSEED="1") == here.read_bytes()
     tasks = read_tasks(here)
     assert len(tasks) == spec.total
-    assert len({task.start.layout for task in tasks}) == 3  # as recorded, and each room's own
+    assert len({task.arrangement.layout for task in tasks}) == 3  # as recorded, and each room's own
     parts = tmp_path / "parts"
     assert [make_suite(spec, 3, parts=parts).tasks] == [tuple(tasks)]
 
@@ -110,7 +110,7 @@ def test_a_seed_gives_the_same_bytes_whatever_the_process_and_the_workers(
 def test_another_seed_gives_other_tasks_and_other_arrangements(tmp_path: Path) -> None:
     spec = SuiteSpec(total=8, scenes=("FloorPlan401",), types=("single_pickup",), layouts=1)
     one, other = (make_suite(spec, seed, parts=tmp_path / str(seed)).tasks for seed in (0, 1))
-    layouts = [{task.start.layout for task in tasks} for tasks in (one, other)]
+    layouts = [{task.arrangement.layout for task in tasks} for tasks in (one, other)]
     assert [len(names) for names in layouts] == [2, 2]
     assert layouts[0] & layouts[1] == {""}
     assert [task.id for task in one] != [task.id for task in other]
@@ -241,7 +241,7 @@ def measured(tasks: Sequence[Task], verifier: Verifier) -> Iterator[tuple[Task, 
     """Each task's difficulty, read off its scene as it begins."""
     with make_controller(headless=True) as controller:
         for task in tasks:
-            objects = begin(controller, task.scene, task.start).metadata["objects"]
+            objects = set_up_scene(controller, task.scene, task.arrangement).metadata["objects"]
             yield task, difficulty(task, objects, verifier(task).start)
 
 
@@ -249,7 +249,7 @@ def test_every_task_that_is_made_can_be_done(
     of_all_types: tuple[Task, ...], verifier: Verifier
 ) -> None:
     assert {task.type for task in of_all_types} == set(TASK_TYPES)
-    assert {bool(task.start.poses) for task in of_all_types} == {True, False}
+    assert {bool(task.arrangement.poses) for task in of_all_types} == {True, False}
     assert len({task.id for task in of_all_types}) == len(of_all_types)
     for task in of_all_types:
         verdict = verifier(task)
@@ -319,7 +319,7 @@ def test_only_the_types_and_rooms_that_are_asked_for(tmp_path: Path) -> None:
     per_layout = Counter((task.scene, task.type) for task in kept)
     assert max(per_layout.values()) == 2
     assert {task.id for task in made.tasks} < {task.id for task in kept}
-    assert {task.start.layout for task in kept} == {""}
+    assert {task.arrangement.layout for task in kept} == {""}
 
 
 # -- the suites that we ship -----------------------------------------------------------------------
@@ -349,7 +349,7 @@ def test_er_1k_is_in_the_evaluation_rooms_alone() -> None:
     assert scenes == set(EVALUATION_SCENES)
     assert scenes.isdisjoint(TRAINING_SCENES)
     assert {split(task) for task in tasks} == {"unseen room", "unseen room and object"}
-    assert sum(bool(task.start.poses) for task in tasks) > 500
+    assert sum(bool(task.arrangement.poses) for task in tasks) > 500
 
 
 def test_er_1k_has_as_many_tasks_of_each_type() -> None:

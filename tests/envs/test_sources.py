@@ -27,7 +27,7 @@ IDS = [task_type.env_id for task_type in TASK_TYPES]
 MINI = load_suite("mini").tasks
 PICKUPS = [task for task in MINI if task.type.name == "single_pickup"]
 TOGGLES = [task for task in MINI if task.type.name == "single_toggle"]
-REARRANGED = next(task for task in load_suite("er-1k").tasks if task.start.poses)
+REARRANGED = next(task for task in load_suite("er-1k").tasks if task.arrangement.poses)
 
 
 def drawn(env: gymnasium.Env[Any, Any], seed: int | None = None, **options: Any) -> Task:
@@ -280,7 +280,7 @@ def test_live_tasks_differ_and_can_be_done(live_tasks: list[Task]) -> None:
     assert len({task.id for task in live_tasks}) == 6
     assert len({task.scene for task in live_tasks}) > 3
     assert len({task.type for task in live_tasks}) > 2
-    assert any(task.start.poses for task in live_tasks)
+    assert any(task.arrangement.poses for task in live_tasks)
     with closing(make_verifier()) as verifier:
         for task in live_tasks:
             verdict = verifier(task)
@@ -346,7 +346,7 @@ def test_a_live_source_keeps_to_its_making(make: Callable[..., EmbodiedEnv]) -> 
     assert {task.type.name for task in tasks} == set(spec.types)
     assert all(2 <= task.extra["difficulty"]["distance"] <= 4.5 for task in tasks)
     layouts = {f"{scene}-{number}" for scene in spec.rooms for number in (1, 2)}
-    assert {task.start.layout for task in tasks} <= {"", *layouts}
+    assert {task.arrangement.layout for task in tasks} <= {"", *layouts}
 
 
 def test_a_live_task_that_cannot_be_is_told(live: EmbodiedEnv) -> None:
@@ -372,13 +372,13 @@ def test_a_rearranged_task_begins_as_it_says(make: Callable[..., EmbodiedEnv]) -
     for _ in range(2):  # after an episode, too
         drawn(env, 0)
         there = {entry["name"]: entry["position"] for entry in env.objects}
-        for name, pose in REARRANGED.start.poses.items():
+        for name, pose in REARRANGED.arrangement.poses.items():
             found = (there[name]["x"], there[name]["y"], there[name]["z"])
             assert found == pytest.approx((pose.x, pose.y, pose.z), abs=1e-3), name
         ids = {entry["objectId"] for entry in env.objects}
         assert {key.object_id for key in REARRANGED.key_actions} - {""} <= ids
         recorded = drawn(env, 0, task=replace(PICKUPS[0], scene=REARRANGED.scene))
-        assert recorded.start.poses == {}
+        assert recorded.arrangement.poses == {}
         assert {entry["name"]: entry["position"] for entry in env.objects} != there
 
 

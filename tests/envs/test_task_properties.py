@@ -72,7 +72,7 @@ def strive(env: EmbodiedEnv, task: Task, other: Task) -> list[Deed]:
 def room_of(env: EmbodiedEnv, task: Task) -> Generator:
     """What can be asked for in the room in which a task begins."""
     begin(env, task)
-    return Generator(task.scene, env.objects, task.start)
+    return Generator(task.scene, env.objects, task.arrangement)
 
 
 def empty(scene: str) -> Task:

@@ -28,7 +28,7 @@ from rooms_by_hand import (
 )
 
 from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.generate import generate_tasks
 from er_gym.tasks.generate.generator import AMBIGUOUS
 from er_gym.tasks.generate.scene_graph import read_room
@@ -231,12 +231,12 @@ def test_the_faucet_by_the_sink_gives_water(objects: Objects) -> None:
 
 
 def test_ids_and_starts_of_a_rearranged_room_name_its_layout() -> None:
-    start = Start("FloorPlan1-7", {"Apple_1": ObjectPose(1.0, 2.0, 3.0)})
+    start = Arrangement("FloorPlan1-7", {"Apple_1": ObjectPose(1.0, 2.0, 3.0)})
     search, pickup = generate_tasks([*FURNITURE, APPLE], "FloorPlan1", nowhere, start)
     assert search.id == "FloorPlan1-7-single_search-Apple"
     assert pickup.id == "FloorPlan1-7-single_pickup-Apple"
     for task in (search, pickup):
-        assert (task.scene, task.start) == ("FloorPlan1", start)
+        assert (task.scene, task.arrangement) == ("FloorPlan1", start)
 
 
 def test_one_of_two_that_are_alike_is_moved_where_the_other_cannot_go() -> None:

@@ -196,7 +196,12 @@ def test_tasks_of_real_scenes_are_whole(
             for key in task.key_actions
             if key.verb == verbs.SLICE
         }
-        mentioned = {*task.target_objects, *task.related_objects, *task.start.dirty, *task.named}
+        mentioned = {
+            *task.target_objects,
+            *task.related_objects,
+            *task.arrangement.dirty,
+            *task.named,
+        }
         mentioned |= {action.object_id for action in task.key_actions[:-1]}
         assert mentioned <= ids | sliced
         assert task.key_actions[-1].verb == verbs.END

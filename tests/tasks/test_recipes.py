@@ -100,13 +100,13 @@ _ONLY_OPENED: set[str] = {"Cabinet", "Drawer", "Fridge", "Microwave", "Safe"}
 def test_dishes_are_dirty_before_and_clean_after_they_are_washed(
     made: dict[str, list[Task]],
 ) -> None:
-    dirty = [task for tasks in made.values() for task in tasks if task.start.dirty]
+    dirty = [task for tasks in made.values() for task in tasks if task.arrangement.dirty]
     assert dirty
     for task in dirty:
-        types = {object_id.split("|")[0] for object_id in task.start.dirty}
+        types = {object_id.split("|")[0] for object_id in task.arrangement.dirty}
         clean = {c.object_type for c in task.goal if ("isDirty", False) in c.state}
         assert types == clean
-    assert not [task for task in made["clear_three"] if task.start.dirty]
+    assert not [task for task in made["clear_three"] if task.arrangement.dirty]
 
 
 # -- faulty files --------------------------------------------------------------------------------

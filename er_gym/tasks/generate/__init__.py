@@ -22,8 +22,8 @@ The rules:
 Whether a task can be done is for an agent to show; :mod:`er_gym.envs.verify` asks one.
 """
 
-from er_gym.tasks.generate.generator import Generator, arranged, generate_tasks
+from er_gym.tasks.generate.generator import Generator, generate_tasks, generator_for
 from er_gym.tasks.generate.rules import GENERATED_TYPES
 from er_gym.tasks.generate.select import select_balanced
 
-__all__ = ["GENERATED_TYPES", "Generator", "arranged", "generate_tasks", "select_balanced"]
+__all__ = ["GENERATED_TYPES", "Generator", "generate_tasks", "generator_for", "select_balanced"]

@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import Start, begin, shuffled
+from er_gym.tasks.arrangement import Arrangement, random_arrangement, set_up_scene
 from er_gym.tasks.generate.rules import ROWS
 from er_gym.tasks.generate.scene_graph import Accepts, Room, Thing, read_room
 from er_gym.tasks.generate.script import Impossible
@@ -27,10 +27,12 @@ DONE_ALREADY = "the goal holds from the start"
 SAME_PLACES = "one type would name two places"
 
 
-def arranged(controller: Any, scene: str, seed: int) -> Generator:
+def generator_for(controller: Any, scene: str, seed: int) -> Generator:
     """The generator for a room in one of its arrangements; 0 is the recorded one."""
-    start = shuffled(controller, scene, seed) if seed else Start()
-    return Generator(scene, begin(controller, scene, start).metadata["objects"], start)
+    arrangement = random_arrangement(controller, scene, seed) if seed else Arrangement()
+    return Generator(
+        scene, set_up_scene(controller, scene, arrangement).metadata["objects"], arrangement
+    )
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Generator:
 
     scene: str
     objects: Sequence[Mapping[str, Any]]
-    start: Start = field(default_factory=Start)
+    arrangement: Arrangement = field(default_factory=Arrangement)
     accepts: Accepts = thor_accepts
     rows: Sequence[Row] = ROWS
     dropped: Counter[str] = field(default_factory=Counter)
@@ -163,7 +165,7 @@ class Generator:
                 replace(condition, object_id=ids.get(condition.object_type, ""))
                 for condition in plan.goal
             ),
-            start=replace(self.start, dirty=plan.dirty),
+            arrangement=replace(self.arrangement, dirty=plan.dirty),
             extra={"made_by": row.slug or row.type},
         )
 
@@ -174,7 +176,9 @@ class Generator:
             if action.verb in verbs.INTERACTIONS and action.verb not in (verbs.OPEN, verbs.CLOSE)
         ] or [thing.type for thing in plan.subjects]
         places = [f"from_{self.room.place_of(thing).type}" for thing in named]
-        return "-".join((self.start.layout or self.scene, row.slug or row.type, *handled, *places))
+        return "-".join(
+            (self.arrangement.layout or self.scene, row.slug or row.type, *handled, *places)
+        )
 
     def _words(self, plan: Plan, named: Sequence[Thing]) -> dict[str, str]:
         words = {"room": room_kind(self.scene)}
@@ -201,7 +205,7 @@ def generate_tasks(
     objects: Sequence[Mapping[str, Any]],
     scene: str,
     accepts: Accepts = thor_accepts,
-    start: Start = Start(),  # noqa: B008  (frozen)
+    arrangement: Arrangement = Arrangement(),  # noqa: B008  (frozen)
 ) -> Iterator[Task]:
     """Yield the candidate tasks of a scene: :meth:`Generator.tasks`."""
-    return Generator(scene, objects, start, accepts).tasks()
+    return Generator(scene, objects, arrangement, accepts).tasks()
