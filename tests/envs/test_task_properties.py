@@ -195,9 +195,9 @@ def nearest() -> Iterator[EmbodiedEnv]:
 def wrong_ones_taken(env: EmbodiedEnv, task: Task) -> int:
     """Take others of the type of which a task names one, as many as one can."""
     room = room_of(env, task)
-    (named,) = (room.room.things[object_id] for object_id in task.named)
+    (named,) = (room.scene_graph.objects[object_id] for object_id in task.named)
     taken = 0
-    for other in room.room.others(named):
+    for other in room.scene_graph.others_of_type(named):
         for deed in strive(env, task, room.request("single_pickup", other.id)):
             if deed.action.verb == verbs.PICKUP and deed.object_id not in task.named:
                 taken += 1
@@ -246,7 +246,7 @@ def test_where_the_words_single_none_out_any_is_as_good(
     (task,) = (task for task in room.tasks([kind]) if task.id.endswith(f"-{object_type}"))
     assert not task.named
     done_to = set()
-    for other in room.room.of_type(object_type):
+    for other in room.scene_graph.of_type(object_type):
         deeds = strive(nearest, task, room.request(kind, other.id))
         if deeds:
             done_to.add(deeds[-1].object_id)

@@ -14,7 +14,7 @@ from er_gym.tasks.generate.recipes import (
     bundled_recipes,
     rows,
 )
-from er_gym.tasks.generate.scene_graph import Room, Thing
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.script import Impossible
 from er_gym.tasks.generate.task_plan import Plan
 from er_gym.tasks.goal import Condition
@@ -50,11 +50,13 @@ KITCHEN = (
 )  # fmt: skip
 
 
-def room_of(*things: Thing, accepts: Callable[[str, str], bool] = lambda what, where: True) -> Room:
-    return Room({item.id: item for item in things}, accepts)
+def room_of(
+    *things: SceneObject, accepts: Callable[[str, str], bool] = lambda what, where: True
+) -> SceneGraph:
+    return SceneGraph({item.id: item for item in things}, accepts)
 
 
-def follow(text: str, *cast: Thing, room: Room | None = None) -> Plan:
+def follow(text: str, *cast: SceneObject, room: SceneGraph | None = None) -> Plan:
     """Act out steps such as ``"put Apple Fridge, wash Apple"``; roles go by the names of types."""
     things = cast or KITCHEN
     given = [words.split() for words in text.split(", ")]
@@ -220,7 +222,7 @@ def test_switch_on_and_off() -> None:
     ]  # fmt: skip
 
 
-def but(*changed: Thing, without: tuple[Thing, ...] = ()) -> list[Thing]:
+def but(*changed: SceneObject, without: tuple[SceneObject, ...] = ()) -> list[SceneObject]:
     """The kitchen with some things in place of those of the same id, and some taken away."""
     by_id = {item.id: item for item in (*KITCHEN, *changed)}
     return [item for item in by_id.values() if item not in without]
@@ -287,7 +289,7 @@ IMPOSSIBLE = {
 
 
 @pytest.mark.parametrize(("text", "things", "message"), IMPOSSIBLE.values(), ids=IMPOSSIBLE)
-def test_what_cannot_be_done(text: str, things: list[Thing], message: str) -> None:
+def test_what_cannot_be_done(text: str, things: list[SceneObject], message: str) -> None:
     with pytest.raises(Impossible, match=message):
         follow(text, *things)
 
@@ -315,7 +317,7 @@ LONG = Recipe(
 PLAIN = (COUNTER, TABLE, FRIDGE, APPLE, KNIFE)
 
 
-def casts(recipe: Recipe, *things: Thing) -> set[tuple[str, ...]]:
+def casts(recipe: Recipe, *things: SceneObject) -> set[tuple[str, ...]]:
     (row,) = rows([recipe])
     return {tuple(item.id for item in cast) for cast in row.choices(room_of(*things))}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from things_by_hand import thing
 
-from er_gym.tasks.generate.scene_graph import Room
+from er_gym.tasks.generate.scene_graph import SceneGraph
 from er_gym.tasks.generate.script import Impossible, Script
 from er_gym.tasks.goal import Condition
 
@@ -22,7 +22,7 @@ LETTUCE = thing("Lettuce", "Fridge", pickupable=True, sliceable=True)
 KNIFE = thing("Knife", "DiningTable", pickupable=True)
 KNOB = thing("StoveKnob", toggleable=True, controlled=(BURNER.id,))
 EVERYTHING = (COUNTER, TABLE, FRIDGE, BURNER, KNOB, LAMP, BOWL, CUP, EGG, POTATO, LETTUCE, KNIFE)
-ROOM = Room({item.id: item for item in EVERYTHING}, lambda what, where: True)
+ROOM = SceneGraph({item.id: item for item in EVERYTHING}, lambda what, where: True)
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def test_who_goes_on_closes_what_was_opened_first(script: Script) -> None:
 
 def test_what_was_open_is_not_closed() -> None:
     open_fridge = thing("Fridge", receptacle=True, openable=True)
-    script = Script(Room({open_fridge.id: open_fridge, EGG.id: EGG}, ROOM.accepts))
+    script = Script(SceneGraph({open_fridge.id: open_fridge, EGG.id: EGG}, ROOM.accepts))
     script.fetch(EGG)
     script.visit(COUNTER)
     assert steps(script) == ["navigate to Fridge", "pickup Egg", "navigate to CounterTop"]
@@ -124,7 +124,7 @@ def test_what_is_carried_is_gone_to_where_it_stands_by_now(script: Script) -> No
 
 def test_a_box_that_is_shut_is_opened_where_it_stands() -> None:
     box = thing("Box", "Fridge", receptacle=True, pickupable=True, openable=True, closed=True)
-    script = Script(Room({item.id: item for item in (*EVERYTHING, box)}, ROOM.accepts))
+    script = Script(SceneGraph({item.id: item for item in (*EVERYTHING, box)}, ROOM.accepts))
     script.fetch(CUP)
     script.put(box)
     assert steps(script)[2:] == ["navigate to Fridge", "open Fridge", "open Box", "put in Box"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import cycle, islice
 
-from er_gym.tasks.generate.scene_graph import Room, Thing
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.script import Script
 from er_gym.tasks.generate.task_plan import Plan, Row, from_templates, plan_of
 from er_gym.tasks.generate.templates import MOVE_TWO
@@ -16,36 +16,40 @@ _PARTNERS = 2
 """How many second transfers each first one gets."""
 
 
-def sequence(room: Room, thing: Thing, target: Thing, second: Thing, where: Thing) -> Plan:
+def sequence(
+    graph: SceneGraph,
+    obj: SceneObject,
+    target: SceneObject,
+    second: SceneObject,
+    where: SceneObject,
+) -> Plan:
     """Put a thing into a target, then a second thing where that belongs."""
-    script = Script(room)
-    script.fetch(thing)
+    script = Script(graph)
+    script.fetch(obj)
     script.put(target)
     script.fetch(second)
     script.put(where)
-    return plan_of(
-        script, thing, second, place=in_the(target.type), second_place=in_the(where.type)
-    )
+    return plan_of(script, obj, second, place=in_the(target.type), second_place=in_the(where.type))
 
 
-def _sequences(room: Room) -> Iterator[tuple[Thing, ...]]:
+def _sequences(graph: SceneGraph) -> Iterator[tuple[SceneObject, ...]]:
     """Each transfer comes first a few times, so that there are not too many."""
-    moves = [*transfers(room, hidden=False), *transfers(room, hidden=True)]
-    for index, (thing, target) in enumerate(moves):
+    moves = [*transfers(graph, hidden=False), *transfers(graph, hidden=True)]
+    for index, (obj, target) in enumerate(moves):
         start = index + len(moves) // 2
         partners = islice(cycle(moves), start, start + len(moves))
         choices = (
-            (thing, target, second, where)
+            (obj, target, second, where)
             for second, where in partners
-            if _independent(thing, target, second, where)
-            and sequence(room, thing, target, second, where).names_one_place_each
+            if _independent(obj, target, second, where)
+            and sequence(graph, obj, target, second, where).names_one_place_each
         )
         yield from islice(choices, _PARTNERS)
 
 
-def _independent(*things: Thing) -> bool:
+def _independent(*objects: SceneObject) -> bool:
     """Whether things, targets and their types all differ: neither transfer undoes the other."""
-    return len({thing.type for thing in things}) == len(things)
+    return len({obj.type for obj in objects}) == len(objects)
 
 
 ROWS = (

@@ -12,7 +12,7 @@ from typing import Any
 from er_gym.tasks import verbs
 from er_gym.tasks.arrangement import Arrangement, random_arrangement, set_up_scene
 from er_gym.tasks.generate.rules import ROWS
-from er_gym.tasks.generate.scene_graph import Accepts, Room, Thing, read_room
+from er_gym.tasks.generate.scene_graph import Accepts, SceneGraph, SceneObject, read_scene_graph
 from er_gym.tasks.generate.script import Impossible
 from er_gym.tasks.generate.task_plan import Plan, Row
 from er_gym.tasks.generate.words import a, in_the, is_are, it
@@ -56,9 +56,9 @@ class Generator:
     dropped: Counter[str] = field(default_factory=Counter)
 
     @cached_property
-    def room(self) -> Room:
+    def scene_graph(self) -> SceneGraph:
         """The scene as the rules see it."""
-        return read_room(self.objects, self.accepts)
+        return read_scene_graph(self.objects, self.accepts)
 
     def tasks(self, types: Collection[str] = ()) -> Iterator[Task]:
         """Yield the candidate tasks, row by row; the same for the same arguments.
@@ -69,7 +69,7 @@ class Generator:
         made: set[str] = set()
         for row in self.rows:
             if not types or row.type in types:
-                for choice in row.choices(self.room):
+                for choice in row.choices(self.scene_graph):
                     task = self._candidate(row, choice)
                     if isinstance(task, str):
                         self.dropped[task] += 1
@@ -92,26 +92,26 @@ class Generator:
         if row is None:
             known = ", ".join(row.type for row in self.rows if not row.slug)
             raise ValueError(f"no {type_name!r} tasks are made on request; choose one of: {known}")
-        unknown = [i for i in object_ids if i not in self.room.things]
+        unknown = [i for i in object_ids if i not in self.scene_graph.chosen]
         if unknown:
             raise ValueError(f"{self.scene} has no object {unknown[0]!r} when the task begins")
-        things = [self.room.things[object_id] for object_id in object_ids]
+        chosen = [self.scene_graph.chosen[object_id] for object_id in object_ids]
         try:
-            plan = row.plan(self.room, *things)
+            plan = row.plan(self.scene_graph, *chosen)
         except (TypeError, Impossible) as error:
             raise ValueError(
-                f"no {type_name!r} task about {len(things)} objects: {error}"
+                f"no {type_name!r} task about {len(chosen)} objects: {error}"
             ) from None
         return self._task(row, plan, ())
 
-    def _candidate(self, row: Row, choice: tuple[Thing, ...]) -> Task | str:
+    def _candidate(self, row: Row, choice: tuple[SceneObject, ...]) -> Task | str:
         """The task of a choice; or why there is none."""
-        plan = row.plan(self.room, *choice)
+        plan = row.plan(self.scene_graph, *choice)
         if not plan.names_one_place_each:
             return SAME_PLACES
-        named: list[Thing] = []
+        named: list[SceneObject] = []
         for subject in plan.subjects:
-            others = self.room.others(subject)
+            others = self.scene_graph.others_of_type(subject)
             if not others:
                 continue
             if self._interchangeable(row, choice, plan, subject, others):
@@ -125,32 +125,37 @@ class Generator:
         return DONE_ALREADY if standing and not unmet(standing, self.objects) else task
 
     def _interchangeable(
-        self, row: Row, choice: tuple[Thing, ...], plan: Plan, subject: Thing, others: list[Thing]
+        self,
+        row: Row,
+        choice: tuple[SceneObject, ...],
+        plan: Plan,
+        subject: SceneObject,
+        others: list[SceneObject],
     ) -> bool:
         """Whether any thing of the subject's type would do: each asks for the same actions."""
         if any(not unmet((each,), self.objects) for each in _about(plan.goal, subject)):
             return False
         for other in others:
-            swapped = tuple(other if thing == subject else thing for thing in choice)
+            swapped = tuple(other if obj == subject else obj for obj in choice)
             try:
-                if row.plan(self.room, *swapped).scored != plan.scored:
+                if row.plan(self.scene_graph, *swapped).scored != plan.scored:
                     return False
             except Impossible:
                 return False
         return True
 
-    def _told_by_place(self, subject: Thing, others: list[Thing]) -> bool:
+    def _told_by_place(self, subject: SceneObject, others: list[SceneObject]) -> bool:
         """Whether the type of what it lies in tells it from the others."""
-        place = self.room.place_of(subject)
-        holders = {parent.type for other in others for parent in self.room.parents(other)}
+        place = self.scene_graph.place_of(subject)
+        holders = {parent.type for other in others for parent in self.scene_graph.parents(other)}
         return place != subject and place.type not in holders
 
-    def _task(self, row: Row, plan: Plan, named: Sequence[Thing]) -> Task:
+    def _task(self, row: Row, plan: Plan, named: Sequence[SceneObject]) -> Task:
         task_id = self._id(row, plan, named)
         words = {**self._words(plan, named), **plan.words}
         sayings = row.sayings(words)
         gone_to = [action.object_id for action in plan.key_actions if action.verb == verbs.NAVIGATE]
-        ids = {thing.type: thing.id for thing in named}
+        ids = {obj.type: obj.id for obj in named}
         return Task(
             id=task_id,
             type=BY_NAME[row.type],
@@ -169,36 +174,36 @@ class Generator:
             extra={"made_by": row.slug or row.type},
         )
 
-    def _id(self, row: Row, plan: Plan, named: Sequence[Thing]) -> str:
+    def _id(self, row: Row, plan: Plan, named: Sequence[SceneObject]) -> str:
         handled = [
             action.object_type
             for action in plan.key_actions
             if action.verb in verbs.INTERACTIONS and action.verb not in (verbs.OPEN, verbs.CLOSE)
-        ] or [thing.type for thing in plan.subjects]
-        places = [f"from_{self.room.place_of(thing).type}" for thing in named]
+        ] or [obj.type for obj in plan.subjects]
+        places = [f"from_{self.scene_graph.place_of(obj).type}" for obj in named]
         return "-".join(
             (self.arrangement.layout or self.scene, row.slug or row.type, *handled, *places)
         )
 
-    def _words(self, plan: Plan, named: Sequence[Thing]) -> dict[str, str]:
+    def _words(self, plan: Plan, named: Sequence[SceneObject]) -> dict[str, str]:
         words = {"room": room_kind(self.scene)}
-        for prefix, thing in zip(("", "second_"), plan.subjects, strict=False):
-            name, one = thing.type, a(thing.type)
-            if thing in named:
-                where = in_the(self.room.place_of(thing).type)
-                name = f"{thing.type} that {is_are(thing.type)} {where}"
+        for prefix, obj in zip(("", "second_"), plan.subjects, strict=False):
+            name, one = obj.type, a(obj.type)
+            if obj in named:
+                where = in_the(self.scene_graph.place_of(obj).type)
+                name = f"{obj.type} that {is_are(obj.type)} {where}"
                 one = f"the {name}"
             words |= {
                 f"{prefix}object": name,
                 f"{prefix}an_object": one,
-                f"{prefix}it": it(thing.type),
-                f"{prefix}is": is_are(thing.type),
+                f"{prefix}it": it(obj.type),
+                f"{prefix}is": is_are(obj.type),
             }
         return words
 
 
-def _about(goal: Sequence[Condition], thing: Thing) -> list[Condition]:
-    return [c for c in goal if c.object_type == thing.type and not (c.in_reach or c.held)]
+def _about(goal: Sequence[Condition], obj: SceneObject) -> list[Condition]:
+    return [c for c in goal if c.object_type == obj.type and not (c.in_reach or c.held)]
 
 
 def generate_tasks(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from er_gym.tasks.generate.scene_graph import Room, Thing
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.script import Script
 from er_gym.tasks.generate.task_plan import Plan, Row, from_templates, plan_of
 from er_gym.tasks.generate.templates import PICK_UP, TOGGLE
@@ -13,28 +13,28 @@ from er_gym.tasks.generate.templates import PICK_UP, TOGGLE
 NEVER_TOGGLED = frozenset({"StoveKnob", "StoveBurner", "LightSwitch"})
 
 
-def pickup(room: Room, thing: Thing) -> Plan:
+def pickup(graph: SceneGraph, obj: SceneObject) -> Plan:
     """Take a thing."""
-    script = Script(room)
-    script.fetch(thing)
-    return plan_of(script, thing)
+    script = Script(graph)
+    script.fetch(obj)
+    return plan_of(script, obj)
 
 
-def toggle(room: Room, thing: Thing) -> Plan:
+def toggle(graph: SceneGraph, obj: SceneObject) -> Plan:
     """Switch a thing."""
-    script = Script(room)
-    script.switch(thing)
-    return plan_of(script, thing, way="off" if thing.on else "on")
+    script = Script(graph)
+    script.switch(obj)
+    return plan_of(script, obj, way="off" if obj.on else "on")
 
 
-def _carried(room: Room, hidden: bool) -> Iterator[tuple[Thing]]:
-    return ((thing,) for thing in room.carried(hidden))
+def _carried(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject]]:
+    return ((obj,) for obj in graph.pickupable_objects(hidden))
 
 
-def _switches(room: Room) -> Iterator[tuple[Thing]]:
-    for thing in room.things.values():
-        if thing.toggleable and thing.type not in NEVER_TOGGLED and room.is_exposed(thing):
-            yield (thing,)
+def _switches(graph: SceneGraph) -> Iterator[tuple[SceneObject]]:
+    for obj in graph.objects.values():
+        if obj.toggleable and obj.type not in NEVER_TOGGLED and graph.is_exposed(obj):
+            yield (obj,)
 
 
 ROWS = (

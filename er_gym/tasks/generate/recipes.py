@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from er_gym.tasks import verbs
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import validated
-from er_gym.tasks.generate.scene_graph import Room, Thing, largest, may_fill
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject, largest, may_put_into
 from er_gym.tasks.generate.script import Impossible, Script
 from er_gym.tasks.generate.task_plan import Plan, Row, plan_of
 from er_gym.tasks.generate.templates import STYLES, in_order
@@ -53,36 +53,36 @@ class Recipe(BaseModel):
 # -- who may take part ---------------------------------------------------------------------------
 
 
-def _loose(room: Room) -> list[Thing]:
-    return [*room.carried(hidden=False), *room.carried(hidden=True)]
+def _loose(graph: SceneGraph) -> list[SceneObject]:
+    return [*graph.pickupable_objects(hidden=False), *graph.pickupable_objects(hidden=True)]
 
 
-def _furniture(room: Room) -> list[Thing]:
+def _furniture(graph: SceneGraph) -> list[SceneObject]:
     return [
-        thing
-        for thing in room.things.values()
-        if thing.receptacle and not thing.pickupable and not thing.openable and may_fill(thing)
+        obj
+        for obj in graph.objects.values()
+        if obj.receptacle and not obj.pickupable and not obj.openable and may_put_into(obj)
     ]
 
 
-def _lockers(room: Room) -> list[Thing]:
+def _lockers(graph: SceneGraph) -> list[SceneObject]:
     return [
-        thing
-        for thing in room.things.values()
-        if thing.receptacle and not thing.pickupable and thing.closed and may_fill(thing)
+        obj
+        for obj in graph.objects.values()
+        if obj.receptacle and not obj.pickupable and obj.closed and may_put_into(obj)
     ]
 
 
-def _switches(room: Room) -> list[Thing]:
-    free = (t for t in room.things.values() if room.is_exposed(t) or room.stands_free(t))
-    return [thing for thing in free if thing.toggleable and thing.type in SWITCHED]
+def _switches(graph: SceneGraph) -> list[SceneObject]:
+    free = (t for t in graph.objects.values() if graph.is_exposed(t) or graph.stands_free(t))
+    return [obj for obj in free if obj.toggleable and obj.type in SWITCHED]
 
 
 SWITCHED = frozenset(
     {"Candle", "CellPhone", "CoffeeMachine", "DeskLamp", "FloorLamp", "Laptop", "Television"}
 )
 """What one switches for its own sake."""
-KINDS: Mapping[str, Callable[[Room], list[Thing]]] = {
+KINDS: Mapping[str, Callable[[SceneGraph], list[SceneObject]]] = {
     "loose": _loose,
     "furniture": _furniture,
     "locker": _lockers,
@@ -104,14 +104,14 @@ class Cooking:
         dirty: ids of what has to be dirty before.
     """
 
-    room: Room
+    graph: SceneGraph
     script: Script
-    cast: dict[str, Thing]
+    cast: dict[str, SceneObject]
     dirty: list[str]
 
-    def only(self, object_type: str) -> Thing:
+    def only(self, object_type: str) -> SceneObject:
         """The one thing of a type."""
-        found = self.room.of_type(object_type)
+        found = self.graph.of_type(object_type)
         if len(found) != 1:
             raise Impossible(f"{len(found)} {object_type} objects")
         return found[0]
@@ -126,124 +126,128 @@ def _step(function: Callable[..., str]) -> Callable[..., str]:
     return function
 
 
-def _carry(cooking: Cooking, thing: Thing, target: Thing) -> None:
-    if cooking.script.lies_in(thing, target) or cooking.script.comes_from(thing) == target:
-        raise Impossible(f"{thing.type} is there, or has just been there")
-    if not cooking.room.accepts(thing.type, target.type):
-        raise Impossible(f"{target.type} does not take {thing.type}")
-    cooking.script.fetch(thing)
+def _carry(cooking: Cooking, obj: SceneObject, target: SceneObject) -> None:
+    if cooking.script.lies_in(obj, target) or cooking.script.comes_from(obj) == target:
+        raise Impossible(f"{obj.type} is there, or has just been there")
+    if not cooking.graph.accepts(obj.type, target.type):
+        raise Impossible(f"{target.type} does not take {obj.type}")
+    cooking.script.fetch(obj)
     cooking.script.put(target)
 
 
 @_step
 def _put(cooking: Cooking, what: str, where: str) -> str:
     """Put a thing into or onto another."""
-    thing, target = cooking.cast[what], cooking.cast[where]
-    _carry(cooking, thing, target)
-    return f"put the {thing.type} {in_the(target.type)}"
+    obj, target = cooking.cast[what], cooking.cast[where]
+    _carry(cooking, obj, target)
+    return f"put the {obj.type} {in_the(target.type)}"
 
 
-def _under_water(cooking: Cooking, thing: Thing) -> None:
-    water = cooking.room.washing_place()
+def _under_water(cooking: Cooking, obj: SceneObject) -> None:
+    water = cooking.graph.sink_and_faucet()
     if water is None:
         raise Impossible("no water")
     basin, faucet = water
-    _carry(cooking, thing, basin)
+    _carry(cooking, obj, basin)
     if not cooking.script.is_on(faucet):
         cooking.script.toggle(faucet)
-    cooking.script.pickup(thing)
-    if thing.fillable:
-        cooking.script.becomes(thing, isFilledWithLiquid=True)
+    cooking.script.pickup(obj)
+    if obj.fillable:
+        cooking.script.becomes(obj, isFilledWithLiquid=True)
 
 
 @_step
 def _wash(cooking: Cooking, what: str) -> str:
     """Lay a thing in the sink, turn on the water, and take it up again."""
-    thing = cooking.cast[what]
-    if thing.dirtyable:
-        cooking.dirty.append(thing.id)
-        cooking.script.becomes(thing, isDirty=False)
-    _under_water(cooking, thing)
-    return f"wash the {thing.type} in the SinkBasin with water from the Faucet"
+    obj = cooking.cast[what]
+    if obj.dirtyable:
+        cooking.dirty.append(obj.id)
+        cooking.script.becomes(obj, isDirty=False)
+    _under_water(cooking, obj)
+    return f"wash the {obj.type} in the SinkBasin with water from the Faucet"
 
 
 @_step
 def _fill(cooking: Cooking, what: str) -> str:
     """Fill a thing with water, and take it up again."""
-    thing = cooking.cast[what]
-    if not thing.fillable:
-        raise Impossible(f"{thing.type} holds no water")
-    _under_water(cooking, thing)
-    return f"fill the {thing.type} in the SinkBasin with water from the Faucet"
+    obj = cooking.cast[what]
+    if not obj.fillable:
+        raise Impossible(f"{obj.type} holds no water")
+    _under_water(cooking, obj)
+    return f"fill the {obj.type} in the SinkBasin with water from the Faucet"
 
 
 @_step
 def _brew(cooking: Cooking, what: str) -> str:
     """Make coffee into a mug, and take it up again."""
-    thing, machine = cooking.cast[what], cooking.only("CoffeeMachine")
-    _carry(cooking, thing, machine)
+    obj, machine = cooking.cast[what], cooking.only("CoffeeMachine")
+    _carry(cooking, obj, machine)
     if cooking.script.is_on(machine):
         raise Impossible("the CoffeeMachine is on already")
     cooking.script.toggle(machine)
-    cooking.script.pickup(thing)
-    cooking.script.becomes(thing, isFilledWithLiquid=True)
-    return f"fill the {thing.type} with coffee from the CoffeeMachine"
+    cooking.script.pickup(obj)
+    cooking.script.becomes(obj, isFilledWithLiquid=True)
+    return f"fill the {obj.type} with coffee from the CoffeeMachine"
 
 
 @_step
 def _heat(cooking: Cooking, what: str) -> str:
     """Heat a thing in the microwave, and take it out again."""
-    thing, microwave = cooking.cast[what], cooking.only("Microwave")
+    obj, microwave = cooking.cast[what], cooking.only("Microwave")
     if microwave.on:
         raise Impossible("the Microwave is on already")
-    _carry(cooking, thing, microwave)
+    _carry(cooking, obj, microwave)
     cooking.script.close(microwave)
     cooking.script.toggle(microwave)
     cooking.script.toggle(microwave)
-    cooking.script.fetch(thing)
-    if thing.cookable:
-        cooking.script.becomes(thing, isCooked=True)
-    return f"heat the {thing.type} in the Microwave, turning it on and off again"
+    cooking.script.fetch(obj)
+    if obj.cookable:
+        cooking.script.becomes(obj, isCooked=True)
+    return f"heat the {obj.type} in the Microwave, turning it on and off again"
 
 
 @_step
 def _chill(cooking: Cooking, what: str) -> str:
     """Cool a thing in the shut fridge, and take it out again."""
-    thing, fridge = cooking.cast[what], cooking.only("Fridge")
-    _carry(cooking, thing, fridge)
+    obj, fridge = cooking.cast[what], cooking.only("Fridge")
+    _carry(cooking, obj, fridge)
     cooking.script.close(fridge)
-    cooking.script.fetch(thing)
-    return f"cool the {thing.type} in the closed Fridge"
+    cooking.script.fetch(obj)
+    return f"cool the {obj.type} in the closed Fridge"
 
 
 @_step
 def _toast(cooking: Cooking, what: str) -> str:
     """Toast a slice, and take it out again."""
-    thing, toaster = cooking.cast[what], cooking.only("Toaster")
+    obj, toaster = cooking.cast[what], cooking.only("Toaster")
     if toaster.on:
         raise Impossible("the Toaster is on already")
-    _carry(cooking, thing, toaster)
+    _carry(cooking, obj, toaster)
     cooking.script.toggle(toaster)
-    cooking.script.pickup(thing)
-    cooking.script.becomes(thing, isCooked=True)
-    return f"toast the {thing.type} in the Toaster"
+    cooking.script.pickup(obj)
+    cooking.script.becomes(obj, isCooked=True)
+    return f"toast the {obj.type} in the Toaster"
 
 
 @_step
 def _slice(cooking: Cooking, what: str, knife: str) -> str:
     """Cut up what lies on something, lay the knife down there, and go on with a slice."""
-    script, blade, thing = cooking.script, cooking.cast[knife], cooking.cast[what]
-    if not thing.sliceable:
-        raise Impossible(f"{thing.type} cannot be sliced")
-    board = script.place_of(thing)
-    if board.openable or not may_fill(board) or not cooking.room.accepts(blade.type, board.type):
+    script, blade, obj = cooking.script, cooking.cast[knife], cooking.cast[what]
+    if not obj.sliceable:
+        raise Impossible(f"{obj.type} cannot be sliced")
+    board = script.place_of(obj)
+    if (
+        board.openable
+        or not may_put_into(board)
+        or not cooking.graph.accepts(blade.type, board.type)
+    ):
         raise Impossible(f"no slicing in {board.type}")
     script.fetch(blade)
-    script.go(board, thing)
-    cooking.cast[what] = script.slice(thing)
+    script.go(board, obj)
+    cooking.cast[what] = script.slice(obj)
     script.put(board)
     return (
-        f"slice the {thing.type} with the {blade.type} and lay the {blade.type} down "
+        f"slice the {obj.type} with the {blade.type} and lay the {blade.type} down "
         f"{in_the(board.type)}"
     )
 
@@ -251,28 +255,28 @@ def _slice(cooking: Cooking, what: str, knife: str) -> str:
 @_step
 def _switch_on(cooking: Cooking, what: str) -> str:
     """Switch a thing on; a burner by its knob."""
-    thing = cooking.cast[what]
-    knobs = [k for k in cooking.room.things.values() if thing.id in k.controlled]
-    if not thing.toggleable and not knobs:
-        raise Impossible(f"{thing.type} has no switch")
-    if cooking.script.is_on(thing) or any(knob.on for knob in knobs):
-        raise Impossible(f"{thing.type} is on already")
-    cooking.script.switch(thing)
+    obj = cooking.cast[what]
+    knobs = [k for k in cooking.graph.objects.values() if obj.id in k.controlled]
+    if not obj.toggleable and not knobs:
+        raise Impossible(f"{obj.type} has no switch")
+    if cooking.script.is_on(obj) or any(knob.on for knob in knobs):
+        raise Impossible(f"{obj.type} is on already")
+    cooking.script.switch(obj)
     for food, pan in permutations(cooking.cast.values(), 2):
-        lies_there = cooking.script.lies_in(food, pan) and cooking.script.lies_in(pan, thing)
+        lies_there = cooking.script.lies_in(food, pan) and cooking.script.lies_in(pan, obj)
         if food.cookable and lies_there:
             cooking.script.becomes(food, isCooked=True)
-    return f"turn on the {thing.type}"
+    return f"turn on the {obj.type}"
 
 
 @_step
 def _switch_off(cooking: Cooking, what: str) -> str:
     """Switch a thing off."""
-    thing = cooking.cast[what]
-    if not thing.toggleable or not cooking.script.is_on(thing):
-        raise Impossible(f"{thing.type} is off already")
-    cooking.script.switch(thing)
-    return f"turn off the {thing.type}"
+    obj = cooking.cast[what]
+    if not obj.toggleable or not cooking.script.is_on(obj):
+        raise Impossible(f"{obj.type} is off already")
+    cooking.script.switch(obj)
+    return f"turn off the {obj.type}"
 
 
 def steps() -> Mapping[str, Callable[..., str]]:
@@ -291,28 +295,28 @@ def _doing(verb: Verb) -> Callable[..., str]:
 
 def _do(verb: Verb, cooking: Cooking, what: str) -> str:
     """Do a verb to a thing where it is, or in the hand."""
-    thing, script = cooking.cast[what], cooking.script
-    if not verb.takes(thing.type):
-        raise Impossible(f"one cannot {verb.name} {thing.type}")
+    obj, script = cooking.cast[what], cooking.script
+    if not verb.takes(obj.type):
+        raise Impossible(f"one cannot {verb.name} {obj.type}")
     if script.held is not None and verb.hand == verbs.EMPTY:
         raise Impossible(f"the hand holds {script.held.type}")
     if script.held is None and verb.hand == verbs.FULL:
         raise Impossible("the hand is empty")
-    if script.held == thing and not verb.in_hand:
+    if script.held == obj and not verb.in_hand:
         raise Impossible(f"one cannot {verb.name} what is in the hand")
     if verb.object_state == ("isDirty", True):
-        cooking.dirty.append(thing.id)
-    script.do(verb, thing)
-    return f"{verb.name} the {thing.type}"
+        cooking.dirty.append(obj.id)
+    script.do(verb, obj)
+    return f"{verb.name} the {obj.type}"
 
 
 def _do_with(verb: Verb, cooking: Cooking, what: str, tool: str) -> str:
     """Fetch a tool, do a verb with it to a thing where that is, and lay the tool down there."""
-    thing, instrument, script = cooking.cast[what], cooking.cast[tool], cooking.script
-    place = script.place_of(thing)
+    obj, instrument, script = cooking.cast[what], cooking.cast[tool], cooking.script
+    place = script.place_of(obj)
     if instrument.type not in verb.hand:
         raise Impossible(f"one cannot {verb.name} with {instrument.type}")
-    if not may_fill(place) or not cooking.room.accepts(instrument.type, place.type):
+    if not may_put_into(place) or not cooking.graph.accepts(instrument.type, place.type):
         raise Impossible(f"{place.type} does not take {instrument.type}")
     script.fetch(instrument)
     said = _do(verb, cooking, what)
@@ -402,32 +406,32 @@ def _sayings(words: Mapping[str, str | Sequence[str]]) -> list[str]:
     return [in_order(clauses, style) for style in range(STYLES)]
 
 
-def _plan(recipe: Recipe, room: Room, *cast: Thing) -> Plan:
+def _plan(recipe: Recipe, graph: SceneGraph, *cast: SceneObject) -> Plan:
     """Act a recipe out."""
     roles = dict(zip(recipe.roles, cast, strict=True))
-    cooking = Cooking(room, Script(room, stays=True), roles, [])
+    cooking = Cooking(graph, Script(graph, stays=True), roles, [])
     do = steps()
     clauses = [do[name](cooking, *args) for step in recipe.steps for name, args in step.items()]
-    moved = [thing for thing in cast if thing.pickupable]
+    moved = [obj for obj in cast if obj.pickupable]
     return plan_of(cooking.script, *moved, dirty=cooking.dirty, clauses=clauses)
 
 
-def _choices(recipe: Recipe, room: Room) -> Iterator[tuple[Thing, ...]]:
+def _choices(recipe: Recipe, graph: SceneGraph) -> Iterator[tuple[SceneObject, ...]]:
     """Some of the ways to fill a recipe's roles, at random but the same for the same room."""
-    candidates = [_candidates(room, kind) for kind in recipe.roles.values()]
+    candidates = [_candidates(graph, kind) for kind in recipe.roles.values()]
     if not all(candidates):
         return
-    rng = random.Random(zlib.crc32("".join((recipe.name, *room.things)).encode()))
+    rng = random.Random(zlib.crc32("".join((recipe.name, *graph.objects)).encode()))
     tried: set[tuple[str, ...]] = set()
     found = 0
     for _ in range(_MOST_TRIES):
-        cast = tuple(rng.choice(things) for things in candidates)
-        ids = tuple(thing.id for thing in cast)
-        if ids in tried or len({thing.type for thing in cast}) < len(cast):
+        cast = tuple(rng.choice(objects) for objects in candidates)
+        ids = tuple(obj.id for obj in cast)
+        if ids in tried or len({obj.type for obj in cast}) < len(cast):
             continue
         tried.add(ids)
         try:
-            plan = _plan(recipe, room, *cast)
+            plan = _plan(recipe, graph, *cast)
         except Impossible:
             continue
         if SHORTEST <= len(plan.key_actions) <= LONGEST and plan.names_one_place_each:
@@ -437,26 +441,26 @@ def _choices(recipe: Recipe, room: Room) -> Iterator[tuple[Thing, ...]]:
                 return
 
 
-def _candidates(room: Room, kind: tuple[str, ...] | str) -> list[Thing]:
+def _candidates(graph: SceneGraph, kind: tuple[str, ...] | str) -> list[SceneObject]:
     """Who may play a role: things that are alone of their type, or the largest of several.
 
     What is carried or switched has to be alone, for the words name it by its type.
     """
-    things = KINDS[kind](room) if isinstance(kind, str) else _of_types(room, kind)
-    groups: dict[str, list[Thing]] = {}
-    for thing in things:
-        groups.setdefault(thing.type, []).append(thing)
+    objects = KINDS[kind](graph) if isinstance(kind, str) else _of_types(graph, kind)
+    groups: dict[str, list[SceneObject]] = {}
+    for obj in objects:
+        groups.setdefault(obj.type, []).append(obj)
     return [
         largest(group)
         for group in groups.values()
-        if not room.others(group[0]) or not (group[0].pickupable or group[0].toggleable)
+        if not graph.others_of_type(group[0]) or not (group[0].pickupable or group[0].toggleable)
     ]
 
 
-def _of_types(room: Room, types: Sequence[str]) -> list[Thing]:
+def _of_types(graph: SceneGraph, types: Sequence[str]) -> list[SceneObject]:
     """Those of some types that one can get at."""
     return [
-        thing
-        for thing in room.of_type(*types)
-        if not thing.pickupable or room.is_exposed(thing) or room.is_enclosed(thing)
+        obj
+        for obj in graph.of_type(*types)
+        if not obj.pickupable or graph.is_exposed(obj) or graph.is_enclosed(obj)
     ]

@@ -21,7 +21,7 @@ WATER_REACH = 1.0
 
 
 @dataclass(frozen=True)
-class Thing:
+class SceneObject:
     """What the rules read of an object's metadata.
 
     Attributes:
@@ -52,42 +52,42 @@ class Thing:
 
 
 @dataclass(frozen=True)
-class Room:
+class SceneGraph:
     """A scene's things by id, in scene order, and what goes where."""
 
-    things: Mapping[str, Thing]
+    objects: Mapping[str, SceneObject]
     accepts: Accepts
 
-    def parents(self, thing: Thing) -> list[Thing]:
+    def parents(self, obj: SceneObject) -> list[SceneObject]:
         """What a thing lies in, as far as that is in the scene."""
-        return [self.things[parent] for parent in thing.parents if parent in self.things]
+        return [self.objects[parent] for parent in obj.parents if parent in self.objects]
 
-    def of_type(self, *types: str) -> list[Thing]:
+    def of_type(self, *types: str) -> list[SceneObject]:
         """All things of these types."""
-        return [thing for thing in self.things.values() if thing.type in types]
+        return [obj for obj in self.objects.values() if obj.type in types]
 
-    def others(self, thing: Thing) -> list[Thing]:
+    def others_of_type(self, obj: SceneObject) -> list[SceneObject]:
         """All other things of its type."""
-        return [other for other in self.of_type(thing.type) if other != thing]
+        return [other for other in self.of_type(obj.type) if other != obj]
 
-    def stands_free(self, thing: Thing) -> bool:
+    def stands_free(self, obj: SceneObject) -> bool:
         """Whether a thing stands on the floor or on nothing."""
-        parents = self.parents(thing)
+        parents = self.parents(obj)
         return not parents or any(parent.type == "Floor" for parent in parents)
 
-    def place_of(self, thing: Thing) -> Thing:
+    def place_of(self, obj: SceneObject) -> SceneObject:
         """What one goes to for a thing: the receptacle that it lies in, else the thing itself.
 
         Of several, what is closed comes first, then what stands free, then what is not carried
         about itself, then what the metadata names first; a chair or the like only if there is
         nothing else.
         """
-        parents = [parent for parent in self.parents(thing) if parent.receptacle]
+        parents = [parent for parent in self.parents(obj) if parent.receptacle]
         fit = [parent for parent in parents if may_visit(parent)] or [
             parent for parent in parents if parent.type != "Floor"
         ]
         if not fit:
-            return thing
+            return obj
         return max(
             fit,
             key=lambda parent: (
@@ -97,29 +97,29 @@ class Room:
             ),
         )
 
-    def is_exposed(self, thing: Thing) -> bool:
+    def is_exposed(self, obj: SceneObject) -> bool:
         """Whether it lies in something that does not open and that stands free."""
-        return not any(parent.openable for parent in self.parents(thing)) and any(
-            may_visit(parent) and self.stands_free(parent) for parent in self.parents(thing)
+        return not any(parent.openable for parent in self.parents(obj)) and any(
+            may_visit(parent) and self.stands_free(parent) for parent in self.parents(obj)
         )
 
-    def is_enclosed(self, thing: Thing) -> bool:
+    def is_enclosed(self, obj: SceneObject) -> bool:
         """Whether it lies in something closed that stands free."""
         return any(
             parent.receptacle and parent.closed and may_visit(parent) and self.stands_free(parent)
-            for parent in self.parents(thing)
+            for parent in self.parents(obj)
         )
 
-    def carried(self, hidden: bool) -> Iterator[Thing]:
+    def pickupable_objects(self, hidden: bool) -> Iterator[SceneObject]:
         """What there is to pick up: the enclosed things or the exposed ones."""
         qualifies = self.is_enclosed if hidden else self.is_exposed
-        return (thing for thing in self.things.values() if thing.pickupable and qualifies(thing))
+        return (obj for obj in self.objects.values() if obj.pickupable and qualifies(obj))
 
-    def is_in(self, thing: Thing, target: Thing) -> bool:
+    def is_in(self, obj: SceneObject, target: SceneObject) -> bool:
         """Whether a thing is, or lies in, that target or another part of it (a Sink's basin)."""
-        return any(same_whole(target.id, holder) for holder in (thing.id, *thing.parents))
+        return any(same_whole(target.id, holder) for holder in (obj.id, *obj.parents))
 
-    def washing_place(self) -> tuple[Thing, Thing] | None:
+    def sink_and_faucet(self) -> tuple[SceneObject, SceneObject] | None:
         """The SinkBasin and its Faucet, which is off: the scene has one of each, that one can name.
 
         None where a bathtub's basin is nearer to the Faucet: the water runs into that.
@@ -129,7 +129,7 @@ class Room:
             return None
         faucet = faucets[0]
 
-        def gap(basin: Thing) -> float:
+        def gap(basin: SceneObject) -> float:
             return hypot(basin.x - faucet.x, basin.z - faucet.z)
 
         nearest = min(self.of_type("SinkBasin", "BathtubBasin"), key=gap)
@@ -137,15 +137,15 @@ class Room:
         return (nearest, faucet) if fed else None
 
 
-def read_room(objects: Sequence[Mapping[str, Any]], accepts: Accepts) -> Room:
+def read_scene_graph(objects: Sequence[Mapping[str, Any]], accepts: Accepts) -> SceneGraph:
     """Read ``metadata["objects"]``."""
-    return Room({item["objectId"]: _thing(item) for item in objects}, accepts)
+    return SceneGraph({item["objectId"]: _scene_object(item) for item in objects}, accepts)
 
 
-def _thing(item: Mapping[str, Any]) -> Thing:
+def _scene_object(item: Mapping[str, Any]) -> SceneObject:
     box = item["axisAlignedBoundingBox"]
     size = box["size"]
-    return Thing(
+    return SceneObject(
         id=item["objectId"],
         type=item["objectType"],
         parents=tuple(item["parentReceptacles"] or ()),
@@ -166,19 +166,19 @@ def _thing(item: Mapping[str, Any]) -> Thing:
     )
 
 
-def largest(things: Iterable[Thing]) -> Thing:
+def largest(objects: Iterable[SceneObject]) -> SceneObject:
     """The thing with the largest box; the last id decides between equals."""
-    return max(things, key=lambda thing: (thing.volume, thing.id))
+    return max(objects, key=lambda obj: (obj.volume, obj.id))
 
 
-def may_visit(thing: Thing) -> bool:
+def may_visit(obj: SceneObject) -> bool:
     """Whether tasks may send the agent to a thing."""
-    return thing.type not in NEVER_VISITED
+    return obj.type not in NEVER_VISITED
 
 
-def may_fill(thing: Thing) -> bool:
+def may_put_into(obj: SceneObject) -> bool:
     """Whether tasks may put something there, a receptacle given."""
-    return may_visit(thing) and thing.type not in WHOLES
+    return may_visit(obj) and obj.type not in WHOLES
 
 
 def same_whole(one_id: str, other_id: str) -> bool:

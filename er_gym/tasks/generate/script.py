@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import chain
 
 from er_gym.tasks import verbs
-from er_gym.tasks.generate.scene_graph import Room, Thing
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.task import KeyAction
 from er_gym.tasks.verbs import Verb
@@ -28,98 +28,100 @@ class Script:
         stays: whether going to where one is already needs no key action.
     """
 
-    def __init__(self, room: Room, stays: bool = False) -> None:
-        self.room = room
+    def __init__(self, graph: SceneGraph, stays: bool = False) -> None:
+        self.graph = graph
         self.actions: list[KeyAction] = []
-        self.handled: list[Thing] = []
+        self.handled: list[SceneObject] = []
         """What it takes hold of, switches or fills, unless that is what one goes to itself."""
-        self.held: Thing | None = None
+        self.held: SceneObject | None = None
         self._stays = stays
-        self._at: Thing | None = None
-        self._inside: dict[str, Thing] = {}  # id of a thing that was moved, to what it lies in
-        self._left: dict[str, Thing] = {}  # and to what it was taken out of again
-        self._open: dict[str, Thing] = {}  # what was opened and not closed again
+        self._at: SceneObject | None = None
+        self._inside: dict[
+            str, SceneObject
+        ] = {}  # id of a thing that was moved, to what it lies in
+        self._left: dict[str, SceneObject] = {}  # and to what it was taken out of again
+        self._open: dict[str, SceneObject] = {}  # what was opened and not closed again
         self._on: dict[str, bool] = {}
-        self._states: dict[Thing, dict[str, bool | str]] = {}
+        self._states: dict[SceneObject, dict[str, bool | str]] = {}
 
     # -- asking ----------------------------------------------------------------------------------
 
-    def place_of(self, thing: Thing) -> Thing:
+    def place_of(self, obj: SceneObject) -> SceneObject:
         """What one goes to for a thing, where it now is."""
-        moved_into = self._inside.get(thing.id)
+        moved_into = self._inside.get(obj.id)
         if moved_into is None:
-            return self.room.place_of(thing)
+            return self.graph.place_of(obj)
         return self.place_of(moved_into) if moved_into.pickupable else moved_into
 
-    def is_on(self, thing: Thing) -> bool:
+    def is_on(self, obj: SceneObject) -> bool:
         """Whether it is switched on by now."""
-        return self._on.get(thing.id, thing.on)
+        return self._on.get(obj.id, obj.on)
 
-    def lies_in(self, thing: Thing, target: Thing) -> bool:
+    def lies_in(self, obj: SceneObject, target: SceneObject) -> bool:
         """Whether a thing lies in a target by now."""
-        moved_into = self._inside.get(thing.id)
-        return self.room.is_in(thing, target) if moved_into is None else moved_into == target
+        moved_into = self._inside.get(obj.id)
+        return self.graph.is_in(obj, target) if moved_into is None else moved_into == target
 
-    def comes_from(self, thing: Thing) -> Thing | None:
+    def comes_from(self, obj: SceneObject) -> SceneObject | None:
         """What the script put a thing into and took it out of again."""
-        return self._left.get(thing.id)
+        return self._left.get(obj.id)
 
-    def _is_closed(self, thing: Thing) -> bool:
-        return thing.closed and thing.id not in self._open
+    def _is_closed(self, obj: SceneObject) -> bool:
+        return obj.closed and obj.id not in self._open
 
     # -- doing -----------------------------------------------------------------------------------
 
-    def go(self, place: Thing, reason: Thing) -> None:
+    def go(self, place: SceneObject, reason: SceneObject) -> None:
         """Go to a receptacle because of what is in it, or to a thing itself."""
         if self._stays and self._at == place:
             return
         if self._at != place:
-            for thing in list(self._open.values()):
-                self.close(thing)
+            for obj in list(self._open.values()):
+                self.close(obj)
         related = tuple(dict.fromkeys((place.id, reason.id)))
         self.actions.append(KeyAction(verbs.NAVIGATE, place.id, place.type, related))
         self._at = place
 
-    def open(self, thing: Thing) -> None:
+    def open(self, obj: SceneObject) -> None:
         """Open it, if it is closed."""
-        if self._is_closed(thing):
-            self._do(verbs.OPEN, thing)
-            self._open[thing.id] = thing
+        if self._is_closed(obj):
+            self._do(verbs.OPEN, obj)
+            self._open[obj.id] = obj
 
-    def close(self, thing: Thing) -> None:
+    def close(self, obj: SceneObject) -> None:
         """Shut it, if the script opened it."""
-        if self._open.pop(thing.id, None):
-            self._do(verbs.CLOSE, thing)
+        if self._open.pop(obj.id, None):
+            self._do(verbs.CLOSE, obj)
 
-    def visit(self, thing: Thing) -> Thing:
+    def visit(self, obj: SceneObject) -> SceneObject:
         """Go to where a thing is and open what hides it; returns the place."""
-        place = self.place_of(thing)
-        self.go(place, thing)
+        place = self.place_of(obj)
+        self.go(place, obj)
         self.open(place)
         return place
 
-    def fetch(self, thing: Thing) -> None:
+    def fetch(self, obj: SceneObject) -> None:
         """Go to where a thing is and take it, leaving the place as it was."""
-        if self.held == thing:
+        if self.held == obj:
             return
-        place = self.visit(thing)
-        self.pickup(thing)
+        place = self.visit(obj)
+        self.pickup(obj)
         self.close(place)
 
-    def pickup(self, thing: Thing) -> None:
+    def pickup(self, obj: SceneObject) -> None:
         """Take a thing from where the agent stands."""
         if self.held is not None:
             raise Impossible(f"the hand holds {self.held.type} already")
-        if not thing.pickupable:
-            raise Impossible(f"{thing.id} cannot be carried")
-        self._do(verbs.PICKUP, thing)
-        self._handle(thing)
-        self.held = thing
-        moved_into = self._inside.pop(thing.id, None)
+        if not obj.pickupable:
+            raise Impossible(f"{obj.id} cannot be carried")
+        self._do(verbs.PICKUP, obj)
+        self._handle(obj)
+        self.held = obj
+        moved_into = self._inside.pop(obj.id, None)
         if moved_into is not None:
-            self._left[thing.id] = moved_into
+            self._left[obj.id] = moved_into
 
-    def put(self, target: Thing) -> None:
+    def put(self, target: SceneObject) -> None:
         """Put what is in the hand into a target, going to where that is."""
         if self.held is None:
             raise Impossible("the hand is empty")
@@ -135,52 +137,52 @@ class Script:
         self._inside[self.held.id] = target
         self.held = None
 
-    def switch(self, thing: Thing) -> None:
+    def switch(self, obj: SceneObject) -> None:
         """Go to where a thing is and switch it."""
-        self.visit(thing)
-        self._handle(thing)
-        self.toggle(thing)
+        self.visit(obj)
+        self._handle(obj)
+        self.toggle(obj)
 
-    def toggle(self, thing: Thing) -> None:
+    def toggle(self, obj: SceneObject) -> None:
         """Switch a thing on, or off if it is on; the agent is there."""
-        knobs = (knob for knob in self.room.things.values() if thing.id in knob.controlled)
-        if not thing.toggleable and not any(knobs):
-            raise Impossible(f"{thing.id} has no switch")
-        self._do(verbs.TOGGLE, thing)
-        self._on[thing.id] = not self.is_on(thing)
-        if thing.toggleable:  # a burner has its state in its knob
-            self.becomes(thing, isToggled=self._on[thing.id])
+        knobs = (knob for knob in self.graph.objects.values() if obj.id in knob.controlled)
+        if not obj.toggleable and not any(knobs):
+            raise Impossible(f"{obj.id} has no switch")
+        self._do(verbs.TOGGLE, obj)
+        self._on[obj.id] = not self.is_on(obj)
+        if obj.toggleable:  # a burner has its state in its knob
+            self.becomes(obj, isToggled=self._on[obj.id])
 
-    def slice(self, thing: Thing) -> Thing:
+    def slice(self, obj: SceneObject) -> SceneObject:
         """Cut up a thing where the agent stands, with the knife in its hand; returns a slice."""
-        self._do(verbs.SLICE, thing)
-        kind = f"{thing.type}Sliced"
+        self._do(verbs.SLICE, obj)
+        kind = f"{obj.type}Sliced"
         cookable = "cookable" in OBJECT_TYPES[kind].properties
-        slice_id = f"{thing.id}|{kind}_0"
-        part = replace(thing, id=slice_id, type=kind, sliceable=False, cookable=cookable)
-        if thing.id in self._inside:
-            self._inside[part.id] = self._inside.pop(thing.id)
+        slice_id = f"{obj.id}|{kind}_0"
+        part = replace(obj, id=slice_id, type=kind, sliceable=False, cookable=cookable)
+        if obj.id in self._inside:
+            self._inside[part.id] = self._inside.pop(obj.id)
         return part
 
-    def do(self, verb: Verb, thing: Thing) -> None:
+    def do(self, verb: Verb, obj: SceneObject) -> None:
         """Do a verb to a thing, going to where that is unless it is in the hand."""
-        if thing != self.held:
-            self.visit(thing)
-        self._do(verb.name, thing)
-        self._handle(thing)
+        if obj != self.held:
+            self.visit(obj)
+        self._do(verb.name, obj)
+        self._handle(obj)
         if verb.makes:
-            self.becomes(thing, **dict(verb.makes))
+            self.becomes(obj, **dict(verb.makes))
 
-    def becomes(self, thing: Thing, **state: bool | str) -> None:
+    def becomes(self, obj: SceneObject, **state: bool | str) -> None:
         """Note what a thing's metadata must say in the end."""
-        self._states.setdefault(thing, {}).update(state)
+        self._states.setdefault(obj, {}).update(state)
 
-    def _do(self, verb: str, thing: Thing) -> None:
-        self.actions.append(KeyAction(verb, thing.id, thing.type, (thing.id,)))
+    def _do(self, verb: str, obj: SceneObject) -> None:
+        self.actions.append(KeyAction(verb, obj.id, obj.type, (obj.id,)))
 
-    def _handle(self, thing: Thing) -> None:
-        if thing not in self.handled:
-            self.handled.append(thing)
+    def _handle(self, obj: SceneObject) -> None:
+        if obj not in self.handled:
+            self.handled.append(obj)
 
     # -- what comes of it ------------------------------------------------------------------------
 
@@ -192,12 +194,12 @@ class Script:
     def goal(self) -> tuple[Condition, ...]:
         """How things are in the end: what was moved, switched or changed."""
         found: dict[str, Condition] = {}
-        for thing in self.handled:
-            if thing == self.held:
-                found[thing.id] = Condition(thing.type, held=True)
-            elif thing.id in self._inside:
-                found[thing.id] = Condition(thing.type, inside=self._inside[thing.id].type)
-        for thing, state in self._states.items():
-            condition = found.get(thing.id) or Condition(thing.type)
-            found[thing.id] = replace(condition, state=tuple(state.items()))
+        for obj in self.handled:
+            if obj == self.held:
+                found[obj.id] = Condition(obj.type, held=True)
+            elif obj.id in self._inside:
+                found[obj.id] = Condition(obj.type, inside=self._inside[obj.id].type)
+        for obj, state in self._states.items():
+            condition = found.get(obj.id) or Condition(obj.type)
+            found[obj.id] = replace(condition, state=tuple(state.items()))
         return tuple(found.values())

@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from er_gym.tasks.generate.scene_graph import Room, Thing
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.script import Script
 from er_gym.tasks.generate.task_plan import Plan, Row, from_templates, plan_of
 from er_gym.tasks.generate.templates import FIND
 from er_gym.tasks.goal import Condition
 
 
-def search(room: Room, thing: Thing) -> Plan:
+def search(graph: SceneGraph, obj: SceneObject) -> Plan:
     """Find a thing."""
-    script = Script(room)
-    script.visit(thing)
-    return plan_of(script, thing, goal=(Condition(thing.type, in_reach=True),))
+    script = Script(graph)
+    script.visit(obj)
+    return plan_of(script, obj, goal=(Condition(obj.type, in_reach=True),))
 
 
-def _each(room: Room, hidden: bool) -> Iterator[tuple[Thing]]:
-    return ((thing,) for thing in room.carried(hidden))
+def _each(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject]]:
+    return ((obj,) for obj in graph.pickupable_objects(hidden))
 
 
 ROWS = tuple(

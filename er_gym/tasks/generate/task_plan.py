@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from er_gym.tasks import verbs
-from er_gym.tasks.generate.scene_graph import Room, Thing
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.script import Script
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.task import KeyAction
@@ -26,7 +26,7 @@ class Plan:
 
     key_actions: tuple[KeyAction, ...]
     goal: tuple[Condition, ...]
-    subjects: tuple[Thing, ...]
+    subjects: tuple[SceneObject, ...]
     related: tuple[str, ...]
     words: Mapping[str, str | Sequence[str]] = field(default_factory=dict)
     dirty: tuple[str, ...] = ()
@@ -47,7 +47,7 @@ class Plan:
 
 def plan_of(
     script: Script,
-    *subjects: Thing,
+    *subjects: SceneObject,
     goal: tuple[Condition, ...] | None = None,
     dirty: Iterable[str] = (),
     **words: str | Sequence[str],
@@ -58,7 +58,7 @@ def plan_of(
         script.key_actions(),
         script.goal() if goal is None else goal,
         subjects,
-        tuple(thing.id for thing in handled),
+        tuple(obj.id for obj in handled),
         words,
         tuple(dirty),
     )
@@ -82,7 +82,7 @@ class Row:
     """
 
     type: str
-    choices: Callable[[Room], Iterable[tuple[Thing, ...]]]
+    choices: Callable[[SceneGraph], Iterable[tuple[SceneObject, ...]]]
     plan: Callable[..., Plan]
     sayings: Callable[[Mapping[str, str | Sequence[str]]], Sequence[str]]
     slug: str = ""
