@@ -23,7 +23,7 @@ from er_gym.tasks import jsonl_format
 from er_gym.tasks.arrangement import Arrangement
 from er_gym.tasks.describe import describe
 from er_gym.tasks.generate import generator_for
-from er_gym.tasks.generate.recipes import read_recipes, rows
+from er_gym.tasks.generate.recipes import read_recipes, recipe_rules
 from er_gym.thor import make_controller
 
 out = Path(sys.argv[1])
@@ -68,7 +68,7 @@ env.close()
 """)
 with make_controller("embedded", scene="FloorPlan1", headless=True) as controller:
     recipes = read_recipes(out / "recipes.yaml")
-    generator = replace(generator_for(controller, "FloorPlan1", 0), rows=rows(recipes))
+    generator = replace(generator_for(controller, "FloorPlan1", 0), rules=recipe_rules(recipes))
     task = next(iter(generator.tasks()))
 assert task.arrangement.dirty
 assert task.arrangement == replace(Arrangement(), dirty=task.arrangement.dirty)

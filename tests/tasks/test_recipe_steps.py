@@ -12,11 +12,11 @@ from er_gym.tasks.generate.recipes import (
     KINDS,
     Recipe,
     bundled_recipes,
-    rows,
+    recipe_rules,
 )
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.script import Impossible
-from er_gym.tasks.generate.task_plan import Plan
+from er_gym.tasks.generate.task_plan import TaskPlan
 from er_gym.tasks.goal import Condition
 
 RECIPES = {recipe.name: recipe for recipe in bundled_recipes()}
@@ -56,7 +56,7 @@ def room_of(
     return SceneGraph({item.id: item for item in things}, accepts)
 
 
-def follow(text: str, *cast: SceneObject, room: SceneGraph | None = None) -> Plan:
+def follow(text: str, *cast: SceneObject, room: SceneGraph | None = None) -> TaskPlan:
     """Act out steps such as ``"put Apple Fridge, wash Apple"``; roles go by the names of types."""
     things = cast or KITCHEN
     given = [words.split() for words in text.split(", ")]
@@ -66,12 +66,12 @@ def follow(text: str, *cast: SceneObject, room: SceneGraph | None = None) -> Pla
         roles={role: (role,) for role in roles},
         steps=tuple({name: tuple(named)} for name, *named in given),
     )
-    (row,) = rows([recipe])
+    (rule,) = recipe_rules([recipe])
     who = {item.type: item for item in things}
-    return row.plan(room or room_of(*things), *(who[role] for role in roles))
+    return rule.plan(room or room_of(*things), *(who[role] for role in roles))
 
 
-def steps(plan: Plan) -> list[str]:
+def steps(plan: TaskPlan) -> list[str]:
     return [f"{key.verb} {key.object_type}" for key in plan.key_actions[:-1]]
 
 
@@ -318,8 +318,8 @@ PLAIN = (COUNTER, TABLE, FRIDGE, APPLE, KNIFE)
 
 
 def casts(recipe: Recipe, *things: SceneObject) -> set[tuple[str, ...]]:
-    (row,) = rows([recipe])
-    return {tuple(item.id for item in cast) for cast in row.choices(room_of(*things))}
+    (rule,) = recipe_rules([recipe])
+    return {tuple(item.id for item in cast) for cast in rule.choices(room_of(*things))}
 
 
 OF_A_KIND = {

@@ -20,7 +20,7 @@ from er_gym.tasks.generate.recipes import (
     Recipe,
     bundled_recipes,
     read_recipes,
-    rows,
+    recipe_rules,
 )
 from er_gym.thor import OBJECT_TYPES
 
@@ -60,7 +60,7 @@ def made(scene_objects: Callable[[str], Objects]) -> dict[str, list[Task]]:
     """Each recipe's tasks in those rooms."""
     found: dict[str, list[Task]] = {name: [] for name in RECIPES}
     for scene in SCENES:
-        generator = Generator(scene, scene_objects(scene), rows=rows(bundled_recipes()))
+        generator = Generator(scene, scene_objects(scene), rules=recipe_rules(bundled_recipes()))
         for task in generator.tasks():
             found[task.id.split("-")[1].removeprefix("long_range_")].append(task)
     return found

@@ -1,6 +1,6 @@
 """The task generator: from AI2-THOR object metadata to tasks of all eleven types.
 
-A kind of task is a :class:`~er_gym.tasks.generate.task_plan.Row`: a task type, which objects
+A kind of task is a :class:`~er_gym.tasks.generate.task_plan.TaskRule`: a task type, which objects
 qualify, which key actions follow, and its instructions.
 Each family has a module with its rows: ``search``,
 ``manipulate``, ``transport``, ``composite``; long-range tasks have recipes, which are data

@@ -7,7 +7,7 @@ from itertools import cycle, islice
 
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.script import Script
-from er_gym.tasks.generate.task_plan import Plan, Row, from_templates, plan_of
+from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import MOVE_TWO
 from er_gym.tasks.generate.transport import transfers
 from er_gym.tasks.generate.words import in_the
@@ -22,14 +22,16 @@ def sequence(
     target: SceneObject,
     second: SceneObject,
     where: SceneObject,
-) -> Plan:
+) -> TaskPlan:
     """Put a thing into a target, then a second thing where that belongs."""
     script = Script(graph)
     script.fetch(obj)
     script.put(target)
     script.fetch(second)
     script.put(where)
-    return plan_of(script, obj, second, place=in_the(target.type), second_place=in_the(where.type))
+    return plan_from(
+        script, obj, second, place=in_the(target.type), second_place=in_the(where.type)
+    )
 
 
 def _sequences(graph: SceneGraph) -> Iterator[tuple[SceneObject, ...]]:
@@ -42,7 +44,7 @@ def _sequences(graph: SceneGraph) -> Iterator[tuple[SceneObject, ...]]:
             (obj, target, second, where)
             for second, where in partners
             if _independent(obj, target, second, where)
-            and sequence(graph, obj, target, second, where).names_one_place_each
+            and sequence(graph, obj, target, second, where).one_object_per_type
         )
         yield from islice(choices, _PARTNERS)
 
@@ -52,11 +54,11 @@ def _independent(*objects: SceneObject) -> bool:
     return len({obj.type for obj in objects}) == len(objects)
 
 
-ROWS = (
-    Row(
+RULES = (
+    TaskRule(
         "ordered_pickup_two_object_and_put",
         choices=_sequences,
         plan=sequence,
-        sayings=from_templates(MOVE_TWO),
+        instructions=from_templates(MOVE_TWO),
     ),
 )

@@ -11,10 +11,10 @@ from typing import Any
 
 from er_gym.tasks import verbs
 from er_gym.tasks.arrangement import Arrangement, random_arrangement, set_up_scene
-from er_gym.tasks.generate.rules import ROWS
+from er_gym.tasks.generate.rules import RULES
 from er_gym.tasks.generate.scene_graph import Accepts, SceneGraph, SceneObject, read_scene_graph
 from er_gym.tasks.generate.script import Impossible
-from er_gym.tasks.generate.task_plan import Plan, Row
+from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule
 from er_gym.tasks.generate.words import a, in_the, is_are, it
 from er_gym.tasks.goal import Condition, unmet
 from er_gym.tasks.room_kinds import room_kind
@@ -52,7 +52,7 @@ class Generator:
     objects: Sequence[Mapping[str, Any]]
     arrangement: Arrangement = field(default_factory=Arrangement)
     accepts: Accepts = thor_accepts
-    rows: Sequence[Row] = ROWS
+    rules: Sequence[TaskRule] = RULES
     dropped: Counter[str] = field(default_factory=Counter)
 
     @cached_property
@@ -67,10 +67,10 @@ class Generator:
             types: names of task types; all where it is empty.
         """
         made: set[str] = set()
-        for row in self.rows:
-            if not types or row.type in types:
-                for choice in row.choices(self.scene_graph):
-                    task = self._candidate(row, choice)
+        for rule in self.rules:
+            if not types or rule.type in types:
+                for choice in rule.choices(self.scene_graph):
+                    task = self._candidate(rule, choice)
                     if isinstance(task, str):
                         self.dropped[task] += 1
                     elif task.id not in made:  # else it is the same, about another of its objects
@@ -88,47 +88,47 @@ class Generator:
             ValueError: no such type is generated on request, the scene has no such object, or their
                 number is wrong.
         """
-        row = next((row for row in self.rows if row.type == type_name and not row.slug), None)
-        if row is None:
-            known = ", ".join(row.type for row in self.rows if not row.slug)
+        rule = next((rule for rule in self.rules if rule.type == type_name and not rule.slug), None)
+        if rule is None:
+            known = ", ".join(rule.type for rule in self.rules if not rule.slug)
             raise ValueError(f"no {type_name!r} tasks are made on request; choose one of: {known}")
         unknown = [i for i in object_ids if i not in self.scene_graph.chosen]
         if unknown:
             raise ValueError(f"{self.scene} has no object {unknown[0]!r} when the task begins")
         chosen = [self.scene_graph.chosen[object_id] for object_id in object_ids]
         try:
-            plan = row.plan(self.scene_graph, *chosen)
+            plan = rule.plan(self.scene_graph, *chosen)
         except (TypeError, Impossible) as error:
             raise ValueError(
                 f"no {type_name!r} task about {len(chosen)} objects: {error}"
             ) from None
-        return self._task(row, plan, ())
+        return self._task(rule, plan, ())
 
-    def _candidate(self, row: Row, choice: tuple[SceneObject, ...]) -> Task | str:
+    def _candidate(self, rule: TaskRule, choice: tuple[SceneObject, ...]) -> Task | str:
         """The task of a choice; or why there is none."""
-        plan = row.plan(self.scene_graph, *choice)
-        if not plan.names_one_place_each:
+        plan = rule.plan(self.scene_graph, *choice)
+        if not plan.one_object_per_type:
             return SAME_PLACES
         named: list[SceneObject] = []
         for subject in plan.subjects:
             others = self.scene_graph.others_of_type(subject)
             if not others:
                 continue
-            if self._interchangeable(row, choice, plan, subject, others):
+            if self._interchangeable(rule, choice, plan, subject, others):
                 continue
-            if not row.names_places or not self._told_by_place(subject, others):
+            if not rule.may_name_places or not self._told_by_place(subject, others):
                 return AMBIGUOUS
             named.append(subject)
-        task = self._task(row, plan, named)
+        task = self._task(rule, plan, named)
         # Whether a search begins beside what is looked for is seen by who plays it.
         standing = [condition for condition in task.goal if not condition.in_reach]
         return DONE_ALREADY if standing and not unmet(standing, self.objects) else task
 
     def _interchangeable(
         self,
-        row: Row,
+        rule: TaskRule,
         choice: tuple[SceneObject, ...],
-        plan: Plan,
+        plan: TaskPlan,
         subject: SceneObject,
         others: list[SceneObject],
     ) -> bool:
@@ -138,7 +138,7 @@ class Generator:
         for other in others:
             swapped = tuple(other if obj == subject else obj for obj in choice)
             try:
-                if row.plan(self.scene_graph, *swapped).scored != plan.scored:
+                if rule.plan(self.scene_graph, *swapped).scored != plan.scored:
                     return False
             except Impossible:
                 return False
@@ -150,19 +150,19 @@ class Generator:
         holders = {parent.type for other in others for parent in self.scene_graph.parents(other)}
         return place != subject and place.type not in holders
 
-    def _task(self, row: Row, plan: Plan, named: Sequence[SceneObject]) -> Task:
-        task_id = self._id(row, plan, named)
+    def _task(self, rule: TaskRule, plan: TaskPlan, named: Sequence[SceneObject]) -> Task:
+        task_id = self._id(rule, plan, named)
         words = {**self._words(plan, named), **plan.words}
-        sayings = row.sayings(words)
+        instructions = rule.instructions(words)
         gone_to = [action.object_id for action in plan.key_actions if action.verb == verbs.NAVIGATE]
         ids = {obj.type: obj.id for obj in named}
         return Task(
             id=task_id,
-            type=BY_NAME[row.type],
+            type=BY_NAME[rule.type],
             scene=self.scene,
             # Not hash(): that differs from process to process.
-            instruction=sayings[zlib.crc32(task_id.encode()) % len(sayings)],
-            name=sayings[0],
+            instruction=instructions[zlib.crc32(task_id.encode()) % len(instructions)],
+            name=instructions[0],
             key_actions=plan.key_actions,
             target_objects=tuple(dict.fromkeys(gone_to)),
             related_objects=plan.related,
@@ -171,10 +171,10 @@ class Generator:
                 for condition in plan.goal
             ),
             arrangement=replace(self.arrangement, dirty=plan.dirty),
-            extra={"made_by": row.slug or row.type},
+            extra={"made_by": rule.slug or rule.type},
         )
 
-    def _id(self, row: Row, plan: Plan, named: Sequence[SceneObject]) -> str:
+    def _id(self, rule: TaskRule, plan: TaskPlan, named: Sequence[SceneObject]) -> str:
         handled = [
             action.object_type
             for action in plan.key_actions
@@ -182,10 +182,10 @@ class Generator:
         ] or [obj.type for obj in plan.subjects]
         places = [f"from_{self.scene_graph.place_of(obj).type}" for obj in named]
         return "-".join(
-            (self.arrangement.layout or self.scene, row.slug or row.type, *handled, *places)
+            (self.arrangement.layout or self.scene, rule.slug or rule.type, *handled, *places)
         )
 
-    def _words(self, plan: Plan, named: Sequence[SceneObject]) -> dict[str, str]:
+    def _words(self, plan: TaskPlan, named: Sequence[SceneObject]) -> dict[str, str]:
         words = {"room": room_kind(self.scene)}
         for prefix, obj in zip(("", "second_"), plan.subjects, strict=False):
             name, one = obj.type, a(obj.type)

@@ -7,24 +7,24 @@ from functools import partial
 
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.script import Script
-from er_gym.tasks.generate.task_plan import Plan, Row, from_templates, plan_of
+from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import PICK_UP, TOGGLE
 
 NEVER_TOGGLED = frozenset({"StoveKnob", "StoveBurner", "LightSwitch"})
 
 
-def pickup(graph: SceneGraph, obj: SceneObject) -> Plan:
+def pickup(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
     """Take a thing."""
     script = Script(graph)
     script.fetch(obj)
-    return plan_of(script, obj)
+    return plan_from(script, obj)
 
 
-def toggle(graph: SceneGraph, obj: SceneObject) -> Plan:
+def toggle(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
     """Switch a thing."""
     script = Script(graph)
     script.switch(obj)
-    return plan_of(script, obj, way="off" if obj.on else "on")
+    return plan_from(script, obj, way="off" if obj.on else "on")
 
 
 def _carried(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject]]:
@@ -37,15 +37,15 @@ def _switches(graph: SceneGraph) -> Iterator[tuple[SceneObject]]:
             yield (obj,)
 
 
-ROWS = (
+RULES = (
     *(
-        Row(
+        TaskRule(
             name,
             choices=partial(_carried, hidden=hidden),
             plan=pickup,
-            sayings=from_templates(PICK_UP),
+            instructions=from_templates(PICK_UP),
         )
         for name, hidden in (("single_pickup", False), ("single_pickup_from_closerep", True))
     ),
-    Row("single_toggle", choices=_switches, plan=toggle, sayings=from_templates(TOGGLE)),
+    TaskRule("single_toggle", choices=_switches, plan=toggle, instructions=from_templates(TOGGLE)),
 )

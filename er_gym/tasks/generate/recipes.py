@@ -19,7 +19,7 @@ from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import validated
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject, largest, may_put_into
 from er_gym.tasks.generate.script import Impossible, Script
-from er_gym.tasks.generate.task_plan import Plan, Row, plan_of
+from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, plan_from
 from er_gym.tasks.generate.templates import STYLES, in_order
 from er_gym.tasks.generate.words import in_the
 from er_gym.tasks.reading import read_yaml
@@ -385,35 +385,35 @@ def bundled_recipes() -> tuple[Recipe, ...]:
     return read_recipes(Path(str(files("er_gym.tasks.generate").joinpath("recipes.yaml"))))
 
 
-def rows(recipes: Sequence[Recipe]) -> tuple[Row, ...]:
+def recipe_rules(recipes: Sequence[Recipe]) -> tuple[TaskRule, ...]:
     """A row of the table of what is generated for each recipe."""
     return tuple(
-        Row(
+        TaskRule(
             "long-range tasks with dependency relationships",
             choices=partial(_choices, recipe),
             plan=partial(_plan, recipe),
-            sayings=_sayings,
+            instructions=_instructions,
             slug=f"long_range_{recipe.name}",
-            names_places=False,
+            may_name_places=False,
         )
         for recipe in recipes
     )
 
 
-def _sayings(words: Mapping[str, str | Sequence[str]]) -> list[str]:
+def _instructions(words: Mapping[str, str | Sequence[str]]) -> list[str]:
     clauses = words["clauses"]
     assert not isinstance(clauses, str)
     return [in_order(clauses, style) for style in range(STYLES)]
 
 
-def _plan(recipe: Recipe, graph: SceneGraph, *cast: SceneObject) -> Plan:
+def _plan(recipe: Recipe, graph: SceneGraph, *cast: SceneObject) -> TaskPlan:
     """Act a recipe out."""
     roles = dict(zip(recipe.roles, cast, strict=True))
     cooking = Cooking(graph, Script(graph, stays=True), roles, [])
     do = steps()
     clauses = [do[name](cooking, *args) for step in recipe.steps for name, args in step.items()]
     moved = [obj for obj in cast if obj.pickupable]
-    return plan_of(cooking.script, *moved, dirty=cooking.dirty, clauses=clauses)
+    return plan_from(cooking.script, *moved, dirty=cooking.dirty, clauses=clauses)
 
 
 def _choices(recipe: Recipe, graph: SceneGraph) -> Iterator[tuple[SceneObject, ...]]:
@@ -434,7 +434,7 @@ def _choices(recipe: Recipe, graph: SceneGraph) -> Iterator[tuple[SceneObject, .
             plan = _plan(recipe, graph, *cast)
         except Impossible:
             continue
-        if SHORTEST <= len(plan.key_actions) <= LONGEST and plan.names_one_place_each:
+        if SHORTEST <= len(plan.key_actions) <= LONGEST and plan.one_object_per_type:
             yield cast
             found += 1
             if found == _MOST_CHOICES:

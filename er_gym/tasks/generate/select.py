@@ -65,7 +65,7 @@ def _evenly(
     """Draw the tasks of one type out of ``pool`` until it is empty."""
     kind_uses: Counter[str] = Counter()
     type_uses: Counter[str] = Counter()
-    row_uses: Counter[str] = Counter()
+    rule_uses: Counter[str] = Counter()
     word_uses: Counter[str] = Counter()
     while pool:
         scene = min(
@@ -75,7 +75,7 @@ def _evenly(
         task = min(
             pool[scene],
             key=lambda task: (
-                row_uses[_row(task)],
+                rule_uses[_rule(task)],
                 # The mean, not the sum: that would prefer the shortest tasks.
                 fmean(word_uses[word] for word in _words(task)),
             ),
@@ -85,13 +85,13 @@ def _evenly(
             del pool[scene]
         kind_uses[room_kind(scene)] += 1
         type_uses[scene] += 1
-        row_uses[_row(task)] += 1
+        rule_uses[_rule(task)] += 1
         scene_uses[scene] += 1
         word_uses.update(_words(task))
         yield task
 
 
-def _row(task: Task) -> str:
+def _rule(task: Task) -> str:
     """What made it: types of long-range tasks have several recipes."""
     return str(task.extra.get("made_by", ""))
 

@@ -13,7 +13,7 @@ from er_gym.tasks.task import KeyAction
 
 
 @dataclass(frozen=True)
-class Plan:
+class TaskPlan:
     """How a task is done, and what its instruction is about.
 
     Attributes:
@@ -32,7 +32,7 @@ class Plan:
     dirty: tuple[str, ...] = ()
 
     @property
-    def names_one_place_each(self) -> bool:
+    def one_object_per_type(self) -> bool:
         """Whether no type stands for two objects among those that the plan acts on."""
         named = {(action.object_type, action.object_id) for action in self.key_actions}
         return len(named) == len({object_type for object_type, _ in named})
@@ -45,16 +45,16 @@ class Plan:
         )
 
 
-def plan_of(
+def plan_from(
     script: Script,
     *subjects: SceneObject,
     goal: tuple[Condition, ...] | None = None,
     dirty: Iterable[str] = (),
     **words: str | Sequence[str],
-) -> Plan:
+) -> TaskPlan:
     """What a script has done, as a plan; its goal is how things are in the end, unless given."""
     handled = dict.fromkeys((*subjects, *script.handled))
-    return Plan(
+    return TaskPlan(
         script.key_actions(),
         script.goal() if goal is None else goal,
         subjects,
@@ -65,7 +65,7 @@ def plan_of(
 
 
 @dataclass(frozen=True)
-class Row:
+class TaskRule:
     """A type of task that can be generated.
 
     Attributes:
@@ -83,10 +83,10 @@ class Row:
 
     type: str
     choices: Callable[[SceneGraph], Iterable[tuple[SceneObject, ...]]]
-    plan: Callable[..., Plan]
-    sayings: Callable[[Mapping[str, str | Sequence[str]]], Sequence[str]]
+    plan: Callable[..., TaskPlan]
+    instructions: Callable[[Mapping[str, str | Sequence[str]]], Sequence[str]]
     slug: str = ""
-    names_places: bool = True
+    may_name_places: bool = True
 
 
 def from_templates(

@@ -7,17 +7,17 @@ from functools import partial
 
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject, largest, may_put_into
 from er_gym.tasks.generate.script import Script
-from er_gym.tasks.generate.task_plan import Plan, Row, from_templates, plan_of
+from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import MOVE
 from er_gym.tasks.generate.words import in_the
 
 
-def transfer(graph: SceneGraph, obj: SceneObject, target: SceneObject) -> Plan:
+def transfer(graph: SceneGraph, obj: SceneObject, target: SceneObject) -> TaskPlan:
     """Fetch a thing and put it into a target."""
     script = Script(graph)
     script.fetch(obj)
     script.put(target)
-    return plan_of(script, obj, place=in_the(target.type))
+    return plan_from(script, obj, place=in_the(target.type))
 
 
 def transfers(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject, SceneObject]]:
@@ -62,12 +62,12 @@ def _moves(
     return (move for move in transfers(graph, hidden) if move[1].closed == into_closed)
 
 
-ROWS = tuple(
-    Row(
+RULES = tuple(
+    TaskRule(
         name,
         choices=partial(_moves, hidden=hidden, into_closed=into_closed),
         plan=transfer,
-        sayings=from_templates(MOVE),
+        instructions=from_templates(MOVE),
     )
     for name, hidden, into_closed in (
         ("pickup_and_put", False, False),
