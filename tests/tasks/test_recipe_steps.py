@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from things_by_hand import thing
 
+from er_gym.tasks.generate.plan_builder import ImpossiblePlan
 from er_gym.tasks.generate.recipes import (
     KINDS,
     Recipe,
@@ -15,7 +16,6 @@ from er_gym.tasks.generate.recipes import (
     recipe_rules,
 )
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
-from er_gym.tasks.generate.script import Impossible
 from er_gym.tasks.generate.task_plan import TaskPlan
 from er_gym.tasks.goal import Condition
 
@@ -290,19 +290,19 @@ IMPOSSIBLE = {
 
 @pytest.mark.parametrize(("text", "things", "message"), IMPOSSIBLE.values(), ids=IMPOSSIBLE)
 def test_what_cannot_be_done(text: str, things: list[SceneObject], message: str) -> None:
-    with pytest.raises(Impossible, match=message):
+    with pytest.raises(ImpossiblePlan, match=message):
         follow(text, *things)
 
 
 def test_nothing_is_put_where_its_type_is_not_accepted() -> None:
     room = room_of(*KITCHEN, accepts=lambda what, where: where != "Fridge")
     assert steps(follow("put Apple CounterTop", room=room))
-    with pytest.raises(Impossible, match="Fridge does not take Apple"):
+    with pytest.raises(ImpossiblePlan, match="Fridge does not take Apple"):
         follow("put Apple Fridge", room=room)
-    with pytest.raises(Impossible, match="Fridge does not take Apple"):
+    with pytest.raises(ImpossiblePlan, match="Fridge does not take Apple"):
         follow("chill Apple", room=room)
     blunt = room_of(*KITCHEN, accepts=lambda what, where: what != "Knife")
-    with pytest.raises(Impossible, match="no slicing in CounterTop"):
+    with pytest.raises(ImpossiblePlan, match="no slicing in CounterTop"):
         follow("slice Potato Knife", room=blunt)
 
 

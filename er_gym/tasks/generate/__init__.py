@@ -4,7 +4,7 @@ A kind of task is a :class:`~er_gym.tasks.generate.task_plan.TaskRule`: a task t
 qualify, which key actions follow, and its instructions.
 Each family has a module with its rows: ``search``,
 ``manipulate``, ``transport``, ``composite``; long-range tasks have recipes, which are data
-(``recipes.yaml``). A plan is acted out on paper (``script``), so that key actions and goal agree.
+(``recipes.yaml``). A plan is acted out on paper (``builder``), so that key actions and goal agree.
 
 The rules:
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import cycle, islice
 
+from er_gym.tasks.generate.plan_builder import PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
-from er_gym.tasks.generate.script import Script
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import MOVE_TWO
 from er_gym.tasks.generate.transport import transfers
@@ -24,13 +24,13 @@ def sequence(
     where: SceneObject,
 ) -> TaskPlan:
     """Put a thing into a target, then a second thing where that belongs."""
-    script = Script(graph)
-    script.fetch(obj)
-    script.put(target)
-    script.fetch(second)
-    script.put(where)
+    builder = PlanBuilder(graph)
+    builder.fetch(obj)
+    builder.put(target)
+    builder.fetch(second)
+    builder.put(where)
     return plan_from(
-        script, obj, second, place=in_the(target.type), second_place=in_the(where.type)
+        builder, obj, second, place=in_the(target.type), second_place=in_the(where.type)
     )
 
 

@@ -11,9 +11,9 @@ from typing import Any
 
 from er_gym.tasks import verbs
 from er_gym.tasks.arrangement import Arrangement, random_arrangement, set_up_scene
+from er_gym.tasks.generate.plan_builder import ImpossiblePlan
 from er_gym.tasks.generate.rules import RULES
 from er_gym.tasks.generate.scene_graph import Accepts, SceneGraph, SceneObject, read_scene_graph
-from er_gym.tasks.generate.script import Impossible
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule
 from er_gym.tasks.generate.words import a, in_the, is_are, it
 from er_gym.tasks.goal import Condition, unmet
@@ -98,7 +98,7 @@ class Generator:
         chosen = [self.scene_graph.chosen[object_id] for object_id in object_ids]
         try:
             plan = rule.plan(self.scene_graph, *chosen)
-        except (TypeError, Impossible) as error:
+        except (TypeError, ImpossiblePlan) as error:
             raise ValueError(
                 f"no {type_name!r} task about {len(chosen)} objects: {error}"
             ) from None
@@ -140,7 +140,7 @@ class Generator:
             try:
                 if rule.plan(self.scene_graph, *swapped).scored != plan.scored:
                     return False
-            except Impossible:
+            except ImpossiblePlan:
                 return False
         return True
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
+from er_gym.tasks.generate.plan_builder import PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
-from er_gym.tasks.generate.script import Script
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import PICK_UP, TOGGLE
 
@@ -15,16 +15,16 @@ NEVER_TOGGLED = frozenset({"StoveKnob", "StoveBurner", "LightSwitch"})
 
 def pickup(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
     """Take a thing."""
-    script = Script(graph)
-    script.fetch(obj)
-    return plan_from(script, obj)
+    builder = PlanBuilder(graph)
+    builder.fetch(obj)
+    return plan_from(builder, obj)
 
 
 def toggle(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
     """Switch a thing."""
-    script = Script(graph)
-    script.switch(obj)
-    return plan_from(script, obj, way="off" if obj.on else "on")
+    builder = PlanBuilder(graph)
+    builder.go_and_toggle(obj)
+    return plan_from(builder, obj, way="off" if obj.on else "on")
 
 
 def _carried(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject]]:

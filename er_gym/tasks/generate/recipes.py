@@ -17,8 +17,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from er_gym.tasks import verbs
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import validated
+from er_gym.tasks.generate.plan_builder import ImpossiblePlan, PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject, largest, may_put_into
-from er_gym.tasks.generate.script import Impossible, Script
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, plan_from
 from er_gym.tasks.generate.templates import STYLES, in_order
 from er_gym.tasks.generate.words import in_the
@@ -105,7 +105,7 @@ class Cooking:
     """
 
     graph: SceneGraph
-    script: Script
+    builder: PlanBuilder
     cast: dict[str, SceneObject]
     dirty: list[str]
 
@@ -113,7 +113,7 @@ class Cooking:
         """The one thing of a type."""
         found = self.graph.of_type(object_type)
         if len(found) != 1:
-            raise Impossible(f"{len(found)} {object_type} objects")
+            raise ImpossiblePlan(f"{len(found)} {object_type} objects")
         return found[0]
 
 
@@ -127,12 +127,12 @@ def _step(function: Callable[..., str]) -> Callable[..., str]:
 
 
 def _carry(cooking: Cooking, obj: SceneObject, target: SceneObject) -> None:
-    if cooking.script.lies_in(obj, target) or cooking.script.comes_from(obj) == target:
-        raise Impossible(f"{obj.type} is there, or has just been there")
+    if cooking.builder.lies_in(obj, target) or cooking.builder.taken_from(obj) == target:
+        raise ImpossiblePlan(f"{obj.type} is there, or has just been there")
     if not cooking.graph.accepts(obj.type, target.type):
-        raise Impossible(f"{target.type} does not take {obj.type}")
-    cooking.script.fetch(obj)
-    cooking.script.put(target)
+        raise ImpossiblePlan(f"{target.type} does not take {obj.type}")
+    cooking.builder.fetch(obj)
+    cooking.builder.put(target)
 
 
 @_step
@@ -146,14 +146,14 @@ def _put(cooking: Cooking, what: str, where: str) -> str:
 def _under_water(cooking: Cooking, obj: SceneObject) -> None:
     water = cooking.graph.sink_and_faucet()
     if water is None:
-        raise Impossible("no water")
+        raise ImpossiblePlan("no water")
     basin, faucet = water
     _carry(cooking, obj, basin)
-    if not cooking.script.is_on(faucet):
-        cooking.script.toggle(faucet)
-    cooking.script.pickup(obj)
+    if not cooking.builder.is_on(faucet):
+        cooking.builder.toggle(faucet)
+    cooking.builder.pickup(obj)
     if obj.fillable:
-        cooking.script.becomes(obj, isFilledWithLiquid=True)
+        cooking.builder.set_state(obj, isFilledWithLiquid=True)
 
 
 @_step
@@ -162,7 +162,7 @@ def _wash(cooking: Cooking, what: str) -> str:
     obj = cooking.cast[what]
     if obj.dirtyable:
         cooking.dirty.append(obj.id)
-        cooking.script.becomes(obj, isDirty=False)
+        cooking.builder.set_state(obj, isDirty=False)
     _under_water(cooking, obj)
     return f"wash the {obj.type} in the SinkBasin with water from the Faucet"
 
@@ -172,7 +172,7 @@ def _fill(cooking: Cooking, what: str) -> str:
     """Fill a thing with water, and take it up again."""
     obj = cooking.cast[what]
     if not obj.fillable:
-        raise Impossible(f"{obj.type} holds no water")
+        raise ImpossiblePlan(f"{obj.type} holds no water")
     _under_water(cooking, obj)
     return f"fill the {obj.type} in the SinkBasin with water from the Faucet"
 
@@ -182,11 +182,11 @@ def _brew(cooking: Cooking, what: str) -> str:
     """Make coffee into a mug, and take it up again."""
     obj, machine = cooking.cast[what], cooking.only("CoffeeMachine")
     _carry(cooking, obj, machine)
-    if cooking.script.is_on(machine):
-        raise Impossible("the CoffeeMachine is on already")
-    cooking.script.toggle(machine)
-    cooking.script.pickup(obj)
-    cooking.script.becomes(obj, isFilledWithLiquid=True)
+    if cooking.builder.is_on(machine):
+        raise ImpossiblePlan("the CoffeeMachine is on already")
+    cooking.builder.toggle(machine)
+    cooking.builder.pickup(obj)
+    cooking.builder.set_state(obj, isFilledWithLiquid=True)
     return f"fill the {obj.type} with coffee from the CoffeeMachine"
 
 
@@ -195,14 +195,14 @@ def _heat(cooking: Cooking, what: str) -> str:
     """Heat a thing in the microwave, and take it out again."""
     obj, microwave = cooking.cast[what], cooking.only("Microwave")
     if microwave.on:
-        raise Impossible("the Microwave is on already")
+        raise ImpossiblePlan("the Microwave is on already")
     _carry(cooking, obj, microwave)
-    cooking.script.close(microwave)
-    cooking.script.toggle(microwave)
-    cooking.script.toggle(microwave)
-    cooking.script.fetch(obj)
+    cooking.builder.close(microwave)
+    cooking.builder.toggle(microwave)
+    cooking.builder.toggle(microwave)
+    cooking.builder.fetch(obj)
     if obj.cookable:
-        cooking.script.becomes(obj, isCooked=True)
+        cooking.builder.set_state(obj, isCooked=True)
     return f"heat the {obj.type} in the Microwave, turning it on and off again"
 
 
@@ -211,8 +211,8 @@ def _chill(cooking: Cooking, what: str) -> str:
     """Cool a thing in the shut fridge, and take it out again."""
     obj, fridge = cooking.cast[what], cooking.only("Fridge")
     _carry(cooking, obj, fridge)
-    cooking.script.close(fridge)
-    cooking.script.fetch(obj)
+    cooking.builder.close(fridge)
+    cooking.builder.fetch(obj)
     return f"cool the {obj.type} in the closed Fridge"
 
 
@@ -221,31 +221,31 @@ def _toast(cooking: Cooking, what: str) -> str:
     """Toast a slice, and take it out again."""
     obj, toaster = cooking.cast[what], cooking.only("Toaster")
     if toaster.on:
-        raise Impossible("the Toaster is on already")
+        raise ImpossiblePlan("the Toaster is on already")
     _carry(cooking, obj, toaster)
-    cooking.script.toggle(toaster)
-    cooking.script.pickup(obj)
-    cooking.script.becomes(obj, isCooked=True)
+    cooking.builder.toggle(toaster)
+    cooking.builder.pickup(obj)
+    cooking.builder.set_state(obj, isCooked=True)
     return f"toast the {obj.type} in the Toaster"
 
 
 @_step
 def _slice(cooking: Cooking, what: str, knife: str) -> str:
     """Cut up what lies on something, lay the knife down there, and go on with a slice."""
-    script, blade, obj = cooking.script, cooking.cast[knife], cooking.cast[what]
+    builder, blade, obj = cooking.builder, cooking.cast[knife], cooking.cast[what]
     if not obj.sliceable:
-        raise Impossible(f"{obj.type} cannot be sliced")
-    board = script.place_of(obj)
+        raise ImpossiblePlan(f"{obj.type} cannot be sliced")
+    board = builder.place_of(obj)
     if (
         board.openable
         or not may_put_into(board)
         or not cooking.graph.accepts(blade.type, board.type)
     ):
-        raise Impossible(f"no slicing in {board.type}")
-    script.fetch(blade)
-    script.go(board, obj)
-    cooking.cast[what] = script.slice(obj)
-    script.put(board)
+        raise ImpossiblePlan(f"no slicing in {board.type}")
+    builder.fetch(blade)
+    builder.go_to(board, obj)
+    cooking.cast[what] = builder.slice(obj)
+    builder.put(board)
     return (
         f"slice the {obj.type} with the {blade.type} and lay the {blade.type} down "
         f"{in_the(board.type)}"
@@ -258,14 +258,14 @@ def _switch_on(cooking: Cooking, what: str) -> str:
     obj = cooking.cast[what]
     knobs = [k for k in cooking.graph.objects.values() if obj.id in k.controlled]
     if not obj.toggleable and not knobs:
-        raise Impossible(f"{obj.type} has no switch")
-    if cooking.script.is_on(obj) or any(knob.on for knob in knobs):
-        raise Impossible(f"{obj.type} is on already")
-    cooking.script.switch(obj)
+        raise ImpossiblePlan(f"{obj.type} has no switch")
+    if cooking.builder.is_on(obj) or any(knob.on for knob in knobs):
+        raise ImpossiblePlan(f"{obj.type} is on already")
+    cooking.builder.go_and_toggle(obj)
     for food, pan in permutations(cooking.cast.values(), 2):
-        lies_there = cooking.script.lies_in(food, pan) and cooking.script.lies_in(pan, obj)
+        lies_there = cooking.builder.lies_in(food, pan) and cooking.builder.lies_in(pan, obj)
         if food.cookable and lies_there:
-            cooking.script.becomes(food, isCooked=True)
+            cooking.builder.set_state(food, isCooked=True)
     return f"turn on the {obj.type}"
 
 
@@ -273,9 +273,9 @@ def _switch_on(cooking: Cooking, what: str) -> str:
 def _switch_off(cooking: Cooking, what: str) -> str:
     """Switch a thing off."""
     obj = cooking.cast[what]
-    if not obj.toggleable or not cooking.script.is_on(obj):
-        raise Impossible(f"{obj.type} is off already")
-    cooking.script.switch(obj)
+    if not obj.toggleable or not cooking.builder.is_on(obj):
+        raise ImpossiblePlan(f"{obj.type} is off already")
+    cooking.builder.go_and_toggle(obj)
     return f"turn off the {obj.type}"
 
 
@@ -295,32 +295,32 @@ def _doing(verb: Verb) -> Callable[..., str]:
 
 def _do(verb: Verb, cooking: Cooking, what: str) -> str:
     """Do a verb to a thing where it is, or in the hand."""
-    obj, script = cooking.cast[what], cooking.script
+    obj, builder = cooking.cast[what], cooking.builder
     if not verb.takes(obj.type):
-        raise Impossible(f"one cannot {verb.name} {obj.type}")
-    if script.held is not None and verb.hand == verbs.EMPTY:
-        raise Impossible(f"the hand holds {script.held.type}")
-    if script.held is None and verb.hand == verbs.FULL:
-        raise Impossible("the hand is empty")
-    if script.held == obj and not verb.in_hand:
-        raise Impossible(f"one cannot {verb.name} what is in the hand")
+        raise ImpossiblePlan(f"one cannot {verb.name} {obj.type}")
+    if builder.held is not None and verb.hand == verbs.EMPTY:
+        raise ImpossiblePlan(f"the hand holds {builder.held.type}")
+    if builder.held is None and verb.hand == verbs.FULL:
+        raise ImpossiblePlan("the hand is empty")
+    if builder.held == obj and not verb.in_hand:
+        raise ImpossiblePlan(f"one cannot {verb.name} what is in the hand")
     if verb.object_state == ("isDirty", True):
         cooking.dirty.append(obj.id)
-    script.do(verb, obj)
+    builder.do(verb, obj)
     return f"{verb.name} the {obj.type}"
 
 
 def _do_with(verb: Verb, cooking: Cooking, what: str, tool: str) -> str:
     """Fetch a tool, do a verb with it to a thing where that is, and lay the tool down there."""
-    obj, instrument, script = cooking.cast[what], cooking.cast[tool], cooking.script
-    place = script.place_of(obj)
+    obj, instrument, builder = cooking.cast[what], cooking.cast[tool], cooking.builder
+    place = builder.place_of(obj)
     if instrument.type not in verb.hand:
-        raise Impossible(f"one cannot {verb.name} with {instrument.type}")
+        raise ImpossiblePlan(f"one cannot {verb.name} with {instrument.type}")
     if not may_put_into(place) or not cooking.graph.accepts(instrument.type, place.type):
-        raise Impossible(f"{place.type} does not take {instrument.type}")
-    script.fetch(instrument)
+        raise ImpossiblePlan(f"{place.type} does not take {instrument.type}")
+    builder.fetch(instrument)
     said = _do(verb, cooking, what)
-    script.put(place)
+    builder.put(place)
     return f"{said} with the {instrument.type} and leave that {in_the(place.type)}"
 
 
@@ -409,11 +409,11 @@ def _instructions(words: Mapping[str, str | Sequence[str]]) -> list[str]:
 def _plan(recipe: Recipe, graph: SceneGraph, *cast: SceneObject) -> TaskPlan:
     """Act a recipe out."""
     roles = dict(zip(recipe.roles, cast, strict=True))
-    cooking = Cooking(graph, Script(graph, stays=True), roles, [])
+    cooking = Cooking(graph, PlanBuilder(graph, merge_visits=True), roles, [])
     do = steps()
     clauses = [do[name](cooking, *args) for step in recipe.steps for name, args in step.items()]
     moved = [obj for obj in cast if obj.pickupable]
-    return plan_from(cooking.script, *moved, dirty=cooking.dirty, clauses=clauses)
+    return plan_from(cooking.builder, *moved, dirty=cooking.dirty, clauses=clauses)
 
 
 def _choices(recipe: Recipe, graph: SceneGraph) -> Iterator[tuple[SceneObject, ...]]:
@@ -432,7 +432,7 @@ def _choices(recipe: Recipe, graph: SceneGraph) -> Iterator[tuple[SceneObject, .
         tried.add(ids)
         try:
             plan = _plan(recipe, graph, *cast)
-        except Impossible:
+        except ImpossiblePlan:
             continue
         if SHORTEST <= len(plan.key_actions) <= LONGEST and plan.one_object_per_type:
             yield cast

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
+from er_gym.tasks.generate.plan_builder import PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
-from er_gym.tasks.generate.script import Script
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import FIND
 from er_gym.tasks.goal import Condition
@@ -14,9 +14,9 @@ from er_gym.tasks.goal import Condition
 
 def search(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
     """Find a thing."""
-    script = Script(graph)
-    script.visit(obj)
-    return plan_from(script, obj, goal=(Condition(obj.type, in_reach=True),))
+    builder = PlanBuilder(graph)
+    builder.visit(obj)
+    return plan_from(builder, obj, goal=(Condition(obj.type, in_reach=True),))
 
 
 def _each(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject]]:

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from er_gym.tasks import verbs
+from er_gym.tasks.generate.plan_builder import PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
-from er_gym.tasks.generate.script import Script
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.task import KeyAction
 
@@ -46,17 +46,17 @@ class TaskPlan:
 
 
 def plan_from(
-    script: Script,
+    builder: PlanBuilder,
     *subjects: SceneObject,
     goal: tuple[Condition, ...] | None = None,
     dirty: Iterable[str] = (),
     **words: str | Sequence[str],
 ) -> TaskPlan:
     """What a script has done, as a plan; its goal is how things are in the end, unless given."""
-    handled = dict.fromkeys((*subjects, *script.handled))
+    handled = dict.fromkeys((*subjects, *builder.handled))
     return TaskPlan(
-        script.key_actions(),
-        script.goal() if goal is None else goal,
+        builder.key_actions(),
+        builder.goal() if goal is None else goal,
         subjects,
         tuple(obj.id for obj in handled),
         words,
@@ -72,7 +72,7 @@ class TaskRule:
         type: a name in :data:`~er_gym.tasks.types.TASK_TYPES`.
         choices: which objects of a room qualify; each choice is a tuple of arguments for ``plan``.
         plan: which key actions follow from a choice. It takes any things at all, those that do not
-            qualify too; it may raise :class:`~er_gym.tasks.generate.script.Impossible`.
+            qualify too; it may raise :class:`~er_gym.tasks.generate.plan_builder.ImpossiblePlan`.
         sayings: all instructions for a plan, at least a dozen, given the words; the first one words
             the task's name.
         slug: stands for the type in task ids, where its name is no good as a part of a file name or

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from functools import partial
 
+from er_gym.tasks.generate.plan_builder import PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject, largest, may_put_into
-from er_gym.tasks.generate.script import Script
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import MOVE
 from er_gym.tasks.generate.words import in_the
@@ -14,10 +14,10 @@ from er_gym.tasks.generate.words import in_the
 
 def transfer(graph: SceneGraph, obj: SceneObject, target: SceneObject) -> TaskPlan:
     """Fetch a thing and put it into a target."""
-    script = Script(graph)
-    script.fetch(obj)
-    script.put(target)
-    return plan_from(script, obj, place=in_the(target.type))
+    builder = PlanBuilder(graph)
+    builder.fetch(obj)
+    builder.put(target)
+    return plan_from(builder, obj, place=in_the(target.type))
 
 
 def transfers(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject, SceneObject]]:

@@ -13,11 +13,11 @@ from er_gym.tasks.verbs import Verb
 from er_gym.thor import OBJECT_TYPES
 
 
-class Impossible(Exception):
+class ImpossiblePlan(Exception):
     """The script cannot go on; the message says why. Most ways to fill a recipe are impossible."""
 
 
-class Script:
+class PlanBuilder:
     """What the agent does, one thing after another, and how the room then is.
 
     What has been opened to get at a thing is closed again: after a pickup at once, after a put when
@@ -28,13 +28,13 @@ class Script:
         stays: whether going to where one is already needs no key action.
     """
 
-    def __init__(self, graph: SceneGraph, stays: bool = False) -> None:
+    def __init__(self, graph: SceneGraph, merge_visits: bool = False) -> None:
         self.graph = graph
         self.actions: list[KeyAction] = []
         self.handled: list[SceneObject] = []
         """What it takes hold of, switches or fills, unless that is what one goes to itself."""
         self.held: SceneObject | None = None
-        self._stays = stays
+        self._merge_visits = merge_visits
         self._at: SceneObject | None = None
         self._inside: dict[
             str, SceneObject
@@ -62,7 +62,7 @@ class Script:
         moved_into = self._inside.get(obj.id)
         return self.graph.is_in(obj, target) if moved_into is None else moved_into == target
 
-    def comes_from(self, obj: SceneObject) -> SceneObject | None:
+    def taken_from(self, obj: SceneObject) -> SceneObject | None:
         """What the script put a thing into and took it out of again."""
         return self._left.get(obj.id)
 
@@ -71,9 +71,9 @@ class Script:
 
     # -- doing -----------------------------------------------------------------------------------
 
-    def go(self, place: SceneObject, reason: SceneObject) -> None:
+    def go_to(self, place: SceneObject, reason: SceneObject) -> None:
         """Go to a receptacle because of what is in it, or to a thing itself."""
-        if self._stays and self._at == place:
+        if self._merge_visits and self._at == place:
             return
         if self._at != place:
             for obj in list(self._open.values()):
@@ -96,7 +96,7 @@ class Script:
     def visit(self, obj: SceneObject) -> SceneObject:
         """Go to where a thing is and open what hides it; returns the place."""
         place = self.place_of(obj)
-        self.go(place, obj)
+        self.go_to(place, obj)
         self.open(place)
         return place
 
@@ -111,9 +111,9 @@ class Script:
     def pickup(self, obj: SceneObject) -> None:
         """Take a thing from where the agent stands."""
         if self.held is not None:
-            raise Impossible(f"the hand holds {self.held.type} already")
+            raise ImpossiblePlan(f"the hand holds {self.held.type} already")
         if not obj.pickupable:
-            raise Impossible(f"{obj.id} cannot be carried")
+            raise ImpossiblePlan(f"{obj.id} cannot be carried")
         self._do(verbs.PICKUP, obj)
         self._handle(obj)
         self.held = obj
@@ -124,11 +124,11 @@ class Script:
     def put(self, target: SceneObject) -> None:
         """Put what is in the hand into a target, going to where that is."""
         if self.held is None:
-            raise Impossible("the hand is empty")
+            raise ImpossiblePlan("the hand is empty")
         if not target.receptacle or target == self.held:
-            raise Impossible(f"{self.held.id} cannot be put into {target.id}")
+            raise ImpossiblePlan(f"{self.held.id} cannot be put into {target.id}")
         place = target if not target.pickupable else self.place_of(target)
-        self.go(place, target)
+        self.go_to(place, target)
         self.open(place)
         self.open(target)
         self._do(verbs.PUT, target)
@@ -137,7 +137,7 @@ class Script:
         self._inside[self.held.id] = target
         self.held = None
 
-    def switch(self, obj: SceneObject) -> None:
+    def go_and_toggle(self, obj: SceneObject) -> None:
         """Go to where a thing is and switch it."""
         self.visit(obj)
         self._handle(obj)
@@ -147,11 +147,11 @@ class Script:
         """Switch a thing on, or off if it is on; the agent is there."""
         knobs = (knob for knob in self.graph.objects.values() if obj.id in knob.controlled)
         if not obj.toggleable and not any(knobs):
-            raise Impossible(f"{obj.id} has no switch")
+            raise ImpossiblePlan(f"{obj.id} has no switch")
         self._do(verbs.TOGGLE, obj)
         self._on[obj.id] = not self.is_on(obj)
         if obj.toggleable:  # a burner has its state in its knob
-            self.becomes(obj, isToggled=self._on[obj.id])
+            self.set_state(obj, isToggled=self._on[obj.id])
 
     def slice(self, obj: SceneObject) -> SceneObject:
         """Cut up a thing where the agent stands, with the knife in its hand; returns a slice."""
@@ -171,9 +171,9 @@ class Script:
         self._do(verb.name, obj)
         self._handle(obj)
         if verb.makes:
-            self.becomes(obj, **dict(verb.makes))
+            self.set_state(obj, **dict(verb.makes))
 
-    def becomes(self, obj: SceneObject, **state: bool | str) -> None:
+    def set_state(self, obj: SceneObject, **state: bool | str) -> None:
         """Note what a thing's metadata must say in the end."""
         self._states.setdefault(obj, {}).update(state)
 
