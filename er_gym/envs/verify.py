@@ -11,7 +11,7 @@ from er_gym.tasks import verbs
 from er_gym.tasks.difficulty import difficulty
 from er_gym.tasks.generate import Generator
 from er_gym.tasks.generate.generator import DONE_ALREADY
-from er_gym.tasks.goal import unmet
+from er_gym.tasks.goal import unmet_conditions
 from er_gym.tasks.splits import UNSEEN_TYPES, subject_types
 from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import AgentPose, Task
@@ -101,7 +101,7 @@ class Verifier:
         _, info = self._env.reset(seed=0, options={"task": task})
         pose = self._env.agent_pose
         where = (pose.x, pose.z)
-        if task.goal and not unmet(task.goal, self._env.objects, info["interactable"]):
+        if task.goal and not unmet_conditions(task.goal, self._env.objects, info["interactable"]):
             return Verdict(DONE_ALREADY, "", 1, where)
         solver = Solver()
         earned, over = 0.0, False

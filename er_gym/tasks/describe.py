@@ -9,7 +9,7 @@ from textwrap import fill
 
 from er_gym.tasks import verbs
 from er_gym.tasks.difficulty import Difficulty
-from er_gym.tasks.generate.words import PLURAL, a, in_the, it
+from er_gym.tasks.generate.words import PLURAL, in_or_on_the, pronoun, with_article
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import KeyAction, Task, type_of_id
@@ -71,7 +71,7 @@ class _Names:
 
     def inside(self, object_id: str) -> str:
         """What is in or on an object: "in the Fridge"."""
-        return f"{in_the(type_of_id(object_id))}{self._place(object_id)}"
+        return f"{in_or_on_the(type_of_id(object_id))}{self._place(object_id)}"
 
     def _place(self, object_id: str) -> str:
         place = object_id.partition("|")[2]
@@ -140,7 +140,7 @@ def _step(action: KeyAction, names: _Names, held: str, before: str) -> str:
     words = {
         "verb": action.verb,
         "the": names.the(name),
-        "it": it(type_of_id(name)) if name and name == before else names.the(name),
+        "it": pronoun(type_of_id(name)) if name and name == before else names.the(name),
         "inside": names.inside(name),
         "held": names.the(held) if held else "what is held",
         "reason": f" (for {_series(map(names.the, reasons))})" if reasons else "",
@@ -171,12 +171,12 @@ def _goal(task: Task) -> Sequence[Condition]:
 
 def _claim(condition: Condition, names: _Names) -> str:
     kind = condition.object_type
-    subject = names.the(condition.object_id) if condition.object_id else a(kind)
+    subject = names.the(condition.object_id) if condition.object_id else with_article(kind)
     is_, lies = ("are", "lie") if kind in PLURAL else ("is", "lies")
     claims = [
         *([f"{is_} in the hand"] if condition.held else []),
         *([f"{is_} in sight and within reach"] if condition.in_reach else []),
-        *([f"{lies} {in_the(condition.inside)}"] if condition.inside else []),
+        *([f"{lies} {in_or_on_the(condition.inside)}"] if condition.inside else []),
         *(
             f"{is_} {_STATES.get((name, value), f'such that {name} says {value}')}"
             for name, value in condition.state

@@ -79,7 +79,7 @@ def _claim(name: str, value: bool | str) -> str:
     return name if value else f"not {name}"
 
 
-def unmet(
+def unmet_conditions(
     goal: Iterable[Condition],
     objects: Sequence[Mapping[str, Any]],
     in_reach: Collection[str] = (),

@@ -17,7 +17,7 @@ from er_gym.envs.solver import Solver
 from er_gym.tasks import TASK_TYPES, Task, TaskType, load_suite, verbs
 from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.tasks.generate import Generator
-from er_gym.tasks.goal import unmet
+from er_gym.tasks.goal import unmet_conditions
 from er_gym.tasks.judge import Criteria, Progress
 from er_gym.tasks.types import SEARCH
 
@@ -46,7 +46,7 @@ def begin(env: EmbodiedEnv, task: Task) -> dict[str, Any]:
 
 
 def goal_holds(env: EmbodiedEnv, task: Task, info: Mapping[str, Any]) -> bool:
-    return not unmet(task.goal, env.objects, info["interactable"])
+    return not unmet_conditions(task.goal, env.objects, info["interactable"])
 
 
 def strive(env: EmbodiedEnv, task: Task, other: Task) -> list[Deed]:

@@ -10,7 +10,7 @@ from things_by_hand import thing
 
 from er_gym.tasks.generate.plan_builder import ImpossiblePlan
 from er_gym.tasks.generate.recipes import (
-    KINDS,
+    ROLE_KINDS,
     Recipe,
     bundled_recipes,
     recipe_rules,
@@ -330,7 +330,7 @@ OF_A_KIND = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ROLE_KINDS)
 def test_kinds_of_things(kind: str) -> None:
     room = room_of(
         *PLAIN, BASIN, FAUCET, LAMP, FISH,
@@ -346,7 +346,7 @@ def test_kinds_of_things(kind: str) -> None:
         thing("CellPhone", "Fridge", pickupable=True, toggleable=True),
         thing("Television", "DiningTable"),
     )  # fmt: skip
-    assert {item.type for item in KINDS[kind](room)} == OF_A_KIND[kind]
+    assert {item.type for item in ROLE_KINDS[kind](room)} == OF_A_KIND[kind]
 
 
 def test_roles_are_filled_by_what_fits_them() -> None:

@@ -12,11 +12,11 @@ import pytest
 
 from er_gym.tasks import Task, TaskFileError, verbs
 from er_gym.tasks.generate import Generator
+from er_gym.tasks.generate.recipe_steps import STEPS
 from er_gym.tasks.generate.recipes import (
-    KINDS,
     LONGEST,
+    ROLE_KINDS,
     SHORTEST,
-    STEPS,
     Recipe,
     bundled_recipes,
     read_recipes,
@@ -35,7 +35,7 @@ RECIPES = {recipe.name: recipe for recipe in bundled_recipes()}
 def test_a_bundled_recipe_names_what_there_is(recipe: Recipe) -> None:
     kinds = recipe.roles.values()
     assert set(chain.from_iterable(k for k in kinds if not isinstance(k, str))) <= set(OBJECT_TYPES)
-    assert {kind for kind in kinds if isinstance(kind, str)} <= set(KINDS)
+    assert {kind for kind in kinds if isinstance(kind, str)} <= set(ROLE_KINDS)
     used = {role for step in recipe.steps for roles in step.values() for role in roles}
     assert used == set(recipe.roles)
 

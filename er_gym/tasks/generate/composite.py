@@ -10,7 +10,7 @@ from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import MOVE_TWO
 from er_gym.tasks.generate.transport import transfers
-from er_gym.tasks.generate.words import in_the
+from er_gym.tasks.generate.words import in_or_on_the
 
 _PARTNERS = 2
 """How many second transfers each first one gets."""
@@ -30,7 +30,7 @@ def sequence(
     builder.fetch(second)
     builder.put(where)
     return plan_from(
-        builder, obj, second, place=in_the(target.type), second_place=in_the(where.type)
+        builder, obj, second, place=in_or_on_the(target.type), second_place=in_or_on_the(where.type)
     )
 
 

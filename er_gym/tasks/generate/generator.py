@@ -15,8 +15,8 @@ from er_gym.tasks.generate.plan_builder import ImpossiblePlan
 from er_gym.tasks.generate.rules import RULES
 from er_gym.tasks.generate.scene_graph import Accepts, SceneGraph, SceneObject, read_scene_graph
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule
-from er_gym.tasks.generate.words import a, in_the, is_are, it
-from er_gym.tasks.goal import Condition, unmet
+from er_gym.tasks.generate.words import in_or_on_the, pronoun, verb_to_be, with_article
+from er_gym.tasks.goal import Condition, unmet_conditions
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME
@@ -122,7 +122,7 @@ class Generator:
         task = self._task(rule, plan, named)
         # Whether a search begins beside what is looked for is seen by who plays it.
         standing = [condition for condition in task.goal if not condition.in_reach]
-        return DONE_ALREADY if standing and not unmet(standing, self.objects) else task
+        return DONE_ALREADY if standing and not unmet_conditions(standing, self.objects) else task
 
     def _interchangeable(
         self,
@@ -133,7 +133,7 @@ class Generator:
         others: list[SceneObject],
     ) -> bool:
         """Whether any thing of the subject's type would do: each asks for the same actions."""
-        if any(not unmet((each,), self.objects) for each in _about(plan.goal, subject)):
+        if any(not unmet_conditions((each,), self.objects) for each in _about(plan.goal, subject)):
             return False
         for other in others:
             swapped = tuple(other if obj == subject else obj for obj in choice)
@@ -188,16 +188,16 @@ class Generator:
     def _words(self, plan: TaskPlan, named: Sequence[SceneObject]) -> dict[str, str]:
         words = {"room": room_kind(self.scene)}
         for prefix, obj in zip(("", "second_"), plan.subjects, strict=False):
-            name, one = obj.type, a(obj.type)
+            name, one = obj.type, with_article(obj.type)
             if obj in named:
-                where = in_the(self.scene_graph.place_of(obj).type)
-                name = f"{obj.type} that {is_are(obj.type)} {where}"
+                where = in_or_on_the(self.scene_graph.place_of(obj).type)
+                name = f"{obj.type} that {verb_to_be(obj.type)} {where}"
                 one = f"the {name}"
             words |= {
                 f"{prefix}object": name,
                 f"{prefix}an_object": one,
-                f"{prefix}it": it(obj.type),
-                f"{prefix}is": is_are(obj.type),
+                f"{prefix}it": pronoun(obj.type),
+                f"{prefix}is": verb_to_be(obj.type),
             }
         return words
 

@@ -9,7 +9,7 @@ from er_gym.tasks.generate.plan_builder import PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject, largest, may_put_into
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import MOVE
-from er_gym.tasks.generate.words import in_the
+from er_gym.tasks.generate.words import in_or_on_the
 
 
 def transfer(graph: SceneGraph, obj: SceneObject, target: SceneObject) -> TaskPlan:
@@ -17,7 +17,7 @@ def transfer(graph: SceneGraph, obj: SceneObject, target: SceneObject) -> TaskPl
     builder = PlanBuilder(graph)
     builder.fetch(obj)
     builder.put(target)
-    return plan_from(builder, obj, place=in_the(target.type))
+    return plan_from(builder, obj, place=in_or_on_the(target.type))
 
 
 def transfers(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject, SceneObject]]:

@@ -24,23 +24,23 @@ UNCOUNTED = frozenset({
 # fmt: on
 
 
-def a(object_type: str) -> str:
+def with_article(object_type: str) -> str:
     """The type with its indefinite article: "an Apple", "some Bread"."""
     if object_type in UNCOUNTED | PLURAL:
         return f"some {object_type}"
     return f"{'an' if object_type[0] in 'AEIOU' else 'a'} {object_type}"
 
 
-def it(object_type: str) -> str:
+def pronoun(object_type: str) -> str:
     """The pronoun for a thing of a type: "it" or "them"."""
     return "them" if object_type in PLURAL else "it"
 
 
-def is_are(object_type: str) -> str:
+def verb_to_be(object_type: str) -> str:
     """The verb for a thing of a type: "is" or "are"."""
     return "are" if object_type in PLURAL else "is"
 
 
-def in_the(receptacle_type: str) -> str:
+def in_or_on_the(receptacle_type: str) -> str:
     """Where a thing is that lies in a receptacle: "in the Fridge", "on the Shelf"."""
     return f"{'in' if receptacle_type in HOLLOW else 'on'} the {receptacle_type}"
