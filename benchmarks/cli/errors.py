@@ -13,7 +13,7 @@ from benchmarks.cli.terminal import echo
 _LONGEST = 2_000  # characters of a complaint
 
 if TYPE_CHECKING:
-    from er_gym.tasks.errors import SetAside, Taken
+    from er_gym.tasks.errors import SetAsideTask, Substitution
 
 CRASHED, STOPPED, INTERRUPTED = 1, 3, 130
 """Exit codes: episodes crashed; a run stopped before its end, as it was told to; Ctrl-C. And 2 is
@@ -44,11 +44,13 @@ def complain(message: str) -> None:
     echo(f"er-gym: {text}", err=True)
 
 
-def tell_left_out(suite: str, set_aside: Iterable[SetAside], taken: Iterable[Taken] = ()) -> None:
+def tell_left_out(
+    suite: str, set_aside: Iterable[SetAsideTask], taken: Iterable[Substitution] = ()
+) -> None:
     """Say which of a suite's tasks are left out, and what is taken for what the scenes lack."""
-    from er_gym.tasks.errors import told_once
+    from er_gym.tasks.errors import describe_substitutions
 
-    for line in told_once(taken):
+    for line in describe_substitutions(taken):
         complain(f"{suite}: {line}")
     for one in set_aside:
         complain(f"{suite}: set aside: {one}")

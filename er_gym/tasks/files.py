@@ -11,7 +11,7 @@ from typing import TypeVar
 from pydantic import BaseModel, ValidationError
 
 from er_gym.tasks import verbs
-from er_gym.tasks.errors import SetAside, TaskFileError
+from er_gym.tasks.errors import SetAsideTask, TaskFileError
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, TaskType
@@ -96,7 +96,7 @@ class TaskFile:
 
     tasks: tuple[Task, ...]
     places: tuple[int, ...] = ()
-    set_aside: tuple[SetAside, ...] = ()
+    set_aside: tuple[SetAsideTask, ...] = ()
 
     def all_or_none(self, path: Path) -> list[Task]:
         """The tasks; a :class:`TaskFileError` says what is wrong with the first set aside."""
@@ -130,7 +130,7 @@ def read_entries(entries: Iterable[Entry]) -> TaskFile:
     """
     tasks: dict[str, Task] = {}
     places: list[int] = []
-    set_aside: list[SetAside] = []
+    set_aside: list[SetAsideTask] = []
     first: dict[str, str] = {}
     for place, entry in enumerate(entries, 1):
         if place > MOST_TASKS:
@@ -138,7 +138,7 @@ def read_entries(entries: Iterable[Entry]) -> TaskFile:
         try:
             task = entry.read()
         except TaskFileError as error:
-            set_aside.append(SetAside(entry.stated_id or entry.where, str(error)))
+            set_aside.append(SetAsideTask(entry.stated_id or entry.where, str(error)))
             continue
         problem = ""
         if not _FILE_NAME_SAFE.fullmatch(task.id):
@@ -149,7 +149,7 @@ def read_entries(entries: Iterable[Entry]) -> TaskFile:
         elif task.id in tasks:
             problem = f"has the id {task.id!r}, as {first[task.id]} has; it must be unique"
         if problem:
-            set_aside.append(SetAside(entry.where, f"{entry.where} {problem}"))
+            set_aside.append(SetAsideTask(entry.where, f"{entry.where} {problem}"))
         else:
             tasks[task.id], first[task.id] = task, entry.where
             places.append(place)

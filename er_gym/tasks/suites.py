@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict
 
 from er_gym.plugins import PluginError, Registry, reason
 from er_gym.tasks import jsonl_format, paper_format
-from er_gym.tasks.errors import SetAside, TaskFileError, in_short
+from er_gym.tasks.errors import SetAsideTask, TaskFileError, summarise_set_aside
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import read_yaml
 from er_gym.tasks.suite_spec import SuiteSpec
@@ -54,7 +54,7 @@ class Suite:
     digest: str
     env: Mapping[str, Any] = field(default_factory=dict)
     description: str = ""
-    set_aside: tuple[SetAside, ...] = ()
+    set_aside: tuple[SetAsideTask, ...] = ()
     places: tuple[int, ...] = ()
 
 
@@ -177,7 +177,7 @@ def suite_from_file(path: str | Path) -> Suite:
         )
     found = _READERS[ending](path)
     if found.set_aside and not found.tasks:
-        raise TaskFileError(f"{path}: no task can be used: {in_short(found.set_aside)}")
+        raise TaskFileError(f"{path}: no task can be used: {summarise_set_aside(found.set_aside)}")
     return Suite(
         name=path.name[: -len(ending)],
         tasks=found.tasks,

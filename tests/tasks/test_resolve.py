@@ -58,7 +58,7 @@ def test_the_nearest_of_the_type_is_taken_wherever_the_id_stands() -> None:
     assert fitted.key_actions[0].related_objects == (SAFE,)
     assert (taken.named, taken.taken) == (off, SAFE)
     assert taken.metres == pytest.approx(0.05)
-    assert str(taken) == f"FloorPlan1 has no {off}: {SAFE}, 0.05 m off, is taken for it"
+    assert str(taken) == f"FloorPlan1 has no {off}: {SAFE}, 0.05 m off, is used instead"
     assert notes == []
 
 
@@ -175,7 +175,7 @@ def test_the_paper_tasks_fit_their_scenes(shared_data) -> None:
     assert sum("Safe|+01.62" in note for note in fitted.notes) == 2  # FloorPlan302
     assert sum("states no type" in note for note in fitted.notes) == 4
     assert len(fitted.notes) == 10
-    assert fitted.taken == fitted.set_aside == ()
+    assert fitted.substitutions == fitted.set_aside == ()
 
 
 def shifted(task: Task, metres: float, rng: random.Random) -> Task:
@@ -278,4 +278,4 @@ def test_arranged_scenes_are_looked_into_where_it_matters(arranged: Task, arrang
     task = replace(plain, arrangement=replace(arranged.arrangement, dirty=(off,)))
     fitted = resolve_tasks([arranged, task], arrange=arrange)
     assert fitted.tasks == (arranged, plain)
-    assert [(one.named, one.taken) for one in fitted.taken] == [(off, dirty)]
+    assert [(one.named, one.taken) for one in fitted.substitutions] == [(off, dirty)]
