@@ -1,4 +1,4 @@
-"""The table of task types: one row each, and nothing about them is written down anywhere else.
+"""The table of task types, one row for each; no other file states facts about single types.
 
 Names, groups and step limits are the paper's (Embodied-Reasoner, arXiv 2503.21696).
 """
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 SEARCH, MANIPULATE, TRANSPORT, COMPOSITE = "Search", "Manipulate", "Transport", "Composite"
 GROUPS = (SEARCH, MANIPULATE, TRANSPORT, COMPOSITE)
-"""In the order of the paper's result table."""
+"""The groups, in the order of the paper's result table."""
 
 
 @dataclass(frozen=True)
@@ -18,13 +18,13 @@ class TaskType:
     """A kind of task.
 
     Attributes:
-        name: as the paper's task files write it (``tasktype``).
-        title: as the paper's text calls it.
+        name: the name in the paper's task files (``tasktype``).
+        title: the name in the paper's text.
         group: one of :data:`GROUPS`.
-        env_id: the Gymnasium id under which episodes of this type can be made.
+        env_id: the Gymnasium id of the environment with tasks of this type.
         max_steps: an episode's step limit; placing the agent counts as the first step.
         ordered: whether key actions count only in the order in which they are listed.
-        search: whether the task is done by finding, that is, ``end`` asks to see the target.
+        search: whether the task is a search: on ``end`` the target must be within reach.
     """
 
     name: str
@@ -36,7 +36,7 @@ class TaskType:
     search: bool = False
 
     def __reduce__(self) -> tuple[Callable[[str], TaskType], tuple[str]]:
-        # A row stays the row of the table when it goes to another process.
+        # Unpickled in another process, a row is that row of the table again.
         return task_type, (self.name,)
 
 
@@ -61,10 +61,10 @@ BY_ENV_ID = {task_type.env_id: task_type for task_type in TASK_TYPES}
 
 
 def task_type(name: str) -> TaskType:
-    """Look a task type up by the paper's name for it or by its environment id.
+    """Look up a task type by the paper's name or by its environment id.
 
     Raises:
-        ValueError: there is no such type; the message lists those there are.
+        ValueError: there is no such type; the message lists the known types.
     """
     found = BY_NAME.get(name) or BY_ENV_ID.get(name) if isinstance(name, str) else None
     if found is None:
