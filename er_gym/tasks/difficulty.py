@@ -9,10 +9,7 @@ from math import dist
 from typing import Any
 
 from er_gym.tasks import verbs
-from er_gym.tasks.task import Task
-
-_WHOLE = 4
-"""The number of parts of an id that name the whole object: its type and three coordinates."""
+from er_gym.tasks.task import Task, whole_id
 
 
 @dataclass(frozen=True)
@@ -90,8 +87,7 @@ def _distance(
 
 def _standing_for(object_id: str, there: Mapping[str, object]) -> str:
     """The id if the scene has it, else the id of the whole object, else ``""``."""
-    whole = "|".join(object_id.split("|")[:_WHOLE])
-    return next((name for name in (object_id, whole) if name in there), "")
+    return next((name for name in (object_id, whole_id(object_id)) if name in there), "")
 
 
 def _middle(entry: Mapping[str, Any]) -> tuple[float, float]:

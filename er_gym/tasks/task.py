@@ -30,6 +30,11 @@ def type_of_id(object_id: str) -> str:
     return re.sub(r"_\d+$", "", last)
 
 
+def whole_id(object_id: str) -> str:
+    """The id of the whole object: its type and three coordinates, without the name of a part."""
+    return "|".join(object_id.split("|")[:4])
+
+
 @dataclass(frozen=True)
 class AgentPose:
     """A pose of the agent: metres and degrees, AI2-THOR's world frame.

@@ -13,7 +13,7 @@ from er_gym.tasks.generate.transport import transfers
 from er_gym.tasks.generate.words import in_or_on_the
 
 _PARTNERS = 2
-"""How many second transfers each first one gets."""
+"""How many second transfers follow each first one."""
 
 
 def sequence(
@@ -23,7 +23,7 @@ def sequence(
     second: SceneObject,
     where: SceneObject,
 ) -> TaskPlan:
-    """Put a thing into a target, then a second thing where that belongs."""
+    """The plan to put an object into a target, then a second object into a second target."""
     builder = PlanBuilder(graph)
     builder.fetch(obj)
     builder.put(target)
@@ -35,7 +35,7 @@ def sequence(
 
 
 def _sequences(graph: SceneGraph) -> Iterator[tuple[SceneObject, ...]]:
-    """Each transfer comes first a few times, so that there are not too many."""
+    """Some pairs of transfers: each transfer is the first one of a few pairs."""
     moves = [*transfers(graph, hidden=False), *transfers(graph, hidden=True)]
     for index, (obj, target) in enumerate(moves):
         start = index + len(moves) // 2
@@ -50,7 +50,7 @@ def _sequences(graph: SceneGraph) -> Iterator[tuple[SceneObject, ...]]:
 
 
 def _independent(*objects: SceneObject) -> bool:
-    """Whether things, targets and their types all differ: neither transfer undoes the other."""
+    """Whether all objects and targets differ in type, so that neither transfer undoes the other."""
     return len({obj.type for obj in objects}) == len(objects)
 
 

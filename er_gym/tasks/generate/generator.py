@@ -1,4 +1,4 @@
-"""From a scene's objects to its tasks."""
+"""The generator: from the objects of a scene to its tasks."""
 
 from __future__ import annotations
 
@@ -28,7 +28,13 @@ SAME_PLACES = "one type would name two places"
 
 
 def generator_for(controller: Any, scene: str, seed: int) -> Generator:
-    """The generator for a room in one of its arrangements; 0 is the recorded one."""
+    """Set up a scene in one of its arrangements, and return the generator for it.
+
+    Args:
+        controller: an AI2-THOR controller.
+        scene: such as ``FloorPlan1``.
+        seed: the seed of the arrangement; 0 for the recorded one.
+    """
     arrangement = random_arrangement(controller, scene, seed) if seed else Arrangement()
     return Generator(
         scene, set_up_scene(controller, scene, arrangement).metadata["objects"], arrangement
@@ -37,15 +43,15 @@ def generator_for(controller: Any, scene: str, seed: int) -> Generator:
 
 @dataclass(frozen=True)
 class Generator:
-    """Makes the tasks of a scene as it is when an episode begins.
+    """Generates the tasks of a scene in one arrangement.
 
-    Args:
+    Attributes:
         scene: its name, such as ``FloorPlan1``.
-        objects: ``event.metadata["objects"]``.
-        start: how the scene was arranged.
-        accepts: whether a thing of one type may be put into a receptacle of another.
-        rows: what to make.
-        dropped: counts the reasons for which tasks were not made.
+        objects: ``event.metadata["objects"]`` after the scene was arranged.
+        arrangement: how the scene was arranged.
+        accepts: whether an object of one type may be put into a receptacle of another.
+        rules: the kinds of tasks to generate.
+        dropped: how many choices gave no task, by reason.
     """
 
     scene: str
@@ -57,14 +63,14 @@ class Generator:
 
     @cached_property
     def scene_graph(self) -> SceneGraph:
-        """The scene as the rules see it."""
+        """The objects and what lies in what."""
         return read_scene_graph(self.objects, self.accepts)
 
     def tasks(self, types: Collection[str] = ()) -> Iterator[Task]:
-        """Yield the candidate tasks, row by row; the same for the same arguments.
+        """Yield the candidate tasks, rule by rule; the same for the same arguments.
 
         Args:
-            types: names of task types; all where it is empty.
+            types: names of task types; all types if it is empty.
         """
         made: set[str] = set()
         for rule in self.rules:
@@ -73,25 +79,26 @@ class Generator:
                     task = self._candidate(rule, choice)
                     if isinstance(task, str):
                         self.dropped[task] += 1
-                    elif task.id not in made:  # else it is the same, about another of its objects
+                    elif task.id not in made:  # else an equal task about an equivalent object
                         made.add(task.id)
                         yield task
 
     def request(self, type_name: str, *object_ids: str) -> Task:
-        """The task of a type about given objects, whether or not the rules would choose them.
+        """The task of a type about given objects, even if the rules would not choose these.
 
         Args:
-            object_ids: what is handled and where it goes, in the order of the instruction: one for
-                a search, a pickup or a toggle, two for a transfer, four for two transfers.
+            type_name: a name in :data:`~er_gym.tasks.types.TASK_TYPES`; not the long-range type.
+            object_ids: the objects and their targets, in the order of the instruction: one id for a
+                search, a pickup or a toggle, two for a transfer, four for two transfers.
 
         Raises:
-            ValueError: no such type is generated on request, the scene has no such object, or their
-                number is wrong.
+            ValueError: the type cannot be requested, the scene lacks an object, or the number of
+                objects is wrong.
         """
         rule = next((rule for rule in self.rules if rule.type == type_name and not rule.slug), None)
         if rule is None:
             known = ", ".join(rule.type for rule in self.rules if not rule.slug)
-            raise ValueError(f"no {type_name!r} tasks are made on request; choose one of: {known}")
+            raise ValueError(f"{type_name!r} tasks cannot be requested; choose one of: {known}")
         unknown = [i for i in object_ids if i not in self.scene_graph.chosen]
         if unknown:
             raise ValueError(f"{self.scene} has no object {unknown[0]!r} when the task begins")
@@ -105,7 +112,7 @@ class Generator:
         return self._task(rule, plan, ())
 
     def _candidate(self, rule: TaskRule, choice: tuple[SceneObject, ...]) -> Task | str:
-        """The task of a choice; or why there is none."""
+        """The task for a choice, or the reason why there is none."""
         plan = rule.plan(self.scene_graph, *choice)
         if not plan.one_object_per_type:
             return SAME_PLACES
@@ -120,7 +127,7 @@ class Generator:
                 return AMBIGUOUS
             named.append(subject)
         task = self._task(rule, plan, named)
-        # Whether a search begins beside what is looked for is seen by who plays it.
+        # Only an agent can tell whether a search begins within reach of its target.
         standing = [condition for condition in task.goal if not condition.in_reach]
         return DONE_ALREADY if standing and not unmet_conditions(standing, self.objects) else task
 
@@ -132,7 +139,7 @@ class Generator:
         subject: SceneObject,
         others: list[SceneObject],
     ) -> bool:
-        """Whether any thing of the subject's type would do: each asks for the same actions."""
+        """Whether any object of the subject's type will do: all need the same actions."""
         if any(not unmet_conditions((each,), self.objects) for each in _about(plan.goal, subject)):
             return False
         for other in others:
@@ -145,7 +152,7 @@ class Generator:
         return True
 
     def _told_by_place(self, subject: SceneObject, others: list[SceneObject]) -> bool:
-        """Whether the type of what it lies in tells it from the others."""
+        """Whether the type of its receptacle distinguishes an object from the others."""
         place = self.scene_graph.place_of(subject)
         holders = {parent.type for other in others for parent in self.scene_graph.parents(other)}
         return place != subject and place.type not in holders
@@ -160,7 +167,7 @@ class Generator:
             id=task_id,
             type=BY_NAME[rule.type],
             scene=self.scene,
-            # Not hash(): that differs from process to process.
+            # Not hash(): it differs between processes.
             instruction=instructions[zlib.crc32(task_id.encode()) % len(instructions)],
             name=instructions[0],
             key_actions=plan.key_actions,

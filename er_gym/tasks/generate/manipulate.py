@@ -1,4 +1,4 @@
-"""Doing something to one thing where it is: take it, switch it."""
+"""Tasks about one object where it is: pick it up, switch it."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ NEVER_TOGGLED = frozenset({"StoveKnob", "StoveBurner", "LightSwitch"})
 
 
 def pickup(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
-    """Take a thing."""
+    """The plan to pick up an object."""
     builder = PlanBuilder(graph)
     builder.fetch(obj)
     return plan_from(builder, obj)
 
 
 def toggle(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
-    """Switch a thing."""
+    """The plan to switch an object on or off."""
     builder = PlanBuilder(graph)
     builder.go_and_toggle(obj)
     return plan_from(builder, obj, way="off" if obj.on else "on")

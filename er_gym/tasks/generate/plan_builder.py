@@ -1,4 +1,4 @@
-"""Acting a task out on paper: key actions as they come, and what they leave behind."""
+"""A builder that collects key actions and tracks how they change the scene."""
 
 from __future__ import annotations
 
@@ -14,56 +14,54 @@ from er_gym.thor import OBJECT_TYPES
 
 
 class ImpossiblePlan(Exception):
-    """The script cannot go on; the message says why. Most ways to fill a recipe are impossible."""
+    """A plan cannot be continued; the message says why. Most choices for recipes are."""
 
 
 class PlanBuilder:
-    """What the agent does, one thing after another, and how the room then is.
+    """Collects the key actions of a plan and tracks the state of the scene.
 
-    What has been opened to get at a thing is closed again: after a pickup at once, after a put when
-    the agent goes on, so that the last put of all leaves it open.
+    Receptacles that the plan opened to reach an object are closed again: at once after a pickup,
+    and before the next navigation after a put. So the last put leaves its receptacle open.
 
     Args:
-        room: where.
-        stays: whether going to where one is already needs no key action.
+        graph: the scene.
+        merge_visits: whether navigation to the agent's present place adds no key action.
     """
 
     def __init__(self, graph: SceneGraph, merge_visits: bool = False) -> None:
         self.graph = graph
         self.actions: list[KeyAction] = []
         self.handled: list[SceneObject] = []
-        """What it takes hold of, switches or fills, unless that is what one goes to itself."""
+        """Objects that the agent picks up, switches or fills, without those it navigates to."""
         self.held: SceneObject | None = None
         self._merge_visits = merge_visits
         self._at: SceneObject | None = None
-        self._inside: dict[
-            str, SceneObject
-        ] = {}  # id of a thing that was moved, to what it lies in
-        self._left: dict[str, SceneObject] = {}  # and to what it was taken out of again
-        self._open: dict[str, SceneObject] = {}  # what was opened and not closed again
+        self._inside: dict[str, SceneObject] = {}  # id of a moved object to its receptacle
+        self._left: dict[str, SceneObject] = {}  # id of one picked up again to that receptacle
+        self._open: dict[str, SceneObject] = {}  # id to object, for what the plan opened
         self._on: dict[str, bool] = {}
         self._states: dict[SceneObject, dict[str, bool | str]] = {}
 
     # -- asking ----------------------------------------------------------------------------------
 
     def place_of(self, obj: SceneObject) -> SceneObject:
-        """What one goes to for a thing, where it now is."""
+        """The object to navigate to for an object, at its present place."""
         moved_into = self._inside.get(obj.id)
         if moved_into is None:
             return self.graph.place_of(obj)
         return self.place_of(moved_into) if moved_into.pickupable else moved_into
 
     def is_on(self, obj: SceneObject) -> bool:
-        """Whether it is switched on by now."""
+        """Whether an object is switched on at present."""
         return self._on.get(obj.id, obj.on)
 
     def lies_in(self, obj: SceneObject, target: SceneObject) -> bool:
-        """Whether a thing lies in a target by now."""
+        """Whether an object lies in a target at present."""
         moved_into = self._inside.get(obj.id)
         return self.graph.is_in(obj, target) if moved_into is None else moved_into == target
 
     def taken_from(self, obj: SceneObject) -> SceneObject | None:
-        """What the script put a thing into and took it out of again."""
+        """The receptacle into which the plan put an object before it picked it up again."""
         return self._left.get(obj.id)
 
     def _is_closed(self, obj: SceneObject) -> bool:
@@ -72,7 +70,7 @@ class PlanBuilder:
     # -- doing -----------------------------------------------------------------------------------
 
     def go_to(self, place: SceneObject, reason: SceneObject) -> None:
-        """Go to a receptacle because of what is in it, or to a thing itself."""
+        """Navigate to an object; ``reason`` is the object that lies in it, or the same object."""
         if self._merge_visits and self._at == place:
             return
         if self._at != place:
@@ -83,25 +81,25 @@ class PlanBuilder:
         self._at = place
 
     def open(self, obj: SceneObject) -> None:
-        """Open it, if it is closed."""
+        """Open an object if it is closed."""
         if self._is_closed(obj):
             self._do(verbs.OPEN, obj)
             self._open[obj.id] = obj
 
     def close(self, obj: SceneObject) -> None:
-        """Shut it, if the script opened it."""
+        """Close an object if the plan opened it."""
         if self._open.pop(obj.id, None):
             self._do(verbs.CLOSE, obj)
 
     def visit(self, obj: SceneObject) -> SceneObject:
-        """Go to where a thing is and open what hides it; returns the place."""
+        """Navigate to the place of an object and open it; returns the place."""
         place = self.place_of(obj)
         self.go_to(place, obj)
         self.open(place)
         return place
 
     def fetch(self, obj: SceneObject) -> None:
-        """Go to where a thing is and take it, leaving the place as it was."""
+        """Navigate to an object and pick it up; its place is closed again."""
         if self.held == obj:
             return
         place = self.visit(obj)
@@ -109,7 +107,11 @@ class PlanBuilder:
         self.close(place)
 
     def pickup(self, obj: SceneObject) -> None:
-        """Take a thing from where the agent stands."""
+        """Pick up an object at the agent's place.
+
+        Raises:
+            ImpossiblePlan: the hand is full, or the object is not pickupable.
+        """
         if self.held is not None:
             raise ImpossiblePlan(f"the hand holds {self.held.type} already")
         if not obj.pickupable:
@@ -122,7 +124,11 @@ class PlanBuilder:
             self._left[obj.id] = moved_into
 
     def put(self, target: SceneObject) -> None:
-        """Put what is in the hand into a target, going to where that is."""
+        """Navigate to a target and put the held object into it.
+
+        Raises:
+            ImpossiblePlan: the hand is empty, or the target is no other receptacle.
+        """
         if self.held is None:
             raise ImpossiblePlan("the hand is empty")
         if not target.receptacle or target == self.held:
@@ -138,23 +144,27 @@ class PlanBuilder:
         self.held = None
 
     def go_and_toggle(self, obj: SceneObject) -> None:
-        """Go to where a thing is and switch it."""
+        """Navigate to an object and switch it."""
         self.visit(obj)
         self._handle(obj)
         self.toggle(obj)
 
     def toggle(self, obj: SceneObject) -> None:
-        """Switch a thing on, or off if it is on; the agent is there."""
+        """Switch an object at the agent's place on, or off if it is on.
+
+        Raises:
+            ImpossiblePlan: the object has no switch.
+        """
         knobs = (knob for knob in self.graph.objects.values() if obj.id in knob.controlled)
         if not obj.toggleable and not any(knobs):
             raise ImpossiblePlan(f"{obj.id} has no switch")
         self._do(verbs.TOGGLE, obj)
         self._on[obj.id] = not self.is_on(obj)
-        if obj.toggleable:  # a burner has its state in its knob
+        if obj.toggleable:  # a StoveBurner has its state in its StoveKnob
             self.set_state(obj, isToggled=self._on[obj.id])
 
     def slice(self, obj: SceneObject) -> SceneObject:
-        """Cut up a thing where the agent stands, with the knife in its hand; returns a slice."""
+        """Slice an object at the agent's place with the held knife; returns the first slice."""
         self._do(verbs.SLICE, obj)
         kind = f"{obj.type}Sliced"
         cookable = "cookable" in OBJECT_TYPES[kind].properties
@@ -165,7 +175,7 @@ class PlanBuilder:
         return part
 
     def do(self, verb: Verb, obj: SceneObject) -> None:
-        """Do a verb to a thing, going to where that is unless it is in the hand."""
+        """Do a verb to an object; navigate to it first unless the agent holds it."""
         if obj != self.held:
             self.visit(obj)
         self._do(verb.name, obj)
@@ -174,7 +184,7 @@ class PlanBuilder:
             self.set_state(obj, **dict(verb.makes))
 
     def set_state(self, obj: SceneObject, **state: bool | str) -> None:
-        """Note what a thing's metadata must say in the end."""
+        """Add metadata fields and their final values to the goal."""
         self._states.setdefault(obj, {}).update(state)
 
     def _do(self, verb: str, obj: SceneObject) -> None:
@@ -184,15 +194,15 @@ class PlanBuilder:
         if obj not in self.handled:
             self.handled.append(obj)
 
-    # -- what comes of it ------------------------------------------------------------------------
+    # -- results ---------------------------------------------------------------------------------
 
     def key_actions(self) -> tuple[KeyAction, ...]:
-        """All of them, and ``end``."""
+        """The collected key actions and ``end``."""
         involved = dict.fromkeys(chain.from_iterable(a.related_objects for a in self.actions))
         return (*self.actions, KeyAction(verbs.END, related_objects=tuple(involved)))
 
     def goal(self) -> tuple[Condition, ...]:
-        """How things are in the end: what was moved, switched or changed."""
+        """The final state of all objects that were moved, switched or changed."""
         found: dict[str, Condition] = {}
         for obj in self.handled:
             if obj == self.held:

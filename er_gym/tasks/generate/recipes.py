@@ -153,12 +153,12 @@ def _check(recipe: Recipe, where: str) -> None:
 
 @lru_cache(maxsize=1)
 def bundled_recipes() -> tuple[Recipe, ...]:
-    """The recipes that come with er-gym."""
+    """The recipes of er-gym."""
     return read_recipes(Path(str(files("er_gym.tasks.generate").joinpath("recipes.yaml"))))
 
 
 def recipe_rules(recipes: Sequence[Recipe]) -> tuple[TaskRule, ...]:
-    """A row of the table of what is generated for each recipe."""
+    """A rule for each recipe."""
     return tuple(
         TaskRule(
             "long-range tasks with dependency relationships",
@@ -179,7 +179,7 @@ def _instructions(words: Mapping[str, str | Sequence[str]]) -> list[str]:
 
 
 def _plan(recipe: Recipe, graph: SceneGraph, *chosen: SceneObject) -> TaskPlan:
-    """Act a recipe out."""
+    """The plan of a recipe for the objects in its roles."""
     roles = dict(zip(recipe.roles, chosen, strict=True))
     run = RecipeRun(graph, PlanBuilder(graph, merge_visits=True), roles, [])
     do = steps()
@@ -189,7 +189,7 @@ def _plan(recipe: Recipe, graph: SceneGraph, *chosen: SceneObject) -> TaskPlan:
 
 
 def _choices(recipe: Recipe, graph: SceneGraph) -> Iterator[tuple[SceneObject, ...]]:
-    """Some of the ways to fill a recipe's roles, at random but the same for the same room."""
+    """Random choices of objects for a recipe's roles; the same for the same scene."""
     candidates = [_candidates(graph, kind) for kind in recipe.roles.values()]
     if not all(candidates):
         return
@@ -214,9 +214,10 @@ def _choices(recipe: Recipe, graph: SceneGraph) -> Iterator[tuple[SceneObject, .
 
 
 def _candidates(graph: SceneGraph, kind: tuple[str, ...] | str) -> list[SceneObject]:
-    """Who may play a role: things that are alone of their type, or the largest of several.
+    """The objects that can fill a role: one of each type, the largest.
 
-    What is carried or switched has to be alone, for the words name it by its type.
+    A pickupable or toggleable object must be the only one of its type, because the instruction
+    names it by its type.
     """
     objects = ROLE_KINDS[kind](graph) if isinstance(kind, str) else _of_types(graph, kind)
     groups: dict[str, list[SceneObject]] = {}
@@ -230,7 +231,7 @@ def _candidates(graph: SceneGraph, kind: tuple[str, ...] | str) -> list[SceneObj
 
 
 def _of_types(graph: SceneGraph, types: Sequence[str]) -> list[SceneObject]:
-    """Those of some types that one can get at."""
+    """The objects of some types, without pickupable ones that are neither exposed nor enclosed."""
     return [
         obj
         for obj in graph.of_type(*types)

@@ -1,4 +1,4 @@
-"""The table of what is generated: the rows of every family."""
+"""The table of all rules: those of every family."""
 
 from __future__ import annotations
 

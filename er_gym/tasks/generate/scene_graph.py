@@ -1,4 +1,4 @@
-"""A scene as the rules see it: an affiliation graph of who lies in what."""
+"""The scene graph: the objects of a scene, and which object lies in which."""
 
 from __future__ import annotations
 
@@ -7,29 +7,35 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any, TypeAlias
 
+from er_gym.tasks.equivalence import BASIN_OF
+from er_gym.tasks.task import whole_id
+
 Accepts: TypeAlias = Callable[[str, str], bool]
-"""Whether a thing of the first type may be put into a receptacle of the second."""
+"""Whether an object of the first type may be put into a receptacle of the second type."""
 
 NEVER_VISITED = frozenset({"Floor", "Toilet", "Chair", "Stool"})
-"""Receptacle types that no task of its own accord sends the agent to: one stands on the floor
-anyhow, a toilet does not count, and the boxes of chairs and stools reach under tables, so that the
-scenes put things into both."""
-WHOLES = frozenset({"Sink", "Bathtub"})
-"""Receptacle types that nothing is put into: things go into their basins."""
+"""Receptacle types to which no generated task sends the agent.
+
+The agent stands on the floor anyway, and toilets do not count. The bounding boxes of chairs and
+stools reach under tables, so that the scenes list some objects in both.
+"""
+NEVER_FILLED = frozenset(BASIN_OF)
+"""Receptacle types into which nothing is put: objects go into their basins."""
 WATER_REACH = 1.0
-"""A Faucet is a basin's if their middles are so near, metres on the floor plan."""
+"""The largest distance between the centres of a basin and its Faucet, metres, floor plan."""
 
 
 @dataclass(frozen=True)
 class SceneObject:
-    """What the rules read of an object's metadata.
+    """The metadata of an object that the rules read.
 
     Attributes:
-        closed: whether it opens and is shut.
+        parents: ids of its parent receptacles.
+        closed: whether it is openable and closed.
         on: whether it is switched on.
-        controlled: ids of what it is the switch of, as a stove knob is of its burner.
-        volume: of its axis-aligned box, m³.
-        x, z: the middle of that box, metres, AI2-THOR's world frame.
+        controlled: ids of the objects that it switches, as a StoveKnob switches its StoveBurner.
+        volume: of its axis-aligned bounding box, m³.
+        x, z: the centre of that box, metres, AI2-THOR's world frame.
     """
 
     id: str
@@ -53,34 +59,34 @@ class SceneObject:
 
 @dataclass(frozen=True)
 class SceneGraph:
-    """A scene's things by id, in scene order, and what goes where."""
+    """The objects of a scene by id, in the order of the metadata, and what receptacles accept."""
 
     objects: Mapping[str, SceneObject]
     accepts: Accepts
 
     def parents(self, obj: SceneObject) -> list[SceneObject]:
-        """What a thing lies in, as far as that is in the scene."""
+        """The parent receptacles of an object that are in the scene."""
         return [self.objects[parent] for parent in obj.parents if parent in self.objects]
 
     def of_type(self, *types: str) -> list[SceneObject]:
-        """All things of these types."""
+        """All objects of these types."""
         return [obj for obj in self.objects.values() if obj.type in types]
 
     def others_of_type(self, obj: SceneObject) -> list[SceneObject]:
-        """All other things of its type."""
+        """All other objects of its type."""
         return [other for other in self.of_type(obj.type) if other != obj]
 
     def stands_free(self, obj: SceneObject) -> bool:
-        """Whether a thing stands on the floor or on nothing."""
+        """Whether an object stands on the floor or on nothing."""
         parents = self.parents(obj)
         return not parents or any(parent.type == "Floor" for parent in parents)
 
     def place_of(self, obj: SceneObject) -> SceneObject:
-        """What one goes to for a thing: the receptacle that it lies in, else the thing itself.
+        """The object to navigate to for an object: its receptacle, else the object itself.
 
-        Of several, what is closed comes first, then what stands free, then what is not carried
-        about itself, then what the metadata names first; a chair or the like only if there is
-        nothing else.
+        Among several receptacles, closed ones come first, then free-standing ones, then those that
+        cannot be picked up, then the metadata's order decides. Those of :data:`NEVER_VISITED` come
+        last, and the Floor never.
         """
         parents = [parent for parent in self.parents(obj) if parent.receptacle]
         fit = [parent for parent in parents if may_visit(parent)] or [
@@ -98,31 +104,31 @@ class SceneGraph:
         )
 
     def is_exposed(self, obj: SceneObject) -> bool:
-        """Whether it lies in something that does not open and that stands free."""
+        """Whether an object lies in a free-standing receptacle that does not open."""
         return not any(parent.openable for parent in self.parents(obj)) and any(
             may_visit(parent) and self.stands_free(parent) for parent in self.parents(obj)
         )
 
     def is_enclosed(self, obj: SceneObject) -> bool:
-        """Whether it lies in something closed that stands free."""
+        """Whether an object lies in a free-standing receptacle that is closed."""
         return any(
             parent.receptacle and parent.closed and may_visit(parent) and self.stands_free(parent)
             for parent in self.parents(obj)
         )
 
     def pickupable_objects(self, hidden: bool) -> Iterator[SceneObject]:
-        """What there is to pick up: the enclosed things or the exposed ones."""
+        """The pickupable objects that are enclosed (``hidden``) or exposed."""
         qualifies = self.is_enclosed if hidden else self.is_exposed
         return (obj for obj in self.objects.values() if obj.pickupable and qualifies(obj))
 
     def is_in(self, obj: SceneObject, target: SceneObject) -> bool:
-        """Whether a thing is, or lies in, that target or another part of it (a Sink's basin)."""
+        """Whether an object is or lies in a target, or another part of it (a Sink's basin)."""
         return any(same_whole(target.id, holder) for holder in (obj.id, *obj.parents))
 
     def sink_and_faucet(self) -> tuple[SceneObject, SceneObject] | None:
-        """The SinkBasin and its Faucet, which is off: the scene has one of each, that one can name.
+        """The SinkBasin and its Faucet, if the scene has exactly one of each and the Faucet is off.
 
-        None where a bathtub's basin is nearer to the Faucet: the water runs into that.
+        None if a BathtubBasin is nearer to the Faucet: the water runs into the bathtub.
         """
         sinks, faucets = self.of_type("SinkBasin"), self.of_type("Faucet")
         if len(sinks) != 1 or len(faucets) != 1 or faucets[0].on:
@@ -167,25 +173,20 @@ def _scene_object(item: Mapping[str, Any]) -> SceneObject:
 
 
 def largest(objects: Iterable[SceneObject]) -> SceneObject:
-    """The thing with the largest box; the last id decides between equals."""
+    """The object with the largest bounding box; the last id decides between equals."""
     return max(objects, key=lambda obj: (obj.volume, obj.id))
 
 
 def may_visit(obj: SceneObject) -> bool:
-    """Whether tasks may send the agent to a thing."""
+    """Whether tasks may send the agent to an object."""
     return obj.type not in NEVER_VISITED
 
 
 def may_put_into(obj: SceneObject) -> bool:
-    """Whether tasks may put something there, a receptacle given."""
-    return may_visit(obj) and obj.type not in WHOLES
+    """Whether tasks may put objects into a receptacle."""
+    return may_visit(obj) and obj.type not in NEVER_FILLED
 
 
 def same_whole(one_id: str, other_id: str) -> bool:
-    """Whether two ids name one object or parts of it, as a Sink and its basin."""
-    return _whole(one_id) == _whole(other_id)
-
-
-def _whole(object_id: str) -> str:
-    """The id of what an object is a part of: type and coordinates, without a part's name."""
-    return "|".join(object_id.split("|")[:4])
+    """Whether two ids name the same object or parts of it, as a Sink and its SinkBasin."""
+    return whole_id(one_id) == whole_id(other_id)

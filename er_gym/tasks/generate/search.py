@@ -1,4 +1,4 @@
-"""Searches: go to where a thing is, open what hides it."""
+"""Searches: go to the place of an object and open the receptacle that hides it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from er_gym.tasks.goal import Condition
 
 
 def search(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
-    """Find a thing."""
+    """The plan to find an object."""
     builder = PlanBuilder(graph)
     builder.visit(obj)
     return plan_from(builder, obj, goal=(Condition(obj.type, in_reach=True),))

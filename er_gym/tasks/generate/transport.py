@@ -1,4 +1,4 @@
-"""Transfers: fetch a thing, put it somewhere else."""
+"""Transfers: fetch an object and put it into another receptacle."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from er_gym.tasks.generate.words import in_or_on_the
 
 
 def transfer(graph: SceneGraph, obj: SceneObject, target: SceneObject) -> TaskPlan:
-    """Fetch a thing and put it into a target."""
+    """The plan to fetch an object and put it into a target."""
     builder = PlanBuilder(graph)
     builder.fetch(obj)
     builder.put(target)
@@ -21,7 +21,7 @@ def transfer(graph: SceneGraph, obj: SceneObject, target: SceneObject) -> TaskPl
 
 
 def transfers(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject, SceneObject]]:
-    """Every exposed or enclosed thing, with one target of each receptacle type that takes it."""
+    """Every exposed or enclosed object, with one target of each receptacle type that accepts it."""
     targets = [target for group in _by_type(graph) if (target := _target_of(graph, group))]
     for obj in graph.pickupable_objects(hidden):
         for target in targets:
@@ -30,9 +30,10 @@ def transfers(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject, Sc
 
 
 def _target_of(graph: SceneGraph, group: list[SceneObject]) -> SceneObject | None:
-    """The largest of some receptacles of one type, if a transfer may go there.
+    """The largest receptacle of one type that can be a target; None if there is none.
 
-    None may be open where another is shut: the words do not say which.
+    All receptacles of the type must be open, or all closed: the instruction does not say which one
+    is meant.
     """
     alike = len({obj.closed for obj in group}) == 1
     fit = [obj for obj in group if _is_target(graph, obj)]
@@ -40,9 +41,10 @@ def _target_of(graph: SceneGraph, group: list[SceneObject]) -> SceneObject | Non
 
 
 def _is_target(graph: SceneGraph, obj: SceneObject) -> bool:
-    """Whether transfers may go to a thing: a receptacle that stands somewhere one can say.
+    """Whether an object can be the target of transfers.
 
-    What can be carried is gone to where it stands, unless that is the floor.
+    The agent reaches a pickupable receptacle by way of the place where it stands, so that place
+    must be exposed, or the receptacle must stand free.
     """
     return (obj.receptacle and may_put_into(obj)) and (
         not obj.pickupable or graph.is_exposed(obj) or graph.stands_free(obj)
