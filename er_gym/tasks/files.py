@@ -35,7 +35,7 @@ def as_utf8(text: str, path: Path) -> bytes:
     except UnicodeEncodeError as error:
         half = error.object[error.start]
         raise TaskFileError(
-            f"{path}: cannot be written: a text holds half a character, {half!r}"
+            f"{path}: cannot be written: a text holds a lone surrogate (half a character), {half!r}"
         ) from None
 
 

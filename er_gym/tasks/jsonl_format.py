@@ -236,7 +236,7 @@ def _entry(data: object, where: str, layouts: Mapping[str, Mapping[str, ObjectPo
     def read() -> Task:
         record = validated(TaskRecord, data, where)
         if record.layout and record.layout not in layouts:
-            raise TaskFileError(f"{where} begins with a layout that no line before it tells")
+            raise TaskFileError(f"{where} names a layout that no earlier line defines")
         return _task(record, layouts.get(record.layout, {}), where)
 
     stated = data.get("id") if isinstance(data, dict) else None

@@ -178,7 +178,7 @@ def _scene(metadatapath: str, path: Path, where: str) -> str:
         with suppress(TaskFileError):
             return known_scene(found[0] if found else "", where)
     raise TaskFileError(
-        f"{where} tells no scene: neither its metadatapath {metadatapath!r} nor its folder "
+        f"{where} names no scene: neither its metadatapath {metadatapath!r} nor its folder "
         f"{folder!r} names one, such as FloorPlan1"
     )
 

@@ -61,7 +61,7 @@ class SuiteSpec(BaseModel):
     def _known_types(cls, types: tuple[str, ...]) -> tuple[str, ...]:
         for name in types:
             if name not in BY_NAME:
-                raise ValueError(f"unknown type {name!r}; choose of: {', '.join(BY_NAME)}")
+                raise ValueError(f"unknown type {name!r}; choose one of: {', '.join(BY_NAME)}")
         return types
 
     @field_validator("hidden_depth", "distractors", "distance")
@@ -69,7 +69,7 @@ class SuiteSpec(BaseModel):
     def _ordered(cls, span: Span) -> Span:
         low, high = span
         if not (math.isfinite(low) and (high is None or low <= high < math.inf)):
-            raise ValueError(f"no range: from {low:g} to {high}; give the smaller number first")
+            raise ValueError(f"not a range: from {low:g} to {high}; give the smaller number first")
         return span
 
     @property

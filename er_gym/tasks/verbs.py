@@ -279,7 +279,7 @@ def register(verb: Verb) -> None:
     """
     if table.cache_info().currsize:
         raise PluginError(
-            f"verb {verb.name!r} comes too late: the action space has been put together. Register "
+            f"verb {verb.name!r} comes too late: the action space has been built. Register "
             f"it before er_gym.envs or agents are imported, or name it in ${VARIABLE}"
         )
     _merged(_merged({each.name: each for each in OWN}, _registered), [verb])
@@ -341,7 +341,7 @@ def _problem(verb: Verb, taken: Mapping[str, str]) -> str:
     """The first problem of a row, "" if there is none."""
     for phrase in verb.said:
         if not _PHRASE.fullmatch(phrase) or phrase != phrase.lower():
-            return f"{phrase!r} is no phrase; write lower-case words with single spaces"
+            return f"{phrase!r} is not a phrase; write lower-case words with single spaces"
         if phrase in {*taken, INIT}:
             return f"{phrase!r} is a way to say {taken.get(phrase, INIT)!r} already; choose another"
     if not verb.thor_action:
@@ -358,7 +358,7 @@ def _problem(verb: Verb, taken: Mapping[str, str]) -> str:
 def _problem_of_object(verb: Verb) -> str:
     about = [name for name in _ABOUT_OBJECTS if getattr(verb, name)]
     if verb.alone and about:
-        return f"it goes with no object, so that {about[0]} means nothing; leave one of them out"
+        return f"it takes no object (alone), so {about[0]} has no meaning; leave one of them out"
     properties = sorted({name for kind in OBJECT_TYPES.values() for name in kind.properties})
     if verb.object_property not in ("", *properties):
         return (
@@ -366,9 +366,8 @@ def _problem_of_object(verb: Verb) -> str:
             f"choose one of: {', '.join(properties)}; or give object_types"
         )
     if verb.object_state is not None and verb.object_state[0] not in PROPERTY_OF_STATE:
-        return (
-            f"{verb.object_state[0]!r} is no state; choose one of: {', '.join(PROPERTY_OF_STATE)}"
-        )
+        known = ", ".join(PROPERTY_OF_STATE)
+        return f"{verb.object_state[0]!r} is not a state; choose one of: {known}"
     return _unknown_type(verb.object_types)
 
 

@@ -228,7 +228,7 @@ WRONG: dict[str, tuple[object, str]] = {
     "no actions": ([{"taskname": "", "tasktype": ""}], "task 1 lacks field 'actions'"),
     "no scene": (
         [generated(metadatapath="{scene}/metadata.json")],
-        "task 1 tells no scene: neither its metadatapath '{scene}/metadata.json' nor its folder",
+        "task 1 names no scene: neither its metadatapath '{scene}/metadata.json' nor its folder",
     ),
     "task type": ([generated(tasktype="dance")], "unknown tasktype 'dance'; choose one of: "),
     "own": ([generated(er_gym={"gaol": []})], "task 1 has a wrong field 'er_gym.gaol'"),

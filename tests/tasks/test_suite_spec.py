@@ -49,14 +49,20 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "a set among rooms": ({"total": 1, "scenes": ["training"]}, "unknown scene 'training'"),
     "a type that is none": (
         {"total": 1, "types": ["single_search", "dance"]},
-        "unknown type 'dance'; choose of: single_search, ",
+        "unknown type 'dance'; choose one of: single_search, ",
     ),
     "layouts": ({"total": 1, "layouts": -1}, "greater than or equal to 0"),
     "none of a layout": ({"total": 1, "per_layout": 0}, "greater than 0"),
     "no rooms": ({"total": 1, "scenes": []}, "unknown scene ''"),
-    "a span the wrong way round": ({"total": 1, "distance": [3, 2]}, "no range: from 3 to 2"),
-    "a span from nowhere": ({"total": 1, "distractors": [float("nan"), 2]}, "no range: from nan"),
-    "a span to nowhere": ({"total": 1, "hidden_depth": [0, float("inf")]}, "no range: from 0 to"),
+    "a span the wrong way round": ({"total": 1, "distance": [3, 2]}, "not a range: from 3 to 2"),
+    "a span from nowhere": (
+        {"total": 1, "distractors": [float("nan"), 2]},
+        "not a range: from nan",
+    ),
+    "a span to nowhere": (
+        {"total": 1, "hidden_depth": [0, float("inf")]},
+        "not a range: from 0 to",
+    ),
     "half a span": ({"total": 1, "distance": [3]}, "Field required"),
     "misspelled": ({"total": 1, "hidden": [0, 1]}, "Extra inputs are not permitted"),
 }

@@ -99,7 +99,7 @@ WRONG = {
     "not JSON": ([HEADER, "", '{"id": '], "not JSON: Expecting value (line 3, column 8)"),
     "no layout": (
         [HEADER, {**TASK_LINE, "key_actions": [], "layout": "x"}],
-        "the task in line 2 begins with a layout that no line before it tells",
+        "the task in line 2 names a layout that no earlier line defines",
     ),
     "wrong layout": (
         [HEADER, {"layout": "x", "poses": {"Apple": [1, 2]}}],

@@ -99,10 +99,10 @@ class Generator:
         if rule is None:
             known = ", ".join(rule.type for rule in self.rules if not rule.slug)
             raise ValueError(f"{type_name!r} tasks cannot be requested; choose one of: {known}")
-        unknown = [i for i in object_ids if i not in self.scene_graph.chosen]
+        unknown = [i for i in object_ids if i not in self.scene_graph.objects]
         if unknown:
             raise ValueError(f"{self.scene} has no object {unknown[0]!r} when the task begins")
-        chosen = [self.scene_graph.chosen[object_id] for object_id in object_ids]
+        chosen = [self.scene_graph.objects[object_id] for object_id in object_ids]
         try:
             plan = rule.plan(self.scene_graph, *chosen)
         except (TypeError, ImpossiblePlan) as error:
