@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from er_gym.tasks.generate.scene_graph import Thing
+from er_gym.tasks.generate.scene_graph import SceneObject
 
 
-def thing(object_type: str, *parents: str, number: int = 0, **fields: Any) -> Thing:
+def thing(object_type: str, *parents: str, number: int = 0, **fields: Any) -> SceneObject:
     """A thing in or on the first things of some types."""
     plain: dict[str, Any] = {
         **dict.fromkeys(("receptacle", "pickupable", "openable", "closed", "toggleable"), False),
@@ -17,7 +17,7 @@ def thing(object_type: str, *parents: str, number: int = 0, **fields: Any) -> Th
         "x": 0.0,
         "z": 0.0,
     }
-    return Thing(
+    return SceneObject(
         f"{object_type}|+00.00|+00.00|+0{number}.00",
         object_type,
         tuple(f"{parent}|+00.00|+00.00|+00.00" for parent in parents),

@@ -157,7 +157,7 @@ def bench(
     from er_gym.rollout.runner import finished
     from er_gym.rollout.selection import Shard, select
     from er_gym.rollout.worker_pool import WorkerSetupError
-    from er_gym.tasks.errors import in_short
+    from er_gym.tasks.errors import summarise_set_aside
     from er_gym.tasks.resolve import resolve_tasks
     from er_gym.thor import BackendError
     from er_gym.writing import file_stem
@@ -175,7 +175,7 @@ def bench(
         fitted = resolve_tasks(asked.tasks, env["backend"])
         aside = (*asked.set_aside, *fitted.set_aside)
         if aside and not fitted.tasks:
-            raise BadInput(f"{asked.name}: no task can be played: {in_short(aside)}")
+            raise BadInput(f"{asked.name}: no task can be played: {summarise_set_aside(aside)}")
         chosen = select(
             fitted.tasks, task_ids=split(*task_ids), shard=part, limit=limit, set_aside=aside
         )
@@ -190,9 +190,9 @@ def bench(
             seed=seed,
             er_gym=__version__,
             set_aside=aside,
-            taken=fitted.taken,
+            taken=fitted.substitutions,
         )
-    report_set_aside(asked.name, aside, fitted.taken)
+    report_set_aside(asked.name, aside, fitted.substitutions)
     for note in fitted.notes:
         console.print(note, style="dim", soft_wrap=True)
 

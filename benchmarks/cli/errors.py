@@ -13,7 +13,7 @@ from benchmarks.cli.terminal import echo
 _LONGEST = 2_000  # characters of a line
 
 if TYPE_CHECKING:
-    from er_gym.tasks.errors import SetAside, Taken
+    from er_gym.tasks.errors import SetAsideTask, Substitution
 
 CRASHED, STOPPED, INTERRUPTED = 1, 3, 130
 """Exit codes: episodes crashed; a budget or the server stopped the run; Ctrl-C. Bad input is 2."""
@@ -44,12 +44,12 @@ def print_problem(message: str) -> None:
 
 
 def report_set_aside(
-    suite: str, set_aside: Iterable[SetAside], taken: Iterable[Taken] = ()
+    suite: str, set_aside: Iterable[SetAsideTask], taken: Iterable[Substitution] = ()
 ) -> None:
     """Print which tasks of a suite are set aside, and which objects stand for missing ones."""
-    from er_gym.tasks.errors import told_once
+    from er_gym.tasks.errors import describe_substitutions
 
-    for line in told_once(taken):
+    for line in describe_substitutions(taken):
         print_problem(f"{suite}: {line}")
     for one in set_aside:
         print_problem(f"{suite}: set aside: {one}")

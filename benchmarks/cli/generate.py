@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from benchmarks.cli.suite_builder import BuildResult
-    from er_gym.tasks.suite_spec import Making
+    from er_gym.tasks.suite_spec import SuiteSpec
     from er_gym.tasks.task import Task
 
 _DEFAULT_TOTAL = 100
@@ -114,7 +114,7 @@ class _Order:
 
     name: str
     description: str
-    spec: Making
+    spec: SuiteSpec
     seed: int
     out: Path
     command: str
@@ -132,7 +132,7 @@ def _order(
     """Work out what is to be made: as the suite says, overruled by the options that were given."""
     from er_gym.tasks.files import validated
     from er_gym.tasks.splits import SCENES
-    from er_gym.tasks.suite_spec import Making
+    from er_gym.tasks.suite_spec import SuiteSpec
     from er_gym.tasks.suites import suite_config, suite_file, suite_home
     from er_gym.tasks.types import task_type
 
@@ -161,7 +161,7 @@ def _order(
     return _Order(
         name=suite if suite and plain else stem,
         description=config.description if config and plain else "Generated tasks.",
-        spec=validated(Making, {**base, **told}, "what to make"),
+        spec=validated(SuiteSpec, {**base, **told}, "what to make"),
         seed=seed,
         out=out,
         command=shlex.join(parts),

@@ -24,9 +24,9 @@ from er_gym.envs.verify import unwanted, with_difficulty
 from er_gym.rollout.verification import make_verifier
 from er_gym.rollout.worker_pool import Lost, do_jobs
 from er_gym.tasks import jsonl_format
-from er_gym.tasks.arrangement import Start
-from er_gym.tasks.generate import Generator, arranged, select_balanced
-from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.arrangement import Arrangement
+from er_gym.tasks.generate import Generator, generator_for, select_balanced
+from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME
 from er_gym.thor import make_controller
@@ -56,7 +56,7 @@ class BuildResult:
 class RoomBuilder:
     """Builds the tasks of one room after another."""
 
-    def __init__(self, spec: Making, seed: int) -> None:
+    def __init__(self, spec: SuiteSpec, seed: int) -> None:
         self._spec, self._seed = spec, seed
         self._controller = make_controller(headless=True)
         self._verify = make_verifier()
@@ -68,7 +68,7 @@ class RoomBuilder:
         layouts = [0, *rng.sample(range(1, 10**6), self._spec.layouts)]
         made = BuildResult()
         for layout in layouts:
-            made = made.plus(self._of(arranged(self._controller, scene, layout), rng))
+            made = made.plus(self._of(generator_for(self._controller, scene, layout), rng))
         return made
 
     def _of(self, room: Generator, rng: random.Random) -> BuildResult:
@@ -104,7 +104,7 @@ class RoomBuilder:
 
 
 def build_suite(
-    spec: Making,
+    spec: SuiteSpec,
     seed: int,
     *,
     parts: Path,
@@ -143,7 +143,7 @@ def build_suite(
     return BuildResult(tuple(_layouts_together(chosen)), every.dropped)
 
 
-def parts_folder(out: Path, spec: Making, seed: int) -> Path:
+def parts_folder(out: Path, spec: SuiteSpec, seed: int) -> Path:
     """The folder of a suite's unfinished parts: beside it, and for this spec alone."""
     told = json.dumps([spec.model_dump(mode="json"), seed, __version__])
     return out.with_name(f".{out.name}.parts-{hashlib.sha256(told.encode()).hexdigest()[:8]}")
@@ -156,10 +156,10 @@ def remove_parts(parts: Path) -> None:
 
 def _layouts_together(tasks: Sequence[Task]) -> Iterable[Task]:
     """The same tasks; equal arrangements become one object, which is written once."""
-    starts: dict[str, Start] = {}
+    starts: dict[str, Arrangement] = {}
     for task in tasks:
-        start = starts.setdefault(task.start.layout, task.start)
-        yield replace(task, start=replace(task.start, poses=start.poses))
+        arrangement = starts.setdefault(task.arrangement.layout, task.arrangement)
+        yield replace(task, arrangement=replace(task.arrangement, poses=arrangement.poses))
 
 
 def _file(parts: Path, scene: str) -> Path:

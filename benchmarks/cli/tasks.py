@@ -40,7 +40,7 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
     from benchmarks.cli.progress import Progress
     from er_gym.rollout.verification import make_verifier
     from er_gym.rollout.worker_pool import Lost, do_jobs
-    from er_gym.tasks.errors import in_short
+    from er_gym.tasks.errors import summarise_set_aside
     from er_gym.tasks.resolve import resolve_tasks
 
     console = terminal(stderr=True)
@@ -51,8 +51,8 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
             fitted = resolve_tasks(suite.tasks)
             todo, aside = fitted.tasks, (*suite.set_aside, *fitted.set_aside)
             if aside and not todo:
-                raise BadInput(f"{suite.name}: no task can be played: {in_short(aside)}")
-        report_set_aside(suite.name, (), fitted.taken)
+                raise BadInput(f"{suite.name}: no task can be played: {summarise_set_aside(aside)}")
+        report_set_aside(suite.name, (), fitted.substitutions)
         for one in aside:
             echo(f"{suite.name}: set aside: {one}")
         solved = 0
@@ -91,7 +91,7 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
 
     from er_gym.tasks.describe import describe
     from er_gym.tasks.difficulty import Difficulty
-    from er_gym.tasks.errors import in_short
+    from er_gym.tasks.errors import summarise_set_aside
     from er_gym.tasks.resolve import resolve_tasks
     from er_gym.tasks.types import BY_NAME, task_type
 
@@ -114,8 +114,8 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
         fitted = resolve_tasks(chosen)
         aside += fitted.set_aside
         if aside and not fitted.tasks:
-            raise BadInput(f"{suite}: no task to show: {in_short(aside)}")
-    report_set_aside(suite, aside, fitted.taken)
+            raise BadInput(f"{suite}: no task to show: {summarise_set_aside(aside)}")
+    report_set_aside(suite, aside, fitted.substitutions)
     names = [field.name for field in fields(Difficulty)]
     pages = []
     for task in fitted.tasks:
@@ -164,14 +164,14 @@ def convert(suite: str, out: Path, force: bool) -> None:
     paper's files do not say who wrote them: another one is replaced with --force only.
     """
     from er_gym.tasks import jsonl_format, paper_format
-    from er_gym.tasks.errors import in_short
+    from er_gym.tasks.errors import summarise_set_aside
     from er_gym.tasks.paper_generator import read_generated, write_generator_tasks
 
     with bad_input():
         read = read_generated(suite) if Path(suite).is_dir() else _suite(suite)
         found, aside = list(read.tasks), read.set_aside
         if aside and not found:
-            raise BadInput(f"{suite}: no task can be read: {in_short(aside)}")
+            raise BadInput(f"{suite}: no task can be read: {summarise_set_aside(aside)}")
         report_set_aside(suite, aside)
         if out.name.endswith((".jsonl", ".jsonl.gz")):
             jsonl_format.write_tasks(out, found, force=force)

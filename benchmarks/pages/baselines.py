@@ -319,8 +319,8 @@ What policies learn on the embedded engine, beside agents that do not learn. Thi
 `python -m benchmarks.pages.baselines` from run directories. Everything is under
 `instances="explore"`, where a type name says nothing of the task's objects, and with the corrected
 scorer. A trained policy plays what it thinks best; it is the one at the end of training, none is
-chosen by how it did in an evaluation. Success in %: the mean over seeds with the least and the most; where there is
-one run only, Wilson's 95 % interval. The rooms of the unseen tasks (`er-1k`) are the paper's twelve
+chosen by how it did in an evaluation. Success in %: the mean over seeds with the least and the most;
+where there is one run only, Wilson's 95 % interval. The rooms of the unseen tasks (`er-1k`) are the paper's twelve
 test rooms, none of them in training; some of their tasks are about types of things that training
 has never named. Training tasks are a sample of those that were trained on.
 =======

@@ -22,7 +22,7 @@ from benchmarks.scoring.metrics import (
 from benchmarks.scoring.scorers import CORRECTED, PAPER, SCORERS, lacks_search_targets
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import Manifest, RunDirectory
-from er_gym.tasks.errors import told_once
+from er_gym.tasks.errors import describe_substitutions
 from er_gym.tasks.types import BY_NAME, GROUPS
 
 BOTH = "both"
@@ -93,7 +93,7 @@ class RunReport:
         return (
             *aside,
             *(f"set aside: {one}" for one in self.manifest.set_aside),
-            *told_once(self.manifest.taken),
+            *describe_substitutions(self.manifest.taken),
             *(f"not counted: {one}" for one in self.unusable),
         )
 
@@ -221,7 +221,7 @@ def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = Fal
                 writer.writerow([*head, name, level, part, summary.n, *numbers])
         for level, lines in (
             ("set aside", map(str, run.manifest.set_aside)),
-            ("taken", told_once(run.manifest.taken)),
+            ("taken", describe_substitutions(run.manifest.taken)),
             ("not counted", run.unusable),
         ):
             for line in lines:

@@ -34,8 +34,8 @@ from er_gym.envs.perception import SENSORS, Percept
 from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import begin
-from er_gym.tasks.goal import Condition, unmet
+from er_gym.tasks.arrangement import set_up_scene
+from er_gym.tasks.goal import Condition, unmet_conditions
 from er_gym.tasks.judge import Criteria, Progress
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import TaskType
@@ -386,7 +386,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._task = task
         self._done = []
         controller = self._started_controller(task.scene)
-        bounds = begin(controller, task.scene, task.start).metadata["sceneBounds"]
+        bounds = set_up_scene(controller, task.scene, task.arrangement).metadata["sceneBounds"]
         floor = skills.reachable(controller, (self._backend, task.scene, self._grid_size))
         pose = self._protocol.start(bounds, floor)
         self._memory = Memory(pose, goal_row(task.instruction))
@@ -504,7 +504,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         if not outcome.success:
             return 0.0
         if action.verb == verbs.END and self._task.goal:
-            self._goal_unmet = unmet(
+            self._goal_unmet = unmet_conditions(
                 self._task.goal, self._objects_of_goal(), self._around.in_reach
             )
         self._progress, reward = self._progress.after(

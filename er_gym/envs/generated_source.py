@@ -9,13 +9,13 @@ import numpy as np
 
 from er_gym.envs.arguments import shown
 from er_gym.envs.verify import PlayableEnv, Verifier, unwanted, with_difficulty
-from er_gym.tasks.generate import Generator, arranged, generated_types
-from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.generate import Generator, generated_types, generator_for
+from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, TaskType
 from er_gym.thor import SCENE_NAMES, make_controller
 
-TRAINING = Making(total=1, scenes="training", layouts=1000, unseen_objects=False)
+TRAINING = SuiteSpec(total=1, scenes="training", layouts=1000, unseen_objects=False)
 """Tasks in the training rooms, none about things that are kept for evaluation."""
 _ROOMS = 40
 """How many rooms are looked at for a task."""
@@ -34,37 +34,37 @@ class GeneratedSource:
 
     Args:
         env: in which tasks are tried; it is closed with the source.
-        making: in which rooms, of which types, how many arrangements of a room there are to draw
+        spec: in which rooms, of which types, how many arrangements of a room there are to draw
             beside the recorded one, how difficult; its ``total`` and ``per_layout`` mean nothing
             here.
     """
 
-    def __init__(self, env: PlayableEnv, making: Making = TRAINING) -> None:
-        self._env, self._making = env, making
-        self._kinds = [BY_NAME[name] for name in making.types] or list(generated_types())
+    def __init__(self, env: PlayableEnv, spec: SuiteSpec = TRAINING) -> None:
+        self._env, self._spec = env, spec
+        self._kinds = [BY_NAME[name] for name in spec.types] or list(generated_types())
         self._controller = make_controller(headless=True)
         self._verify = Verifier(env)
         self._room: Callable[[str, int], Generator]
-        self._room = lru_cache(_KEPT)(partial(arranged, self._controller))
+        self._room = lru_cache(_KEPT)(partial(generator_for, self._controller))
 
-    def __reduce__(self) -> tuple[type[GeneratedSource], tuple[PlayableEnv, Making]]:
+    def __reduce__(self) -> tuple[type[GeneratedSource], tuple[PlayableEnv, SuiteSpec]]:
         # A copy has engines of its own; what is drawn depends on the random generator alone.
-        return GeneratedSource, (self._env, self._making)
+        return GeneratedSource, (self._env, self._spec)
 
     def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
         """A task that the solver has just done."""
         if scene and scene not in SCENE_NAMES:
             raise ValueError(f"unknown scene {shown(scene)}; give a name such as FloorPlan1")
         kinds = [task_type] if task_type else self._kinds
-        rooms = (scene,) if scene else self._making.rooms
+        rooms = (scene,) if scene else self._spec.rooms
         for _ in range(_ROOMS):
             kind = kinds[int(rng.integers(len(kinds)))]
             name = rooms[int(rng.integers(len(rooms)))]
-            room = self._room(name, int(rng.integers(self._making.layouts + 1)))
+            room = self._room(name, int(rng.integers(self._spec.layouts + 1)))
             tasks = [
                 task
                 for task in room.tasks([kind.name])
-                if not unwanted(task, room, self._making, self._verify)
+                if not unwanted(task, room, self._spec, self._verify)
             ]
             order: list[int] = rng.permutation(len(tasks)).tolist()
             for task in (tasks[number] for number in order[:_CANDIDATES]):

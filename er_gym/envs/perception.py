@@ -120,7 +120,7 @@ def perceive(event: Any) -> Percept:
 
 
 def _rows_of_pixels(masks: Any, row: Mapping[str, int]) -> NDArray[np.int32]:
-    """(P,) 1 + the row of the object at each pixel, from the colours by which masks tell objects apart.
+    """(P,) 1 + the row of the object at each pixel, from the colours of instance masks.
 
     Neighbouring pixels mostly have one colour, so a colour is looked up once for each run of equal
     pixels: masks of all objects, one after another, take twenty times as long.

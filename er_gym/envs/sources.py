@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 
 from er_gym.envs.arguments import shown
-from er_gym.tasks.errors import TaskFileError, in_short, told_once
+from er_gym.tasks.errors import TaskFileError, describe_substitutions, summarise_set_aside
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite, suite_file, suite_from_file, suite_names
 from er_gym.tasks.task import Task
@@ -156,10 +156,10 @@ def _read(name: str, is_file: bool, changed: int) -> tuple[TaskList, str]:
     fitted = resolve_tasks(suite.tasks, arrange=False)
     aside = (*suite.set_aside, *fitted.set_aside)
     if aside and not fitted.tasks:
-        raise TaskFileError(f"{name}: no task can be played: {in_short(aside)}")
-    remarks = told_once(fitted.taken)
+        raise TaskFileError(f"{name}: no task can be played: {summarise_set_aside(aside)}")
+    remarks = describe_substitutions(fitted.substitutions)
     if aside:
         every = len(fitted.tasks) + len(aside)
-        remarks.insert(0, f"{len(aside)} of {every} tasks set aside: {in_short(aside)}")
+        remarks.insert(0, f"{len(aside)} of {every} tasks set aside: {summarise_set_aside(aside)}")
     told = f"{name}: {'; '.join(remarks)}" if remarks else ""
     return TaskList(fitted.tasks, f"the suite {suite.name}"), told

@@ -11,9 +11,9 @@ from er_gym.tasks import verbs
 from er_gym.tasks.difficulty import difficulty
 from er_gym.tasks.generate import Generator
 from er_gym.tasks.generate.generator import DONE_ALREADY
-from er_gym.tasks.goal import unmet
+from er_gym.tasks.goal import unmet_conditions
 from er_gym.tasks.splits import UNSEEN_TYPES, subject_types
-from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import TASK_TYPES
 
@@ -101,7 +101,7 @@ class Verifier:
         _, info = self._env.reset(seed=0, options={"task": task})
         pose = self._env.agent_pose
         where = (pose.x, pose.z)
-        if task.goal and not unmet(task.goal, self._env.objects, info["interactable"]):
+        if task.goal and not unmet_conditions(task.goal, self._env.objects, info["interactable"]):
             return Verdict(DONE_ALREADY, "", 1, where)
         solver = Solver()
         earned, over = 0.0, False
@@ -123,14 +123,14 @@ class Verifier:
         self._env.close()
 
 
-def unwanted(task: Task, room: Generator, making: Making, verify: Verifier) -> str:
+def unwanted(task: Task, room: Generator, spec: SuiteSpec, verify: Verifier) -> str:
     """Why a generated task is not one that is wanted, ``""`` if it is; nothing is played."""
-    if not making.unseen_objects and UNSEEN_TYPES & subject_types(task):
+    if not spec.unseen_objects and UNSEEN_TYPES & subject_types(task):
         return "it is about things that training never sees"
-    if making.is_any_difficulty:
+    if spec.allows_any_difficulty:
         return ""
     figures = difficulty(task, room.objects, verify.start_of(task.scene))
-    return "" if making.admits(figures) else "it is not as difficult as asked"
+    return "" if spec.admits(figures) else "it is not as difficult as asked"
 
 
 def with_difficulty(task: Task, room: Generator, verdict: Verdict) -> Task:

@@ -34,7 +34,7 @@ from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.events import EVENTS
 from er_gym.rollout.play import episode_seed
 from er_gym.rollout.records import EpisodeRecord
-from er_gym.tasks.errors import SetAside, Taken, TaskFileError
+from er_gym.tasks.errors import SetAsideTask, Substitution, TaskFileError
 from er_gym.tasks.reading import read_bytes, read_text
 from er_gym.writing import file_stem, make_folder, write_whole
 
@@ -81,8 +81,8 @@ class Manifest(BaseModel):
     env: dict[str, Any]
     seed: int
     er_gym: str
-    set_aside: tuple[SetAside, ...] = ()
-    taken: tuple[Taken, ...] = ()
+    set_aside: tuple[SetAsideTask, ...] = ()
+    taken: tuple[Substitution, ...] = ()
 
     @property
     def protocol(self) -> str:

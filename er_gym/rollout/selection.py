@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from er_gym.tasks.errors import SetAside, in_short
+from er_gym.tasks.errors import SetAsideTask, summarise_set_aside
 from er_gym.tasks.task import Task
 
 
@@ -41,7 +41,7 @@ def select(
     task_ids: Iterable[str] = (),
     shard: Shard | None = None,
     limit: int | None = None,
-    set_aside: Iterable[SetAside] = (),
+    set_aside: Iterable[SetAsideTask] = (),
 ) -> list[Task]:
     """The tasks to play, in the suite's order: those named, of these the shard's, of these the
     first ``limit``. Of tasks that were set aside none is played, named or not.
@@ -53,7 +53,7 @@ def select(
     aside = [one for one in set_aside if one.task in wanted]
     unknown = wanted.difference((task.id for task in tasks), (one.task for one in aside))
     if aside and len(aside) == len(wanted):
-        raise ValueError(f"no task to play: {in_short(aside)}")
+        raise ValueError(f"no task to play: {summarise_set_aside(aside)}")
     if unknown:
         some = ", ".join(task.id for task in tasks[:3])
         raise ValueError(f"no task with the id {min(unknown)!r}; ids here are such as {some}")

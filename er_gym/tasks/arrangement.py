@@ -1,4 +1,4 @@
-"""How a scene is made ready for a task: as recorded, or rearranged."""
+"""Arrangements: how a scene is set up for a task, as recorded or with moved objects."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 _DECIMALS = 4
-"""Of kept poses: a tenth of a millimetre, a ten-thousandth of a degree."""
+"""Decimals of stored poses: a tenth of a millimetre, a ten-thousandth of a degree."""
 _SOMEWHERE_ELSE = 20
-"""How many receptacles a thing tries before it stays where it is."""
+"""How many places AI2-THOR tries for an object before the object stays where it is."""
 _ATTEMPTS = 20
-"""How many arrangements are looked at for one of which the poses tell all."""
+"""How many arrangements are tried to find one that its poses determine completely."""
 
 
 @dataclass(frozen=True)
 class ObjectPose:
-    """Where an object is: metres and degrees, AI2-THOR's world frame."""
+    """The pose of an object: metres and degrees, AI2-THOR's world frame."""
 
     x: float
     y: float
@@ -27,15 +27,15 @@ class ObjectPose:
 
 
 @dataclass(frozen=True)
-class Start:
-    """How a scene differs from the recorded one when an episode begins.
+class Arrangement:
+    """How a scene differs from the recorded scene when an episode begins.
 
     Attributes:
-        layout: a name for the arrangement, ``""`` for the recorded one.
-        poses: an object's ``name`` in the metadata to where it is, for those that have been moved.
-            Objects that have been moved have other ids than in the recorded scene: AI2-THOR names
-            things after their places.
-        dirty: ids of objects that are made dirty.
+        layout: the name of the arrangement, ``""`` for the recorded one.
+        poses: an object's ``name`` in the metadata to its pose, for the objects that were moved.
+            Moved objects have other ids than in the recorded scene, because AI2-THOR derives ids
+            from positions.
+        dirty: ids of the objects that are made dirty.
     """
 
     layout: str = ""
@@ -43,38 +43,43 @@ class Start:
     dirty: tuple[str, ...] = ()
 
 
-def begin(controller: Any, scene: str, start: Start) -> Any:
+def set_up_scene(controller: Any, scene: str, arrangement: Arrangement) -> Any:
     """Load a scene and arrange it; returns the last event.
 
+    Args:
+        controller: an AI2-THOR controller.
+        scene: such as ``FloorPlan1``.
+        arrangement: what to change.
+
     Raises:
-        ValueError: an object of the start is not in the scene.
+        ValueError: an object of the arrangement is not in the scene.
     """
     event = controller.reset(scene)
-    if start.poses:
-        poses = _all_poses(_recorded_poses(controller, scene, event), start)
-        del event  # what nobody keeps, the embedded engine need not work out
+    if arrangement.poses:
+        poses = _all_poses(_recorded_poses(controller, scene, event), arrangement)
+        del event  # the embedded engine need not compute an event that nobody keeps
         event = controller.step(action="SetObjectPoses", objectPoses=poses, placeStationary=True)
-        _check(event, scene, start)
-    for object_id in start.dirty:
+        _check(event, scene, arrangement)
+    for object_id in arrangement.dirty:
         event = controller.step(action="DirtyObject", objectId=object_id, forceAction=True)
-        _check(event, scene, start)
+        _check(event, scene, arrangement)
     return event
 
 
-def _check(event: Any, scene: str, start: Start) -> None:
+def _check(event: Any, scene: str, arrangement: Arrangement) -> None:
     if not event.metadata["lastActionSuccess"]:
         raise ValueError(
-            f"{scene} cannot be arranged as {start.layout or 'its task asks'!r}: "
+            f"{scene} cannot be arranged as {arrangement.layout or 'its task asks'!r}: "
             f"{event.metadata['errorMessage']}"
         )
 
 
 _recorded: dict[tuple[type, str], Mapping[str, ObjectPose]] = {}
-"""By the kind of controller, which is to say by engine, and scene."""
+"""By the class of the controller, that is by engine, and by scene."""
 
 
 def _recorded_poses(controller: Any, scene: str, event: Any) -> Mapping[str, ObjectPose]:
-    """Where everything loose is in a scene that has just been loaded, by name."""
+    """Object name to pose for everything movable in a scene that was just loaded."""
     key = (type(controller), scene)
     if key not in _recorded:
         _recorded[key] = {
@@ -85,15 +90,17 @@ def _recorded_poses(controller: Any, scene: str, event: Any) -> Mapping[str, Obj
     return _recorded[key]
 
 
-def _all_poses(recorded: Mapping[str, ObjectPose], start: Start) -> list[dict[str, Any]]:
-    """What SetObjectPoses needs: the pose of everything loose, for it takes away the rest."""
+def _all_poses(
+    recorded: Mapping[str, ObjectPose], arrangement: Arrangement
+) -> list[dict[str, Any]]:
+    """The poses of all movable objects: SetObjectPoses removes those that are not listed."""
     return [
         {
             "objectName": name,
             "position": {"x": pose.x, "y": pose.y, "z": pose.z},
             "rotation": {"x": pose.pitch, "y": pose.yaw, "z": pose.roll},
         }
-        for name, pose in {**recorded, **start.poses}.items()
+        for name, pose in {**recorded, **arrangement.poses}.items()
     ]
 
 
@@ -102,16 +109,22 @@ def _pose(entry: Mapping[str, Any]) -> ObjectPose:
     return ObjectPose(*(position[axis] for axis in "xyz"), *(rotation[axis] for axis in "xyz"))
 
 
-def shuffled(controller: Any, scene: str, seed: int) -> Start:
-    """A scene with everything that can be carried put somewhere else, by a seed.
+def random_arrangement(controller: Any, scene: str, seed: int) -> Arrangement:
+    """A random arrangement in which the pickupable objects have other places.
 
-    AI2-THOR's ``InitialRandomSpawn`` chooses the places, closed receptacles among them; the poses
-    are kept, so that the start is the same on every engine and for good. Of several arrangements it
-    is the first of which the poses alone tell what lies in what, or that of which they tell most.
+    AI2-THOR's ``InitialRandomSpawn`` chooses the places, also in closed receptacles. The
+    arrangement stores the poses, so that it is the same on every engine. Several arrangements are
+    tried. The result is the first whose poses alone determine which object lies in which
+    receptacle, or the one whose poses determine most.
+
+    Args:
+        controller: an AI2-THOR controller; the scene is loaded into it.
+        scene: such as ``FloorPlan1``.
+        seed: the same seed gives the same arrangement.
     """
     objects = controller.reset(scene).metadata["objects"]
     recorded = {entry["name"]: _pose(entry) for entry in objects}
-    best, fewest = Start(), float("inf")
+    best, fewest = Arrangement(), float("inf")
     for attempt in range(_ATTEMPTS):
         if attempt:
             controller.reset(scene)
@@ -127,23 +140,23 @@ def shuffled(controller: Any, scene: str, seed: int) -> Start:
             for entry in spawned
             if (pose := _pose(entry)) != recorded.get(entry["name"], pose)
         }
-        start = Start(f"{scene}-{seed}", poses)
+        arrangement = Arrangement(f"{scene}-{seed}", poses)
         wanted = _holders(spawned)
-        arranged = _holders(begin(controller, scene, start).metadata["objects"])
+        arranged = _holders(set_up_scene(controller, scene, arrangement).metadata["objects"])
         doubtful = sum(holders != wanted[name] for name, holders in arranged.items())
         if doubtful < fewest:
-            best, fewest = start, doubtful
+            best, fewest = arrangement, doubtful
         if not doubtful:
             break
     return best
 
 
 def _holders(objects: list[dict[str, Any]]) -> dict[str, frozenset[str]]:
-    """Object name to the receptacles that it lies in."""
+    """Object name to the ids of its parent receptacles."""
     return {entry["name"]: frozenset(entry["parentReceptacles"] or ()) for entry in objects}
 
 
 def _rounded(pose: ObjectPose) -> ObjectPose:
-    # Adding 0.0 turns a minus zero into a plain one.
+    # Adding 0.0 turns -0.0 into 0.0.
     values = (pose.x, pose.y, pose.z, pose.pitch, pose.yaw, pose.roll)
     return ObjectPose(*(round(value, _DECIMALS) + 0.0 for value in values))

@@ -1,4 +1,4 @@
-"""A task as a person would want to read it."""
+"""A task as plain text for people."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from textwrap import fill
 
 from er_gym.tasks import verbs
 from er_gym.tasks.difficulty import Difficulty
-from er_gym.tasks.generate.words import PLURAL, a, in_the, it
+from er_gym.tasks.generate.words import PLURAL, in_or_on_the, pronoun, with_article
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import KeyAction, Task, type_of_id
@@ -37,15 +37,15 @@ _STATES: dict[tuple[str, bool | str], str] = {
     ("temperature", "Cold"): "cold",
     ("temperature", "RoomTemp"): "at room temperature",
 }
-"""Fields of AI2-THOR's metadata with a value, as what the object "is"."""
+"""Field of AI2-THOR's metadata and its value to a word that follows "is"."""
 
 
 @dataclass(frozen=True)
 class _Names:
-    """How the objects of a task are called: by type, with coordinates where types are not enough.
+    """Names for the objects of a task: the type, with coordinates if others have the same type.
 
     Attributes:
-        shared: the types that several objects have.
+        shared: the types of which there are several objects.
     """
 
     shared: frozenset[str]
@@ -59,7 +59,7 @@ class _Names:
                 *(other for action in task.key_actions for other in action.related_objects),
                 *(condition.object_id for condition in task.goal),
                 *task.related_objects,
-                *task.start.dirty,
+                *task.arrangement.dirty,
             ]
         )
         counts = Counter(type_of_id(object_id) for object_id in ids if object_id)
@@ -70,8 +70,8 @@ class _Names:
         return f"the {type_of_id(object_id)}{self._place(object_id)}"
 
     def inside(self, object_id: str) -> str:
-        """What is in or on an object: "in the Fridge"."""
-        return f"{in_the(type_of_id(object_id))}{self._place(object_id)}"
+        """The place in or on an object: "in the Fridge"."""
+        return f"{in_or_on_the(type_of_id(object_id))}{self._place(object_id)}"
 
     def _place(self, object_id: str) -> str:
         place = object_id.partition("|")[2]
@@ -81,11 +81,13 @@ class _Names:
 def describe(
     task: Task, difficulty: Difficulty | None = None, scene_ids: Iterable[str] = ()
 ) -> str:
-    """A task in plain text, several lines: what is asked, an expert's plan, what counts.
+    """A task in several lines of plain text: instruction, an expert's plan, criteria of success.
 
     Args:
-        scene_ids: the ids of all objects of the scene. An object whose type others have too is
-            told from them by its coordinates; without these ids, only from others of the task.
+        task: the task.
+        difficulty: its difficulty, if it is to be printed.
+        scene_ids: the ids of all objects of the scene. Coordinates are added to the name of an
+            object if another of these, or of the task's objects, has the same type.
     """
     names = _Names.of(task, scene_ids)
     lines = [
@@ -109,13 +111,13 @@ def describe(
 
 def _where(task: Task) -> str:
     where = f"{room_kind(task.scene)} {task.scene}"
-    if not task.start.poses:
+    if not task.arrangement.poses:
         return where
-    return f"{where}, rearranged as {task.start.layout or 'the task says'}"
+    return f"{where}, rearranged as {task.arrangement.layout or 'the task says'}"
 
 
 def _dirty(task: Task, names: _Names) -> list[str]:
-    made = _series(names.the(object_id) for object_id in task.start.dirty)
+    made = _series(names.the(object_id) for object_id in task.arrangement.dirty)
     return [_wrapped(f"dirty when it begins: {made}")] if made else []
 
 
@@ -134,13 +136,13 @@ def _plan(task: Task, names: _Names) -> list[str]:
 def _step(action: KeyAction, names: _Names, held: str, before: str) -> str:
     name = _name(action)
     reasons = [other for other in action.related_objects if other != action.object_id]
-    # {it} is the name unless the action before named the thing.
+    # {it} is a pronoun if the action before named the same object.
     plans = {verb.name: verb.in_plan for verb in verbs.table()} | {verbs.INIT: "begin"}
     template = plans.get(action.verb, "{verb} {the}")
     words = {
         "verb": action.verb,
         "the": names.the(name),
-        "it": it(type_of_id(name)) if name and name == before else names.the(name),
+        "it": pronoun(type_of_id(name)) if name and name == before else names.the(name),
         "inside": names.inside(name),
         "held": names.the(held) if held else "what is held",
         "reason": f" (for {_series(map(names.the, reasons))})" if reasons else "",
@@ -149,7 +151,7 @@ def _step(action: KeyAction, names: _Names, held: str, before: str) -> str:
 
 
 def _name(action: KeyAction) -> str:
-    """The id, or the type alone where a file gives no id."""
+    """The object's id, or its type if the file states no id."""
     return action.object_id or action.object_type
 
 
@@ -160,7 +162,7 @@ def _claims(task: Task, names: _Names) -> list[str]:
 
 
 def _goal(task: Task) -> Sequence[Condition]:
-    """The task's goal, and what a search asks for without saying so."""
+    """The task's goal, with the implicit conditions of a search."""
     if not task.type.search:
         return task.goal
     last = next((key.related_objects[-1:] for key in task.key_actions if key.verb == verbs.END), ())
@@ -171,12 +173,12 @@ def _goal(task: Task) -> Sequence[Condition]:
 
 def _claim(condition: Condition, names: _Names) -> str:
     kind = condition.object_type
-    subject = names.the(condition.object_id) if condition.object_id else a(kind)
+    subject = names.the(condition.object_id) if condition.object_id else with_article(kind)
     is_, lies = ("are", "lie") if kind in PLURAL else ("is", "lies")
     claims = [
         *([f"{is_} in the hand"] if condition.held else []),
         *([f"{is_} in sight and within reach"] if condition.in_reach else []),
-        *([f"{lies} {in_the(condition.inside)}"] if condition.inside else []),
+        *([f"{lies} {in_or_on_the(condition.inside)}"] if condition.inside else []),
         *(
             f"{is_} {_STATES.get((name, value), f'such that {name} says {value}')}"
             for name, value in condition.state
@@ -193,7 +195,7 @@ def _difficulty(figures: Difficulty) -> str:
 
 
 def _series(words: Iterable[str]) -> str:
-    """Words in a row: "a, b and c"."""
+    """An enumeration: "a, b and c"."""
     *most, last = [*words] or [""]
     return f"{', '.join(most)} and {last}" if most else last
 

@@ -1,4 +1,4 @@
-"""How hard a task is, in figures that can be read off it and its scene."""
+"""The difficulty of a task, measured from the task and its scene."""
 
 from __future__ import annotations
 
@@ -9,24 +9,21 @@ from math import dist
 from typing import Any
 
 from er_gym.tasks import verbs
-from er_gym.tasks.task import Task
-
-_WHOLE = 4
-"""How many parts of an id name the whole object: its type and three coordinates."""
+from er_gym.tasks.task import Task, whole_id
 
 
 @dataclass(frozen=True)
 class Difficulty:
-    """Figures of one task, all as the plan of its key actions has them.
+    """The difficulty of one task, measured along its key actions.
 
     Attributes:
-        hidden_depth: how many containers must be opened.
-        distractors: how many other objects of the types that key actions name there are.
-        distance: metres from the agent's first place to the first thing gone to, from there to the
-            next, and so on: straight lines over the floor plan, from middle to middle, with
-            everything where it is when the episode begins. Walks differ: furniture makes them
-            longer, stopping within an arm's reach makes them shorter.
-        length: how many key actions there are.
+        hidden_depth: the number of containers that must be opened.
+        distractors: the number of other objects of the types that key actions name.
+        distance: metres from the agent's first position through the objects to which it navigates,
+            in straight lines on the floor plan between the centres of their bounding boxes, with
+            every object where it is when the episode begins. Actual walks differ: furniture makes
+            them longer, and stopping within reach makes them shorter.
+        length: the number of key actions.
     """
 
     hidden_depth: int
@@ -36,12 +33,12 @@ class Difficulty:
 
 
 def hidden_depth(task: Task) -> int:
-    """How many times the key actions open something."""
+    """The number of key actions that open something."""
     return sum(action.verb == verbs.OPEN for action in task.key_actions)
 
 
 def length(task: Task) -> int:
-    """How many key actions a task has, ``end`` among them."""
+    """The number of key actions, ``end`` included."""
     return len(task.key_actions)
 
 
@@ -50,13 +47,13 @@ def difficulty(
 ) -> Difficulty:
     """Measure a task in its scene.
 
-    An object that is not there yet, such as a slice, stands where its whole stands; what is not
-    there at all is passed over. Ids have to be spelled as the scene spells them
-    (:func:`~er_gym.tasks.resolve.resolve_task`).
+    A slice, which does not exist yet, counts as its whole. Other missing objects are ignored. The
+    task must have the ids of the scene (:func:`~er_gym.tasks.resolve.resolve_task`).
 
     Args:
+        task: the task.
         objects: ``event.metadata["objects"]`` when the episode begins.
-        start_xz: x and z of the agent then, metres, AI2-THOR's world frame.
+        start_xz: x and z of the agent when the episode begins, metres, AI2-THOR's world frame.
     """
     there = {entry["objectId"]: entry for entry in objects}
     return Difficulty(
@@ -89,9 +86,8 @@ def _distance(
 
 
 def _standing_for(object_id: str, there: Mapping[str, object]) -> str:
-    """The id itself, else its whole's, if the scene has that; ``""`` where it has neither."""
-    whole = "|".join(object_id.split("|")[:_WHOLE])
-    return next((name for name in (object_id, whole) if name in there), "")
+    """The id if the scene has it, else the id of the whole object, else ``""``."""
+    return next((name for name in (object_id, whole_id(object_id)) if name in there), "")
 
 
 def _middle(entry: Mapping[str, Any]) -> tuple[float, float]:

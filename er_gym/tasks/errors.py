@@ -1,4 +1,4 @@
-"""What goes wrong with a task file, with one of its tasks, or with an id in it."""
+"""Problems of task files: the error, tasks that are set aside, ids that are substituted."""
 
 from __future__ import annotations
 
@@ -9,16 +9,18 @@ _NAMED = 3
 
 
 class TaskFileError(ValueError):
-    """A file of tasks cannot be used; the message is one line that names the file and the place."""
+    """A task file cannot be used; the message is one line that names the file and the place."""
 
 
 @dataclass(frozen=True)
-class SetAside:
-    """A task of a file that is not played, while the others are.
+class SetAsideTask:
+    """A task that cannot be played, while the other tasks of its file can.
+
+    The fields are stored in ``run.json``.
 
     Attributes:
-        task: its id, or where in the file it stands, if it has no id that can be used.
-        reason: why not, in one line.
+        task: its id, or its place in the file if it has no usable id.
+        reason: why it cannot be played, in one line.
     """
 
     task: str
@@ -30,14 +32,16 @@ class SetAside:
 
 
 @dataclass(frozen=True)
-class Taken:
-    """An object that stands for one that a task names and its scene lacks.
+class Substitution:
+    """An object of the scene that replaces an object that the task names and the scene lacks.
+
+    The fields are stored in ``run.json``.
 
     Attributes:
-        task_id, scene: where.
-        named: the id that the task states; in its start, an object's name.
-        taken: the id, or name, that the scene has.
-        metres: how far off it is, None where no place is stated.
+        task_id, scene: the task and its scene.
+        named: the id that the task states; in its arrangement, an object's name.
+        taken: the id, or the name, that is used instead.
+        metres: the distance between the two, None where the task states no position.
     """
 
     task_id: str
@@ -47,23 +51,23 @@ class Taken:
     metres: float | None
 
     def __str__(self) -> str:
-        off = "" if self.metres is None else f", {self.metres:.2f} m off"
-        return f"{self.scene} has no {self.named}: {self.taken}{off}, is taken for it"
+        away = "" if self.metres is None else f", {self.metres:.2f} m off"
+        return f"{self.scene} has no {self.named}: {self.taken}{away}, is used instead"
 
 
-def in_short(set_aside: Sequence[SetAside]) -> str:
-    """The first few tasks that were set aside, and how many more there are."""
+def summarise_set_aside(set_aside: Sequence[SetAsideTask]) -> str:
+    """One line: the first few tasks that were set aside, and the number of the others."""
     named = "; ".join(map(str, set_aside[:_NAMED]))
     more = len(set_aside) - _NAMED
     return f"{named}; and {more} more" if more > 0 else named
 
 
-def told_once(taken: Iterable[Taken]) -> list[str]:
-    """What was taken for what, each once, with the tasks that this concerns."""
+def describe_substitutions(substitutions: Iterable[Substitution]) -> list[str]:
+    """One line for each different substitution, with the ids of its tasks."""
     tasks: dict[str, list[str]] = {}
-    for one in taken:
-        tasks.setdefault(str(one), []).append(one.task_id)
+    for substitution in substitutions:
+        tasks.setdefault(str(substitution), []).append(substitution.task_id)
     return [
-        f"{said} ({', '.join(ids[:3])}{f' and {len(ids) - 3} more' if len(ids) > 3 else ''})"
-        for said, ids in tasks.items()
+        f"{text} ({', '.join(ids[:3])}{f' and {len(ids) - 3} more' if len(ids) > 3 else ''})"
+        for text, ids in tasks.items()
     ]

@@ -1,4 +1,4 @@
-"""What every task file format shares: checking, and saying in one line what is wrong."""
+"""Checks that all task file formats share; each error is one line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TypeVar
 from pydantic import BaseModel, ValidationError
 
 from er_gym.tasks import verbs
-from er_gym.tasks.errors import SetAside, TaskFileError
+from er_gym.tasks.errors import SetAsideTask, TaskFileError
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, TaskType
@@ -21,21 +21,21 @@ Model = TypeVar("Model", bound=BaseModel)
 _FILE_NAME_SAFE = re.compile(r"[\w+=.-]+")
 _LONGEST_QUOTE = 60
 MOST_TASKS = 50_000
-"""Tasks in a file; the suite ``train`` has 10,000."""
+"""The most tasks in one file; the suite ``train`` has 10,000."""
 
 
 def as_utf8(text: str, path: Path) -> bytes:
-    """A text as it is written.
+    """Encode a text for a file.
 
     Raises:
-        TaskFileError: it holds half a character (a lone surrogate), which UTF-8 cannot.
+        TaskFileError: the text holds a lone surrogate (half a character), which UTF-8 cannot hold.
     """
     try:
         return text.encode()
     except UnicodeEncodeError as error:
         half = error.object[error.start]
         raise TaskFileError(
-            f"{path}: cannot be written: a text holds half a character, {half!r}"
+            f"{path}: cannot be written: a text holds a lone surrogate (half a character), {half!r}"
         ) from None
 
 
@@ -43,7 +43,7 @@ def validated(model: type[Model], data: object, where: str) -> Model:
     """Build a pydantic model from parsed JSON.
 
     Raises:
-        TaskFileError: it does not fit; the message is ``where`` and the first problem.
+        TaskFileError: the data do not fit; the message is ``where`` and the first problem.
     """
     try:
         return model.model_validate(data)
@@ -52,7 +52,7 @@ def validated(model: type[Model], data: object, where: str) -> Model:
 
 
 def known_type(name: str, where: str) -> TaskType:
-    """The task type of that name; a :class:`TaskFileError` lists those there are."""
+    """The task type of a name; for an unknown one a :class:`TaskFileError` lists the known."""
     if name not in BY_NAME:
         raise TaskFileError(
             f"{where} has unknown tasktype {name!r}; choose one of: {', '.join(BY_NAME)}"
@@ -61,7 +61,7 @@ def known_type(name: str, where: str) -> TaskType:
 
 
 def known_scene(name: str, where: str) -> str:
-    """The scene's name, unchanged; a :class:`TaskFileError` says which scenes there are."""
+    """The scene name, unchanged; for an unknown one a :class:`TaskFileError` lists the known."""
     try:
         room_kind(name)
     except ValueError:
@@ -73,7 +73,7 @@ def known_scene(name: str, where: str) -> str:
 
 
 def known_verb(name: str, where: str) -> str:
-    """The canonical spelling of a verb; a :class:`TaskFileError` lists those there are."""
+    """A verb's canonical spelling; for an unknown one a :class:`TaskFileError` lists the known."""
     verb = verbs.canonical_verb(name)
     known = verbs.OBJECT_VERBS + verbs.BARE_VERBS
     if verb not in known:
@@ -85,52 +85,55 @@ def known_verb(name: str, where: str) -> str:
 
 @dataclass(frozen=True)
 class TaskFile:
-    """What a task file holds.
+    """The content of a task file.
 
     Attributes:
-        tasks: those that can be used, in the file's order; their ids are unique and fit for file
-            names.
-        places: where each of them stands among all tasks of the file, from 1.
-        set_aside: the others, and why.
+        tasks: the usable tasks in the file's order; their ids are unique and usable as file names.
+        places: the number of each of them among all tasks of the file, from 1.
+        set_aside: the other tasks, and why they cannot be used.
     """
 
     tasks: tuple[Task, ...]
     places: tuple[int, ...] = ()
-    set_aside: tuple[SetAside, ...] = ()
+    set_aside: tuple[SetAsideTask, ...] = ()
 
     def all_or_none(self, path: Path) -> list[Task]:
-        """The tasks; a :class:`TaskFileError` says what is wrong with the first set aside."""
+        """The tasks, if none was set aside.
+
+        Raises:
+            TaskFileError: a task was set aside; the message gives the reason of the first.
+        """
         if self.set_aside:
             raise TaskFileError(f"{path}: {self.set_aside[0].reason}")
         return list(self.tasks)
 
 
 @dataclass(frozen=True)
-class Entry:
-    """A task in a file that is not understood yet.
+class UnreadTask:
+    """A task in a file before it is read.
 
     Attributes:
-        where: its place, for messages.
-        stated_id: the id that it states, if that can be told.
-        read: makes the task, or raises a :class:`TaskFileError` that begins with ``where``.
+        where: its place in the file, for messages.
+        id: the id that it states, "" if it states none.
+        read: returns the task, or raises a :class:`TaskFileError` that begins with ``where``.
     """
 
     where: str
-    stated_id: str
+    id: str
     read: Callable[[], Task]
 
 
-def read_entries(entries: Iterable[Entry]) -> TaskFile:
-    """Read one task after another; what is wrong with one does not keep the others from use.
+def read_entries(entries: Iterable[UnreadTask]) -> TaskFile:
+    """Read tasks one after another; a faulty task is set aside and the others are used.
 
-    Of several tasks with one id the first is used.
+    If several tasks have the same id, the first is used.
 
     Raises:
         TaskFileError: there are more than :data:`MOST_TASKS`.
     """
     tasks: dict[str, Task] = {}
     places: list[int] = []
-    set_aside: list[SetAside] = []
+    set_aside: list[SetAsideTask] = []
     first: dict[str, str] = {}
     for place, entry in enumerate(entries, 1):
         if place > MOST_TASKS:
@@ -138,7 +141,7 @@ def read_entries(entries: Iterable[Entry]) -> TaskFile:
         try:
             task = entry.read()
         except TaskFileError as error:
-            set_aside.append(SetAside(entry.stated_id or entry.where, str(error)))
+            set_aside.append(SetAsideTask(entry.id or entry.where, str(error)))
             continue
         problem = ""
         if not _FILE_NAME_SAFE.fullmatch(task.id):
@@ -149,7 +152,7 @@ def read_entries(entries: Iterable[Entry]) -> TaskFile:
         elif task.id in tasks:
             problem = f"has the id {task.id!r}, as {first[task.id]} has; it must be unique"
         if problem:
-            set_aside.append(SetAside(entry.where, f"{entry.where} {problem}"))
+            set_aside.append(SetAsideTask(entry.where, f"{entry.where} {problem}"))
         else:
             tasks[task.id], first[task.id] = task, entry.where
             places.append(place)
@@ -157,12 +160,12 @@ def read_entries(entries: Iterable[Entry]) -> TaskFile:
 
 
 def _first_problem(error: ValidationError) -> str:
-    """Pydantic's first complaint in words that fit behind the name of what is wrong."""
+    """The first problem that pydantic found, worded to follow the name of the faulty record."""
     problem = error.errors(include_url=False)[0]
     field = re.sub(r"\.(\d+)", r"[\1]", ".".join(map(str, problem["loc"])))
     if problem["type"] == "missing":
         return f"lacks field {field!r}"
-    if problem["type"] == "value_error":  # one of our own validators, which says it all
+    if problem["type"] == "value_error":  # one of our own validators: the message is complete
         return f"has a wrong field {field!r}: {problem['ctx']['error']}"
     given = repr(problem["input"])
     if len(given) > _LONGEST_QUOTE:

@@ -1,4 +1,4 @@
-"""When a task is done: conditions on how things are in the end."""
+"""The goal of a task: conditions on the final state of its scene."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ STATES: Mapping[str, tuple[bool | str, ...]] = {
     "temperature": ("Hot", "Cold", "RoomTemp"),
     "fillLiquid": ("water", "coffee", "wine"),
 }  # fmt: skip
-"""What a goal may ask of an object's metadata, and the values that each has."""
+"""The metadata fields that a goal may test, and the values of each."""
 
 State = tuple[tuple[str, bool | str], ...]
-"""Fields of AI2-THOR's object metadata, such as ``isToggled``, with the values they must have."""
+"""Fields of AI2-THOR's object metadata, such as ``isToggled``, and the values they must have."""
 
 
 @dataclass(frozen=True)
 class Condition:
-    """What has to be true of an object; any object of the type will do unless the id says which.
+    """A condition on an object. Without an id, any object of the type can fulfil it.
 
     Attributes:
-        object_type: of the object.
-        object_id: which one it must be, where the task says which; ``""`` otherwise.
-        held: it must be in the agent's hand.
-        in_reach: the agent must be where an object of that type can be seen and handled.
-        inside: the type of a receptacle that it must lie in or on, ``""`` for anywhere. What lies
-            in a SinkBasin is in the Sink, too; what lies on the rim of a Sink is not in its basin.
-        state: what its metadata must say, of :data:`STATES`.
+        object_type: the type of the object.
+        object_id: the id of the object if the task names one; ``""`` otherwise.
+        held: the object must be in the agent's hand.
+        in_reach: an object of the type must be visible and within the agent's reach.
+        inside: the type of a receptacle in or on which the object must lie, ``""`` for anywhere. An
+            object in a SinkBasin is in the Sink, too; one on the rim of a Sink is not in its basin.
+        state: metadata fields of :data:`STATES` and the values they must have.
 
     Raises:
-        ValueError: the metadata have no such state, or not with that value.
+        ValueError: :data:`STATES` lacks a field of ``state``, or its value.
     """
 
     object_type: str
@@ -79,7 +79,7 @@ def _claim(name: str, value: bool | str) -> str:
     return name if value else f"not {name}"
 
 
-def unmet(
+def unmet_conditions(
     goal: Iterable[Condition],
     objects: Sequence[Mapping[str, Any]],
     in_reach: Collection[str] = (),
@@ -87,8 +87,9 @@ def unmet(
     """The conditions of a goal that do not hold.
 
     Args:
+        goal: the conditions.
         objects: ``event.metadata["objects"]``.
-        in_reach: the types of which the agent sees something that it can handle.
+        in_reach: the types of which the agent sees an object within reach.
     """
     kind_of = {entry["objectId"]: entry["objectType"] for entry in objects}
     return tuple(
@@ -103,7 +104,7 @@ def _holds(condition: Condition, entry: Mapping[str, Any], kind_of: Mapping[str,
     if entry["objectType"] != condition.object_type:
         return False
     if not is_there(entry) and _CUT_UP.isdisjoint(name for name, _ in condition.state):
-        return False  # a whole of which only parts are there, and the condition is not about that
+        return False  # the object was cut into parts, and the condition is not about that
     if condition.object_id and entry["objectId"] != condition.object_id:
         return False
     if condition.held and not entry["isPickedUp"]:

@@ -1,10 +1,10 @@
-"""Our own task file: JSON lines, versioned, compact, one task a line below a header line.
+"""er-gym's own task files: JSON lines, versioned and compact, with one task on each line.
 
-The header is ``{"format": "er-gym/tasks/1", "tasks": 110, …}``; the number of tasks guards against
-a file cut short, and further fields (how the file was made) are the writer's own. A task's line has
-the fields of :class:`TaskRecord`, those at their default left out. An arrangement of a scene that
-tasks begin with has a line before the first of them, :class:`LayoutRecord`. A file whose name ends
-in ``.gz`` is compressed.
+The first line is a header: ``{"format": "er-gym/tasks/1", "tasks": 110, …}``. The number of tasks
+shows whether a file was cut short. The writer may add fields that say how the file was made. The
+line of a task has the fields of :class:`TaskRecord`, without those at their default. The line of an
+arrangement (:class:`LayoutRecord`) stands before the first task that uses it. A file is compressed
+if its name ends in ``.gz``.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, field_validator
 
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import (
-    Entry,
     TaskFile,
+    UnreadTask,
     as_utf8,
     known_scene,
     known_type,
@@ -40,13 +40,13 @@ FORMAT = "er-gym/tasks/1"
 
 
 class _Strict(BaseModel):
-    """A misspelled field is a mistake worth hearing of."""
+    """Refuses unknown fields, so that a misspelled field is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class KeyActionRecord(_Strict):
-    """A key action; without ``object_type`` it is the one that the object's id names."""
+    """A key action; ``object_type`` None stands for the type that the object's id names."""
 
     verb: str
     object_id: str = ""
@@ -56,7 +56,7 @@ class KeyActionRecord(_Strict):
 
 
 class PoseRecord(_Strict):
-    """A pose of the agent: metres and degrees, AI2-THOR's frame."""
+    """A pose of the agent: metres and degrees, AI2-THOR's world frame."""
 
     x: float
     y: float
@@ -93,11 +93,11 @@ class ConditionRecord(_Strict):
 
 
 class LayoutRecord(_Strict):
-    """How a scene is arranged.
+    """An arrangement of a scene.
 
     Attributes:
         layout: the name by which tasks refer to it.
-        poses: object name to x, y, z, pitch, yaw and roll, for those that have been moved.
+        poses: object name to x, y, z (metres) and pitch, yaw, roll (degrees), for moved objects.
     """
 
     layout: str
@@ -105,7 +105,7 @@ class LayoutRecord(_Strict):
 
 
 class TaskRecord(_Strict):
-    """A task; the fields are those of :class:`~er_gym.tasks.task.Task`, its start's among them."""
+    """A task: the fields of :class:`~er_gym.tasks.task.Task` and of its arrangement."""
 
     id: str
     type: str
@@ -136,14 +136,13 @@ def read_tasks(path: str | Path) -> list[Task]:
     """Read a task file.
 
     Raises:
-        TaskFileError: the file cannot be used, or one of its tasks cannot; one line says where and
-            why.
+        TaskFileError: the file or one of its tasks cannot be used; one line says where and why.
     """
     return read_file(path).all_or_none(Path(path))
 
 
 def read_file(path: str | Path) -> TaskFile:
-    """Read what can be used of a task file.
+    """Read the usable tasks of a task file.
 
     Raises:
         TaskFileError: the file as a whole cannot be used.
@@ -163,17 +162,17 @@ def read_file(path: str | Path) -> TaskFile:
 def write_tasks(
     path: str | Path, tasks: Iterable[Task], *, force: bool = True, **made: object
 ) -> None:
-    """Write a task file, whole or not at all.
+    """Write a task file, completely or not at all.
 
     Args:
         path: the file; compressed if its name ends in ``.gz``.
-        tasks: what to write.
-        force: whether to replace also a file that er-gym did not write.
-        made: for the header: generator, seed, …
+        tasks: the tasks.
+        force: whether to replace a file that er-gym did not write.
+        made: further fields of the header: generator, seed, …
 
     Raises:
-        ValueError: two tasks name different arrangements alike, or a text is none that UTF-8 can
-            hold.
+        ValueError: two tasks have different arrangements with the same name, or a text holds a
+            lone surrogate.
         NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     path, tasks = Path(path), list(tasks)
@@ -184,9 +183,9 @@ def write_tasks(
 
 
 def digest(tasks: Iterable[Task]) -> str:
-    """The sha256, in hex, of what is asked in tasks, in their order; ``extra`` has no part in it.
+    """The sha256, in hex, of tasks in their order, without ``extra``.
 
-    The same tasks have the same digest whichever format they were read from.
+    Equal tasks have the same digest, whichever format they were read from.
     """
     total = hashlib.sha256(FORMAT.encode())
     for line in _lines(replace(task, extra={}) for task in tasks):
@@ -195,16 +194,18 @@ def digest(tasks: Iterable[Task]) -> str:
 
 
 def _lines(tasks: Iterable[Task]) -> Iterator[str]:
-    """A line for each task, and before the first that needs it one for each arrangement."""
+    """A line for each task; the line of an arrangement stands before its first task."""
     written: dict[str, Mapping[str, ObjectPose]] = {}
     for task in tasks:
-        start = task.start
-        if start.poses and start.layout not in written:
-            written[start.layout] = start.poses
-            poses = {name: astuple(pose) for name, pose in start.poses.items()}
-            yield _line(LayoutRecord(layout=start.layout, poses=poses))
-        if start.poses != written.get(start.layout, {}):
-            raise ValueError(f"task {task.id}: another arrangement is named {start.layout!r} too")
+        arrangement = task.arrangement
+        if arrangement.poses and arrangement.layout not in written:
+            written[arrangement.layout] = arrangement.poses
+            poses = {name: astuple(pose) for name, pose in arrangement.poses.items()}
+            yield _line(LayoutRecord(layout=arrangement.layout, poses=poses))
+        if arrangement.poses != written.get(arrangement.layout, {}):
+            raise ValueError(
+                f"task {task.id}: another arrangement is named {arrangement.layout!r} too"
+            )
         yield _line(_record(task))
 
 
@@ -219,7 +220,7 @@ def _header(lines: Iterator[tuple[int, object]], path: Path) -> Header:
     return header
 
 
-def _entries(lines: Iterable[tuple[int, object]], path: Path) -> Iterator[Entry]:
+def _entries(lines: Iterable[tuple[int, object]], path: Path) -> Iterator[UnreadTask]:
     layouts: dict[str, dict[str, ObjectPose]] = {}
     for number, data in lines:
         if isinstance(data, dict) and "layout" in data and "id" not in data:
@@ -231,15 +232,15 @@ def _entries(lines: Iterable[tuple[int, object]], path: Path) -> Iterator[Entry]
             yield _entry(data, f"the task in line {number}", dict(layouts))
 
 
-def _entry(data: object, where: str, layouts: Mapping[str, Mapping[str, ObjectPose]]) -> Entry:
+def _entry(data: object, where: str, layouts: Mapping[str, Mapping[str, ObjectPose]]) -> UnreadTask:
     def read() -> Task:
         record = validated(TaskRecord, data, where)
         if record.layout and record.layout not in layouts:
-            raise TaskFileError(f"{where} begins with a layout that no line before it tells")
+            raise TaskFileError(f"{where} names a layout that no earlier line defines")
         return _task(record, layouts.get(record.layout, {}), where)
 
     stated = data.get("id") if isinstance(data, dict) else None
-    return Entry(where, stated if isinstance(stated, str) else "", read)
+    return UnreadTask(where, stated if isinstance(stated, str) else "", read)
 
 
 def _task(record: TaskRecord, poses: Mapping[str, ObjectPose], where: str) -> Task:
@@ -254,7 +255,7 @@ def _task(record: TaskRecord, poses: Mapping[str, ObjectPose], where: str) -> Ta
         related_objects=record.related_objects,
         navigable_objects=record.navigable_objects,
         goal=tuple(condition.condition() for condition in record.goal),
-        start=Start(record.layout, poses, record.dirty),
+        arrangement=Arrangement(record.layout, poses, record.dirty),
         poses={key: AgentPose(**pose.model_dump()) for key, pose in record.poses.items()},
         extra=record.extra,
     )
@@ -283,8 +284,8 @@ def _record(task: Task) -> TaskRecord:
         related_objects=task.related_objects,
         navigable_objects=task.navigable_objects,
         goal=tuple(map(ConditionRecord.of, task.goal)),
-        layout=task.start.layout,
-        dirty=task.start.dirty,
+        layout=task.arrangement.layout,
+        dirty=task.arrangement.dirty,
         poses={key: PoseRecord(**asdict(pose)) for key, pose in task.poses.items()},
         extra=dict(task.extra),
     )

@@ -1,38 +1,38 @@
-"""The one judge: which key actions of its task an episode has done, and whether it succeeded.
+"""The one judge: which key actions an episode has done, and whether the episode is a success.
 
 The environment asks the judge at every step. The corrected scorer asks it again, from the record of
-an episode (:func:`replay`). Only the paper's scorer keeps rules of its own. These are the judge's
-rules:
+an episode (:func:`replay`). Only the paper's scorer has other rules. The judge's rules are:
 
 1. **Steps.** A step counts if it was legal and the simulator did it. ``init``, the placing of the
    agent, and replies that name no known action never count.
-2. **Key actions.** A step does one key action of its verb and type, if one is left, and earns its
+2. **Key actions.** A step does one remaining key action of its verb and type, and earns its
    reward. Each key action can be done once.
 3. **Types.** A key action's type is read from its object id, where it has one. A Sink and its
    SinkBasin are one type for key actions and search targets, and so are a Bathtub and its
    BathtubBasin (:mod:`er_gym.tasks.equivalence`). In a goal, what lies in the basin is in the
    whole, too, but what lies on the rim is not in the basin.
-4. **Instances.** Any object of the type will do, unless the task's goal names an object by its id.
-   A key action on an object that is named must be done to that very object, and it goes first where
-   a step fits several key actions.
+4. **Instances.** Any object of the type counts, unless the task's goal names an object by its id.
+   A key action on a named object must be done to that object. If a step fits several key actions,
+   it does one on a named object first.
 5. **Order.** The key actions of an ordered task type count only in the order of the task: a step
    out of turn earns nothing, and the same key action can still be done in its turn. Navigations are
    free: one that the task lists before the next scored key action may be done or left out. In all
    other task types the order does not matter.
 6. **Success** is decided by the first ``end`` that counts, and by nothing else. That ``end`` is a
-   success, and only then does its own key action, if the task lists one, if three things hold:
+   success if the following three conditions hold. Only then is its own key action done, if the
+   task lists one.
 
    - All key actions are done, apart from navigations, ``observe`` and ``move forward``.
-   - In a search, the agent can interact with an object of each type that is searched for
-     (:func:`search_targets`) when it says ``end``. How it got there, and whether it does the listed
-     navigations, does not matter.
+   - In a search, the agent can interact with an object of each target type
+     (:func:`search_targets`) when it says ``end``. The way there and the listed navigations do not
+     matter.
    - The task's goal holds (:mod:`er_gym.tasks.goal`), if it has one.
 
 7. **After ``end``** nothing counts, whether ``end`` was a success or not.
 8. **The step limit** ends an episode without success, even if only ``end`` was missing. An ``end``
    that is itself the last step within the limit counts. The paper's protocol appends an ``end``
    when it cuts an episode off, and that ``end`` is judged like any other. A fourth repetition in a
-   row and a crash are no ``end``.
+   row and a crash do not count as an ``end``.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ from er_gym.tasks.task import KeyAction, Task, type_of_id
 
 @dataclass(frozen=True)
 class Criteria:
-    """What an episode is judged by, apart from the goal's conditions on the final state.
+    """The criteria for an episode, except the goal's conditions on the final state.
 
     Attributes:
         key_actions: in the order of the task.
-        ordered: whether they count in that order only.
-        named: ids of the objects that the task singles out.
-        targets: the types that are searched for; empty if the task is no search.
+        ordered: whether they count only in that order.
+        named: ids of the objects that the task names.
+        targets: the types to search for; empty if the task is not a search.
     """
 
     key_actions: tuple[KeyAction, ...]
@@ -64,12 +64,12 @@ class Criteria:
 
     @staticmethod
     def of(task: Task) -> Criteria:
-        """A task's."""
+        """The criteria of a task."""
         return Criteria(task.key_actions, task.type.ordered, task.named, search_targets(task))
 
 
 def search_targets(task: Task) -> frozenset[str]:
-    """The types that a search is for; empty if the task is no search.
+    """The types to search for; empty if the task is not a search.
 
     They are the types of the task's related objects, or of the last related object of its ``end``.
     """
@@ -86,11 +86,11 @@ class Progress:
     """How far an episode has come. It is immutable: :meth:`after` gives the next.
 
     Attributes:
-        criteria: what it is judged by.
+        criteria: the criteria of the task.
         done: the key actions done, in the order in which they were done.
-        left: those that are not, in the order of the task.
-        ended: whether ``end`` was said.
-        success: whether it was said rightly.
+        left: the key actions not done yet, in the order of the task.
+        ended: whether the agent has said ``end``.
+        success: whether that ``end`` was a success.
     """
 
     criteria: Criteria
@@ -101,12 +101,12 @@ class Progress:
 
     @staticmethod
     def start(criteria: Criteria) -> Progress:
-        """Nothing is done yet."""
+        """The progress before the first step."""
         return Progress(criteria, (), criteria.key_actions)
 
     @property
     def only_end_left(self) -> bool:
-        """Whether every key action is done that success asks for, apart from ``end``."""
+        """Whether all key actions that success requires are done, except ``end``."""
         return all(key.verb == verbs.END or not key.scored for key in self.left)
 
     def after(
@@ -123,9 +123,9 @@ class Progress:
         Args:
             verb: canonical.
             object_type: as the agent named it.
-            object_id: of the object that it was done to.
-            in_reach: the types of which the agent can interact with an object; only ``end`` asks.
-            goal_holds: whether the task's goal holds, if it has one; only ``end`` asks.
+            object_id: the id of the object to which it was done.
+            in_reach: the types of which the agent can interact with an object; used for ``end``.
+            goal_holds: whether the task's goal, if any, holds; used for ``end``.
         """
         if self.ended or verb == verbs.INIT:
             return self, 0.0
@@ -157,7 +157,7 @@ class Progress:
         return self.left[k].object_id in self.criteria.named
 
     def _in_turn(self) -> Iterable[int]:
-        """The places in ``left`` of the key actions whose turn it is."""
+        """The indices in ``left`` of the key actions that may be done next."""
         if not self.criteria.ordered:
             return range(len(self.left))
         scored = (k for k, key in enumerate(self.left) if key.scored)
@@ -165,19 +165,19 @@ class Progress:
 
 
 class RecordedStep(Protocol):
-    """What the judge reads of a step in an episode's record."""
+    """The fields of a recorded step that the judge reads."""
 
     @property
     def verb(self) -> str:
-        """What was done."""
+        """The verb."""
 
     @property
     def object_type(self) -> str:
-        """As the agent named it, ``""`` for none."""
+        """The object type as the agent named it, ``""`` for none."""
 
     @property
     def object_id(self) -> str:
-        """Of the object that it was done to, ``""`` for none."""
+        """The id of the object to which the verb was done, ``""`` for none."""
 
     @property
     def success(self) -> bool:
@@ -192,8 +192,8 @@ def replay(criteria: Criteria, steps: Iterable[RecordedStep], *, goal_holds: boo
     """Judge an episode from its record.
 
     Args:
-        criteria: what it is judged by.
-        steps: all of them, in order.
+        criteria: the criteria of its task.
+        steps: all steps, in order.
         goal_holds: whether the task's goal held when the agent said ``end``.
     """
     progress = Progress.start(criteria)

@@ -1,15 +1,15 @@
 """The paper's own file formats: test files, and the exact poses from which objects are reached.
 
-A test file is a JSON list of objects; :func:`read_tasks` and :func:`write_tasks` are inverse to
-each other, for the paper's files as for tasks of any other origin, but for ``Task.poses``. What
-:class:`~er_gym.tasks.task.Task` has no field for travels in ``Task.extra``: ``identity``,
-``instruction_idx`` and whatever else a task's object holds, under its own name, and what
-:mod:`~er_gym.tasks.paper_records` names. What the paper's format has no field for (an id of our
-own, the goal, the start) travels in the object, under ``er_gym``.
+A test file is a JSON list of objects. :func:`read_tasks` and :func:`write_tasks` are inverse to
+each other, for the paper's files and for tasks of any other origin, except for ``Task.poses``.
+``Task.extra`` keeps the fields for which :class:`~er_gym.tasks.task.Task` has no attribute:
+``identity``, ``instruction_idx`` and other fields of a task's object under their own names, and
+those that :mod:`~er_gym.tasks.paper_records` lists. Attributes for which the paper's format has no
+field (our own id, the goal, the arrangement) are stored in the object under ``er_gym``.
 
-A file may leave out what has an obvious default (see :class:`PaperTask`); written again, it is
-there. A pose file is a JSON object, keyed by a task's identity. What the paper's generator writes
-is for :mod:`~er_gym.tasks.paper_generator`.
+A file may leave out fields that have a default (see :class:`PaperTask`); :func:`write_tasks` writes
+them. A pose file is a JSON object, keyed by the tasks' identities.
+:mod:`~er_gym.tasks.paper_generator` reads the files of the paper's generator.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import (
-    Entry,
     TaskFile,
+    UnreadTask,
     known_scene,
     known_type,
     read_entries,
@@ -33,14 +33,14 @@ from er_gym.tasks.files import (
 from er_gym.tasks.paper_records import (
     PaperTask,
     as_json,
+    extra_action_fields,
+    extra_fields,
     json_kind,
     key_actions,
     metadata_record,
     own_fields,
-    unknown,
-    unspoken,
     with_own_fields,
-    without,
+    without_fields_of,
 )
 from er_gym.tasks.reading import parse_json, read_text
 from er_gym.tasks.task import AgentPose, Task
@@ -56,7 +56,7 @@ class _Vector(BaseModel):
 
 
 class PaperPose(BaseModel):
-    """A pose of the agent as the paper's files write it: metres and degrees, AI2-THOR's frame."""
+    """An agent pose as the paper's files write it: metres and degrees, AI2-THOR's world frame."""
 
     model_config = ConfigDict(allow_inf_nan=False)
 
@@ -67,7 +67,7 @@ class PaperPose(BaseModel):
 
 
 class PaperPoses(BaseModel):
-    """The poses of one task: beside the three named fields, one per object id."""
+    """The poses of one task: besides the three declared fields, one field per object id."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, PaperPose] = Field(init=False)
@@ -81,17 +81,16 @@ def read_tasks(path: str | Path) -> list[Task]:
     """Read a test file of the paper.
 
     Returns:
-        Tasks in the file's order, with ids such as ``paper-57`` where the file states no other.
+        Tasks in the file's order. Their ids are those of ``er_gym`` or such as ``paper-57``.
 
     Raises:
-        TaskFileError: the file cannot be used, or one of its tasks cannot; one line says where and
-            why.
+        TaskFileError: the file or one of its tasks cannot be used; one line says where and why.
     """
     return read_file(path).all_or_none(Path(path))
 
 
 def read_file(path: str | Path) -> TaskFile:
-    """Read what can be used of a test file of the paper; see :func:`read_tasks`.
+    """Read the usable tasks of a test file of the paper; see :func:`read_tasks`.
 
     Raises:
         TaskFileError: the file as a whole cannot be used.
@@ -113,26 +112,26 @@ def read_file(path: str | Path) -> TaskFile:
     return read_entries(_entry(item, number) for number, item in enumerate(data, 1))
 
 
-def _entry(data: object, number: int) -> Entry:
+def _entry(data: object, number: int) -> UnreadTask:
     identity = data.get("identity") if isinstance(data, dict) else None
     stated = isinstance(identity, int | str) and not isinstance(identity, bool)
     where = f"task {number}" + (f" (identity {identity})" if stated else "")
-    return Entry(where, f"paper-{identity}" if stated else "", lambda: _read_task(data, where))
+    return UnreadTask(where, f"paper-{identity}" if stated else "", lambda: _read_task(data, where))
 
 
 def write_tasks(path: str | Path, tasks: Iterable[Task], *, force: bool = True) -> None:
-    """Write tasks as the paper's test files do; ``Task.poses`` go into a file of their own.
+    """Write a test file in the paper's format; :func:`write_poses` writes ``Task.poses``.
 
-    A task that came from elsewhere and so has no identity gets its place in the file, from 1, or,
-    where another task has that identity, the next number that is as far into the file again.
+    A task from another source has no identity. It gets its number in the file, from 1. If another
+    task has that identity, the file's length is added until the number is free.
 
     Args:
         path: the file.
-        tasks: what to write.
-        force: whether to replace another file; one of the paper's says nothing of who wrote it.
+        tasks: the tasks.
+        force: whether to replace an existing file; the format does not tell who wrote it.
 
     Raises:
-        TaskFileError: a task could not be read again, for what its ``extra`` says.
+        TaskFileError: a task's ``extra`` holds fields with which the task could not be read again.
         NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     path, tasks = Path(path), list(tasks)
@@ -147,7 +146,7 @@ def read_poses(path: str | Path) -> dict[str, dict[str, AgentPose]]:
     """Read a pose file of the paper (``agent_positions.json``).
 
     Returns:
-        Identity of a task, to object id, to the pose from which that object is reached.
+        Task identity to object id to the agent pose from which that object is reached.
 
     Raises:
         TaskFileError: the file cannot be used; one line says where and why.
@@ -172,9 +171,13 @@ def read_poses(path: str | Path) -> dict[str, dict[str, AgentPose]]:
 
 
 def write_poses(path: str | Path, tasks: Iterable[Task]) -> None:
-    """Write the poses of those tasks that state any, as the paper's file does.
+    """Write a pose file in the paper's format, for those tasks that state poses.
 
     The tasks have the identities that :func:`write_tasks` gives to the same list.
+
+    Raises:
+        TaskFileError: a text holds a lone surrogate.
+        CannotWrite: the file cannot be written.
     """
     entries = {
         str(identity): {
@@ -194,11 +197,13 @@ def with_poses(
     poses: Mapping[str, Mapping[str, AgentPose]],
     places: Sequence[int] = (),
 ) -> list[Task]:
-    """The same tasks, each with the poses that a pose file states for its identity.
+    """The tasks, each with the poses that a pose file states for its identity.
 
     Args:
-        places: where each task stands in its file, from 1, if some of the file's tasks are missing:
-            a task without an identity has the one that :func:`write_tasks` gives to its place.
+        tasks: the tasks.
+        poses: task identity to object id to pose (:func:`read_poses`).
+        places: the number of each task in its file, from 1, if some of the file's tasks are
+            missing. :func:`write_tasks` derives a missing identity from this number.
     """
     return [
         replace(task, poses={**task.poses, **poses.get(str(identity), {})})
@@ -209,10 +214,10 @@ def with_poses(
 def with_every_pose(
     tasks: Iterable[Task], poses: Mapping[str, Mapping[str, AgentPose]] | None = None
 ) -> list[Task]:
-    """The same tasks, each with all poses that a pose file and the tasks state, whatever for.
+    """The tasks, each with all poses of all tasks and of a pose file.
 
-    So the paper's program reads its pose file: the pose of an object is its pose in every task. Of
-    several poses of one object the last one counts, as it does there.
+    The paper's program reads its pose file in this way: an object has the same pose in every task.
+    If several poses are stated for one object, the last one counts.
     """
     tasks = list(tasks)
     every: dict[str, AgentPose] = {}
@@ -250,16 +255,16 @@ def _read_task(data: object, where: str) -> Task:
         navigable_objects=tuple(paper.navigable_objects),
         extra={
             "identity": paper.identity,
-            **unknown(paper),
-            "task_metadata": unknown(paper.task_metadata),
-            "actions": [unspoken(action) for action in actions],
+            **extra_fields(paper),
+            "task_metadata": extra_fields(paper.task_metadata),
+            "actions": [extra_action_fields(action) for action in actions],
         },
     )
     return with_own_fields(task, paper.er_gym, where)
 
 
 def _task_record(task: Task, identity: object, path: Path, number: int) -> dict[str, Any]:
-    extra = without(task.extra, PaperTask)
+    extra = without_fields_of(task.extra, PaperTask)
     extra.pop("actions", None)
     record = {
         "scene": task.scene,

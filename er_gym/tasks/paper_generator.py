@@ -1,11 +1,11 @@
-"""The files that the paper's task generator writes: per scene and task type, a list of tasks.
+"""The files of the paper's task generator: a list of tasks for each scene and task type.
 
-They lie in ``kitchens/FloorPlan1/single_search_task_metadata.json`` and so on, and hold what the
-paper's test files repeat as ``task_metadata``. :func:`read_generator_tasks` and
-:func:`write_generator_tasks` are inverse to each other but for the order of the tasks, which is
-that of the files. What :class:`~er_gym.tasks.task.Task` has no field for travels in ``Task.extra``,
-under the names of :mod:`~er_gym.tasks.paper_records`, so that such tasks can be written into a test
-file. What the generator's format has no field for travels in a task's object, under ``er_gym``.
+A path is ``kitchens/FloorPlan1/single_search_task_metadata.json``, for example. The paper's test
+files repeat a task of these files as ``task_metadata``. :func:`read_generator_tasks` and
+:func:`write_generator_tasks` are inverse to each other, except that tasks come in the order of the
+files. ``Task.extra`` keeps the fields for which :class:`~er_gym.tasks.task.Task` has no attribute,
+under the names of :mod:`~er_gym.tasks.paper_records`, so that the tasks can be written into a test
+file. Attributes for which the format has no field are stored in a task's object under ``er_gym``.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from typing import Any
 
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import (
-    Entry,
     TaskFile,
+    UnreadTask,
     known_scene,
     known_type,
     read_entries,
     validated,
 )
 from er_gym.tasks.paper_records import (
-    PaperGenerated,
+    PaperGeneratedTask,
     as_json,
+    extra_action_fields,
+    extra_fields,
     json_kind,
     key_actions,
     metadata_record,
     own_fields,
-    unknown,
-    unspoken,
     with_own_fields,
 )
 from er_gym.tasks.reading import parse_json, read_text
@@ -47,26 +47,26 @@ _SCENE = re.compile(r"FloorPlan(\d+)\w*")
 
 
 def read_generator_tasks(path: str | Path) -> list[Task]:
-    """Read what the paper's generator wrote.
+    """Read files of the paper's generator.
 
     Args:
-        path: a file, or a folder of them at any depth; other files in it are passed over.
+        path: a file, or a folder that holds such files at any depth; other files are ignored.
 
     Returns:
-        Tasks by kind of room, scene and type, with ids such as ``FloorPlan1-single_search-3`` (the
-        place in the file, from 1) where the file states no other.
+        Tasks in the order of room kinds, scenes and types. Their ids are those of ``er_gym`` or
+        such as ``FloorPlan1-single_search-3``, with the number in the file, from 1.
 
     Raises:
-        TaskFileError: a file cannot be used, or there is none; one line says where and why.
+        TaskFileError: there is no file, or one cannot be used; one line says where and why.
     """
     return read_generated(path).all_or_none(Path(path))
 
 
 def read_generated(path: str | Path) -> TaskFile:
-    """Read what can be used of what the paper's generator wrote; see :func:`read_generator_tasks`.
+    """Read the usable tasks of files of the paper's generator; see :func:`read_generator_tasks`.
 
     Raises:
-        TaskFileError: one of the files as a whole cannot be used, or there is none.
+        TaskFileError: there is no file, or one of them cannot be used at all.
     """
     path = Path(path)
     files = sorted(path.rglob(f"*{_ENDING}"), key=_order) if path.is_dir() else [path]
@@ -81,21 +81,21 @@ def read_generated(path: str | Path) -> TaskFile:
 def write_generator_tasks(
     folder: str | Path, tasks: Iterable[Task], *, force: bool = True
 ) -> list[Path]:
-    """Write tasks as the paper's generator does, one file for each scene and type among them.
+    """Write tasks in the format of the paper's generator, one file for each scene and type.
 
-    Files of other names in the folder stay.
+    Other files in the folder stay.
 
     Args:
-        folder: where to; it is made where it is not there.
-        tasks: what to write.
-        force: whether to replace files of the same names; without it, and where one of them says
-            something else, nothing is written.
+        folder: the folder; it is created if it does not exist.
+        tasks: the tasks.
+        force: whether to replace existing files. Without it, nothing is written if one of the
+            files exists with other content.
 
     Returns:
-        The files, in the order in which they are read again.
+        The files, in the order in which :func:`read_generator_tasks` reads them.
 
     Raises:
-        TaskFileError: a task could not be read again, for what its ``extra`` says.
+        TaskFileError: a task's ``extra`` holds fields with which the task could not be read again.
         NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     groups: dict[Path, list[Task]] = {}
@@ -115,7 +115,7 @@ def write_generator_tasks(
     return list(content)
 
 
-def _entries(path: Path, top: Path) -> list[Entry]:
+def _entries(path: Path, top: Path) -> list[UnreadTask]:
     data = parse_json(read_text(path), path)
     if not isinstance(data, list):
         raise TaskFileError(
@@ -129,17 +129,17 @@ def _entries(path: Path, top: Path) -> list[Entry]:
         )
     name = "" if path == top else f"{path.relative_to(top)}: "
 
-    def entry(item: object, number: int) -> Entry:
+    def entry(item: object, number: int) -> UnreadTask:
         where = f"{name}task {number}"
-        return Entry(where, "", lambda: _read_task(item, path, number, where))
+        return UnreadTask(where, "", lambda: _read_task(item, path, number, where))
 
     return [entry(item, number) for number, item in enumerate(data, 1)]
 
 
 def _read_task(data: object, path: Path, number: int, where: str) -> Task:
-    paper = validated(PaperGenerated, data, where)
+    paper = validated(PaperGeneratedTask, data, where)
     scene, kind = _scene(paper.metadatapath, path, where), known_type(paper.tasktype, where)
-    metadata = unknown(paper)
+    metadata = extra_fields(paper)
     if paper.metadatapath:
         metadata["metadatapath"] = paper.metadatapath
     task = Task(
@@ -151,7 +151,7 @@ def _read_task(data: object, path: Path, number: int, where: str) -> Task:
         key_actions=key_actions(paper.actions, where),
         extra={
             "task_metadata": metadata,
-            "actions": [unspoken(action) for action in paper.actions],
+            "actions": [extra_action_fields(action) for action in paper.actions],
         },
     )
     return with_own_fields(task, paper.er_gym, where)
@@ -164,27 +164,27 @@ def _record(task: Task, path: Path, number: int) -> dict[str, Any]:
         "metadatapath": f"taskgenerate/{_room(task.scene)}/{task.scene}/metadata.json",
         **metadata_record(task),
     }
-    # What a test file repeated of them need not fit the task: in one of the paper's it does not.
+    # The copies in a test file may contradict the task: in one task of the paper they do.
     record["tasktype"] = task.type.name
     record.pop("er_gym", None)
     return record | own_fields(task, _read_task(record, path, number, f"{path}: task {number}"))
 
 
 def _scene(metadatapath: str, path: Path, where: str) -> str:
-    """The scene of a task: some of the paper's paths name none, ``{scene}`` having stayed there."""
+    """The scene of a task; some paths of the paper have a literal ``{scene}`` instead of a name."""
     folder = path.absolute().parent.name
     for name in (metadatapath, folder):
         found = _SCENE.search(name)
         with suppress(TaskFileError):
             return known_scene(found[0] if found else "", where)
     raise TaskFileError(
-        f"{where} tells no scene: neither its metadatapath {metadatapath!r} nor its folder "
+        f"{where} names no scene: neither its metadatapath {metadatapath!r} nor its folder "
         f"{folder!r} names one, such as FloorPlan1"
     )
 
 
 def _order(path: Path) -> tuple[float, int, str]:
-    """By scene number, and so by kind of room, then by type; what is named otherwise comes last."""
+    """By scene number, which orders kinds of room, then by type; other names come last."""
     scene = _SCENE.fullmatch(path.parent.name)
     slugs = [_slug(kind) for kind in TASK_TYPES]
     slug = path.name[: -len(_ENDING)]

@@ -1,12 +1,14 @@
-"""What the paper's two task formats share: the records, and what these have no field for.
+"""The records of the paper's two task formats, and the fields that one side lacks.
 
-What :class:`~er_gym.tasks.task.Task` has no field for travels in ``Task.extra``:
+``Task.extra`` keeps the fields for which :class:`~er_gym.tasks.task.Task` has no attribute:
 
-- ``task_metadata``: what the paper's generator knew of the task, without its list of actions;
-- ``actions``: per key action, what :class:`~er_gym.tasks.task.KeyAction` has no field for.
+- ``task_metadata``: the fields that the paper's generator wrote, without its list of actions;
+- ``actions``: a mapping for each key action, with the fields that
+  :class:`~er_gym.tasks.task.KeyAction` lacks.
 
-What the paper's records have no field for travels in :class:`OwnFields`, under the key ``er_gym``.
-The paper's own files have no such key and, read and written again, get none.
+:class:`OwnFields`, under the key ``er_gym``, keeps the attributes for which the paper's records
+have no field. The paper's own files have no such key. They do not get one when er-gym reads them
+and writes them again.
 """
 
 from __future__ import annotations
@@ -20,23 +22,25 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.files import as_utf8, known_scene, known_type, known_verb
 from er_gym.tasks.jsonl_format import ConditionRecord, PoseRecord
 from er_gym.tasks.task import AgentPose, KeyAction, Task
 
 _SPELLED = {verbs.PUT: "put"}
-"""Verbs that the paper's task files spell unlike its agents' replies."""
+"""Verbs that the paper's task files and its agents' replies spell differently."""
 
 
 class OwnFields(BaseModel):
-    """What the paper's fields do not say of a task; a field left out is as they say.
+    """The attributes of a task that the paper's fields do not state.
+
+    Each attribute overrides the paper's fields. One that is left out is as they say.
 
     Attributes:
-        id: stated also where ``extra`` is not what the paper's fields leave of it; a task that
-            states it has no ``extra`` but the one stated here, and no identity by its place.
-        layout_poses: object name to x, y, z, pitch, yaw and roll.
-        poses: object id to the agent's pose; a test file has its pose file instead.
+        id: also stated where ``extra`` differs from what the paper's fields give. A task that
+            states its id takes ``extra`` from here alone.
+        layout_poses: object name to x, y, z (metres) and pitch, yaw, roll (degrees).
+        poses: object id to the agent's pose; test files have a pose file for these.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -57,14 +61,14 @@ class OwnFields(BaseModel):
     extra: dict[str, Any] = {}
 
 
-_ALIKE = (
+_SHARED_FIELDS = (
     "id", "instruction", "name", "target_objects", "related_objects", "navigable_objects",
 )  # fmt: skip
-"""Fields that :class:`OwnFields` takes from a task, and gives it, as they are."""
+"""Fields that :class:`OwnFields` and tasks have in the same form."""
 
 
 class _PaperModel(BaseModel):
-    """Keeps fields that it does not know, so that they can be written again."""
+    """Keeps unknown fields, so that they can be written again."""
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
 
@@ -80,13 +84,13 @@ class PaperAction(_PaperModel):
 
 
 class PaperMetadata(_PaperModel):
-    """What the paper's generator knew of a task, as its test file repeats it."""
+    """The part of a test file that repeats the record of the paper's generator."""
 
     actions: list[PaperAction]
 
 
-class PaperGenerated(PaperMetadata):
-    """The same as the paper's generator writes it."""
+class PaperGeneratedTask(PaperMetadata):
+    """A task as the paper's generator writes it."""
 
     taskname: str
     tasktype: str
@@ -110,7 +114,11 @@ class PaperTask(_PaperModel):
 
 
 def key_actions(actions: list[PaperAction], where: str) -> tuple[KeyAction, ...]:
-    """The key actions that are written so; a :class:`TaskFileError` names an unknown verb."""
+    """The key actions of the paper's records.
+
+    Raises:
+        TaskFileError: a verb is unknown; the message begins with ``where``.
+    """
     return tuple(
         KeyAction(
             verb=known_verb(action.action, where),
@@ -123,45 +131,46 @@ def key_actions(actions: list[PaperAction], where: str) -> tuple[KeyAction, ...]
     )
 
 
-def unspoken(action: PaperAction) -> dict[str, Any]:
-    """What of a key action :class:`KeyAction` does not tell, an odd spelling of the verb too."""
+def extra_action_fields(action: PaperAction) -> dict[str, Any]:
+    """The fields that :class:`KeyAction` lacks, among them an unusual spelling of the verb."""
     usual = action.action == _spelled(verbs.canonical_verb(action.action))
-    return unknown(action) | ({} if usual else {"action": action.action})
+    return extra_fields(action) | ({} if usual else {"action": action.action})
 
 
-def unknown(model: BaseModel) -> dict[str, Any]:
-    """The fields that a model does not know."""
+def extra_fields(model: BaseModel) -> dict[str, Any]:
+    """The fields of a record that its model does not declare."""
     return dict(model.model_extra or {})
 
 
 def metadata_record(task: Task) -> dict[str, Any]:
-    """What the paper's generator would know of a task, but for where the scene's metadata lie."""
+    """A task as the paper's generator writes it, without the path of the scene's metadata."""
     metadata = task.extra.get("task_metadata")
     return {
         "taskname": task.name,
         "tasktype": task.type.name,
         "actions": _action_records(task),
         "totalreward": _plain(task.total_reward),
-        **without(metadata, PaperMetadata),
+        **without_fields_of(metadata, PaperMetadata),
     }
 
 
-def without(fields: object, model: type[BaseModel]) -> dict[str, Any]:
-    """Fields without those that a model knows; none, if they are not even a mapping."""
+def without_fields_of(fields: object, model: type[BaseModel]) -> dict[str, Any]:
+    """The fields that a model does not declare; none if ``fields`` is no mapping."""
     if not isinstance(fields, Mapping):
         return {}
     return {name: value for name, value in fields.items() if name not in model.model_fields}
 
 
 def own_fields(task: Task, plain: Task) -> dict[str, Any]:
-    """What the paper's fields do not say of a task, as a record under its key, or nothing.
+    """:class:`OwnFields` of a task under their key ``er_gym``; empty if there are none to state.
 
     Args:
-        plain: the task as the paper's fields alone tell it.
+        task: the task that is written.
+        plain: the task that the paper's fields alone give when they are read.
     """
     own: dict[str, Any] = {
         name: getattr(task, name)
-        for name in (*_ALIKE, "scene")
+        for name in (*_SHARED_FIELDS, "scene")
         if getattr(task, name) != getattr(plain, name)
     }
     if task.type != plain.type:
@@ -171,9 +180,9 @@ def own_fields(task: Task, plain: Task) -> dict[str, Any]:
     record = OwnFields(
         **own,
         goal=tuple(map(ConditionRecord.of, task.goal)),
-        layout=task.start.layout,
-        layout_poses={name: astuple(pose) for name, pose in task.start.poses.items()},
-        dirty=task.start.dirty,
+        layout=task.arrangement.layout,
+        layout_poses={name: astuple(pose) for name, pose in task.arrangement.poses.items()},
+        dirty=task.arrangement.dirty,
         poses={key: PoseRecord(**asdict(pose)) for key, pose in task.poses.items()},
     )
     fields = record.model_dump(exclude_defaults=True)
@@ -181,17 +190,19 @@ def own_fields(task: Task, plain: Task) -> dict[str, Any]:
 
 
 def with_own_fields(plain: Task, own: OwnFields, where: str) -> Task:
-    """The task that the paper's fields, as ``plain``, and our own tell together."""
+    """The task that ``plain``, from the paper's fields, and :class:`OwnFields` give together."""
     defaults = OwnFields()
     stated = {
-        name: getattr(own, name) for name in _ALIKE if getattr(own, name) != getattr(defaults, name)
+        name: getattr(own, name)
+        for name in _SHARED_FIELDS
+        if getattr(own, name) != getattr(defaults, name)
     }
     return replace(
         plain,
         type=plain.type if own.type is None else known_type(own.type, where),
         scene=plain.scene if own.scene is None else known_scene(own.scene, where),
         goal=tuple(condition.condition() for condition in own.goal),
-        start=Start(
+        arrangement=Arrangement(
             own.layout,
             {name: ObjectPose(*pose) for name, pose in own.layout_poses.items()},
             own.dirty,
@@ -203,32 +214,32 @@ def with_own_fields(plain: Task, own: OwnFields, where: str) -> Task:
 
 
 def json_kind(data: object) -> str:
-    """What parsed JSON is, for a message."""
+    """The kind of a parsed JSON value, for a message."""
     kinds = {dict: "an object", list: "a list", str: "a string", type(None): "null"}
     return kinds.get(type(data), "a number or a truth value")
 
 
 def as_json(path: Path, data: object) -> bytes:
-    """The content of a file as the paper's are laid out.
+    """The content of a JSON file in the paper's layout, UTF-8.
 
     Raises:
-        TaskFileError: it holds half a character.
+        TaskFileError: a text holds a lone surrogate.
     """
     return as_utf8(json.dumps(data, indent=4, ensure_ascii=False) + "\n", path)
 
 
 def odd_spellings(task: Task) -> list[str]:
-    """For each key action, the verb as the task's file spells it; "" where it is the usual way."""
+    """For each key action, the verb as the task's file spells it; "" for the usual spelling."""
     spelled = (
         _as_spelled(action.verb, more)
-        for action, more in zip(task.key_actions, _rest(task), strict=True)
+        for action, more in zip(task.key_actions, _extra_of_actions(task), strict=True)
     )
     usual = (_spelled(action.verb) for action in task.key_actions)
     return ["" if one == other else one for one, other in zip(spelled, usual, strict=True)]
 
 
-def _rest(task: Task) -> Sequence[object]:
-    """What the task's file tells of each key action that :class:`KeyAction` does not."""
+def _extra_of_actions(task: Task) -> Sequence[object]:
+    """For each key action, the fields of the task's file that :class:`KeyAction` lacks."""
     rest = task.extra.get("actions")
     if not isinstance(rest, list) or len(rest) != len(task.key_actions):
         return [{}] * len(task.key_actions)
@@ -243,14 +254,14 @@ def _action_records(task: Task) -> list[dict[str, Any]]:
             "objectType": action.object_type,
             "reward": _plain(action.reward),
             "relatedObject": list(action.related_objects),
-            **without(more, PaperAction),
+            **without_fields_of(more, PaperAction),
         }
-        for action, more in zip(task.key_actions, _rest(task), strict=True)
+        for action, more in zip(task.key_actions, _extra_of_actions(task), strict=True)
     ]
 
 
 def _as_spelled(verb: str, more: object) -> str:
-    """The verb as the task's file spelled it, unless that was another verb."""
+    """The verb as the task's file spelled it; the usual spelling if the verb has changed since."""
     odd = more.get("action") if isinstance(more, Mapping) else None
     return odd if isinstance(odd, str) and verbs.canonical_verb(odd) == verb else _spelled(verb)
 

@@ -1,7 +1,7 @@
-"""The hook by which a language model words instructions anew.
+"""Paraphrases of instructions by a language model.
 
-The model is the user's: any function from a prompt to a reply. What it replied is kept in a file,
-so that it is asked once; what is kept is checked anew each time it is used.
+The user supplies the model: any function from a prompt to a reply. Replies are stored in a file, so
+that the model is asked only once. Stored replies are checked each time they are used.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from er_gym.thor import OBJECT_TYPES
 from er_gym.writing import CannotWrite, make_folder
 
 Ask: TypeAlias = Callable[[str], str]
-"""A language model: a prompt to its reply."""
+"""A language model: a function from a prompt to a reply."""
 
 LONGEST = 400
-"""Characters that a paraphrase may have."""
+"""The most characters of a paraphrase."""
 
 PROMPT_VERSION = 1
-"""A part of the key that replies are kept under; a new one has the model asked again."""
+"""Part of the key of stored replies; after a change, the model is asked again."""
 
 _PROMPT = """\
 Here is an instruction for a robot in a home:
@@ -54,7 +54,7 @@ _WORD = re.compile(r"\w+")
 
 
 _BEGINS = b'{"key": "'
-"""How every line of the file of replies does."""
+"""The beginning of every line of the file of replies."""
 
 
 class _Entry(BaseModel):
@@ -68,22 +68,23 @@ class _Entry(BaseModel):
 
 
 class Paraphraser:
-    """Has a model paraphrase instructions, and remembers what it replied.
+    """Asks a model for paraphrases and stores its replies.
 
-    Processes may share a file; two that begin with the same instruction at the same time both ask,
-    and later ones use the first reply. Models should not share one: it says nothing of who replied.
+    Processes may share a file. If two processes ask about the same instruction at the same time,
+    the first stored reply is used later. Models should not share a file, because it does not store
+    which model replied.
     """
 
     def __init__(self, ask: Ask, cache: Path | None, count: int = 3) -> None:
-        """Read what was replied before.
+        """Read the stored replies.
 
         Args:
-            ask: the model; what it raises is not caught.
-            cache: JSON lines of replies, made when the first one comes; None to keep no file.
-            count: how many paraphrases to ask for, and to return at most.
+            ask: the model; its exceptions are not caught.
+            cache: a file of JSON lines, created with the first reply; None to store nothing.
+            count: how many paraphrases to ask for and, at most, to return.
 
         Raises:
-            ValueError: ``count`` is below 1, or ``cache`` has lines of another kind.
+            ValueError: ``count`` is below 1, or er-gym did not write ``cache``.
         """
         if count < 1:
             raise ValueError(f"count is {count}; ask for at least 1 paraphrase")
@@ -93,15 +94,15 @@ class Paraphraser:
         self._replies = {} if cache is None else _read(cache)
 
     def __call__(self, instruction: str, names: Collection[str]) -> tuple[str, ...]:
-        """Up to ``count`` paraphrases of an instruction; none if the model gave none of use.
+        """Up to ``count`` paraphrases of an instruction; none if the model gave no usable one.
 
         Args:
             instruction: one line of English.
-            names: what each paraphrase must have, spelled so: object types, perhaps "off".
+            names: words that each paraphrase must hold in this spelling: object types, perhaps
+                "off".
 
         Raises:
-            ValueError: the instruction itself lacks one of the names, or the model's reply is no
-                text.
+            ValueError: the instruction lacks one of the names, or the model's reply is not a str.
         """
         if lacking := sorted(name for name in set(names) if not _has(instruction, name)):
             raise ValueError(
@@ -125,16 +126,16 @@ class Paraphraser:
 
 
 def make_prompt(instruction: str, names: Collection[str], count: int) -> str:
-    """What a model is asked; the order of ``names`` makes no difference."""
+    """The prompt for a model; it does not depend on the order of ``names``."""
     kept = _NAMES.format(names=", ".join(sorted(set(names)))) if names else ""
     return _PROMPT.format(instruction=instruction, count=count, names=kept, longest=LONGEST)
 
 
 def usable(reply: str, instruction: str, names: Collection[str]) -> tuple[str, ...]:
-    """The lines of a reply that may stand for the instruction, in order, each once.
+    """The lines of a reply that can replace the instruction, in order, without duplicates.
 
-    Such a line has every one of ``names``, no object type that the instruction has not, and whole
-    sentences, of at most :data:`LONGEST` characters. Nothing checks that it means the same.
+    Such a line consists of whole sentences with at most :data:`LONGEST` characters. It has all of
+    ``names`` and no object type that the instruction lacks. Its meaning is not checked.
     """
     own_types = _types(instruction)
     seen = {_plain(instruction)}
@@ -159,10 +160,10 @@ def names_in(instruction: str) -> frozenset[str]:
 
 
 def choose(variants: Sequence[str], task_id: str) -> str:
-    """One of several wordings of a task, the same for the same id in every process.
+    """One of several wordings of a task; the same for the same id in every process.
 
     Raises:
-        ValueError: there are none.
+        ValueError: there are no wordings.
     """
     if not variants:
         raise ValueError(f"task {task_id}: no wordings to choose from; give at least one")
@@ -176,20 +177,20 @@ PARAPHRASERS: Registry[Ask] = Registry(
     expected="a function from a prompt to a reply",
     fits=callable,
 )
-"""The language models of other packages, by name; er-gym brings none."""
+"""The language models of other packages, by name; er-gym has none."""
 
 
 def load_ask(spec: str) -> Ask:
-    """The function that a name such as ``my_package.models:ask`` stands for.
+    """Load a language model by its name, such as ``my_package.models:ask``.
 
     Raises:
-        ValueError: the name stands for no function.
+        ValueError: there is no function of that name.
     """
     return PARAPHRASERS.get(spec)
 
 
 def _read(cache: Path) -> dict[str, str]:
-    """Key to reply; a line that is not whole, since its writer was killed, is passed over."""
+    """Key to reply; incomplete lines, whose writer was killed, are skipped."""
     replies: dict[str, str] = {}
     if not cache.exists():
         return replies
@@ -210,21 +211,21 @@ def _read(cache: Path) -> dict[str, str]:
 
 
 def _append(cache: Path, entry: _Entry) -> None:
-    """Add a line in one write, so that it is there whole or, if we are killed, at most torn."""
+    """Append a line in one write, so that at most this line is incomplete if er-gym is killed."""
     make_folder(cache.parent)
     line = json.dumps(entry.model_dump()).encode() + b"\n"
-    with open(cache, "ab+", buffering=0) as file:  # O_APPEND: other writers' lines stay whole
+    with open(cache, "ab+", buffering=0) as file:  # O_APPEND keeps other writers' lines intact
         end = file.seek(0, os.SEEK_END)
         if end:
             file.seek(end - 1)
-            if file.read(1) != b"\n":  # a torn line is not to spoil this one
+            if file.read(1) != b"\n":  # an incomplete line must not spoil this one
                 line = b"\n" + line
         if file.write(line) != len(line):
             raise CannotWrite(f"{cache}: cannot be written: the disk is full")
 
 
 def _bare(line: str) -> str:
-    """A line without numbering, bullet and quotation marks, its spaces single."""
+    """A line without numbering, bullet and quotation marks, with single spaces."""
     line = " ".join(line.split())
     if bullet := _BULLET.match(line):
         line = line[bullet.end() :]
@@ -235,7 +236,7 @@ def _bare(line: str) -> str:
 
 
 def _has(text: str, name: str) -> bool:
-    """Whether a text has a name as a word, or words, of its own, spelled exactly so."""
+    """Whether a text has a name, in this spelling, as separate words."""
     return re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text) is not None
 
 
@@ -244,5 +245,5 @@ def _types(text: str) -> set[str]:
 
 
 def _plain(text: str) -> str:
-    """What texts that differ in no word have in common."""
+    """A text reduced to its words in lower case, for comparison."""
     return " ".join(_WORD.findall(text)).casefold()

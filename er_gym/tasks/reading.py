@@ -1,9 +1,9 @@
-"""Reads the files that users give, so that none of them can hang er-gym or fill the memory.
+"""Read users' files within limits, so that no file can hang er-gym or fill the memory.
 
-Every file that a user may have written comes through here: task files, configurations, prompts, run
-directories. What is read is a regular file, never a device or a pipe; it is of bounded size, also
-once it is unpacked; what is parsed is of bounded size and depth, aliases counted as what they stand
-for.
+All files that users may have written are read here: task files, configurations, prompts, run
+directories. Only regular files are read, never devices or pipes. The size is limited before and
+after decompression. Parsed data are limited in size and depth; a YAML alias counts as much as the
+value that it stands for.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ import yaml
 from er_gym.tasks.errors import TaskFileError
 
 LARGEST = 64 << 20
-"""Bytes of a file, unpacked. The suite ``train``, 10,000 tasks, has 14 MB."""
+"""The most bytes of a file, decompressed. The suite ``train``, 10,000 tasks, has 14 MB."""
 LARGEST_TEXT = 32 << 20
-"""Bytes of a file that is one text; as characters it takes up to four times as much memory."""
+"""The most bytes of a file read as one text; in memory a text takes up to four times as much."""
 LONGEST_LINE = 4 << 20
-"""Bytes of a line of JSON Lines; those of ``train`` have up to 4,600."""
+"""The most bytes of a line of JSON Lines; the longest line of ``train`` has 4,600."""
 LARGEST_YAML = 1 << 16
-"""Characters; PyYAML takes up to two seconds for so many."""
+"""The most characters of a YAML document; PyYAML takes up to two seconds for these."""
 MOST_VALUES = 2_000_000
-"""Values in a file of JSON, the separators among them counted; ``train`` has 0.6 million."""
+"""The most commas and opening brackets in a JSON file; ``train`` has 0.6 million."""
 MOST_IN_YAML = 100_000
-"""Nodes of a YAML document, those that an alias stands for counted each time."""
+"""The most nodes of a YAML document; an alias counts as the nodes that it stands for."""
 DEEPEST = 64
-"""How deeply lists and objects may be nested in one another."""
+"""The most levels of nested lists and objects."""
 LONGEST_INTEGER = 20
-"""Characters: more than 64 bits need."""
+"""The most characters of an integer; 64 bits need at most this many."""
 
 _KINDS = (
     (stat.S_ISDIR, "a directory"),
@@ -53,20 +53,20 @@ _MOST_BRACKETS = 500
 _BRACKET = re.compile(r"[\[\]{}]")
 _INTEGER = "tag:yaml.org,2002:int"
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
-"""Escapes of JSON that stand for a character only in pairs."""
+"""JSON escapes that form a character only in pairs."""
 
 
 def open_file(path: Path) -> BinaryIO:
-    """Open a regular file to read its bytes.
+    """Open a regular file for reading bytes.
 
     Raises:
-        TaskFileError: it is not there, is no regular file, or may not be read.
+        TaskFileError: the file does not exist, is not a regular file, or may not be read.
     """
     try:
-        _must_be_regular(os.stat(path).st_mode, path)  # to open a device may have consequences
-        # Nobody is waited for if a pipe has taken the file's place meanwhile.
+        _must_be_regular(os.stat(path).st_mode, path)  # opening a device can have side effects
+        # O_NONBLOCK: do not wait if a pipe has replaced the file in the meantime.
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-        file = open(handle, "rb")  # noqa: SIM115  # the caller's to close
+        file = open(handle, "rb")  # noqa: SIM115  # the caller closes it
     except TaskFileError:
         raise
     except FileNotFoundError:
@@ -84,14 +84,14 @@ def open_file(path: Path) -> BinaryIO:
 
 
 def read_bytes(path: Path, most: int = LARGEST) -> bytes:
-    """The bytes of a file, unpacked if its name ends in ``.gz``.
+    """The bytes of a file, decompressed if its name ends in ``.gz``.
 
     Args:
-        path: of a regular file.
-        most: bytes that it may have, packed and unpacked.
+        path: a regular file.
+        most: the most bytes that it may have, compressed and decompressed.
 
     Raises:
-        TaskFileError: it cannot be read, is larger, or is not gzip.
+        TaskFileError: the file cannot be read, is larger, or is not gzip.
     """
     with open_file(path) as file:
         try:
@@ -111,10 +111,11 @@ def read_bytes(path: Path, most: int = LARGEST) -> bytes:
 
 
 def read_text(path: Path, most: int = LARGEST_TEXT) -> str:
-    """The text of a file, unpacked if its name ends in ``.gz``; a byte order mark is left out.
+    """The text of a file without a byte order mark, decompressed if its name ends in ``.gz``.
 
     Raises:
-        TaskFileError: it cannot be read, is larger than ``most`` bytes, or is not UTF-8 or gzip.
+        TaskFileError: the file cannot be read, is larger than ``most`` bytes, or is not UTF-8 or
+            gzip.
     """
     return _decoded(read_bytes(path, most), path)
 
@@ -123,8 +124,8 @@ def parse_json(text: str, path: Path, first_line: int = 1) -> object:
     """Parse JSON that starts at line ``first_line`` of a file.
 
     Raises:
-        TaskFileError: it is not JSON, or holds what er-gym does not read: too many values, nested
-            too deeply, NaN, numbers beyond 64 bits, half a character. The message says where.
+        TaskFileError: the text is not JSON, has too many values or levels, or holds NaN, a number
+            beyond 64 bits or a lone surrogate. The message says where.
     """
     opened = text.count("[") + text.count("{")
     if opened + text.count(",") > MOST_VALUES:
@@ -138,7 +139,7 @@ def parse_json(text: str, path: Path, first_line: int = 1) -> object:
         ) from None
     except RecursionError:
         _too_deep(f"{path}: line {first_line}")
-    except ValueError as error:  # of the decoder's parts below
+    except ValueError as error:  # raised by _integer, _decimal and _constant
         raise TaskFileError(f"{path}: {_place(text, first_line)}: {error}") from None
     if opened > DEEPEST and _is_deeper(data):
         _too_deep(f"{path}: {_place(text, first_line)}")
@@ -154,9 +155,9 @@ def parse_json(text: str, path: Path, first_line: int = 1) -> object:
 
 
 def read_json_lines(path: Path) -> Iterator[tuple[int, object]]:
-    """The number of each line, from 1, and the JSON in it; empty lines are passed over.
+    """Yield the number of each line, from 1, and its JSON value; empty lines are skipped.
 
-    Lines end with a newline and nothing else: U+2028 and its like are characters of a text.
+    Only a newline ends a line. U+2028 and similar characters are part of a text.
 
     Raises:
         TaskFileError: as :func:`read_bytes` and :func:`parse_json`.
@@ -175,24 +176,27 @@ def read_json_lines(path: Path) -> Iterator[tuple[int, object]]:
 
 
 def read_yaml(path: Path) -> Any:
-    """What a YAML file says; see :func:`parse_yaml`."""
+    """Parse a YAML file.
+
+    Raises:
+        TaskFileError: as :func:`read_text` and :func:`parse_yaml`.
+    """
     return parse_yaml(read_text(path, LARGEST_YAML), str(path))
 
 
 def parse_yaml(text: str, where: str) -> Any:
-    """What YAML says.
+    """Parse a YAML document.
 
     Args:
         text: one document.
         where: its place, for messages.
 
     Raises:
-        TaskFileError: it is not YAML, is too large or nested too deeply, or its aliases make too
-            much of little.
+        TaskFileError: the text is not YAML, is too long, or has too many levels or nodes.
     """
     if len(text) > LARGEST_YAML:
         raise TaskFileError(f"{where}: too long; YAML may have {LARGEST_YAML:,} characters")
-    if _brackets(text) > _MOST_BRACKETS:  # PyYAML's time goes with the square of them
+    if _brackets(text) > _MOST_BRACKETS:  # PyYAML takes quadratic time for these
         _too_deep(where)
     loader = None
     try:
@@ -205,8 +209,8 @@ def parse_yaml(text: str, where: str) -> Any:
             _too_deep(where)
         if size > MOST_IN_YAML:
             raise TaskFileError(
-                f"{where}: too many values; YAML may have {MOST_IN_YAML:,}, what an alias stands "
-                "for counted each time"
+                f"{where}: too many values; YAML may have {MOST_IN_YAML:,}; an alias counts as the "
+                "values that it stands for"
             )
         return loader.construct_document(node)
     except TaskFileError:
@@ -217,9 +221,9 @@ def parse_yaml(text: str, where: str) -> Any:
         raise TaskFileError(f"{where}: not YAML: {' '.join(str(error).split())}") from None
     except RecursionError:
         _too_deep(where)
-    except Exception as error:  # PyYAML takes "!!int" and 2001-99-99 for what they say they are
+    except Exception as error:  # PyYAML fails so on "!!int x" and on 2001-99-99
         raise TaskFileError(
-            f"{where}: not YAML: a value that is not of its kind ({type(error).__name__}: "
+            f"{where}: not YAML: a value does not fit its tag ({type(error).__name__}: "
             f"{' '.join(str(error).split())})"
         ) from None
     finally:
@@ -244,7 +248,7 @@ def _decimal(text: str) -> float:
 
 
 def _constant(text: str) -> NoReturn:
-    raise ValueError(f"{text} is no number of JSON; give a finite one, or null")
+    raise ValueError(f"{text} is not a JSON number; give a finite number or null")
 
 
 _DECODER = json.JSONDecoder(parse_int=_integer, parse_float=_decimal, parse_constant=_constant)
@@ -265,13 +269,13 @@ def _decoded(data: bytes, path: Path, line: int | None = None) -> str:
 
 
 def _place(text: str, first_line: int) -> str:
-    """Where JSON stands: its line, or its lines."""
+    """The line or the lines of a JSON text."""
     last = first_line + text.rstrip().count("\n")
     return f"line {first_line}" if last == first_line else f"lines {first_line} to {last}"
 
 
 def _is_deeper(data: object) -> bool:
-    """Whether JSON is nested more deeply than :data:`DEEPEST`."""
+    """Whether parsed JSON has more levels than :data:`DEEPEST`."""
     level: list[Any] = [data]
     for _ in range(DEEPEST):
         inner = (each.values() if isinstance(each, dict) else each for each in level)
@@ -282,7 +286,7 @@ def _is_deeper(data: object) -> bool:
 
 
 def _brackets(text: str) -> int:
-    """How deeply YAML's brackets are nested at most; those in its texts count too."""
+    """The deepest nesting of brackets in YAML, brackets in strings included."""
     depth = deepest = 0
     for bracket in _BRACKET.findall(text):
         depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
@@ -291,10 +295,11 @@ def _brackets(text: str) -> int:
 
 
 def _measured(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:
-    """How many nodes a YAML node stands for, aliases followed, and how deeply it is nested.
+    """The number of nodes below a YAML node, itself and aliases included, and its height.
 
     Args:
-        known: what was found so far, by the node's id; None while a node is being looked at.
+        node: the node.
+        known: results by the node's Python id; None while a node is being measured.
     """
     if isinstance(node, yaml.ScalarNode):
         node.value.encode()
@@ -304,7 +309,7 @@ def _measured(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tupl
     if id(node) in known:
         found = known[id(node)]
         if found is None:
-            raise yaml.YAMLError("a value that has itself for a part")
+            raise yaml.YAMLError("a value contains itself")
         return found
     known[id(node)] = None
     is_map = isinstance(node, yaml.MappingNode)

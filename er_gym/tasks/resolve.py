@@ -1,8 +1,9 @@
-"""Fit tasks to their scenes: real files spell some object ids differently, or wrongly.
+"""Match the object ids of tasks to their scenes: real files spell some ids differently or wrongly.
 
-An id that a scene lacks is mostly one of another build of AI2-THOR, where the object stands a
-little elsewhere. So the nearest object of its type, at most :data:`NEAR` metres off, is taken for
-it, if no other comes into question. A task that this leaves in doubt is set aside.
+An id that a scene lacks usually comes from another build of AI2-THOR, in which the object has a
+slightly different position. The nearest object of the same type replaces it, if it is at most
+:data:`NEAR` metres away and no other object is as near. A task is set aside if an id that it needs
+remains unclear.
 """
 
 from __future__ import annotations
@@ -13,15 +14,15 @@ from dataclasses import dataclass, replace
 from math import dist, inf
 from typing import Any
 
-from er_gym.tasks.arrangement import Start, begin
-from er_gym.tasks.errors import SetAside, Taken, TaskFileError
+from er_gym.tasks.arrangement import Arrangement, set_up_scene
+from er_gym.tasks.errors import SetAsideTask, Substitution, TaskFileError
 from er_gym.tasks.task import Task, type_of_id
 from er_gym.thor import make_controller
 
 NEAR = 0.25
-"""How far off an object may be that is taken for one that is missing, metres."""
+"""The largest distance between a missing object and its substitute, metres."""
 _ROUNDED = 0.01
-"""Ids tell places to a hundredth of a metre."""
+"""Ids state coordinates to a hundredth of a metre."""
 _NUMBER = re.compile(r"[+-]?\d+\.\d+")
 _NOT_THERE_YET = re.compile(r"(.*)(\|(?:\w+Sliced_\d+|EggCracked(?:_0)?))")
 
@@ -30,38 +31,40 @@ Position = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """What came of fitting tasks to their scenes.
+class ResolvedTasks:
+    """The result of :func:`resolve_tasks`.
 
     Attributes:
-        tasks: those that can be played, in their order, with the ids that their scenes have.
-        taken: what stands for objects that the scenes lack.
-        notes: what else is odd about them, in words.
-        set_aside: the others, and why.
+        tasks: the tasks that can be played, in their order, with the ids of their scenes.
+        substitutions: the objects that replace objects that the scenes lack.
+        notes: other oddities of these tasks, one sentence each.
+        set_aside: the tasks that cannot be played, and why.
     """
 
     tasks: tuple[Task, ...]
-    taken: tuple[Taken, ...] = ()
+    substitutions: tuple[Substitution, ...] = ()
     notes: tuple[str, ...] = ()
-    set_aside: tuple[SetAside, ...] = ()
+    set_aside: tuple[SetAsideTask, ...] = ()
 
 
 def resolve_task(
     task: Task, objects: Mapping[str, Position] | Collection[str]
-) -> tuple[Task, list[Taken], list[str]]:
-    """Give a task the ids that its scene has.
+) -> tuple[Task, list[Substitution], list[str]]:
+    """Replace the object ids of a task by those of its scene.
 
     Args:
-        objects: the ids of the objects of the task's scene as it is arranged when the task begins,
-            with their positions where these are known.
+        task: the task.
+        objects: the ids of all objects of the scene when the episode begins; a mapping also gives
+            their positions (x, y, z in metres, AI2-THOR's world frame).
 
     Returns:
-        The task with every id that is spelled differently, or that is off a little, replaced; what
-        was taken for what; and notes in words on ids that were respelled and on doubtful types.
+        The task with the scene's ids, the substitutions, and notes. There is a note for each id
+        that was only spelled differently, for each missing id that no key action needs, and for
+        each key action that states another type than its object has.
 
     Raises:
-        TaskFileError: a key action, the goal or the start is about an object that the scene lacks,
-            and none, or several, could be meant.
+        TaskFileError: the scene lacks an object of a key action, of the goal or of the arrangement,
+            and no object, or several, could replace it.
     """
     try:
         return _resolve(task, objects)
@@ -71,37 +74,40 @@ def resolve_task(
 
 def resolve_tasks(
     tasks: Iterable[Task], backend: str = "embedded", *, arrange: bool = True
-) -> Fitted:
-    """:func:`resolve_task` for each of several tasks, in the scenes of a backend.
+) -> ResolvedTasks:
+    """Apply :func:`resolve_task` to tasks, in the scenes of a backend.
 
     Args:
-        arrange: make each arrangement of a scene to see what is in it; else this is told from the
-            poses of the arrangement, which is quicker, and only what that leaves open is made.
+        tasks: the tasks.
+        backend: a name that :func:`~er_gym.thor.make_controller` knows.
+        arrange: whether to set up every arrangement on the backend. Otherwise the poses of an
+            arrangement decide, which is quicker, and the backend sets up only those arrangements
+            whose poses leave a question open.
 
     Raises:
         BackendError: the backend cannot be started.
         ValueError: there is no such backend.
     """
-    fitted, taken, notes, set_aside = [], [], [], []
+    fitted, substitutions, notes, set_aside = [], [], [], []
     with make_controller(backend, headless=True) as controller:
-        rooms = _Rooms(controller)
+        scenes = _Scenes(controller)
         for task in tasks:
             try:
-                task, renamed = _with_names(task, rooms.names(task.scene))
-                if arrange or not _all_there(task, rooms):
-                    task, near, said = _resolve(task, rooms.objects(task))
-                    taken += near
-                    notes += said
+                task, renamed = _with_known_names(task, scenes.names(task.scene))
+                if arrange or not _contains_all(task, scenes):
+                    task, near, remarks = _resolve(task, scenes.objects(task))
+                    substitutions += near
+                    notes += remarks
             except ValueError as error:  # a TaskFileError, or an engine that cannot arrange it
-                set_aside.append(SetAside(task.id, " ".join(str(error).split())))
+                set_aside.append(SetAsideTask(task.id, " ".join(str(error).split())))
                 continue
-            taken += renamed
+            substitutions += renamed
             fitted.append(task)
-    return Fitted(tuple(fitted), tuple(taken), tuple(notes), tuple(set_aside))
+    return ResolvedTasks(tuple(fitted), tuple(substitutions), tuple(notes), tuple(set_aside))
 
 
-class _Rooms:
-    """What is in scenes and arrangements of them, found out once."""
+class _Scenes:
+    """The objects of scenes and of their arrangements, each asked of the backend once."""
 
     def __init__(self, controller: Any) -> None:
         self._controller = controller
@@ -109,30 +115,32 @@ class _Rooms:
         self._arranged: dict[tuple[str, str], dict[str, Position]] = {}
 
     def recorded(self, scene: str) -> list[dict[str, Any]]:
-        """Metadata of a scene's objects as they are recorded."""
+        """The object metadata of a scene as recorded."""
         if scene not in self._recorded:
-            self._recorded[scene] = begin(self._controller, scene, Start()).metadata["objects"]
+            self._recorded[scene] = set_up_scene(self._controller, scene, Arrangement()).metadata[
+                "objects"
+            ]
         return self._recorded[scene]
 
     def names(self, scene: str) -> Mapping[str, str]:
-        """Name to id, in a scene as it is recorded."""
+        """Object name to id, in a scene as recorded."""
         return {entry["name"]: entry["objectId"] for entry in self.recorded(scene)}
 
     def objects(self, task: Task) -> Mapping[str, Position]:
-        """Id to position, as the task begins."""
-        key = (task.scene, task.start.layout)
+        """Object id to position when the task's episode begins."""
+        key = (task.scene, task.arrangement.layout)
         if key not in self._arranged:
-            if task.start.poses:
-                start = replace(task.start, dirty=())
-                metadata = begin(self._controller, task.scene, start).metadata
+            if task.arrangement.poses:
+                arrangement = replace(task.arrangement, dirty=())
+                metadata = set_up_scene(self._controller, task.scene, arrangement).metadata
                 entries = metadata["objects"]
             else:
                 entries = self.recorded(task.scene)
-            self._arranged[key] = {entry["objectId"]: _position(entry) for entry in entries}
+            self._arranged[key] = {entry["objectId"]: _position_of(entry) for entry in entries}
         return self._arranged[key]
 
 
-def _position(entry: Mapping[str, Any]) -> Position:
+def _position_of(entry: Mapping[str, Any]) -> Position:
     at = entry["position"]
     return at["x"], at["y"], at["z"]
 
@@ -142,47 +150,48 @@ def _position(entry: Mapping[str, Any]) -> Position:
 
 def _resolve(
     task: Task, objects: Mapping[str, Position] | Collection[str]
-) -> tuple[Task, list[Taken], list[str]]:
+) -> tuple[Task, list[Substitution], list[str]]:
     positions = objects if isinstance(objects, Mapping) else {}
-    respelled, missing = _respelled(task, objects)
-    there = {respelled.get(i, i) for i in _named(task)}.difference(missing)
-    found = _nearest(missing, [i for i in objects if i not in there], positions)
-    for object_id in _essential(task):
-        whole = _to_be_there(object_id)
+    respelled, missing = _find_respelled(task, objects)
+    there = {respelled.get(i, i) for i in _mentioned_ids(task)}.difference(missing)
+    found = _find_nearest(missing, [i for i in objects if i not in there], positions)
+    for object_id in _required_ids(task):
+        whole = _whole_of_slice(object_id)
         if whole in missing and whole not in found:
             gone = there | {other for other, _ in found.values()}
-            raise TaskFileError(_lacking(whole, task.scene, objects, gone, positions))
+            raise TaskFileError(_missing_message(whole, task.scene, objects, gone, positions))
     instead = {**respelled, **{named: other for named, (other, _) in found.items()}}
     notes = [
         f"task {task.id}: {named} is {other} in {task.scene}" for named, other in respelled.items()
     ]
-    taken = [
-        Taken(task.id, task.scene, named, other, metres) for named, (other, metres) in found.items()
+    substitutions = [
+        Substitution(task.id, task.scene, named, other, metres)
+        for named, (other, metres) in found.items()
     ]
     notes += [
         f"task {task.id}: {task.scene} has no {named}; no key action is about it"
         for named in missing
         if named not in found
     ]
-    return _with_ids(task, instead), taken, [*notes, *_doubtful(task)]
+    return _with_ids(task, instead), substitutions, [*notes, *_type_mismatches(task)]
 
 
-def _essential(task: Task) -> Iterator[str]:
-    """The ids without which a task cannot be done; "" where none is stated."""
+def _required_ids(task: Task) -> Iterator[str]:
+    """The ids that a task needs; "" where a key action or condition states none."""
     yield from (action.object_id for action in task.key_actions)
     yield from (condition.object_id for condition in task.goal)
-    yield from task.start.dirty
+    yield from task.arrangement.dirty
 
 
-def _ids(task: Task) -> Iterator[str]:
-    """Every object id in a task, those of its poses too: they may be of another build than it."""
-    yield from _named(task)
+def _all_ids(task: Task) -> Iterator[str]:
+    """Every object id in a task. Those of its poses may come from another build."""
+    yield from _mentioned_ids(task)
     yield from task.poses
 
 
-def _named(task: Task) -> Iterator[str]:
-    """The ids of what a task is about."""
-    yield from filter(None, _essential(task))
+def _mentioned_ids(task: Task) -> Iterator[str]:
+    """Every object id in a task except those of its poses."""
+    yield from filter(None, _required_ids(task))
     for action in task.key_actions:
         yield from action.related_objects
     yield from task.target_objects
@@ -190,10 +199,10 @@ def _named(task: Task) -> Iterator[str]:
 
 
 def _with_ids(task: Task, instead: Mapping[str, str]) -> Task:
-    """The task with some ids replaced by others."""
+    """The task with its ids replaced as ``instead`` says."""
 
     def fit(object_id: str) -> str:
-        whole = _to_be_there(object_id)
+        whole = _whole_of_slice(object_id)
         return instead.get(whole, whole) + object_id[len(whole) :]
 
     return replace(
@@ -209,20 +218,20 @@ def _with_ids(task: Task, instead: Mapping[str, str]) -> Task:
         target_objects=tuple(fit(i) for i in task.target_objects),
         related_objects=tuple(fit(i) for i in task.related_objects),
         goal=tuple(replace(one, object_id=fit(one.object_id)) for one in task.goal),
-        start=replace(task.start, dirty=tuple(fit(i) for i in task.start.dirty)),
-        # What is stated for the object itself counts before what is stated for another.
+        arrangement=replace(task.arrangement, dirty=tuple(fit(i) for i in task.arrangement.dirty)),
+        # The pose that the file states for the object itself wins.
         poses={fit(i): task.poses[i] for i in sorted(task.poses, key=lambda i: fit(i) == i)},
     )
 
 
-def _to_be_there(object_id: str) -> str:
-    """Whose part an id names, if it is a slice: that is not there yet when the episode begins."""
+def _whole_of_slice(object_id: str) -> str:
+    """The id of the whole for the id of a slice, which does not exist yet; else the same id."""
     part = _NOT_THERE_YET.fullmatch(object_id)
     return part[1] if part else object_id
 
 
-def _doubtful(task: Task) -> list[str]:
-    """Key actions whose stated type is not that of their object."""
+def _type_mismatches(task: Task) -> list[str]:
+    """A note for each key action whose stated type is not the type of its object."""
     return [
         f"task {task.id}: key action '{action.verb}' states {action.object_type or 'no type'} "
         f"for {action.object_id}, a {action.actual_type}"
@@ -234,11 +243,11 @@ def _doubtful(task: Task) -> list[str]:
 # -- ids -------------------------------------------------------------------------------------------
 
 
-def _respelled(task: Task, objects: Collection[str]) -> tuple[dict[str, str], list[str]]:
-    """The ids of a task that its scene only spells differently, and those that it lacks."""
+def _find_respelled(task: Task, objects: Collection[str]) -> tuple[dict[str, str], list[str]]:
+    """The ids that the scene spells differently, with its spelling, and the ids that it lacks."""
     spelled = {_coordinates(object_id): object_id for object_id in objects}
     respelled, missing = {}, []
-    for object_id in dict.fromkeys(map(_to_be_there, _ids(task))):
+    for object_id in dict.fromkeys(map(_whole_of_slice, _all_ids(task))):
         if object_id not in objects:
             other = spelled.get(_coordinates(object_id))
             if other is None:
@@ -249,15 +258,15 @@ def _respelled(task: Task, objects: Collection[str]) -> tuple[dict[str, str], li
 
 
 def _coordinates(object_id: str) -> tuple[str, ...]:
-    """An id with its coordinates as numbers: ``+00.00``, ``-00.00`` and ``00.00`` are one."""
+    """An id with normalised coordinates: ``+00.00``, ``-00.00`` and ``00.00`` become equal."""
     return tuple(
         f"{float(part) + 0.0:.2f}" if _NUMBER.fullmatch(part) else part
         for part in object_id.split("|")
     )
 
 
-def _place(object_id: str) -> Position | None:
-    """The position that an id tells, metres."""
+def _position_in_id(object_id: str) -> Position | None:
+    """The position in an object id, metres; None if the id has none."""
     parts = object_id.split("|")[1:4]
     if len(parts) < 3 or not all(map(_NUMBER.fullmatch, parts)):
         return None
@@ -268,26 +277,26 @@ def _place(object_id: str) -> Position | None:
 def _distances(
     object_id: str, candidates: Iterable[str], positions: Mapping[str, Position]
 ) -> list[tuple[float, str]]:
-    """How far off the candidates of an id's type are, metres, the nearest first.
+    """The candidates of an id's type with their distances in metres, the nearest first.
 
-    An object is where its id says or where it is, whichever is nearer: what has come to rest, or
-    has been moved, is not where it was named after.
+    The distance is to the position in the candidate's id or to its actual position, whichever is
+    smaller: an object that settled or was moved keeps the id of its former position.
     """
-    place, kind = _place(object_id), type_of_id(object_id)
+    place, kind = _position_in_id(object_id), type_of_id(object_id)
     found = []
     for other in candidates:
         if type_of_id(other) == kind:
-            places = filter(None, (_place(other), positions.get(other)))
+            places = filter(None, (_position_in_id(other), positions.get(other)))
             found.append(
                 (min((dist(place, p) for p in places), default=inf) if place else inf, other)
             )
     return sorted((round(metres, 4), other) for metres, other in found)
 
 
-def _nearest(
+def _find_nearest(
     missing: Sequence[str], candidates: Sequence[str], positions: Mapping[str, Position]
 ) -> dict[str, tuple[str, float]]:
-    """Missing id to what is taken for it and how far off that is, metres; each is taken once."""
+    """Missing id to its substitute and their distance, metres; no object is used twice."""
     near = {named: _distances(named, candidates, positions) for named in missing}
     pairs = sorted((metres, named, other) for named in near for metres, other in near[named])
     found: dict[str, tuple[str, float]] = {}
@@ -297,7 +306,7 @@ def _nearest(
         if metres > NEAR or named in found or named in unclear or other in gone:
             continue
         others = [far for far, one in near[named] if one not in gone and one != other]
-        if min(others, default=inf) < metres + _ROUNDED / 2:  # as near, as far as ids tell
+        if min(others, default=inf) < metres + _ROUNDED / 2:  # as near, to the precision of ids
             unclear.add(named)
         else:
             found[named] = (other, metres)
@@ -305,14 +314,14 @@ def _nearest(
     return found
 
 
-def _lacking(
+def _missing_message(
     object_id: str,
     scene: str,
     objects: Collection[str],
     gone: Collection[str],
     positions: Mapping[str, Position],
 ) -> str:
-    """Why nothing is taken for an id; of the objects some are ``gone``, the task's already."""
+    """Why no object replaces an id; the task uses those that are ``gone`` already."""
     kind = type_of_id(object_id)
     near = _distances(object_id, [i for i in objects if i not in gone], positions)
     told = [f"{one}, {metres:.2f} m off" if metres < inf else one for metres, one in near[:2]]
@@ -325,46 +334,48 @@ def _lacking(
     return f"{scene} has no object {object_id!r}; {why}"
 
 
-# -- starts ----------------------------------------------------------------------------------------
+# -- arrangements ----------------------------------------------------------------------------------
 
 
-def _with_names(task: Task, names: Mapping[str, str]) -> tuple[Task, list[Taken]]:
-    """The task with a start that moves what the scene has: names end in what differs by build."""
-    poses = task.start.poses
-    taken = []
+def _with_known_names(task: Task, names: Mapping[str, str]) -> tuple[Task, list[Substitution]]:
+    """The task with the scene's names in its arrangement: name suffixes differ between builds."""
+    poses = task.arrangement.poses
+    substitutions = []
     instead: dict[str, str] = {}
     for name in poses:
         if name not in names:
             alike = [n for n in names if _stem(n) == _stem(name) and n not in poses]
             if len(alike) != 1 or alike[0] in instead.values():
                 raise TaskFileError(
-                    f"its start moves {name!r}, which {task.scene} does not have; "
+                    f"its arrangement moves {name!r}, which {task.scene} does not have; "
                     + (f"it could be {' or '.join(alike)}" if alike else "nor any of that name")
                 )
             instead[name] = alike[0]
-            taken.append(Taken(task.id, task.scene, name, alike[0], None))
+            substitutions.append(Substitution(task.id, task.scene, name, alike[0], None))
     if not instead:
         return task, []
     moved = {instead.get(name, name): pose for name, pose in poses.items()}
-    return replace(task, start=replace(task.start, poses=moved)), taken
+    return replace(task, arrangement=replace(task.arrangement, poses=moved)), substitutions
 
 
 def _stem(name: str) -> str:
     return name.rpartition("_")[0]
 
 
-def _all_there(task: Task, rooms: _Rooms) -> bool:
-    """Whether a scene has all that a task names, as far as that can be told without arranging it:
-    what is as recorded, and what has been moved to where its id says."""
-    poses = task.start.poses
-    still = {object_id for name, object_id in rooms.names(task.scene).items() if name not in poses}
-    kinds = {name: type_of_id(object_id) for name, object_id in rooms.names(task.scene).items()}
+def _contains_all(task: Task, scenes: _Scenes) -> bool:
+    """Whether the poses alone show that the scene has every object of a task.
+
+    They do if each object was not moved, or was moved to the position in its id.
+    """
+    poses = task.arrangement.poses
+    still = {object_id for name, object_id in scenes.names(task.scene).items() if name not in poses}
+    kinds = {name: type_of_id(object_id) for name, object_id in scenes.names(task.scene).items()}
 
     def moved_there(object_id: str) -> bool:
-        place, kind = _place(object_id), type_of_id(object_id)
+        place, kind = _position_in_id(object_id), type_of_id(object_id)
         return place is not None and any(
             kinds[name] == kind and dist(place, (pose.x, pose.y, pose.z)) < _ROUNDED
             for name, pose in poses.items()
         )
 
-    return all(i in still or moved_there(i) for i in map(_to_be_there, _ids(task)))
+    return all(i in still or moved_there(i) for i in map(_whole_of_slice, _all_ids(task)))

@@ -1,4 +1,4 @@
-"""What is kept from training: rooms, and types of things."""
+"""The training split: which scenes and object types training does not see."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ EVALUATION_SCENES = (
     "FloorPlan301", "FloorPlan302", "FloorPlan303",
     "FloorPlan401", "FloorPlan403", "FloorPlan404",
 )
-"""The twelve rooms of the paper's test tasks, three of each kind."""
+"""The twelve scenes of the paper's test tasks, three of each kind of room."""
 _ALSO_HELD_OUT = ("FloorPlan4", "FloorPlan22", "FloorPlan27")
-"""Rooms in which tasks of the paper's test file play that are long-range."""
+"""Further scenes of the long-range tasks in the paper's test file."""
 TRAINING_SCENES = tuple(
     name for name in SCENE_NAMES if name not in (*EVALUATION_SCENES, *_ALSO_HELD_OUT)
 )
-"""All rooms in which no test task of the paper that we know of plays."""
+"""All scenes without a known test task of the paper."""
 UNSEEN_TYPES = frozenset({
     "AlarmClock", "Kettle", "Ladle", "Newspaper", "SprayBottle", "Statue", "TissueBox", "Watch",
 })
-"""Types that no training task is about: no one looks for them, takes them or switches them."""
+"""Types that no training task searches for, picks up or switches."""
 # fmt: on
 SCENES: Mapping[str, tuple[str, ...]] = {
     "all": SCENE_NAMES,
     "training": TRAINING_SCENES,
     "evaluation": EVALUATION_SCENES,
 }
-"""Sets of rooms by name."""
+"""Sets of scenes by name."""
 
 
 _ABOUT_PLACES = frozenset({verbs.PUT, verbs.OPEN, verbs.CLOSE})
-"""Interactions with what a thing is in, rather than with the thing."""
+"""Interactions with an object's receptacle rather than with the object."""
 
 
 def subject_types(task: Task) -> frozenset[str]:
-    """The types that a task is about: what is looked for, taken, switched, sliced and so on."""
+    """The types that a task searches for, picks up, switches, slices and so on."""
     acted_on = {
         action.actual_type
         for action in task.key_actions
@@ -50,7 +50,7 @@ def subject_types(task: Task) -> frozenset[str]:
 
 
 def split(task: Task) -> str:
-    """How new a task is to who was trained in the training rooms on tasks about the other types.
+    """How new a task is to an agent that was trained on the training split.
 
     Returns:
         ``seen``, ``unseen room``, ``unseen object`` or ``unseen room and object``.

@@ -1,4 +1,4 @@
-"""What a suite is made of: counts over its tasks, and a card in Markdown that tells them."""
+"""Statistics of a suite's tasks, and its card in Markdown."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from er_gym.writing import MARKDOWN_MARK
 
 _WIDTH = 100
 _TIED = "\u00a0"
-"""Holds a name and its count together while lines are wrapped; a plain space afterwards."""
+"""Keeps a name and its count on one line while text is wrapped; then replaced by a space."""
 _LICENCE = (
     "Licence: Apache-2.0. The scene data that the tasks build on derive from ProcTHOR's "
     "ai2thor-object-metadata (Apache-2.0) and from ALFWorld (MIT); see NOTICE."
@@ -27,18 +27,19 @@ _LICENCE = (
 
 @dataclass(frozen=True)
 class Summary:
-    """How many tasks there are of each kind; what does not occur is left out.
+    """Numbers of tasks by several properties, without entries of zero.
 
     Attributes:
-        tasks: how many there are.
+        tasks: the number of all tasks.
         groups, types, room_kinds: in the order of their tables.
         scenes: in the order of their numbers.
         subjects: by :func:`subject_type`, the most frequent first.
-        receptacles: how many tasks go to a receptacle of the type, the most frequent first. A task
-            that goes to several types counts for each.
-        lengths, depths: by number of key actions, and of those that open something; ascending.
-        rearranged: how many tasks begin in a scene that differs from the recorded one.
-        layouts: how many different arrangements these have.
+        receptacles: by type of receptacle that the agent must visit, the most frequent first. A
+            task with several types counts for each.
+        lengths, depths: by number of key actions, and by number of those that open something;
+            ascending.
+        rearranged: the number of tasks with moved objects.
+        layouts: the number of different arrangements of these tasks.
     """
 
     tasks: int
@@ -55,7 +56,7 @@ class Summary:
 
 
 def subject_type(task: Task) -> str:
-    """The type of what a task is about: of the first thing handled; ``""`` where nothing is."""
+    """The type of the first object that a task handles; ``""`` if it handles none."""
     types = [
         *map(type_of_id, task.related_objects[:1]),
         *(
@@ -68,7 +69,7 @@ def subject_type(task: Task) -> str:
 
 
 def receptacle_types(task: Task) -> tuple[str, ...]:
-    """The types of the receptacles that key actions go to, each once, in their order."""
+    """The types of the receptacles to which key actions navigate, each once, in their order."""
     gone_to = (action.actual_type for action in task.key_actions if action.verb == verbs.NAVIGATE)
     return tuple(dict.fromkeys(name for name in gone_to if _is_receptacle(name)))
 
@@ -78,12 +79,12 @@ def _is_receptacle(object_type: str) -> bool:
 
 
 def summarise(tasks: Iterable[Task]) -> Summary:
-    """Count tasks by everything that a suite should be balanced in."""
+    """Count tasks by every property in which a suite should be balanced."""
     tasks = list(tasks)
     scenes = Counter(task.scene for task in tasks)
     lengths = Counter(length(task) for task in tasks)
     depths = Counter(hidden_depth(task) for task in tasks)
-    rearranged = [task for task in tasks if task.start.poses]
+    rearranged = [task for task in tasks if task.arrangement.poses]
     return Summary(
         tasks=len(tasks),
         groups=_in_order(GROUPS, (task.type.group for task in tasks)),
@@ -95,7 +96,7 @@ def summarise(tasks: Iterable[Task]) -> Summary:
         lengths={number: lengths[number] for number in sorted(lengths)},
         depths={number: depths[number] for number in sorted(depths)},
         rearranged=len(rearranged),
-        layouts=len({(task.scene, task.start.layout) for task in rearranged}),
+        layouts=len({(task.scene, task.arrangement.layout) for task in rearranged}),
     )
 
 
@@ -122,8 +123,11 @@ def card(
     """A suite's card in Markdown; the same for the same arguments.
 
     Args:
-        made: what the task file's header says of how it was made.
-        command: what makes the task file anew.
+        suite_name: the title.
+        description: a sentence for people.
+        tasks: the suite's tasks.
+        made: the fields of the task file's header that say how it was made.
+        command: the command that writes the task file.
     """
     summary = summarise(tasks)
     parts = [
@@ -179,7 +183,7 @@ def _types(summary: Summary) -> str:
 
 
 def _scenes(summary: Summary) -> str:
-    """A line for each kind of room."""
+    """A list item for each kind of room."""
     lines = []
     for kind in summary.room_kinds:
         mine = {scene: n for scene, n in summary.scenes.items() if room_kind(scene) == kind}
@@ -196,13 +200,13 @@ def _listed(counts: Mapping[str, int]) -> str:
 
 
 def _across(title: str, counts: Mapping[str, int] | Mapping[int, int]) -> str:
-    """A table of one row."""
+    """A table with one row."""
     head = (title, *map(str, counts))
     return _table(head, [("Tasks", *map(str, counts.values()))], figures=len(counts))
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]], figures: int = 0) -> str:
-    """A table of which the last so many columns hold figures; nothing where there are no rows."""
+    """A Markdown table whose last ``figures`` columns hold numbers; "" without rows."""
     if not rows:
         return ""
     words = len(head) - figures

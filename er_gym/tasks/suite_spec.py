@@ -1,4 +1,4 @@
-"""How a suite is made: the part of its configuration that the generator reads."""
+"""The part of a suite's configuration that says which tasks to generate."""
 
 from __future__ import annotations
 
@@ -13,21 +13,22 @@ from er_gym.tasks.types import BY_NAME
 from er_gym.thor import SCENE_NAMES
 
 Span = tuple[float, float | None]
-"""From and to, both included; no end for None."""
+"""The smallest and the largest allowed value, both included; None for no upper bound."""
 
 
-class Making(BaseModel):
-    """What to generate.
+class SuiteSpec(BaseModel):
+    """Which tasks a suite has.
 
     Attributes:
-        total: how many tasks.
-        scenes: a set of rooms by its name (:data:`~er_gym.tasks.splits.SCENES`), or rooms.
-        types: names of task types; all where it is empty.
-        layouts: how many arrangements of each room, beside the recorded one.
-        per_layout: how many tasks of a type are kept of each arrangement, to choose from.
-        unseen_objects: whether tasks may be about the types that training never sees.
-        hidden_depth, distractors, distance: what difficulty tasks may have
-            (:class:`~er_gym.tasks.difficulty.Difficulty`).
+        total: the number of tasks.
+        scenes: the name of a set of scenes (:data:`~er_gym.tasks.splits.SCENES`), or scene names.
+        types: names of task types; all types if it is empty.
+        layouts: the number of arrangements of each scene, besides the recorded one.
+        per_layout: the number of candidates of each type from each arrangement.
+        unseen_objects: whether tasks may be about the types that training does not see
+            (:data:`~er_gym.tasks.splits.UNSEEN_TYPES`).
+        hidden_depth, distractors, distance: the allowed difficulty
+            (:class:`~er_gym.tasks.difficulty.Difficulty`; distance in metres).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -60,7 +61,7 @@ class Making(BaseModel):
     def _known_types(cls, types: tuple[str, ...]) -> tuple[str, ...]:
         for name in types:
             if name not in BY_NAME:
-                raise ValueError(f"unknown type {name!r}; choose of: {', '.join(BY_NAME)}")
+                raise ValueError(f"unknown type {name!r}; choose one of: {', '.join(BY_NAME)}")
         return types
 
     @field_validator("hidden_depth", "distractors", "distance")
@@ -68,23 +69,23 @@ class Making(BaseModel):
     def _ordered(cls, span: Span) -> Span:
         low, high = span
         if not (math.isfinite(low) and (high is None or low <= high < math.inf)):
-            raise ValueError(f"no range: from {low:g} to {high}; give the smaller number first")
+            raise ValueError(f"not a range: from {low:g} to {high}; give the smaller number first")
         return span
 
     @property
     def rooms(self) -> Sequence[str]:
-        """The rooms, by name."""
+        """The names of the scenes, each once."""
         if isinstance(self.scenes, str):
             return SCENES.get(self.scenes, (self.scenes,))
         return tuple(dict.fromkeys(self.scenes))
 
     @property
-    def is_any_difficulty(self) -> bool:
-        """Whether a task may be as difficult as it likes."""
+    def allows_any_difficulty(self) -> bool:
+        """Whether the difficulty is not limited."""
         return self.hidden_depth == self.distractors == self.distance == (0, None)
 
     def admits(self, difficulty: Difficulty) -> bool:
-        """Whether a task may be so difficult."""
+        """Whether a task of this difficulty is allowed."""
         return all(
             low <= value <= (math.inf if high is None else high)
             for value, (low, high) in (

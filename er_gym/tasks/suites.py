@@ -1,8 +1,8 @@
-"""Suites: lists of tasks to be played under stated environment settings.
+"""Suites: lists of tasks with the environment settings under which they are played.
 
-A suite ``NAME`` is ``configs/suites/NAME.yaml`` and the task file it names. That comes with er-gym,
-in ``er_gym/tasks/data``, or is made by ``er-gym tasks generate`` and kept in :func:`suite_home`.
-Any task file is a suite of its own: :func:`suite_from_file`.
+A suite ``NAME`` is ``configs/suites/NAME.yaml`` and the task file that it names. The task file
+comes with er-gym, in ``er_gym/tasks/data``, or ``er-gym tasks generate`` writes it to
+:func:`suite_home`. Any task file can be played as a suite, too: :func:`suite_from_file`.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from pydantic import BaseModel, ConfigDict
 
 from er_gym.plugins import PluginError, Registry, reason
 from er_gym.tasks import jsonl_format, paper_format
-from er_gym.tasks.errors import SetAside, TaskFileError, in_short
+from er_gym.tasks.errors import SetAsideTask, TaskFileError, summarise_set_aside
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import read_yaml
-from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import Task
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _LONGEST_QUOTE = 80
-"""No message quotes more of a name."""
+"""The most characters of a name that a message quotes."""
 _DATA = _PACKAGE / "tasks" / "data"
 _READERS = {
     ".json": paper_format.read_file,
@@ -40,13 +40,13 @@ class Suite:
     """Tasks that are played and reported together.
 
     Attributes:
-        name: of the bundled suite, or of the file without its ending.
+        name: the name of the suite, or of the file without its ending.
         tasks: in the order in which they are played.
-        digest: sha256, in hex, of the tasks; two runs compare only if theirs are equal.
+        digest: sha256, in hex, of the tasks; only runs with equal digests can be compared.
         env: keyword arguments of ``EmbodiedEnv`` that belong to the suite.
         description: a sentence for people.
         set_aside: tasks of the file that cannot be used, and why.
-        places: where in the file each of the tasks stands, from 1; none for a bundled suite.
+        places: the number of each task in the file, from 1; empty for a bundled suite.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Suite:
     digest: str
     env: Mapping[str, Any] = field(default_factory=dict)
     description: str = ""
-    set_aside: tuple[SetAside, ...] = ()
+    set_aside: tuple[SetAsideTask, ...] = ()
     places: tuple[int, ...] = ()
 
 
@@ -65,8 +65,8 @@ class SuiteConfig(BaseModel):
         description: a sentence for people.
         tasks: the name of the task file.
         env: keyword arguments of ``EmbodiedEnv``.
-        generate: how the tasks are made.
-        seed: with which seed.
+        generate: which tasks to generate.
+        seed: the seed of the generator.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -74,7 +74,7 @@ class SuiteConfig(BaseModel):
     description: str
     tasks: str
     env: dict[str, Any] = {}
-    generate: Making | None = None
+    generate: SuiteSpec | None = None
     seed: int = 0
 
 
@@ -99,8 +99,8 @@ def load_suite(name: str) -> Suite:
     """Load a suite: er-gym's own or another package's by its name, or ``package.module:function``.
 
     Raises:
-        ValueError: there is no such suite; the message lists those there are.
-        TaskFileError: one of its files is damaged, or it has not been made yet.
+        ValueError: there is no such suite; the message lists the known suites.
+        TaskFileError: one of its files is damaged, or the suite has not been generated yet.
     """
     found = suite_registry().get(name)
     if name in suite_names() and not isinstance(found, Suite):
@@ -128,10 +128,10 @@ def _own_suite(name: str) -> Suite:
 
 
 def suite_config(name: str) -> SuiteConfig:
-    """What ``configs/suites/NAME.yaml`` says.
+    """The content of ``configs/suites/NAME.yaml``.
 
     Raises:
-        ValueError: there is no such suite; the message lists those there are.
+        ValueError: there is no such suite; the message lists the known suites.
         TaskFileError: the file is damaged.
     """
     if name not in suite_names():
@@ -141,17 +141,17 @@ def suite_config(name: str) -> SuiteConfig:
 
 
 def suite_file(name: str) -> Path:
-    """Where a suite's tasks are: with er-gym, or else in :func:`suite_home`, made or not."""
+    """The path of a suite's task file: in er-gym, else in :func:`suite_home`, even if missing."""
     tasks = suite_config(name).tasks
     bundled = _DATA / tasks
     return bundled if bundled.exists() else suite_home() / tasks
 
 
 def suite_home() -> Path:
-    """Where suites are kept that do not come with er-gym.
+    """The folder of the suites that do not come with er-gym.
 
-    ``$ER_GYM_HOME/suites``; by default ``~/.local/share/er-gym/suites``, or where
-    ``$XDG_DATA_HOME`` says.
+    It is ``$ER_GYM_HOME/suites``, else ``$XDG_DATA_HOME/er-gym/suites``, else
+    ``~/.local/share/er-gym/suites``.
     """
     home = os.environ.get("ER_GYM_HOME")
     if home:
@@ -161,12 +161,12 @@ def suite_home() -> Path:
 
 
 def suite_from_file(path: str | Path) -> Suite:
-    """Make a suite of a task file: the paper's ``.json`` or our own ``.jsonl`` or ``.jsonl.gz``.
+    """Load a task file as a suite: the paper's ``.json``, or er-gym's ``.jsonl`` or ``.jsonl.gz``.
 
-    What is wrong with one task sets that one aside (``Suite.set_aside``).
+    Faulty tasks are set aside (``Suite.set_aside``).
 
     Raises:
-        TaskFileError: the file cannot be used, or none of its tasks; one line says where and why.
+        TaskFileError: the file or all of its tasks cannot be used; one line says where and why.
     """
     path = Path(path)
     ending = next((end for end in _READERS if path.name.lower().endswith(end)), "")
@@ -177,7 +177,7 @@ def suite_from_file(path: str | Path) -> Suite:
         )
     found = _READERS[ending](path)
     if found.set_aside and not found.tasks:
-        raise TaskFileError(f"{path}: no task can be used: {in_short(found.set_aside)}")
+        raise TaskFileError(f"{path}: no task can be used: {summarise_set_aside(found.set_aside)}")
     return Suite(
         name=path.name[: -len(ending)],
         tasks=found.tasks,
@@ -188,9 +188,9 @@ def suite_from_file(path: str | Path) -> Suite:
 
 
 def config_directory(kind: str) -> Path:
-    """Where the configurations of a kind are, such as ``suites``.
+    """The folder of the configurations of a kind, such as ``suites``.
 
-    A wheel carries configs/ inside the package, a checkout has it beside the package.
+    A wheel has configs/ inside the package, a checkout has it beside the package.
     """
     inside = _PACKAGE / "configs" / kind
     return inside if inside.is_dir() else _PACKAGE.parent / "configs" / kind

@@ -1,4 +1,4 @@
-"""What is asked of an agent: :class:`Task` and its :class:`KeyAction` list."""
+"""A task for an agent: :class:`Task`, its :class:`KeyAction` list and :class:`AgentPose`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import Start
+from er_gym.tasks.arrangement import Arrangement
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.types import TaskType
 
@@ -16,9 +16,9 @@ _COORDINATE = re.compile(r"[+-]?\d+\.\d+")
 
 
 def type_of_id(object_id: str) -> str:
-    """The object type that an AI2-THOR object id names, ``""`` for an empty id.
+    """The object type of an AI2-THOR object id, ``""`` for an empty id.
 
-    A part of an object carries its own type behind the coordinates of the whole:
+    The id of a part ends in the part's type, after the coordinates of the whole object:
     ``Sink|-01.90|+00.97|-01.50|SinkBasin`` is a SinkBasin, ``Apple|…|AppleSliced_2`` an
     AppleSliced.
     """
@@ -30,15 +30,20 @@ def type_of_id(object_id: str) -> str:
     return re.sub(r"_\d+$", "", last)
 
 
+def whole_id(object_id: str) -> str:
+    """The id of the whole object: its type and three coordinates, without the name of a part."""
+    return "|".join(object_id.split("|")[:4])
+
+
 @dataclass(frozen=True)
 class AgentPose:
-    """Where the agent stands and looks: metres and degrees, AI2-THOR's world frame.
+    """A pose of the agent: metres and degrees, AI2-THOR's world frame.
 
     Attributes:
         x, y, z: the agent's position; y is the height of its centre, not of its feet.
-        rotation: clockwise seen from above, 0 looks along +z.
-        horizon: downwards is positive.
-        standing: False when it crouches.
+        rotation: clockwise seen from above; at 0 the agent looks along +z.
+        horizon: pitch of the camera; positive is downwards.
+        standing: False if the agent crouches.
     """
 
     x: float
@@ -51,15 +56,15 @@ class AgentPose:
 
 @dataclass(frozen=True)
 class KeyAction:
-    """One of the actions that a task is judged by.
+    """An action by which a task is judged.
 
     Attributes:
         verb: canonical (see :mod:`er_gym.tasks.verbs`).
-        object_id: the AI2-THOR id of the object it is done to, ``""`` for ``end``.
-        object_type: the type that the task file states. Real files are wrong now and then: empty,
-            or another object's.
-        related_objects: ids of what the action involves besides.
-        reward: what doing it is worth.
+        object_id: the AI2-THOR id of the object, ``""`` for ``end``.
+        object_type: the type that the task file states. Real files sometimes leave it empty or
+            state another object's type.
+        related_objects: ids of other objects that the action involves.
+        reward: the reward for doing it.
     """
 
     verb: str
@@ -70,34 +75,33 @@ class KeyAction:
 
     @property
     def actual_type(self) -> str:
-        """The object's type, read from its id where there is one."""
+        """The object's type, from its id if it has one."""
         return type_of_id(self.object_id) or self.object_type
 
     @property
     def scored(self) -> bool:
-        """Whether success asks for it; getting about and looking are the agent's own affair."""
+        """Whether success requires it; navigation and observation are up to the agent."""
         return self.verb not in verbs.UNSCORED
 
 
 @dataclass(frozen=True)
 class Task:
-    """An instruction in a scene, and how it is judged.
+    """An instruction in a scene, and the criteria by which an episode is judged.
 
     Attributes:
         id: unique in its suite and usable as a file name.
         type: the row of :data:`er_gym.tasks.types.TASK_TYPES`.
         scene: an iTHOR scene name, ``FloorPlan1`` and so on.
-        instruction: what the agent is told.
-        name: the instruction as generated, before paraphrase (the paper's ``taskname``; its scorer
-            looks into it).
+        instruction: the text for the agent.
         key_actions: in the order in which an expert does them.
-        target_objects, related_objects: object ids; names stand for these first.
-        navigable_objects: object types that may be navigated to from the start.
-        goal: how things must be in the end, beside the key actions; the paper's files say nothing
-            of it.
-        start: how the scene is arranged when the episode begins.
-        poses: object id to the exact pose that going to it leads to, where the file states one.
-        extra: fields of the file that nothing here reads, kept so that it can be written again.
+        name: the instruction before paraphrase (the paper's ``taskname``; its scorer reads it).
+        target_objects, related_objects: object ids. If an action names only a type, these objects
+            are preferred.
+        navigable_objects: object types to which the agent may navigate from the beginning.
+        goal: conditions on the final state, besides the key actions; the paper's files have none.
+        arrangement: how the scene is arranged when the episode begins.
+        poses: object id to the exact pose to which navigation leads, if the file states one.
+        extra: fields of the file that er-gym does not use; they are kept for writing.
     """
 
     id: str
@@ -110,21 +114,21 @@ class Task:
     related_objects: tuple[str, ...] = ()
     navigable_objects: tuple[str, ...] = ()
     goal: tuple[Condition, ...] = ()
-    start: Start = field(default_factory=Start)
+    arrangement: Arrangement = field(default_factory=Arrangement)
     poses: Mapping[str, AgentPose] = field(default_factory=dict)
     extra: Mapping[str, object] = field(default_factory=dict)
 
     @property
     def max_steps(self) -> int:
-        """The step limit of the task's type, the first step being the placing of the agent."""
+        """The step limit of the task's type; placing the agent counts as the first step."""
         return self.type.max_steps
 
     @property
     def total_reward(self) -> float:
-        """What all key actions together are worth."""
+        """The sum of the key actions' rewards."""
         return sum(action.reward for action in self.key_actions)
 
     @cached_property
     def named(self) -> frozenset[str]:
-        """Ids of the objects that the words single out; elsewhere any object of a type will do."""
+        """Ids of the objects that the goal names; elsewhere any object of a type is right."""
         return frozenset(condition.object_id for condition in self.goal) - {""}

@@ -1,4 +1,4 @@
-"""The table of task types: one row each, and nothing about them is written down anywhere else.
+"""The table of task types, one row for each; no other file states facts about single types.
 
 Names, groups and step limits are the paper's (Embodied-Reasoner, arXiv 2503.21696).
 
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from er_gym.plugins import PluginError, added
 
 if TYPE_CHECKING:
-    from er_gym.tasks.generate.task_plan import Row
+    from er_gym.tasks.generate.task_plan import TaskRule
 
 GROUP = "er_gym.task_types"
 """The entry points in which packages declare task types."""
@@ -25,7 +25,7 @@ VARIABLE = "ER_GYM_TASK_TYPES"
 """The environment variable that names task types, such as ``my_package.tasks:OPEN``."""
 SEARCH, MANIPULATE, TRANSPORT, COMPOSITE = "Search", "Manipulate", "Transport", "Composite"
 GROUPS = (SEARCH, MANIPULATE, TRANSPORT, COMPOSITE)
-"""In the order of the paper's result table."""
+"""The groups, in the order of the paper's result table."""
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,14 @@ class TaskType:
     """A kind of task.
 
     Attributes:
-        name: as the paper's task files write it (``tasktype``).
-        title: as the paper's text calls it.
+        name: the name in the paper's task files (``tasktype``).
+        title: the name in the paper's text.
         group: one of :data:`GROUPS`.
-        env_id: the Gymnasium id under which episodes of this type can be made.
+        env_id: the Gymnasium id of the environment with tasks of this type.
         max_steps: an episode's step limit; placing the agent counts as the first step.
         ordered: whether key actions count only in the order in which they are listed.
-        search: whether the task is done by finding, that is, ``end`` asks to see the target.
-        rows: how tasks of a type that another package adds are generated; er-gym's own rows are in
+        search: whether the task is a search: on ``end`` the target must be within reach.
+        rules: how tasks of a type that another package adds are generated; er-gym's own rules are in
             :mod:`er_gym.tasks.generate`.
     """
 
@@ -51,10 +51,10 @@ class TaskType:
     max_steps: int
     ordered: bool = False
     search: bool = False
-    rows: tuple[Row, ...] = field(default=(), compare=False, repr=False)
+    rules: tuple[TaskRule, ...] = field(default=(), compare=False, repr=False)
 
     def __reduce__(self) -> tuple[Callable[[str], TaskType], tuple[str]]:
-        # A row stays the row of the table when it goes to another process.
+        # Unpickled in another process, a row is that row of the table again.
         return task_type, (self.name,)
 
 
@@ -96,7 +96,7 @@ def register(row: TaskType) -> TaskType:
         PluginError: the row cannot be used; the message says why.
     """
     known = BY_NAME.get(row.name)
-    if known is not None and (known, known.rows) == (row, row.rows):
+    if known is not None and (known, known.rules) == (row, row.rules):
         return known
     problem = _problem(row)
     if problem:
@@ -135,17 +135,17 @@ def _problem(row: TaskType) -> str:
         return f"group is {row.group!r}; choose one of: {', '.join(GROUPS)}"
     if not isinstance(row.max_steps, int) or isinstance(row.max_steps, bool) or row.max_steps < 2:
         return f"max_steps is {row.max_steps!r}; give a whole number from 2"
-    others = [each for each in row.rows if getattr(each, "type", None) != row.name]
+    others = [each for each in row.rules if getattr(each, "type", None) != row.name]
     if others:
-        return f"a row that generates tasks is {others[0]!r}; give a Row of type {row.name!r}"
+        return f"a rule that generates tasks is {others[0]!r}; give a TaskRule of type {row.name!r}"
     return ""
 
 
 def task_type(name: str) -> TaskType:
-    """Look a task type up by the paper's name for it or by its environment id.
+    """Look up a task type by the paper's name or by its environment id.
 
     Raises:
-        ValueError: there is no such type; the message lists those there are.
+        ValueError: there is no such type; the message lists the known types.
     """
     found = BY_NAME.get(name) or BY_ENV_ID.get(name) if isinstance(name, str) else None
     if found is None:

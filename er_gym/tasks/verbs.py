@@ -1,19 +1,18 @@
-"""The high-level verbs: one table, :func:`table`, from which everything about a verb derives.
+"""The high-level verbs: one table, :func:`table`, with one row for each verb.
 
-An action is a verb, alone (:data:`BARE_VERBS`) or with an object type (:data:`OBJECT_VERBS`). Names
-are plain strings, because they are what files, models and people write; they are spelled as the
-paper's files spell them.
+An action is a verb, alone (:data:`BARE_VERBS`) or with an object type (:data:`OBJECT_VERBS`). Verb
+names are plain strings, as in files and replies, in the spelling of the paper's files.
 
-The action space, the legality mask, the ``state`` and ``text`` observations, task files, the words
-by which replies are read, prompts and tool calls all derive from the rows. Other packages add rows
+The action space, the legality mask, the ``state`` and ``text`` observations, task files, the
+parsing of replies, prompts and tool calls all derive from the rows. Other packages add rows
 (``docs/extending.md``):
 
 - with an entry point in the group ``er_gym.verbs``;
 - with dotted names in the environment variable ``ER_GYM_VERBS``, separated by commas;
 - with :func:`register`, before anything derives from the table.
 
-The table is put together when it is first asked for, and not while this module is imported: a
-module that defines a verb has to import this one first.
+The table is built when it is first used, not when this module is imported, because a module that
+defines a verb must import this module first.
 """
 
 from __future__ import annotations
@@ -33,21 +32,21 @@ from er_gym.thor.object_types import OBJECT_TYPES
 from er_gym.thor.objects import PROPERTY_OF_STATE
 
 GROUP = "er_gym.verbs"
-"""The entry points in which packages declare verbs."""
+"""The entry point group in which packages declare verbs."""
 VARIABLE = "ER_GYM_VERBS"
 """The environment variable that names verbs, such as ``my_package.verbs:CLEAN``."""
 ANY, EMPTY, FULL = "any", "empty", "full"
-"""What a verb may ask of the hand, besides certain types in it."""
+"""What a verb may require of the hand, besides certain object types in it."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Words:
-    """A verb in one language.
+    """The phrases for a verb in one language.
 
     Attributes:
-        said: how models may say it, in lower case with single spaces.
-        meaning: the sentence by which a prompt explains the verb. Prompts whose ``actions.yaml``
-            explains the verb do without; the bundled prompts explain er-gym's own verbs there.
+        said: phrases by which models may name it, in lower case with single spaces.
+        meaning: the sentence by which a prompt explains the verb. A prompt does not use it if its
+            ``actions.yaml`` explains the verb, as the bundled prompts do for er-gym's own verbs.
     """
 
     said: tuple[str, ...] = ()
@@ -56,30 +55,31 @@ class Words:
 
 @dataclass(frozen=True, kw_only=True)
 class Verb:
-    """A high-level verb: what it takes, what it does, and how people say it.
+    """A high-level verb: its object, its effect, and the phrases for it.
 
     Attributes:
-        name: in lower case with single spaces: ``"put in"``.
-        aliases: other spellings, which task files and ``EmbodiedEnv.step`` accept as well.
-        thor_action: the AI2-THOR action that does it. It gets the ``objectId``, unless the verb is
+        name: the canonical name, in lower case with single spaces: ``"put in"``.
+        aliases: other spellings that task files and ``EmbodiedEnv.step`` accept as well.
+        thor_action: the AI2-THOR action for it. It gets the ``objectId``, unless the verb is
             ``alone``.
-        parameters: what that action gets besides.
-        alone: the verb goes with no object.
+        parameters: further parameters of that action.
+        alone: whether the verb takes no object.
         object_property: AI2-THOR's name of the property that an object must have,
-            ``"dirtyable"``; ``""`` if any object will do, or only those of ``object_types``.
-        object_types: those that take the verb without the property.
-        object_state: a field of AI2-THOR's metadata and the value that it must have before,
-            ``("isDirty", True)``; it is asked only of objects that can have it. None for any.
-        hand: :data:`ANY`, :data:`EMPTY`, :data:`FULL`, or the object types of which one must be in
-            the hand.
-        tool: what these types are together, in words: ``"a knife"``.
-        in_hand: the verb can be done to what is in the hand, too.
-        makes: fields of the object's metadata and their values afterwards, for the goal of tasks
-            that are generated.
-        scored: success asks for key actions with this verb.
-        plan: what one does, in a list of steps for people: ``{it}`` is the object.
-        otherwise: what an agent is told when the object or its state does not allow the verb.
-        words: language code (``"en"``) to the words of that language.
+            ``"dirtyable"``; ``""`` for any object, or for those of ``object_types`` only.
+        object_types: types that take the verb without the property.
+        object_state: a field of AI2-THOR's metadata and its required value before the verb,
+            ``("isDirty", True)``; it is tested only on objects that have the field. None for any
+            state.
+        hand: :data:`ANY`, :data:`EMPTY`, :data:`FULL`, or object types of which the hand must hold
+            one.
+        tool: a common name of these types: ``"a knife"``.
+        in_hand: whether the verb can also be done to the held object.
+        makes: fields of the object's metadata and their values after the verb, for the goals of
+            generated tasks.
+        scored: whether success requires key actions with this verb.
+        plan: the wording in a list of steps for people; ``{it}`` is the object.
+        otherwise: the feedback to an agent if the object or its state does not allow the verb.
+        words: language code (``"en"``) to the phrases in that language.
     """
 
     name: str
@@ -100,7 +100,7 @@ class Verb:
     words: Mapping[str, Words] = field(default_factory=dict)
 
     def takes(self, object_type: str) -> bool:
-        """Whether the verb makes sense for an object type, in some scene and some state."""
+        """Whether the verb is possible for an object type in at least one state."""
         if object_type in self.object_types:
             return True
         if self.object_property:
@@ -109,7 +109,7 @@ class Verb:
 
     @property
     def said(self) -> tuple[str, ...]:
-        """Every way of saying it, in any language."""
+        """All phrases for the verb, in all languages."""
         phrases = (phrase for words in self.words.values() for phrase in words.said)
         return tuple(dict.fromkeys((*phrases, self.name, *self.aliases)))
 
@@ -120,7 +120,7 @@ class Verb:
 
 
 NOWHERE = frozenset({"Floor"})
-"""Types that one is always at: one cannot go there."""
+"""Types to which the agent cannot navigate, because it is always there."""
 NAVIGATE = "navigate to"
 PICKUP = "pickup"
 PUT = "put in"
@@ -132,11 +132,11 @@ OBSERVE = "observe"
 MOVE_FORWARD = "move forward"
 END = "end"
 INIT = "init"
-"""Not an action: the name of an episode's first recorded step, in which the agent is placed."""
+"""Not an action: the verb of an episode's first recorded step, which places the agent."""
 
 
 def _say(en: str, zh: str) -> Mapping[str, Words]:
-    """Words of er-gym's own verbs, ``/`` between the phrases."""
+    """The phrases of er-gym's own verbs, separated by ``/``."""
     return {"en": Words(said=tuple(en.split("/"))), "zh": Words(said=tuple(zh.split("/")))}
 
 
@@ -171,11 +171,11 @@ OWN: tuple[Verb, ...] = (
         name=PUT,
         aliases=("put",),
         thor_action="PutObject",
-        # forceAction waives which types AI2-THOR thinks belong there: the paper asks for a Cup in
-        # the GarbageCan. Room, reach and a closed door still count.
+        # forceAction lets any type into any receptacle: the paper asks for a Cup in the GarbageCan.
+        # Free space, reach and a closed door still count.
         parameters={"forceAction": True},
         object_property="receptacle",
-        object_types=("Sink", "Bathtub"),  # one puts things into their basins
+        object_types=("Sink", "Bathtub"),  # objects go into their basins
         object_state=("isOpen", True),
         hand=FULL,
         plan="put {held} {inside}",
@@ -258,7 +258,7 @@ OWN: tuple[Verb, ...] = (
         ),
     ),
 )
-"""The verbs that come with er-gym: the paper's, and "slice"."""
+"""The verbs of er-gym: those of the paper, and "slice"."""
 
 
 # -- what other packages add -----------------------------------------------------------------------
@@ -274,11 +274,11 @@ def register(verb: Verb) -> None:
     """Add a verb in this process; worker processes need one of the other two ways.
 
     Raises:
-        PluginError: the verb cannot be used, or the action space has been put together already.
+        PluginError: the verb is invalid, or the table has been built already.
     """
     if table.cache_info().currsize:
         raise PluginError(
-            f"verb {verb.name!r} comes too late: the action space has been put together. Register "
+            f"verb {verb.name!r} comes too late: the action space has been built. Register "
             f"it before er_gym.envs or agents are imported, or name it in ${VARIABLE}"
         )
     _merged(_merged({each.name: each for each in OWN}, _registered), [verb])
@@ -287,10 +287,10 @@ def register(verb: Verb) -> None:
 
 @lru_cache(maxsize=1)
 def table() -> tuple[Verb, ...]:
-    """Every verb: er-gym's own, then those that were added, in the order of their names.
+    """All verbs: er-gym's own, then added verbs in the order of their names.
 
     Raises:
-        PluginError: a verb cannot be loaded or used.
+        PluginError: a verb cannot be loaded, or is invalid.
     """
     expected = f"an {__name__}.Verb"
     given = [
@@ -301,12 +301,12 @@ def table() -> tuple[Verb, ...]:
         if not isinstance(verb, Verb):
             raise PluginError(f"{origin} is {verb!r}; give {expected}")
     found = _merged({verb.name: verb for verb in OWN}, [verb for verb, _ in given])
-    # In the order of names: the number of an action may not depend on who is asked first.
+    # Sorted by name: the number of an action must not depend on the order of loading.
     return (*OWN, *(found[name] for name in sorted(found.keys() - {each.name for each in OWN})))
 
 
 def _merged(known: Mapping[str, Verb], verbs: list[Verb]) -> dict[str, Verb]:
-    """The known verbs and others by name; one that is added twice counts once."""
+    """The known verbs and further ones by name; equal rows count once."""
     found = dict(known)
     for verb in map(_typed, verbs):
         if verb == found.get(verb.name):
@@ -320,7 +320,7 @@ def _merged(known: Mapping[str, Verb], verbs: list[Verb]) -> dict[str, Verb]:
 
 
 def _typed(verb: Verb) -> Verb:
-    """The same row, once its fields are known to be of their types."""
+    """The row, after a check of its fields' types."""
     try:
         return _TYPES.validate_python(asdict(verb))
     except ValidationError as error:
@@ -332,10 +332,10 @@ def _typed(verb: Verb) -> Verb:
 
 
 def _problem(verb: Verb, taken: Mapping[str, str]) -> str:
-    """What is wrong with a row, "" if nothing."""
+    """The first problem of a row, "" if there is none."""
     for phrase in verb.said:
         if not _PHRASE.fullmatch(phrase) or phrase != phrase.lower():
-            return f"{phrase!r} is no phrase; write lower-case words with single spaces"
+            return f"{phrase!r} is not a phrase; write lower-case words with single spaces"
         if phrase in {*taken, INIT}:
             return f"{phrase!r} is a way to say {taken.get(phrase, INIT)!r} already; choose another"
     if not verb.thor_action:
@@ -352,7 +352,7 @@ def _problem(verb: Verb, taken: Mapping[str, str]) -> str:
 def _problem_of_object(verb: Verb) -> str:
     about = [name for name in _ABOUT_OBJECTS if getattr(verb, name)]
     if verb.alone and about:
-        return f"it goes with no object, so that {about[0]} means nothing; leave one of them out"
+        return f"it takes no object (alone), so {about[0]} has no meaning; leave one of them out"
     properties = sorted({name for kind in OBJECT_TYPES.values() for name in kind.properties})
     if verb.object_property not in ("", *properties):
         return (
@@ -360,9 +360,8 @@ def _problem_of_object(verb: Verb) -> str:
             f"choose one of: {', '.join(properties)}; or give object_types"
         )
     if verb.object_state is not None and verb.object_state[0] not in PROPERTY_OF_STATE:
-        return (
-            f"{verb.object_state[0]!r} is no state; choose one of: {', '.join(PROPERTY_OF_STATE)}"
-        )
+        known = ", ".join(PROPERTY_OF_STATE)
+        return f"{verb.object_state[0]!r} is not a state; choose one of: {known}"
     return _unknown_type(verb.object_types)
 
 
@@ -392,7 +391,7 @@ def verb_named(name: str) -> Verb:
 
 
 def canonical_verb(verb: str) -> str:
-    """The spelling used here of a verb as files write it ("put" and "put in" are one verb)."""
+    """The canonical spelling of a verb: "put" becomes "put in"."""
     verb = " ".join(verb.lower().split())
     return _derived()["ALIASES"].get(verb, verb)  # type: ignore[no-any-return]
 
@@ -417,15 +416,15 @@ def _derived() -> Mapping[str, Any]:
 
 if TYPE_CHECKING:
     BARE_VERBS: tuple[str, ...]
-    """Verbs that go with no object."""
+    """Verbs without an object."""
     OBJECT_VERBS: tuple[str, ...]
-    """Verbs that go with an object type."""
+    """Verbs with an object type."""
     INTERACTIONS: tuple[str, ...]
-    """Verbs that change the object they name: all of these but "navigate to"."""
+    """Verbs that change their object: :data:`OBJECT_VERBS` except "navigate to"."""
     ADDED: tuple[Verb, ...]
-    """The rows that other packages added."""
+    """The rows of other packages."""
     UNSCORED: frozenset[str]
-    """Verbs that success does not ask for: how the agent gets about is its own affair."""
+    """Verbs that success does not require, such as navigation and observation."""
     ALIASES: Mapping[str, str]
     """Other spellings of verbs."""
 else:

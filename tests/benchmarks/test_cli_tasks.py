@@ -363,7 +363,7 @@ def test_stats_draw(er_gym: Command, made: Path, tmp_path: Path) -> None:
 def test_tasks_are_converted_without_loss(er_gym: Command, tmp_path: Path) -> None:
     every = load_suite("er-1k").tasks
     tasks = [next(task for task in every if task.type is kind) for kind in TASK_TYPES]
-    tasks += [task for task in every if task.start.poses][:3]
+    tasks += [task for task in every if task.arrangement.poses][:3]
     tasks = list({task.id: task for task in tasks}.values())
     write_tasks(tmp_path / "0.jsonl", tasks)
     row = ["0.jsonl", "1.json", "2.jsonl.gz", "folder", "3.jsonl"]
@@ -526,7 +526,7 @@ def elsewhere(task: Task, metres: float) -> Task:
 def mixed(made: Path, tmp_path: Path) -> Path:
     """Two tasks as they should be, one that is 3 cm off, one about a ghost, and two that cannot be
     read: of an unknown type, and with an id that is there already."""
-    one, two, three, *_ = (task for task in read_tasks(made) if not task.start.poses)
+    one, two, three, *_ = (task for task in read_tasks(made) if not task.arrangement.poses)
     file = tmp_path / "mixed.jsonl"
     write_tasks(file, [one, elsewhere(two, 0.03), about_a_ghost(three, id="ghost"), three])
     header, *lines = file.read_text(encoding="utf-8").splitlines()
@@ -550,7 +550,7 @@ def test_verify_plays_what_can_be_played(er_gym: Command, mixed: Path) -> None:
     assert "unknown tasktype 'dance'" in aside[0]
     assert "the task in line 7 has the id" in aside[1]
     assert "no object 'Egg|+09.00|+09.00|+09.00'" in aside[2]
-    assert len(re.findall(r", 0\.03 m off, is taken for it \(", err)) == 1
+    assert len(re.findall(r", 0\.03 m off, is used instead \(", err)) == 1
 
 
 def test_show_stats_and_convert_leave_out_what_cannot_be_read(
@@ -582,11 +582,11 @@ def test_bench_plays_what_can_be_played_and_says_so_everywhere(
     code, out, err = er_gym(*command)
     assert code == 0
     assert err.count("set aside") == 3
-    assert err.count("is taken for it") == 1
+    assert err.count("is used instead") == 1
     for text in (out, er_gym("report", "run", "--format", "md")[1]):
         assert "3 of the suite's tasks set aside and not counted" in text
         assert "set aside: ghost: FloorPlan" in text
-        assert "0.03 m off, is taken for it" in text
+        assert "0.03 m off, is used instead" in text
     rows = list(csv.DictReader(io.StringIO(er_gym("report", "run", "--format", "csv")[1])))
     assert [row["n"] for row in rows if row["level"] == "overall"] == ["3"]
     levels = [row["level"] for row in rows]

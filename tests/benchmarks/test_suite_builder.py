@@ -22,7 +22,7 @@ from benchmarks.cli.suite_builder import BuildResult, build_suite, parts_folder
 from er_gym.envs.verify import Verifier
 from er_gym.rollout.verification import make_verifier
 from er_gym.tasks import TASK_TYPES, Task, jsonl_format, load_suite, suites, verbs
-from er_gym.tasks.arrangement import begin
+from er_gym.tasks.arrangement import set_up_scene
 from er_gym.tasks.difficulty import Difficulty, difficulty
 from er_gym.tasks.jsonl_format import read_tasks
 from er_gym.tasks.splits import (
@@ -33,7 +33,7 @@ from er_gym.tasks.splits import (
     subject_types,
 )
 from er_gym.tasks.suite_card import card
-from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.thor import make_controller
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,13 +41,13 @@ COMMAND = [sys.executable, "-m", "benchmarks.cli", "tasks", "generate"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 LONG_RANGE = TASK_TYPES[-1]
-PICKUPS = Making(
+PICKUPS = SuiteSpec(
     total=40,
     scenes=("FloorPlan401", "FloorPlan410", "FloorPlan425"),
     types=("single_pickup", "single_toggle", "pickup_and_put"),
 )
 """Three bathrooms as recorded: made in a second or two."""
-KITCHENS = Making(
+KITCHENS = SuiteSpec(
     total=30,
     scenes=("FloorPlan5", "FloorPlan10", "FloorPlan6", "FloorPlan7"),
     types=("single_pickup", "pickup_from_closerep_and_put"),
@@ -55,14 +55,14 @@ KITCHENS = Making(
 """Rooms that are some work each, so that there is time to end the command between two of them."""
 
 
-def options(spec: Making, seed: int) -> list[str]:
+def options(spec: SuiteSpec, seed: int) -> list[str]:
     """The options of the command that say the same as a spec."""
     given = ["--seed", str(seed), "--total", str(spec.total), "--layouts", str(spec.layouts)]
     given += ["--per-layout", str(spec.per_layout), "--scenes", ",".join(spec.rooms)]
     return [*given, *(["--types", ",".join(spec.types)] if spec.types else [])]
 
 
-def generated(out: Path, spec: Making, seed: int, workers: int = 1, **environment: str) -> bytes:
+def generated(out: Path, spec: SuiteSpec, seed: int, workers: int = 1, **environment: str) -> bytes:
     """The file that the command makes, in a process of its own."""
     done = subprocess.run(
         [*COMMAND, "--out", str(out), "--workers", str(workers), *options(spec, seed)],
@@ -86,7 +86,7 @@ def header(file: Path) -> dict[str, Any]:
 def test_a_seed_gives_the_same_bytes_whatever_the_process_and_the_workers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    spec = Making(
+    spec = SuiteSpec(
         total=14,
         scenes=("FloorPlan401", "FloorPlan410"),
         types=("single_pickup", "pickup_and_put"),
@@ -102,15 +102,15 @@ def test_a_seed_gives_the_same_bytes_whatever_the_process_and_the_workers(
     assert generated(there, spec, 3, PYTHONHASHSEED="1") == here.read_bytes()
     tasks = read_tasks(here)
     assert len(tasks) == spec.total
-    assert len({task.start.layout for task in tasks}) == 3  # as recorded, and each room's own
+    assert len({task.arrangement.layout for task in tasks}) == 3  # as recorded, and each room's own
     parts = tmp_path / "parts"
     assert [build_suite(spec, 3, parts=parts).tasks] == [tuple(tasks)]
 
 
 def test_another_seed_gives_other_tasks_and_other_arrangements(tmp_path: Path) -> None:
-    spec = Making(total=8, scenes=("FloorPlan401",), types=("single_pickup",), layouts=1)
+    spec = SuiteSpec(total=8, scenes=("FloorPlan401",), types=("single_pickup",), layouts=1)
     one, other = (build_suite(spec, seed, parts=tmp_path / str(seed)).tasks for seed in (0, 1))
-    layouts = [{task.start.layout for task in tasks} for tasks in (one, other)]
+    layouts = [{task.arrangement.layout for task in tasks} for tasks in (one, other)]
     assert [len(names) for names in layouts] == [2, 2]
     assert layouts[0] & layouts[1] == {""}
     assert [task.id for task in one] != [task.id for task in other]
@@ -228,7 +228,7 @@ def test_an_ended_command_goes_on(
 @pytest.fixture(scope="module")
 def of_all_types(tmp_path_factory: pytest.TempPathFactory) -> tuple[Task, ...]:
     """Everything that a kitchen and a bathroom give, as recorded and rearranged."""
-    spec = Making(total=10_000, scenes=("FloorPlan5", "FloorPlan410"), layouts=1, per_layout=2)
+    spec = SuiteSpec(total=10_000, scenes=("FloorPlan5", "FloorPlan410"), layouts=1, per_layout=2)
     return build_suite(spec, 0, parts=tmp_path_factory.mktemp("all") / "parts", workers=2).tasks
 
 
@@ -242,7 +242,7 @@ def measured(tasks: Sequence[Task], verifier: Verifier) -> Iterator[tuple[Task, 
     """Each task's difficulty, read off its scene as it begins."""
     with make_controller(headless=True) as controller:
         for task in tasks:
-            objects = begin(controller, task.scene, task.start).metadata["objects"]
+            objects = set_up_scene(controller, task.scene, task.arrangement).metadata["objects"]
             yield task, difficulty(task, objects, verifier(task).start)
 
 
@@ -250,7 +250,7 @@ def test_every_task_that_is_made_can_be_done(
     of_all_types: tuple[Task, ...], verifier: Verifier
 ) -> None:
     assert {task.type for task in of_all_types} == set(TASK_TYPES)
-    assert {bool(task.start.poses) for task in of_all_types} == {True, False}
+    assert {bool(task.arrangement.poses) for task in of_all_types} == {True, False}
     assert len({task.id for task in of_all_types}) == len(of_all_types)
     for task in of_all_types:
         verdict = verifier(task)
@@ -279,7 +279,7 @@ LIMITS = {"hidden_depth": (1, 1), "distractors": (2, 6), "distance": (4, 9.5)}
 def test_limits_of_difficulty_are_kept(limited: str, verifier: Verifier, tmp_path: Path) -> None:
     low, high = LIMITS[limited]
     types = ("single_pickup", "single_pickup_from_closerep", "pickup_and_put", "single_toggle")
-    spec = Making(total=100, scenes=("FloorPlan5",), types=types, **{limited: (low, high)})
+    spec = SuiteSpec(total=100, scenes=("FloorPlan5",), types=types, **{limited: (low, high)})
     made = build_suite(spec, 0, parts=tmp_path / "parts")
     assert made.tasks
     assert made.dropped["it is not as difficult as asked"]
@@ -288,7 +288,7 @@ def test_limits_of_difficulty_are_kept(limited: str, verifier: Verifier, tmp_pat
 
 
 def test_no_task_is_about_what_training_never_sees(tmp_path: Path) -> None:
-    spec = Making(
+    spec = SuiteSpec(
         total=500, scenes=("FloorPlan212",), types=("single_search", "single_pickup"), per_layout=9
     )
     every = build_suite(spec, 0, parts=tmp_path / "every").tasks
@@ -322,7 +322,7 @@ def test_only_the_types_and_rooms_that_are_asked_for(tmp_path: Path) -> None:
     per_layout = Counter((task.scene, task.type) for task in kept)
     assert max(per_layout.values()) == 2
     assert {task.id for task in made.tasks} < {task.id for task in kept}
-    assert {task.start.layout for task in kept} == {""}
+    assert {task.arrangement.layout for task in kept} == {""}
 
 
 # -- the suites that we ship -----------------------------------------------------------------------
@@ -352,7 +352,7 @@ def test_er_1k_is_in_the_evaluation_rooms_alone() -> None:
     assert scenes == set(EVALUATION_SCENES)
     assert scenes.isdisjoint(TRAINING_SCENES)
     assert {split(task) for task in tasks} == {"unseen room", "unseen room and object"}
-    assert sum(bool(task.start.poses) for task in tasks) > 500
+    assert sum(bool(task.arrangement.poses) for task in tasks) > 500
 
 
 def test_er_1k_has_as_many_tasks_of_each_type() -> None:

@@ -21,13 +21,13 @@ from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.rollout.verification import make_verifier
 from er_gym.tasks import TASK_TYPES, Task, TaskType, jsonl_format, load_suite, paper_format
 from er_gym.tasks.splits import TRAINING_SCENES, UNSEEN_TYPES, subject_types
-from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.suite_spec import SuiteSpec
 
 IDS = [task_type.env_id for task_type in TASK_TYPES]
 MINI = load_suite("mini").tasks
 PICKUPS = [task for task in MINI if task.type.name == "single_pickup"]
 TOGGLES = [task for task in MINI if task.type.name == "single_toggle"]
-REARRANGED = next(task for task in load_suite("er-1k").tasks if task.start.poses)
+REARRANGED = next(task for task in load_suite("er-1k").tasks if task.arrangement.poses)
 
 
 def drawn(env: gymnasium.Env[Any, Any], seed: int | None = None, **options: Any) -> Task:
@@ -280,7 +280,7 @@ def test_live_tasks_differ_and_can_be_done(live_tasks: list[Task]) -> None:
     assert len({task.id for task in live_tasks}) == 6
     assert len({task.scene for task in live_tasks}) > 3
     assert len({task.type for task in live_tasks}) > 2
-    assert any(task.start.poses for task in live_tasks)
+    assert any(task.arrangement.poses for task in live_tasks)
     with closing(make_verifier()) as verifier:
         for task in live_tasks:
             verdict = verifier(task)
@@ -312,8 +312,8 @@ def test_live_tasks_are_of_the_type_and_in_the_room_that_are_asked_for() -> None
 
 
 def test_live_tasks_are_about_what_training_may_see(make: Callable[..., EmbodiedEnv]) -> None:
-    def abouts(making: Making) -> set[str]:
-        with closing(GeneratedSource(EmbodiedEnv((), obs_mode="state"), making)) as source:
+    def abouts(spec: SuiteSpec) -> set[str]:
+        with closing(GeneratedSource(EmbodiedEnv((), obs_mode="state"), spec)) as source:
             env = make(source, task_type="single_pickup")
             tasks = [drawn(env, seed, scene=ROOM) for seed in range(8)]
         return {name for task in tasks for name in subject_types(task)}
@@ -324,14 +324,14 @@ def test_live_tasks_are_about_what_training_may_see(make: Callable[..., Embodied
 
 
 def test_a_live_source_keeps_to_its_making(make: Callable[..., EmbodiedEnv]) -> None:
-    making = Making(
+    spec = SuiteSpec(
         total=1,
         scenes=("FloorPlan301", "FloorPlan401"),
         types=("pickup_and_put", "single_pickup"),
         layouts=2,
         distance=(2, 4.5),
     )
-    with closing(GeneratedSource(EmbodiedEnv((), obs_mode="state"), making)) as source:
+    with closing(GeneratedSource(EmbodiedEnv((), obs_mode="state"), spec)) as source:
         env = make(source)
         tasks = [drawn(env, seed) for seed in range(8)]
         # Nothing opens in this bathroom.
@@ -342,11 +342,11 @@ def test_a_live_source_keeps_to_its_making(make: Callable[..., EmbodiedEnv]) -> 
                 seed=0, options={"scene": "FloorPlan401"}
             )
     assert "\n" not in str(e.value)
-    assert {task.scene for task in tasks} == set(making.rooms)
-    assert {task.type.name for task in tasks} == set(making.types)
+    assert {task.scene for task in tasks} == set(spec.rooms)
+    assert {task.type.name for task in tasks} == set(spec.types)
     assert all(2 <= task.extra["difficulty"]["distance"] <= 4.5 for task in tasks)
-    layouts = {f"{scene}-{number}" for scene in making.rooms for number in (1, 2)}
-    assert {task.start.layout for task in tasks} <= {"", *layouts}
+    layouts = {f"{scene}-{number}" for scene in spec.rooms for number in (1, 2)}
+    assert {task.arrangement.layout for task in tasks} <= {"", *layouts}
 
 
 def test_a_live_task_that_cannot_be_is_told(live: EmbodiedEnv) -> None:
@@ -372,13 +372,13 @@ def test_a_rearranged_task_begins_as_it_says(make: Callable[..., EmbodiedEnv]) -
     for _ in range(2):  # after an episode, too
         drawn(env, 0)
         there = {entry["name"]: entry["position"] for entry in env.objects}
-        for name, pose in REARRANGED.start.poses.items():
+        for name, pose in REARRANGED.arrangement.poses.items():
             found = (there[name]["x"], there[name]["y"], there[name]["z"])
             assert found == pytest.approx((pose.x, pose.y, pose.z), abs=1e-3), name
         ids = {entry["objectId"] for entry in env.objects}
         assert {key.object_id for key in REARRANGED.key_actions} - {""} <= ids
         recorded = drawn(env, 0, task=replace(PICKUPS[0], scene=REARRANGED.scene))
-        assert recorded.start.poses == {}
+        assert recorded.arrangement.poses == {}
         assert {entry["name"]: entry["position"] for entry in env.objects} != there
 
 

@@ -17,7 +17,7 @@ from er_gym.envs.solver import Solver
 from er_gym.tasks import TASK_TYPES, Task, TaskType, load_suite, verbs
 from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.tasks.generate import Generator
-from er_gym.tasks.goal import unmet
+from er_gym.tasks.goal import unmet_conditions
 from er_gym.tasks.judge import Criteria, Progress
 from er_gym.tasks.types import SEARCH
 
@@ -46,7 +46,7 @@ def begin(env: EmbodiedEnv, task: Task) -> dict[str, Any]:
 
 
 def goal_holds(env: EmbodiedEnv, task: Task, info: Mapping[str, Any]) -> bool:
-    return not unmet(task.goal, env.objects, info["interactable"])
+    return not unmet_conditions(task.goal, env.objects, info["interactable"])
 
 
 def strive(env: EmbodiedEnv, task: Task, other: Task) -> list[Deed]:
@@ -72,7 +72,7 @@ def strive(env: EmbodiedEnv, task: Task, other: Task) -> list[Deed]:
 def room_of(env: EmbodiedEnv, task: Task) -> Generator:
     """What can be asked for in the room in which a task begins."""
     begin(env, task)
-    return Generator(task.scene, env.objects, task.start)
+    return Generator(task.scene, env.objects, task.arrangement)
 
 
 def empty(scene: str) -> Task:
@@ -195,9 +195,9 @@ def nearest() -> Iterator[EmbodiedEnv]:
 def wrong_ones_taken(env: EmbodiedEnv, task: Task) -> int:
     """Take others of the type of which a task names one, as many as one can."""
     room = room_of(env, task)
-    (named,) = (room.room.things[object_id] for object_id in task.named)
+    (named,) = (room.scene_graph.objects[object_id] for object_id in task.named)
     taken = 0
-    for other in room.room.others(named):
+    for other in room.scene_graph.others_of_type(named):
         for deed in strive(env, task, room.request("single_pickup", other.id)):
             if deed.action.verb == verbs.PICKUP and deed.object_id not in task.named:
                 taken += 1
@@ -246,7 +246,7 @@ def test_where_the_words_single_none_out_any_is_as_good(
     (task,) = (task for task in room.tasks([kind]) if task.id.endswith(f"-{object_type}"))
     assert not task.named
     done_to = set()
-    for other in room.room.of_type(object_type):
+    for other in room.scene_graph.of_type(object_type):
         deeds = strive(nearest, task, room.request(kind, other.id))
         if deeds:
             done_to.add(deeds[-1].object_id)

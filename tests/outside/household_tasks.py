@@ -2,24 +2,24 @@
 
 from collections.abc import Iterator
 
-from er_gym.tasks.generate.scene_graph import Room, Thing
-from er_gym.tasks.generate.script import Script
-from er_gym.tasks.generate.task_plan import Plan, Row, from_templates, plan_of
+from er_gym.tasks.generate.plan_builder import PlanBuilder
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
+from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.types import MANIPULATE, TaskType, register
 
 
-def shut_things(room: Room) -> Iterator[tuple[Thing]]:
+def shut_things(graph: SceneGraph) -> Iterator[tuple[SceneObject]]:
     """Everything that stands free and is shut."""
-    return ((thing,) for thing in room.things.values() if thing.closed and not thing.pickupable)
+    return ((obj,) for obj in graph.objects.values() if obj.closed and not obj.pickupable)
 
 
-def leave_open(room: Room, thing: Thing) -> Plan:
+def leave_open(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
     """Go there and open it."""
-    script = Script(room)
-    script.go(thing, thing)
-    script.open(thing)
-    script.becomes(thing, isOpen=True)
-    return plan_of(script, thing)
+    builder = PlanBuilder(graph)
+    builder.go_to(obj, obj)
+    builder.open(obj)
+    builder.set_state(obj, isOpen=True)
+    return plan_from(builder, obj)
 
 
 SAYINGS = ("Open {an_object}.", "Leave the {object} open.", "Would you open {an_object}?")
@@ -30,6 +30,6 @@ OPEN = register(
         group=MANIPULATE,
         env_id="Household-Open-v0",
         max_steps=24,
-        rows=(Row("single_open", shut_things, leave_open, from_templates(SAYINGS)),),
+        rules=(TaskRule("single_open", shut_things, leave_open, from_templates(SAYINGS)),),
     )
 )

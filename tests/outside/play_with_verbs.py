@@ -20,10 +20,10 @@ from er_gym.envs.actions import ACTIONS, INDEX, parse
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.solver import Solver
 from er_gym.tasks import jsonl_format
-from er_gym.tasks.arrangement import Start
+from er_gym.tasks.arrangement import Arrangement
 from er_gym.tasks.describe import describe
-from er_gym.tasks.generate import arranged
-from er_gym.tasks.generate.recipes import read_recipes, rows
+from er_gym.tasks.generate import generator_for
+from er_gym.tasks.generate.recipes import read_recipes, recipe_rules
 from er_gym.thor import make_controller
 
 out = Path(sys.argv[1])
@@ -68,10 +68,10 @@ env.close()
 """)
 with make_controller("embedded", scene="FloorPlan1", headless=True) as controller:
     recipes = read_recipes(out / "recipes.yaml")
-    generator = replace(arranged(controller, "FloorPlan1", 0), rows=rows(recipes))
+    generator = replace(generator_for(controller, "FloorPlan1", 0), rules=recipe_rules(recipes))
     task = next(iter(generator.tasks()))
-assert task.start.dirty
-assert task.start == replace(Start(), dirty=task.start.dirty)
+assert task.arrangement.dirty
+assert task.arrangement == replace(Arrangement(), dirty=task.arrangement.dirty)
 jsonl_format.write_tasks(out / "tasks.jsonl", [task])
 env = EmbodiedEnv(str(out / "tasks.jsonl"), obs_mode="state")
 obs, info = env.reset(seed=0)

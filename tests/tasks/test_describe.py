@@ -6,7 +6,7 @@ import pytest
 from support import make_task
 
 from er_gym.tasks import load_suite, verbs
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.describe import describe
 from er_gym.tasks.difficulty import Difficulty
 from er_gym.tasks.goal import Condition
@@ -43,7 +43,9 @@ def test_a_whole_task() -> None:
             KeyAction(verbs.END),
         ),
         goal=(Condition("Egg", EGG, held=True),),
-        start=Start("FloorPlan1-9", {"Egg_1": ObjectPose(0.0, 1.0, 0.0)}, dirty=(FRIDGE,)),
+        arrangement=Arrangement(
+            "FloorPlan1-9", {"Egg_1": ObjectPose(0.0, 1.0, 0.0)}, dirty=(FRIDGE,)
+        ),
     )
     assert describe(task, Difficulty(1, 2, 3.26, 5)) == (
         "FloorPlan1-egg\n"

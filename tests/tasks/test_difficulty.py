@@ -93,7 +93,11 @@ def test_a_type_without_an_id_finds_no_object() -> None:
 @pytest.mark.parametrize("kind", TASK_TYPES, ids=lambda row: row.env_id)
 def test_the_bundled_tasks_in_their_scenes(kind: TaskType, scene_objects) -> None:
     task = next(
-        (task for task in load_suite("mini").tasks if task.type == kind and not task.start.poses),
+        (
+            task
+            for task in load_suite("mini").tasks
+            if task.type == kind and not task.arrangement.poses
+        ),
         None,
     )
     if task is None:

@@ -28,10 +28,10 @@ from rooms_by_hand import (
 )
 
 from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.generate import generate_tasks
 from er_gym.tasks.generate.generator import AMBIGUOUS
-from er_gym.tasks.generate.scene_graph import read_room
+from er_gym.tasks.generate.scene_graph import read_scene_graph
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.judge import Criteria, Progress
 
@@ -192,8 +192,8 @@ def test_what_one_goes_to_for_a_thing(parents: list[str], place: str) -> None:
     cloth = thing("Cloth", *parents, pickupable=True)
     painting = thing("Painting")
     objects = [*FURNITURE, MICROWAVE, TRAY, BOX, BOWL, DESK, TOILET, painting, cloth]
-    room = read_room(objects, everywhere)
-    assert room.place_of(room.things[cloth["objectId"]]).type == place
+    room = read_scene_graph(objects, everywhere)
+    assert room.place_of(room.objects[cloth["objectId"]]).type == place
 
 
 SINK = thing("Sink", receptacle=True)
@@ -213,7 +213,7 @@ NO_WATER = {
 
 @pytest.mark.parametrize("objects", NO_WATER.values(), ids=NO_WATER)
 def test_there_is_no_water_without_a_faucet_that_one_can_name(objects: Objects) -> None:
-    assert read_room(objects, everywhere).washing_place() is None
+    assert read_scene_graph(objects, everywhere).sink_and_faucet() is None
 
 
 WATER = {
@@ -225,18 +225,18 @@ WATER = {
 
 @pytest.mark.parametrize("objects", WATER.values(), ids=WATER)
 def test_the_faucet_by_the_sink_gives_water(objects: Objects) -> None:
-    water = read_room([SINK, BASIN, *objects], everywhere).washing_place()
+    water = read_scene_graph([SINK, BASIN, *objects], everywhere).sink_and_faucet()
     assert water is not None
     assert [thing.id for thing in water] == [BASIN["objectId"], FAUCET["objectId"]]
 
 
 def test_ids_and_starts_of_a_rearranged_room_name_its_layout() -> None:
-    start = Start("FloorPlan1-7", {"Apple_1": ObjectPose(1.0, 2.0, 3.0)})
+    start = Arrangement("FloorPlan1-7", {"Apple_1": ObjectPose(1.0, 2.0, 3.0)})
     search, pickup = generate_tasks([*FURNITURE, APPLE], "FloorPlan1", nowhere, start)
     assert search.id == "FloorPlan1-7-single_search-Apple"
     assert pickup.id == "FloorPlan1-7-single_pickup-Apple"
     for task in (search, pickup):
-        assert (task.scene, task.start) == ("FloorPlan1", start)
+        assert (task.scene, task.arrangement) == ("FloorPlan1", start)
 
 
 def test_one_of_two_that_are_alike_is_moved_where_the_other_cannot_go() -> None:

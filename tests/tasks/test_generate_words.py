@@ -33,8 +33,8 @@ from rooms_by_hand import (
 from benchmarks.checks.key_actions import compare
 from er_gym.tasks import TASK_TYPES, verbs
 from er_gym.tasks.generate import generate_tasks
-from er_gym.tasks.generate.rules import ROWS
-from er_gym.tasks.generate.task_plan import Row
+from er_gym.tasks.generate.rules import RULES
+from er_gym.tasks.generate.task_plan import TaskRule
 from er_gym.tasks.paper_format import read_tasks
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.types import COMPOSITE, SEARCH
@@ -69,8 +69,8 @@ def test_a_request_gives_the_task_that_is_made_anyhow() -> None:
 
 
 FAULTS = {
-    "no such type": (["dance"], r"no 'dance' tasks are made on request; choose one of: single_se"),
-    "a recipe": ([TASK_TYPES[-1].name], "no 'long-range .* tasks are made on request; choose one"),
+    "no such type": (["dance"], r"no 'dance' tasks cannot be requested; choose one of: single_se"),
+    "a recipe": ([TASK_TYPES[-1].name], "no 'long-range .* tasks cannot be requested; choose one"),
     "too few": (["pickup_and_put", APPLE["objectId"]], "no 'pickup_and_put' task about 1 objects"),
     "none": (["single_search"], "no 'single_search' task about 0 objects"),
     "too many": (
@@ -123,8 +123,8 @@ WORDS = {
 }
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.slug or row.type)
-def test_every_kind_of_task_is_told_in_a_dozen_ways_and_more(row: Row) -> None:
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.slug or rule.type)
+def test_every_kind_of_task_is_told_in_a_dozen_ways_and_more(rule: TaskRule) -> None:
     words = {
         **WORDS,
         "way": "on",
@@ -132,9 +132,9 @@ def test_every_kind_of_task_is_told_in_a_dozen_ways_and_more(row: Row) -> None:
         "second_place": "on the Desk",
         "clauses": ["put the Apple in the Fridge", "turn on the DeskLamp"],
     }
-    sayings = row.sayings(words)
-    assert len(set(sayings)) == len(sayings) >= 12
-    assert not [saying for saying in sayings if set("{}") & set(saying)]
+    instructions = rule.instructions(words)
+    assert len(set(instructions)) == len(instructions) >= 12
+    assert not [saying for saying in instructions if set("{}") & set(saying)]
 
 
 def test_the_name_is_the_first_saying_and_the_instruction_any() -> None:
@@ -149,11 +149,11 @@ def test_the_name_is_the_first_saying_and_the_instruction_any() -> None:
         ),
     }
     for name, (things, places) in asked.items():
-        row = next(row for row in ROWS if row.type == name)
-        sayings = row.sayings({**WORDS, **places})
+        rule = next(rule for rule in RULES if rule.type == name)
+        instructions = rule.instructions({**WORDS, **places})
         task = room.request(name, *(item["objectId"] for item in things))
-        assert task.name == sayings[0]
-        assert task.instruction in sayings
+        assert task.name == instructions[0]
+        assert task.instruction in instructions
 
 
 def test_articles_and_pronouns() -> None:
@@ -196,7 +196,12 @@ def test_tasks_of_real_scenes_are_whole(
             for key in task.key_actions
             if key.verb == verbs.SLICE
         }
-        mentioned = {*task.target_objects, *task.related_objects, *task.start.dirty, *task.named}
+        mentioned = {
+            *task.target_objects,
+            *task.related_objects,
+            *task.arrangement.dirty,
+            *task.named,
+        }
         mentioned |= {action.object_id for action in task.key_actions[:-1]}
         assert mentioned <= ids | sliced
         assert task.key_actions[-1].verb == verbs.END

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from er_gym.tasks.goal import Condition, unmet
+from er_gym.tasks.goal import Condition, unmet_conditions
 
 
 def entry(object_type: str, number: int = 1, *parents: str, **fields: Any) -> dict[str, Any]:
@@ -65,22 +65,22 @@ IN_REACH = ("Egg", "Potato")
 
 @pytest.mark.parametrize("condition", HOLDS.values(), ids=HOLDS)
 def test_a_goal_that_holds(condition: Condition) -> None:
-    assert unmet([condition], OBJECTS, IN_REACH) == ()
+    assert unmet_conditions([condition], OBJECTS, IN_REACH) == ()
 
 
 @pytest.mark.parametrize("condition", FAILS.values(), ids=FAILS)
 def test_a_goal_that_does_not_hold(condition: Condition) -> None:
-    assert unmet([condition], OBJECTS, IN_REACH) == (condition,)
+    assert unmet_conditions([condition], OBJECTS, IN_REACH) == (condition,)
 
 
 def test_all_that_does_not_hold_is_named_in_order() -> None:
     held, inside, absent = HOLDS["held"], FAILS["inside something else"], FAILS["there is none"]
-    assert unmet([absent, held, inside], OBJECTS) == (absent, inside)
-    assert unmet([], OBJECTS) == ()
+    assert unmet_conditions([absent, held, inside], OBJECTS) == (absent, inside)
+    assert unmet_conditions([], OBJECTS) == ()
 
 
 def test_nothing_is_in_reach_unless_one_says_so() -> None:
-    assert unmet([HOLDS["in reach"]], OBJECTS) == (HOLDS["in reach"],)
+    assert unmet_conditions([HOLDS["in reach"]], OBJECTS) == (HOLDS["in reach"],)
 
 
 WORDS = {

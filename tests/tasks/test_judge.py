@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from er_gym.tasks.equivalence import same_type
-from er_gym.tasks.goal import Condition, unmet
+from er_gym.tasks.goal import Condition, unmet_conditions
 from er_gym.tasks.judge import Criteria, Progress, replay, search_targets
 from er_gym.tasks.task import KeyAction, Task
 from er_gym.tasks.types import BY_NAME
@@ -248,10 +248,12 @@ def test_what_is_in_the_basin_is_in_the_sink_but_what_is_on_the_rim_is_not_in_th
     for place, fulfils in ((BASIN, {"Sink", "SinkBasin"}), (SINK, {"Sink"}), ("gone", set())):
         objects = [*room, entry(EGG, "Egg", place)]
         for inside in ("Sink", "SinkBasin", "Bathtub", "Bowl"):
-            assert (not unmet([Condition("Egg", inside=inside)], objects)) == (inside in fulfils)
+            assert (not unmet_conditions([Condition("Egg", inside=inside)], objects)) == (
+                inside in fulfils
+            )
 
 
 def test_a_goal_to_have_a_sink_in_reach_is_met_by_its_basin() -> None:
     goal = [Condition("Sink", in_reach=True)]
-    assert not unmet(goal, [entry(SINK, "Sink")], ["SinkBasin"])
-    assert unmet(goal, [entry(SINK, "Sink")], ["BathtubBasin"])
+    assert not unmet_conditions(goal, [entry(SINK, "Sink")], ["SinkBasin"])
+    assert unmet_conditions(goal, [entry(SINK, "Sink")], ["BathtubBasin"])

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from er_gym.tasks import AgentPose, KeyAction, Task, TaskFileError, load_suite, task_type, verbs
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.paper_format import read_poses, read_tasks, with_poses, write_poses, write_tasks
 
@@ -35,7 +35,7 @@ OWN = Task(
         Condition("Plate", held=True),
         Condition("Faucet", in_reach=True, state=(("isToggled", True),)),
     ),
-    start=Start(
+    arrangement=Arrangement(
         "FloorPlan4-7",
         {"Mug_1": ObjectPose(-0.3799, 1.1, 3.1868, yaw=359.9999), "Pot_2": ObjectPose(1, 2, 3)},
         (MUG, "Plate|+01.00|+01.00|+01.00"),
@@ -162,9 +162,11 @@ OWN_TASKS = {
     "fields that have a place": replace(OWN, extra={"scene": "FloorPlan9", "er_gym": 1}),
     "metadata": replace(OWN, extra={"task_metadata": {"totalreward": 9, "actions": 0}}),
     "odd metadata": replace(OWN, extra={"task_metadata": 1, "actions": [1, {"reward": 7}, {}]}),
-    "no words": replace(OWN, instruction="", goal=(), start=Start()),
-    "dirty alone": replace(BARE, start=Start(dirty=(MUG,))),
-    "poses without a name": replace(BARE, start=Start(poses={"Mug_1": ObjectPose(1, 2, 3)})),
+    "no words": replace(OWN, instruction="", goal=(), arrangement=Arrangement()),
+    "dirty alone": replace(BARE, arrangement=Arrangement(dirty=(MUG,))),
+    "poses without a name": replace(
+        BARE, arrangement=Arrangement(poses={"Mug_1": ObjectPose(1, 2, 3)})
+    ),
     "a goal alone": replace(BARE, goal=(Condition("Pen", in_reach=True),)),
 }
 
@@ -218,7 +220,7 @@ def test_what_the_papers_format_has_no_field_for_lies_under_one_key(tmp_path: Pa
             "Mug_1": [-0.3799, 1.1, 3.1868, 0.0, 359.9999, 0.0],
             "Pot_2": [1, 2, 3, 0.0, 0.0, 0.0],
         },
-        "dirty": list(OWN.start.dirty),
+        "dirty": list(OWN.arrangement.dirty),
     }
     assert bare["er_gym"] == {"id": "look"}
 

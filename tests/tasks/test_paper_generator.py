@@ -10,7 +10,7 @@ import pytest
 
 from er_gym.tasks import AgentPose, KeyAction, Task, TaskFileError, load_suite, task_type, verbs
 from er_gym.tasks import paper_format as test_file
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.paper_generator import read_generator_tasks, write_generator_tasks
 
@@ -34,7 +34,7 @@ OWN = Task(
     related_objects=(MUG,),
     navigable_objects=("Fridge", "Fridge"),
     goal=(Condition("Mug", MUG, inside="SinkBasin", state=(("isDirty", False),)),),
-    start=Start("FloorPlan204-7", {"Mug_1": ObjectPose(-0.3799, 1.1, 3.1868)}, (MUG,)),
+    arrangement=Arrangement("FloorPlan204-7", {"Mug_1": ObjectPose(-0.3799, 1.1, 3.1868)}, (MUG,)),
     poses={SINK: AgentPose(0.25, 0.9, -1.5, 180.0, horizon=-18.0)},
 )
 
@@ -85,7 +85,7 @@ def test_a_task_says_what_its_file_says(tmp_path: Path) -> None:
     assert task.type.name == "single_search"
     assert task.instruction == task.name == "Look for the Mug in the room."
     assert [action.verb for action in task.key_actions] == [verbs.NAVIGATE, verbs.PUT, verbs.END]
-    assert (task.goal, task.start, task.target_objects) == ((), Start(), ())
+    assert (task.goal, task.arrangement, task.target_objects) == ((), Arrangement(), ())
     assert task.extra == {
         "task_metadata": {
             "totalreward": 7,
@@ -228,7 +228,7 @@ WRONG: dict[str, tuple[object, str]] = {
     "no actions": ([{"taskname": "", "tasktype": ""}], "task 1 lacks field 'actions'"),
     "no scene": (
         [generated(metadatapath="{scene}/metadata.json")],
-        "task 1 tells no scene: neither its metadatapath '{scene}/metadata.json' nor its folder",
+        "task 1 names no scene: neither its metadatapath '{scene}/metadata.json' nor its folder",
     ),
     "task type": ([generated(tasktype="dance")], "unknown tasktype 'dance'; choose one of: "),
     "own": ([generated(er_gym={"gaol": []})], "task 1 has a wrong field 'er_gym.gaol'"),

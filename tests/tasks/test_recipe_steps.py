@@ -8,15 +8,15 @@ from dataclasses import replace
 import pytest
 from things_by_hand import thing
 
+from er_gym.tasks.generate.plan_builder import ImpossiblePlan
 from er_gym.tasks.generate.recipes import (
-    KINDS,
+    ROLE_KINDS,
     Recipe,
     bundled_recipes,
-    rows,
+    recipe_rules,
 )
-from er_gym.tasks.generate.scene_graph import Room, Thing
-from er_gym.tasks.generate.script import Impossible
-from er_gym.tasks.generate.task_plan import Plan
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
+from er_gym.tasks.generate.task_plan import TaskPlan
 from er_gym.tasks.goal import Condition
 
 RECIPES = {recipe.name: recipe for recipe in bundled_recipes()}
@@ -50,11 +50,13 @@ KITCHEN = (
 )  # fmt: skip
 
 
-def room_of(*things: Thing, accepts: Callable[[str, str], bool] = lambda what, where: True) -> Room:
-    return Room({item.id: item for item in things}, accepts)
+def room_of(
+    *things: SceneObject, accepts: Callable[[str, str], bool] = lambda what, where: True
+) -> SceneGraph:
+    return SceneGraph({item.id: item for item in things}, accepts)
 
 
-def follow(text: str, *cast: Thing, room: Room | None = None) -> Plan:
+def follow(text: str, *cast: SceneObject, room: SceneGraph | None = None) -> TaskPlan:
     """Act out steps such as ``"put Apple Fridge, wash Apple"``; roles go by the names of types."""
     things = cast or KITCHEN
     given = [words.split() for words in text.split(", ")]
@@ -64,12 +66,12 @@ def follow(text: str, *cast: Thing, room: Room | None = None) -> Plan:
         roles={role: (role,) for role in roles},
         steps=tuple({name: tuple(named)} for name, *named in given),
     )
-    (row,) = rows([recipe])
+    (rule,) = recipe_rules([recipe])
     who = {item.type: item for item in things}
-    return row.plan(room or room_of(*things), *(who[role] for role in roles))
+    return rule.plan(room or room_of(*things), *(who[role] for role in roles))
 
 
-def steps(plan: Plan) -> list[str]:
+def steps(plan: TaskPlan) -> list[str]:
     return [f"{key.verb} {key.object_type}" for key in plan.key_actions[:-1]]
 
 
@@ -220,7 +222,7 @@ def test_switch_on_and_off() -> None:
     ]  # fmt: skip
 
 
-def but(*changed: Thing, without: tuple[Thing, ...] = ()) -> list[Thing]:
+def but(*changed: SceneObject, without: tuple[SceneObject, ...] = ()) -> list[SceneObject]:
     """The kitchen with some things in place of those of the same id, and some taken away."""
     by_id = {item.id: item for item in (*KITCHEN, *changed)}
     return [item for item in by_id.values() if item not in without]
@@ -287,20 +289,20 @@ IMPOSSIBLE = {
 
 
 @pytest.mark.parametrize(("text", "things", "message"), IMPOSSIBLE.values(), ids=IMPOSSIBLE)
-def test_what_cannot_be_done(text: str, things: list[Thing], message: str) -> None:
-    with pytest.raises(Impossible, match=message):
+def test_what_cannot_be_done(text: str, things: list[SceneObject], message: str) -> None:
+    with pytest.raises(ImpossiblePlan, match=message):
         follow(text, *things)
 
 
 def test_nothing_is_put_where_its_type_is_not_accepted() -> None:
     room = room_of(*KITCHEN, accepts=lambda what, where: where != "Fridge")
     assert steps(follow("put Apple CounterTop", room=room))
-    with pytest.raises(Impossible, match="Fridge does not take Apple"):
+    with pytest.raises(ImpossiblePlan, match="Fridge does not take Apple"):
         follow("put Apple Fridge", room=room)
-    with pytest.raises(Impossible, match="Fridge does not take Apple"):
+    with pytest.raises(ImpossiblePlan, match="Fridge does not take Apple"):
         follow("chill Apple", room=room)
     blunt = room_of(*KITCHEN, accepts=lambda what, where: what != "Knife")
-    with pytest.raises(Impossible, match="no slicing in CounterTop"):
+    with pytest.raises(ImpossiblePlan, match="no slicing in CounterTop"):
         follow("slice Potato Knife", room=blunt)
 
 
@@ -315,9 +317,9 @@ LONG = Recipe(
 PLAIN = (COUNTER, TABLE, FRIDGE, APPLE, KNIFE)
 
 
-def casts(recipe: Recipe, *things: Thing) -> set[tuple[str, ...]]:
-    (row,) = rows([recipe])
-    return {tuple(item.id for item in cast) for cast in row.choices(room_of(*things))}
+def casts(recipe: Recipe, *things: SceneObject) -> set[tuple[str, ...]]:
+    (rule,) = recipe_rules([recipe])
+    return {tuple(item.id for item in cast) for cast in rule.choices(room_of(*things))}
 
 
 OF_A_KIND = {
@@ -328,7 +330,7 @@ OF_A_KIND = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ROLE_KINDS)
 def test_kinds_of_things(kind: str) -> None:
     room = room_of(
         *PLAIN, BASIN, FAUCET, LAMP, FISH,
@@ -344,7 +346,7 @@ def test_kinds_of_things(kind: str) -> None:
         thing("CellPhone", "Fridge", pickupable=True, toggleable=True),
         thing("Television", "DiningTable"),
     )  # fmt: skip
-    assert {item.type for item in KINDS[kind](room)} == OF_A_KIND[kind]
+    assert {item.type for item in ROLE_KINDS[kind](room)} == OF_A_KIND[kind]
 
 
 def test_roles_are_filled_by_what_fits_them() -> None:

@@ -12,15 +12,15 @@ import pytest
 
 from er_gym.tasks import Task, TaskFileError, verbs
 from er_gym.tasks.generate import Generator
+from er_gym.tasks.generate.recipe_steps import STEPS
 from er_gym.tasks.generate.recipes import (
-    KINDS,
     LONGEST,
+    ROLE_KINDS,
     SHORTEST,
-    STEPS,
     Recipe,
     bundled_recipes,
     read_recipes,
-    rows,
+    recipe_rules,
 )
 from er_gym.thor import OBJECT_TYPES
 
@@ -35,7 +35,7 @@ RECIPES = {recipe.name: recipe for recipe in bundled_recipes()}
 def test_a_bundled_recipe_names_what_there_is(recipe: Recipe) -> None:
     kinds = recipe.roles.values()
     assert set(chain.from_iterable(k for k in kinds if not isinstance(k, str))) <= set(OBJECT_TYPES)
-    assert {kind for kind in kinds if isinstance(kind, str)} <= set(KINDS)
+    assert {kind for kind in kinds if isinstance(kind, str)} <= set(ROLE_KINDS)
     used = {role for step in recipe.steps for roles in step.values() for role in roles}
     assert used == set(recipe.roles)
 
@@ -60,7 +60,7 @@ def made(scene_objects: Callable[[str], Objects]) -> dict[str, list[Task]]:
     """Each recipe's tasks in those rooms."""
     found: dict[str, list[Task]] = {name: [] for name in RECIPES}
     for scene in SCENES:
-        generator = Generator(scene, scene_objects(scene), rows=rows(bundled_recipes()))
+        generator = Generator(scene, scene_objects(scene), rules=recipe_rules(bundled_recipes()))
         for task in generator.tasks():
             found[task.id.split("-")[1].removeprefix("long_range_")].append(task)
     return found
@@ -100,13 +100,13 @@ _ONLY_OPENED: set[str] = {"Cabinet", "Drawer", "Fridge", "Microwave", "Safe"}
 def test_dishes_are_dirty_before_and_clean_after_they_are_washed(
     made: dict[str, list[Task]],
 ) -> None:
-    dirty = [task for tasks in made.values() for task in tasks if task.start.dirty]
+    dirty = [task for tasks in made.values() for task in tasks if task.arrangement.dirty]
     assert dirty
     for task in dirty:
-        types = {object_id.split("|")[0] for object_id in task.start.dirty}
+        types = {object_id.split("|")[0] for object_id in task.arrangement.dirty}
         clean = {c.object_type for c in task.goal if ("isDirty", False) in c.state}
         assert types == clean
-    assert not [task for task in made["clear_three"] if task.start.dirty]
+    assert not [task for task in made["clear_three"] if task.arrangement.dirty]
 
 
 # -- faulty files --------------------------------------------------------------------------------

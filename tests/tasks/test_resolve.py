@@ -11,7 +11,7 @@ import pytest
 from support import make_task
 
 from er_gym.tasks import AgentPose, Task, TaskFileError, load_suite
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.paper_format import read_tasks
 from er_gym.tasks.resolve import NEAR, resolve_task, resolve_tasks
@@ -43,7 +43,7 @@ def test_the_nearest_of_the_type_is_taken_wherever_the_id_stands() -> None:
         target_objects=(off,),
         related_objects=(off,),
         goal=(Condition("Safe", off, state=(("isOpen", True),)),),
-        start=Start(dirty=(off,)),
+        arrangement=Arrangement(dirty=(off,)),
         poses={off: POSE},
     )
     keys = (replace(task.key_actions[0], related_objects=(off,)), *task.key_actions[1:])
@@ -54,11 +54,11 @@ def test_the_nearest_of_the_type_is_taken_wherever_the_id_stands() -> None:
     assert off not in repr(fitted)
     assert fitted.named == {SAFE}
     assert fitted.poses == {SAFE: POSE}
-    assert fitted.start.dirty == (SAFE,)
+    assert fitted.arrangement.dirty == (SAFE,)
     assert fitted.key_actions[0].related_objects == (SAFE,)
     assert (taken.named, taken.taken) == (off, SAFE)
     assert taken.metres == pytest.approx(0.05)
-    assert str(taken) == f"FloorPlan1 has no {off}: {SAFE}, 0.05 m off, is taken for it"
+    assert str(taken) == f"FloorPlan1 has no {off}: {SAFE}, 0.05 m off, is used instead"
     assert notes == []
 
 
@@ -149,7 +149,10 @@ def test_what_no_key_action_is_about_may_be_missing() -> None:
         [],
         [f"task test: FloorPlan1 has no {ghost}; no key action is about it"],
     )
-    for asks in ({"goal": (Condition("Egg", ghost, held=True),)}, {"start": Start(dirty=(ghost,))}):
+    for asks in (
+        {"goal": (Condition("Egg", ghost, held=True),)},
+        {"arrangement": Arrangement(dirty=(ghost,))},
+    ):
         with pytest.raises(TaskFileError, match="no object 'Egg"):
             resolve_task(replace(task, **asks), [SAFE])
 
@@ -172,7 +175,7 @@ def test_the_paper_tasks_fit_their_scenes(shared_data) -> None:
     assert sum("Safe|+01.62" in note for note in fitted.notes) == 2  # FloorPlan302
     assert sum("states no type" in note for note in fitted.notes) == 4
     assert len(fitted.notes) == 10
-    assert fitted.taken == fitted.set_aside == ()
+    assert fitted.substitutions == fitted.set_aside == ()
 
 
 def shifted(task: Task, metres: float, rng: random.Random) -> Task:
@@ -239,38 +242,40 @@ def test_ids_of_another_build_lead_to_the_same_objects(
 def test_what_cannot_be_played_is_set_aside_and_the_rest_is_not() -> None:
     good = load_suite("mini").tasks[0]
     nowhere = replace(good, id="nowhere", scene="FloorPlan999")
-    moved = Start("moved", {"Ghost_12ab": ObjectPose(0, 0, 0)})
-    fitted = resolve_tasks([nowhere, good, replace(good, id="ghost", start=moved)])
+    moved = Arrangement("moved", {"Ghost_12ab": ObjectPose(0, 0, 0)})
+    fitted = resolve_tasks([nowhere, good, replace(good, id="ghost", arrangement=moved)])
     assert fitted.tasks == (good,)
     assert [one.task for one in fitted.set_aside] == ["nowhere", "ghost"]
     assert "FloorPlan999" in fitted.set_aside[0].reason
-    assert "its start moves 'Ghost_12ab'" in fitted.set_aside[1].reason
+    assert "its arrangement moves 'Ghost_12ab'" in fitted.set_aside[1].reason
 
 
 @pytest.fixture(scope="module")
 def arranged() -> Task:
-    return next(t for t in load_suite("er-1k").tasks if len(t.start.poses) > 3 and t.start.dirty)
+    return next(
+        t for t in load_suite("er-1k").tasks if len(t.arrangement.poses) > 3 and t.arrangement.dirty
+    )
 
 
 @pytest.mark.parametrize("arrange", [True, False])
 def test_a_start_may_name_things_by_another_build(arranged: Task, arrange: bool) -> None:
-    poses = dict(arranged.start.poses)
+    poses = dict(arranged.arrangement.poses)
     stems = [name.rpartition("_")[0] for name in poses]
     name = next(n for n in poses if stems.count(n.rpartition("_")[0]) == 1)
     other = name.rpartition("_")[0] + "_0123abcd"
     renamed = {other if n == name else n: pose for n, pose in poses.items()}
-    task = replace(arranged, start=replace(arranged.start, poses=renamed))
+    task = replace(arranged, arrangement=replace(arranged.arrangement, poses=renamed))
     (fitted,) = resolve_tasks([task], arrange=arrange).tasks
     assert fitted == arranged
 
 
 @pytest.mark.parametrize("arrange", [True, False])
 def test_arranged_scenes_are_looked_into_where_it_matters(arranged: Task, arrange: bool) -> None:
-    (dirty,) = arranged.start.dirty
+    (dirty,) = arranged.arrangement.dirty
     kind, x, *rest = dirty.split("|")
     off = "|".join([kind, f"{float(x) + 0.02:+06.2f}", *rest])
     plain = replace(arranged, key_actions=(), goal=(), target_objects=(), related_objects=())
-    task = replace(plain, start=replace(arranged.start, dirty=(off,)))
+    task = replace(plain, arrangement=replace(arranged.arrangement, dirty=(off,)))
     fitted = resolve_tasks([arranged, task], arrange=arrange)
     assert fitted.tasks == (arranged, plain)
-    assert [(one.named, one.taken) for one in fitted.taken] == [(off, dirty)]
+    assert [(one.named, one.taken) for one in fitted.substitutions] == [(off, dirty)]

@@ -10,7 +10,7 @@ import pytest
 from support import make_task
 
 from er_gym.tasks import GROUPS, TASK_TYPES, load_suite, suites, verbs
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.suite_card import card, receptacle_types, subject_type, summarise
 from er_gym.tasks.task import KeyAction, type_of_id
@@ -36,7 +36,7 @@ MOVE = make_task(
     (verbs.NAVIGATE, FRIDGE),
     (verbs.PUT, FRIDGE),
     scene="FloorPlan2",
-    start=Start("FloorPlan2-7", MOVED),
+    arrangement=Arrangement("FloorPlan2-7", MOVED),
 )
 TOGGLE = make_task(
     "single_toggle", (verbs.NAVIGATE, LAMP), (verbs.TOGGLE, LAMP), scene="FloorPlan201"

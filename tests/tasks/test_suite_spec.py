@@ -9,18 +9,18 @@ from pydantic import ValidationError
 
 from er_gym.tasks.difficulty import Difficulty
 from er_gym.tasks.splits import EVALUATION_SCENES, TRAINING_SCENES
-from er_gym.tasks.suite_spec import Making
+from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.thor import SCENE_NAMES
 
 
 def test_all_rooms_all_types_and_any_difficulty_are_the_default() -> None:
-    making = Making(total=3)
-    assert making.rooms == SCENE_NAMES
-    assert making.types == ()
-    assert (making.layouts, making.unseen_objects) == (0, True)
-    assert making.is_any_difficulty
-    assert making.admits(Difficulty(0, 0, 0.0, 2))
-    assert making.admits(Difficulty(9, 99, 999.0, 99))
+    spec = SuiteSpec(total=3)
+    assert spec.rooms == SCENE_NAMES
+    assert spec.types == ()
+    assert (spec.layouts, spec.unseen_objects) == (0, True)
+    assert spec.allows_any_difficulty
+    assert spec.admits(Difficulty(0, 0, 0.0, 2))
+    assert spec.admits(Difficulty(9, 99, 999.0, 99))
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def test_all_rooms_all_types_and_any_difficulty_are_the_default() -> None:
     ids=["training", "evaluation", "one room", "rooms", "one room twice"],
 )
 def test_rooms_by_the_name_of_a_set_or_by_their_own(scenes: Any, rooms: tuple[str, ...]) -> None:
-    assert tuple(Making(total=1, scenes=scenes).rooms) == rooms
+    assert tuple(SuiteSpec(total=1, scenes=scenes).rooms) == rooms
 
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
@@ -49,14 +49,20 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "a set among rooms": ({"total": 1, "scenes": ["training"]}, "unknown scene 'training'"),
     "a type that is none": (
         {"total": 1, "types": ["single_search", "dance"]},
-        "unknown type 'dance'; choose of: single_search, ",
+        "unknown type 'dance'; choose one of: single_search, ",
     ),
     "layouts": ({"total": 1, "layouts": -1}, "greater than or equal to 0"),
     "none of a layout": ({"total": 1, "per_layout": 0}, "greater than 0"),
     "no rooms": ({"total": 1, "scenes": []}, "unknown scene ''"),
-    "a span the wrong way round": ({"total": 1, "distance": [3, 2]}, "no range: from 3 to 2"),
-    "a span from nowhere": ({"total": 1, "distractors": [float("nan"), 2]}, "no range: from nan"),
-    "a span to nowhere": ({"total": 1, "hidden_depth": [0, float("inf")]}, "no range: from 0 to"),
+    "a span the wrong way round": ({"total": 1, "distance": [3, 2]}, "not a range: from 3 to 2"),
+    "a span from nowhere": (
+        {"total": 1, "distractors": [float("nan"), 2]},
+        "not a range: from nan",
+    ),
+    "a span to nowhere": (
+        {"total": 1, "hidden_depth": [0, float("inf")]},
+        "not a range: from 0 to",
+    ),
     "half a span": ({"total": 1, "distance": [3]}, "Field required"),
     "misspelled": ({"total": 1, "hidden": [0, 1]}, "Extra inputs are not permitted"),
 }
@@ -65,7 +71,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
 @pytest.mark.parametrize(("data", "message"), WRONG.values(), ids=WRONG)
 def test_what_cannot_be_made_is_refused(data: dict[str, Any], message: str) -> None:
     with pytest.raises(ValidationError) as caught:
-        Making.model_validate(data)
+        SuiteSpec.model_validate(data)
     (problem,) = caught.value.errors()
     assert message in problem["msg"]
 
@@ -84,19 +90,19 @@ SPANS = {
 def test_a_span_admits_what_lies_in_it(
     figure: str, span: tuple[float, float | None], refused: list[int], admitted: list[int]
 ) -> None:
-    making = Making.model_validate({"total": 1, figure: span})
-    assert not making.is_any_difficulty
+    spec = SuiteSpec.model_validate({"total": 1, figure: span})
+    assert not spec.allows_any_difficulty
 
     def of(value: int) -> Difficulty:
         plain: dict[str, Any] = {"hidden_depth": 1, "distractors": 1, "distance": 1.0, "length": 9}
         return Difficulty(**{**plain, figure: value})
 
-    assert not [value for value in refused if making.admits(of(value))]
-    assert [value for value in admitted if making.admits(of(value))] == admitted
+    assert not [value for value in refused if spec.admits(of(value))]
+    assert [value for value in admitted if spec.admits(of(value))] == admitted
 
 
 def test_all_spans_have_to_admit_a_task() -> None:
-    making = Making(total=1, hidden_depth=(1, None), distance=(0, 5))
-    assert making.admits(Difficulty(1, 0, 5.0, 9))
-    assert not making.admits(Difficulty(0, 0, 5.0, 9))
-    assert not making.admits(Difficulty(1, 0, 5.1, 9))
+    spec = SuiteSpec(total=1, hidden_depth=(1, None), distance=(0, 5))
+    assert spec.admits(Difficulty(1, 0, 5.0, 9))
+    assert not spec.admits(Difficulty(0, 0, 5.0, 9))
+    assert not spec.admits(Difficulty(1, 0, 5.1, 9))

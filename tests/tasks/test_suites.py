@@ -20,7 +20,7 @@ from er_gym.tasks import (
     task_type,
     verbs,
 )
-from er_gym.tasks.arrangement import ObjectPose, Start
+from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.generate import GENERATED_TYPES
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.jsonl_format import FORMAT, digest, read_tasks, write_tasks
@@ -99,7 +99,7 @@ WRONG = {
     "not JSON": ([HEADER, "", '{"id": '], "not JSON: Expecting value (line 3, column 8)"),
     "no layout": (
         [HEADER, {**TASK_LINE, "key_actions": [], "layout": "x"}],
-        "the task in line 2 begins with a layout that no line before it tells",
+        "the task in line 2 names a layout that no earlier line defines",
     ),
     "wrong layout": (
         [HEADER, {"layout": "x", "poses": {"Apple": [1, 2]}}],
@@ -150,7 +150,7 @@ def test_a_suite_that_is_not_made_says_how_to_make_it(
     assert load_suite("train").tasks == (TASK,)
 
 
-MOVED = Start("FloorPlan1-7", {"Apple_1": ObjectPose(1.0, 0.9, -1.25, yaw=90.0)})
+MOVED = Arrangement("FloorPlan1-7", {"Apple_1": ObjectPose(1.0, 0.9, -1.25, yaw=90.0)})
 
 
 def test_a_start_and_a_goal_are_kept(tmp_path: Path) -> None:
@@ -159,20 +159,26 @@ def test_a_start_and_a_goal_are_kept(tmp_path: Path) -> None:
         Condition("Cup", held=True, state=(("isDirty", False), ("fillLiquid", "water"))),
         Condition("Plate", PLATE, in_reach=True, inside="Shelf"),
     )
-    first = replace(TASK, goal=goal, start=replace(MOVED, dirty=(PLATE,)))
-    tasks = [first, replace(first, id="b", start=MOVED), replace(first, id="c", start=Start())]
+    first = replace(TASK, goal=goal, arrangement=replace(MOVED, dirty=(PLATE,)))
+    tasks = [
+        first,
+        replace(first, id="b", arrangement=MOVED),
+        replace(first, id="c", arrangement=Arrangement()),
+    ]
     write_tasks(path, tasks)
     assert read_tasks(path) == tasks
     lines = gzip.decompress(path.read_bytes()).decode().splitlines()
     assert [("poses" in line) for line in lines].count(True) == 4  # the layout, and three tasks'
     assert sum('"layout":' in line and '"id":' not in line for line in lines) == 1
-    assert digest(tasks) != digest([replace(first, start=Start()), *tasks[1:]])
+    assert digest(tasks) != digest([replace(first, arrangement=Arrangement()), *tasks[1:]])
 
 
 def test_one_name_for_two_arrangements_is_refused(tmp_path: Path) -> None:
-    other = replace(TASK, id="b", start=replace(MOVED, poses={"Apple_1": ObjectPose(0, 0, 0)}))
+    other = replace(
+        TASK, id="b", arrangement=replace(MOVED, poses={"Apple_1": ObjectPose(0, 0, 0)})
+    )
     with pytest.raises(ValueError, match="task b: another arrangement is named 'FloorPlan1-7'"):
-        write_tasks(tmp_path / "own.jsonl", [replace(TASK, start=MOVED), other])
+        write_tasks(tmp_path / "own.jsonl", [replace(TASK, arrangement=MOVED), other])
     assert list(tmp_path.iterdir()) == []
 
 

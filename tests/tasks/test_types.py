@@ -47,5 +47,5 @@ def test_kinds_of_room(scene: str, kind: str) -> None:
 
 @pytest.mark.parametrize("scene", ["FloorPlan0", "FloorPlan31", "FloorPlan101", "Kitchen1"])
 def test_a_scene_without_a_kind(scene: str) -> None:
-    with pytest.raises(ValueError, match="is no iTHOR scene"):
+    with pytest.raises(ValueError, match="is not an iTHOR scene"):
         room_kind(scene)

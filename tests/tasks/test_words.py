@@ -10,10 +10,10 @@ from er_gym.tasks.generate.words import (
     HOLLOW,
     PLURAL,
     UNCOUNTED,
-    a,
-    in_the,
-    is_are,
-    it,
+    in_or_on_the,
+    pronoun,
+    verb_to_be,
+    with_article,
 )
 from er_gym.thor import OBJECT_TYPES
 
@@ -40,12 +40,12 @@ ON = frozenset(
 
 def subject(object_type: str, where: str = "") -> dict[str, str]:
     """What templates say of a thing; with ``where`` it is told from its like."""
-    relative = f" that {is_are(object_type)} {where}" if where else ""
+    relative = f" that {verb_to_be(object_type)} {where}" if where else ""
     return {
         "object": object_type + relative,
-        "an_object": f"the {object_type}{relative}" if where else a(object_type),
-        "it": it(object_type),
-        "is": is_are(object_type),
+        "an_object": f"the {object_type}{relative}" if where else with_article(object_type),
+        "it": pronoun(object_type),
+        "is": verb_to_be(object_type),
     }
 
 
@@ -251,11 +251,11 @@ def test_every_receptacle_is_either_hollow_or_not() -> None:
     ],
 )
 def test_where_a_thing_lies(receptacle: str, where: str) -> None:
-    assert in_the(receptacle) == where
+    assert in_or_on_the(receptacle) == where
 
 
 @pytest.mark.parametrize(
-    ("object_type", "some", "pronoun", "verb"),
+    ("object_type", "article", "it", "verb"),
     [
         ("Apple", "an Apple", "it", "is"),
         ("AlarmClock", "an AlarmClock", "it", "is"),
@@ -276,8 +276,12 @@ def test_where_a_thing_lies(receptacle: str, where: str) -> None:
         ("Curtains", "some Curtains", "them", "are"),
     ],
 )
-def test_articles_pronouns_verbs(object_type: str, some: str, pronoun: str, verb: str) -> None:
-    assert (a(object_type), it(object_type), is_are(object_type)) == (some, pronoun, verb)
+def test_articles_pronouns_verbs(object_type: str, article: str, it: str, verb: str) -> None:
+    assert (with_article(object_type), pronoun(object_type), verb_to_be(object_type)) == (
+        article,
+        it,
+        verb,
+    )
 
 
 def test_the_lists_name_real_types_and_every_plural_one() -> None:

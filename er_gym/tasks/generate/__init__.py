@@ -1,36 +1,40 @@
 """The task generator: from AI2-THOR object metadata to tasks of all eleven types.
 
-A kind of task is a :class:`~er_gym.tasks.generate.task_plan.Row`: a task type, which objects
-qualify, which key actions follow, and its instructions.
-Each family has a module with its rows: ``search``,
-``manipulate``, ``transport``, ``composite``; long-range tasks have recipes, which are data
-(``recipes.yaml``). A plan is acted out on paper (``script``), so that key actions and goal agree.
+A kind of task is a :class:`~er_gym.tasks.generate.task_plan.TaskRule`: a task type, the choice of
+objects, the plan for a choice, and the instructions. The modules ``search``, ``manipulate``,
+``transport`` and ``composite`` have the rules of one family each. Long-range tasks come from
+recipes, which are data (``recipes.yaml``). A
+:class:`~er_gym.tasks.generate.plan_builder.PlanBuilder` derives both the key actions and the goal
+of a plan, so that they agree.
 
-The rules:
+All rules have this in common:
 
-- A thing is *exposed* if it lies in something that does not open and that stands free: on the floor
-  or on nothing; *enclosed* if it lies in something closed that stands free. Toilets, chairs and
-  stools are not gone to.
-- A transfer goes to a receptacle whose type accepts the thing's type, not to what it is in already;
-  of several receptacles of one type it is the largest. Something that could itself be carried (a
-  Bowl) is gone to where it stands. Sinks and bathtubs are filled by their basins.
-- Within one task, a type names one receptacle: nothing goes from one CounterTop to another.
-- Where several objects fit the words, any of them counts if all ask for the same actions; else the
-  words say where the one is that is meant ("the Book that is on the Desk"), and it must be that
-  one; else there is no task.
+- A receptacle stands free if it stands on the floor or on nothing. An object is *exposed* if it
+  lies in a free-standing receptacle that does not open, and *enclosed* if it lies in a
+  free-standing receptacle that is closed. No task sends the agent to a toilet, chair or stool.
+- A transfer goes to a receptacle whose type accepts the object's type and that does not hold the
+  object already. Among receptacles of one type, the largest is the target. To reach a receptacle
+  that can itself be picked up (a Bowl), the agent goes to where it stands. Objects go into the
+  basins of sinks and bathtubs.
+- Within one task, a type names one receptacle: no task moves an object from one CounterTop to
+  another.
+- If several objects fit an instruction, any of them counts, provided that all need the same
+  actions. Otherwise the instruction says where the object is ("the Book that is on the Desk"), and
+  only that object counts. If that is not possible either, there is no task.
 
-Whether a task can be done is for an agent to show; :mod:`er_gym.envs.verify` asks one.
+The generator does not check whether a task can be done: :mod:`er_gym.envs.verify` has an agent
+play it.
 """
 
-from er_gym.tasks.generate.generator import Generator, arranged, generate_tasks
+from er_gym.tasks.generate.generator import Generator, generate_tasks, generator_for
 from er_gym.tasks.generate.rules import GENERATED_TYPES, generated_types
 from er_gym.tasks.generate.select import select_balanced
 
 __all__ = [
     "GENERATED_TYPES",
     "Generator",
-    "arranged",
     "generate_tasks",
     "generated_types",
+    "generator_for",
     "select_balanced",
 ]

@@ -5,54 +5,60 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import cycle, islice
 
-from er_gym.tasks.generate.scene_graph import Room, Thing
-from er_gym.tasks.generate.script import Script
-from er_gym.tasks.generate.task_plan import Plan, Row, from_templates, plan_of
+from er_gym.tasks.generate.plan_builder import PlanBuilder
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
+from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import MOVE_TWO
 from er_gym.tasks.generate.transport import transfers
-from er_gym.tasks.generate.words import in_the
+from er_gym.tasks.generate.words import in_or_on_the
 
 _PARTNERS = 2
-"""How many second transfers each first one gets."""
+"""How many second transfers follow each first one."""
 
 
-def sequence(room: Room, thing: Thing, target: Thing, second: Thing, where: Thing) -> Plan:
-    """Put a thing into a target, then a second thing where that belongs."""
-    script = Script(room)
-    script.fetch(thing)
-    script.put(target)
-    script.fetch(second)
-    script.put(where)
-    return plan_of(
-        script, thing, second, place=in_the(target.type), second_place=in_the(where.type)
+def sequence(
+    graph: SceneGraph,
+    obj: SceneObject,
+    target: SceneObject,
+    second: SceneObject,
+    where: SceneObject,
+) -> TaskPlan:
+    """The plan to put an object into a target, then a second object into a second target."""
+    builder = PlanBuilder(graph)
+    builder.fetch(obj)
+    builder.put(target)
+    builder.fetch(second)
+    builder.put(where)
+    return plan_from(
+        builder, obj, second, place=in_or_on_the(target.type), second_place=in_or_on_the(where.type)
     )
 
 
-def _sequences(room: Room) -> Iterator[tuple[Thing, ...]]:
-    """Each transfer comes first a few times, so that there are not too many."""
-    moves = [*transfers(room, hidden=False), *transfers(room, hidden=True)]
-    for index, (thing, target) in enumerate(moves):
+def _sequences(graph: SceneGraph) -> Iterator[tuple[SceneObject, ...]]:
+    """Some pairs of transfers: each transfer is the first one of a few pairs."""
+    moves = [*transfers(graph, hidden=False), *transfers(graph, hidden=True)]
+    for index, (obj, target) in enumerate(moves):
         start = index + len(moves) // 2
         partners = islice(cycle(moves), start, start + len(moves))
         choices = (
-            (thing, target, second, where)
+            (obj, target, second, where)
             for second, where in partners
-            if _independent(thing, target, second, where)
-            and sequence(room, thing, target, second, where).names_one_place_each
+            if _independent(obj, target, second, where)
+            and sequence(graph, obj, target, second, where).one_object_per_type
         )
         yield from islice(choices, _PARTNERS)
 
 
-def _independent(*things: Thing) -> bool:
-    """Whether things, targets and their types all differ: neither transfer undoes the other."""
-    return len({thing.type for thing in things}) == len(things)
+def _independent(*objects: SceneObject) -> bool:
+    """Whether all objects and targets differ in type, so that neither transfer undoes the other."""
+    return len({obj.type for obj in objects}) == len(objects)
 
 
-ROWS = (
-    Row(
+RULES = (
+    TaskRule(
         "ordered_pickup_two_object_and_put",
         choices=_sequences,
         plan=sequence,
-        sayings=from_templates(MOVE_TWO),
+        instructions=from_templates(MOVE_TWO),
     ),
 )

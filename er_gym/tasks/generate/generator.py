@@ -1,4 +1,4 @@
-"""From a scene's objects to its tasks."""
+"""The generator: from the objects of a scene to its tasks."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from functools import cached_property
 from typing import Any
 
 from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import Start, begin, shuffled
-from er_gym.tasks.generate.rules import all_rows
-from er_gym.tasks.generate.scene_graph import Accepts, Room, Thing, read_room
-from er_gym.tasks.generate.script import Impossible
-from er_gym.tasks.generate.task_plan import Plan, Row
-from er_gym.tasks.generate.words import a, in_the, is_are, it
-from er_gym.tasks.goal import Condition, unmet
+from er_gym.tasks.arrangement import Arrangement, random_arrangement, set_up_scene
+from er_gym.tasks.generate.plan_builder import ImpossiblePlan
+from er_gym.tasks.generate.rules import all_rules
+from er_gym.tasks.generate.scene_graph import Accepts, SceneGraph, SceneObject, read_scene_graph
+from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule
+from er_gym.tasks.generate.words import in_or_on_the, pronoun, verb_to_be, with_article
+from er_gym.tasks.goal import Condition, unmet_conditions
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME
@@ -27,135 +27,149 @@ DONE_ALREADY = "the goal holds from the start"
 SAME_PLACES = "one type would name two places"
 
 
-def arranged(controller: Any, scene: str, seed: int) -> Generator:
-    """The generator for a room in one of its arrangements; 0 is the recorded one."""
-    start = shuffled(controller, scene, seed) if seed else Start()
-    return Generator(scene, begin(controller, scene, start).metadata["objects"], start)
+def generator_for(controller: Any, scene: str, seed: int) -> Generator:
+    """Set up a scene in one of its arrangements, and return the generator for it.
+
+    Args:
+        controller: an AI2-THOR controller.
+        scene: such as ``FloorPlan1``.
+        seed: the seed of the arrangement; 0 for the recorded one.
+    """
+    arrangement = random_arrangement(controller, scene, seed) if seed else Arrangement()
+    return Generator(
+        scene, set_up_scene(controller, scene, arrangement).metadata["objects"], arrangement
+    )
 
 
 @dataclass(frozen=True)
 class Generator:
-    """Makes the tasks of a scene as it is when an episode begins.
+    """Generates the tasks of a scene in one arrangement.
 
-    Args:
+    Attributes:
         scene: its name, such as ``FloorPlan1``.
-        objects: ``event.metadata["objects"]``.
-        start: how the scene was arranged.
-        accepts: whether a thing of one type may be put into a receptacle of another.
-        rows: what to make.
-        dropped: counts the reasons for which tasks were not made.
+        objects: ``event.metadata["objects"]`` after the scene was arranged.
+        arrangement: how the scene was arranged.
+        accepts: whether an object of one type may be put into a receptacle of another.
+        rules: the kinds of tasks to generate.
+        dropped: how many choices gave no task, by reason.
     """
 
     scene: str
     objects: Sequence[Mapping[str, Any]]
-    start: Start = field(default_factory=Start)
+    arrangement: Arrangement = field(default_factory=Arrangement)
     accepts: Accepts = thor_accepts
-    rows: Sequence[Row] = field(default_factory=all_rows)
+    rules: Sequence[TaskRule] = field(default_factory=all_rules)
     dropped: Counter[str] = field(default_factory=Counter)
 
     @cached_property
-    def room(self) -> Room:
-        """The scene as the rules see it."""
-        return read_room(self.objects, self.accepts)
+    def scene_graph(self) -> SceneGraph:
+        """The objects and what lies in what."""
+        return read_scene_graph(self.objects, self.accepts)
 
     def tasks(self, types: Collection[str] = ()) -> Iterator[Task]:
-        """Yield the candidate tasks, row by row; the same for the same arguments.
+        """Yield the candidate tasks, rule by rule; the same for the same arguments.
 
         Args:
-            types: names of task types; all where it is empty.
+            types: names of task types; all types if it is empty.
         """
         made: set[str] = set()
-        for row in self.rows:
-            if not types or row.type in types:
-                for choice in row.choices(self.room):
-                    task = self._candidate(row, choice)
+        for rule in self.rules:
+            if not types or rule.type in types:
+                for choice in rule.choices(self.scene_graph):
+                    task = self._candidate(rule, choice)
                     if isinstance(task, str):
                         self.dropped[task] += 1
-                    elif task.id not in made:  # else it is the same, about another of its objects
+                    elif task.id not in made:  # else an equal task about an equivalent object
                         made.add(task.id)
                         yield task
 
     def request(self, type_name: str, *object_ids: str) -> Task:
-        """The task of a type about given objects, whether or not the rules would choose them.
+        """The task of a type about given objects, even if the rules would not choose these.
 
         Args:
-            object_ids: what is handled and where it goes, in the order of the instruction: one for
-                a search, a pickup or a toggle, two for a transfer, four for two transfers.
+            type_name: a name in :data:`~er_gym.tasks.types.TASK_TYPES`; not the long-range type.
+            object_ids: the objects and their targets, in the order of the instruction: one id for a
+                search, a pickup or a toggle, two for a transfer, four for two transfers.
 
         Raises:
-            ValueError: no such type is generated on request, the scene has no such object, or their
-                number is wrong.
+            ValueError: the type cannot be requested, the scene lacks an object, or the number of
+                objects is wrong.
         """
-        row = next((row for row in self.rows if row.type == type_name and not row.slug), None)
-        if row is None:
-            known = ", ".join(row.type for row in self.rows if not row.slug)
-            raise ValueError(f"no {type_name!r} tasks are made on request; choose one of: {known}")
-        unknown = [i for i in object_ids if i not in self.room.things]
+        rule = next((rule for rule in self.rules if rule.type == type_name and not rule.slug), None)
+        if rule is None:
+            known = ", ".join(rule.type for rule in self.rules if not rule.slug)
+            raise ValueError(f"{type_name!r} tasks cannot be requested; choose one of: {known}")
+        unknown = [i for i in object_ids if i not in self.scene_graph.objects]
         if unknown:
             raise ValueError(f"{self.scene} has no object {unknown[0]!r} when the task begins")
-        things = [self.room.things[object_id] for object_id in object_ids]
+        chosen = [self.scene_graph.objects[object_id] for object_id in object_ids]
         try:
-            plan = row.plan(self.room, *things)
-        except (TypeError, Impossible) as error:
+            plan = rule.plan(self.scene_graph, *chosen)
+        except (TypeError, ImpossiblePlan) as error:
             raise ValueError(
-                f"no {type_name!r} task about {len(things)} objects: {error}"
+                f"no {type_name!r} task about {len(chosen)} objects: {error}"
             ) from None
-        return self._task(row, plan, ())
+        return self._task(rule, plan, ())
 
-    def _candidate(self, row: Row, choice: tuple[Thing, ...]) -> Task | str:
-        """The task of a choice; or why there is none."""
-        plan = row.plan(self.room, *choice)
-        if not plan.names_one_place_each:
+    def _candidate(self, rule: TaskRule, choice: tuple[SceneObject, ...]) -> Task | str:
+        """The task for a choice, or the reason why there is none."""
+        plan = rule.plan(self.scene_graph, *choice)
+        if not plan.one_object_per_type:
             return SAME_PLACES
-        named: list[Thing] = []
+        named: list[SceneObject] = []
         for subject in plan.subjects:
-            others = self.room.others(subject)
+            others = self.scene_graph.others_of_type(subject)
             if not others:
                 continue
-            if self._interchangeable(row, choice, plan, subject, others):
+            if self._interchangeable(rule, choice, plan, subject, others):
                 continue
-            if not row.names_places or not self._told_by_place(subject, others):
+            if not rule.may_name_places or not self._told_by_place(subject, others):
                 return AMBIGUOUS
             named.append(subject)
-        task = self._task(row, plan, named)
-        # Whether a search begins beside what is looked for is seen by who plays it.
+        task = self._task(rule, plan, named)
+        # Only an agent can tell whether a search begins within reach of its target.
         standing = [condition for condition in task.goal if not condition.in_reach]
-        return DONE_ALREADY if standing and not unmet(standing, self.objects) else task
+        return DONE_ALREADY if standing and not unmet_conditions(standing, self.objects) else task
 
     def _interchangeable(
-        self, row: Row, choice: tuple[Thing, ...], plan: Plan, subject: Thing, others: list[Thing]
+        self,
+        rule: TaskRule,
+        choice: tuple[SceneObject, ...],
+        plan: TaskPlan,
+        subject: SceneObject,
+        others: list[SceneObject],
     ) -> bool:
-        """Whether any thing of the subject's type would do: each asks for the same actions."""
-        if any(not unmet((each,), self.objects) for each in _about(plan.goal, subject)):
+        """Whether any object of the subject's type will do: all need the same actions."""
+        if any(not unmet_conditions((each,), self.objects) for each in _about(plan.goal, subject)):
             return False
         for other in others:
-            swapped = tuple(other if thing == subject else thing for thing in choice)
+            swapped = tuple(other if obj == subject else obj for obj in choice)
             try:
-                if row.plan(self.room, *swapped).scored != plan.scored:
+                if rule.plan(self.scene_graph, *swapped).scored != plan.scored:
                     return False
-            except Impossible:
+            except ImpossiblePlan:
                 return False
         return True
 
-    def _told_by_place(self, subject: Thing, others: list[Thing]) -> bool:
-        """Whether the type of what it lies in tells it from the others."""
-        place = self.room.place_of(subject)
-        holders = {parent.type for other in others for parent in self.room.parents(other)}
+    def _told_by_place(self, subject: SceneObject, others: list[SceneObject]) -> bool:
+        """Whether the type of its receptacle distinguishes an object from the others."""
+        place = self.scene_graph.place_of(subject)
+        holders = {parent.type for other in others for parent in self.scene_graph.parents(other)}
         return place != subject and place.type not in holders
 
-    def _task(self, row: Row, plan: Plan, named: Sequence[Thing]) -> Task:
-        task_id = self._id(row, plan, named)
+    def _task(self, rule: TaskRule, plan: TaskPlan, named: Sequence[SceneObject]) -> Task:
+        task_id = self._id(rule, plan, named)
         words = {**self._words(plan, named), **plan.words}
-        sayings = row.sayings(words)
+        instructions = rule.instructions(words)
         gone_to = [action.object_id for action in plan.key_actions if action.verb == verbs.NAVIGATE]
-        ids = {thing.type: thing.id for thing in named}
+        ids = {obj.type: obj.id for obj in named}
         return Task(
             id=task_id,
-            type=BY_NAME[row.type],
+            type=BY_NAME[rule.type],
             scene=self.scene,
-            # Not hash(): that differs from process to process.
-            instruction=sayings[zlib.crc32(task_id.encode()) % len(sayings)],
-            name=sayings[0],
+            # Not hash(): it differs between processes.
+            instruction=instructions[zlib.crc32(task_id.encode()) % len(instructions)],
+            name=instructions[0],
             key_actions=plan.key_actions,
             target_objects=tuple(dict.fromkeys(gone_to)),
             related_objects=plan.related,
@@ -163,45 +177,47 @@ class Generator:
                 replace(condition, object_id=ids.get(condition.object_type, ""))
                 for condition in plan.goal
             ),
-            start=replace(self.start, dirty=plan.dirty),
-            extra={"made_by": row.slug or row.type},
+            arrangement=replace(self.arrangement, dirty=plan.dirty),
+            extra={"made_by": rule.slug or rule.type},
         )
 
-    def _id(self, row: Row, plan: Plan, named: Sequence[Thing]) -> str:
+    def _id(self, rule: TaskRule, plan: TaskPlan, named: Sequence[SceneObject]) -> str:
         handled = [
             action.object_type
             for action in plan.key_actions
             if action.verb in verbs.INTERACTIONS and action.verb not in (verbs.OPEN, verbs.CLOSE)
-        ] or [thing.type for thing in plan.subjects]
-        places = [f"from_{self.room.place_of(thing).type}" for thing in named]
-        return "-".join((self.start.layout or self.scene, row.slug or row.type, *handled, *places))
+        ] or [obj.type for obj in plan.subjects]
+        places = [f"from_{self.scene_graph.place_of(obj).type}" for obj in named]
+        return "-".join(
+            (self.arrangement.layout or self.scene, rule.slug or rule.type, *handled, *places)
+        )
 
-    def _words(self, plan: Plan, named: Sequence[Thing]) -> dict[str, str]:
+    def _words(self, plan: TaskPlan, named: Sequence[SceneObject]) -> dict[str, str]:
         words = {"room": room_kind(self.scene)}
-        for prefix, thing in zip(("", "second_"), plan.subjects, strict=False):
-            name, one = thing.type, a(thing.type)
-            if thing in named:
-                where = in_the(self.room.place_of(thing).type)
-                name = f"{thing.type} that {is_are(thing.type)} {where}"
+        for prefix, obj in zip(("", "second_"), plan.subjects, strict=False):
+            name, one = obj.type, with_article(obj.type)
+            if obj in named:
+                where = in_or_on_the(self.scene_graph.place_of(obj).type)
+                name = f"{obj.type} that {verb_to_be(obj.type)} {where}"
                 one = f"the {name}"
             words |= {
                 f"{prefix}object": name,
                 f"{prefix}an_object": one,
-                f"{prefix}it": it(thing.type),
-                f"{prefix}is": is_are(thing.type),
+                f"{prefix}it": pronoun(obj.type),
+                f"{prefix}is": verb_to_be(obj.type),
             }
         return words
 
 
-def _about(goal: Sequence[Condition], thing: Thing) -> list[Condition]:
-    return [c for c in goal if c.object_type == thing.type and not (c.in_reach or c.held)]
+def _about(goal: Sequence[Condition], obj: SceneObject) -> list[Condition]:
+    return [c for c in goal if c.object_type == obj.type and not (c.in_reach or c.held)]
 
 
 def generate_tasks(
     objects: Sequence[Mapping[str, Any]],
     scene: str,
     accepts: Accepts = thor_accepts,
-    start: Start = Start(),  # noqa: B008  (frozen)
+    arrangement: Arrangement = Arrangement(),  # noqa: B008  (frozen)
 ) -> Iterator[Task]:
     """Yield the candidate tasks of a scene: :meth:`Generator.tasks`."""
-    return Generator(scene, objects, start, accepts).tasks()
+    return Generator(scene, objects, arrangement, accepts).tasks()

@@ -1,51 +1,51 @@
-"""Doing something to one thing where it is: take it, switch it."""
+"""Tasks about one object where it is: pick it up, switch it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
 
-from er_gym.tasks.generate.scene_graph import Room, Thing
-from er_gym.tasks.generate.script import Script
-from er_gym.tasks.generate.task_plan import Plan, Row, from_templates, plan_of
+from er_gym.tasks.generate.plan_builder import PlanBuilder
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
+from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import PICK_UP, TOGGLE
 
 NEVER_TOGGLED = frozenset({"StoveKnob", "StoveBurner", "LightSwitch"})
 
 
-def pickup(room: Room, thing: Thing) -> Plan:
-    """Take a thing."""
-    script = Script(room)
-    script.fetch(thing)
-    return plan_of(script, thing)
+def pickup(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
+    """The plan to pick up an object."""
+    builder = PlanBuilder(graph)
+    builder.fetch(obj)
+    return plan_from(builder, obj)
 
 
-def toggle(room: Room, thing: Thing) -> Plan:
-    """Switch a thing."""
-    script = Script(room)
-    script.switch(thing)
-    return plan_of(script, thing, way="off" if thing.on else "on")
+def toggle(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
+    """The plan to switch an object on or off."""
+    builder = PlanBuilder(graph)
+    builder.go_and_toggle(obj)
+    return plan_from(builder, obj, way="off" if obj.on else "on")
 
 
-def _carried(room: Room, hidden: bool) -> Iterator[tuple[Thing]]:
-    return ((thing,) for thing in room.carried(hidden))
+def _carried(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject]]:
+    return ((obj,) for obj in graph.pickupable_objects(hidden))
 
 
-def _switches(room: Room) -> Iterator[tuple[Thing]]:
-    for thing in room.things.values():
-        if thing.toggleable and thing.type not in NEVER_TOGGLED and room.is_exposed(thing):
-            yield (thing,)
+def _switches(graph: SceneGraph) -> Iterator[tuple[SceneObject]]:
+    for obj in graph.objects.values():
+        if obj.toggleable and obj.type not in NEVER_TOGGLED and graph.is_exposed(obj):
+            yield (obj,)
 
 
-ROWS = (
+RULES = (
     *(
-        Row(
+        TaskRule(
             name,
             choices=partial(_carried, hidden=hidden),
             plan=pickup,
-            sayings=from_templates(PICK_UP),
+            instructions=from_templates(PICK_UP),
         )
         for name, hidden in (("single_pickup", False), ("single_pickup_from_closerep", True))
     ),
-    Row("single_toggle", choices=_switches, plan=toggle, sayings=from_templates(TOGGLE)),
+    TaskRule("single_toggle", choices=_switches, plan=toggle, instructions=from_templates(TOGGLE)),
 )

@@ -1,4 +1,4 @@
-"""A scene as the rules see it: an affiliation graph of who lies in what."""
+"""The scene graph: the objects of a scene, and which object lies in which."""
 
 from __future__ import annotations
 
@@ -7,29 +7,35 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any, TypeAlias
 
+from er_gym.tasks.equivalence import BASIN_OF
+from er_gym.tasks.task import whole_id
+
 Accepts: TypeAlias = Callable[[str, str], bool]
-"""Whether a thing of the first type may be put into a receptacle of the second."""
+"""Whether an object of the first type may be put into a receptacle of the second type."""
 
 NEVER_VISITED = frozenset({"Floor", "Toilet", "Chair", "Stool"})
-"""Receptacle types that no task of its own accord sends the agent to: one stands on the floor
-anyhow, a toilet does not count, and the boxes of chairs and stools reach under tables, so that the
-scenes put things into both."""
-WHOLES = frozenset({"Sink", "Bathtub"})
-"""Receptacle types that nothing is put into: things go into their basins."""
+"""Receptacle types to which no generated task sends the agent.
+
+The agent stands on the floor anyway, and toilets do not count. The bounding boxes of chairs and
+stools reach under tables, so that the scenes list some objects in both.
+"""
+NEVER_FILLED = frozenset(BASIN_OF)
+"""Receptacle types into which nothing is put: objects go into their basins."""
 WATER_REACH = 1.0
-"""A Faucet is a basin's if their middles are so near, metres on the floor plan."""
+"""The largest distance between the centres of a basin and its Faucet, metres, floor plan."""
 
 
 @dataclass(frozen=True)
-class Thing:
-    """What the rules read of an object's metadata.
+class SceneObject:
+    """The metadata of an object that the rules read.
 
     Attributes:
-        closed: whether it opens and is shut.
+        parents: ids of its parent receptacles.
+        closed: whether it is openable and closed.
         on: whether it is switched on.
-        controlled: ids of what it is the switch of, as a stove knob is of its burner.
-        volume: of its axis-aligned box, m³.
-        x, z: the middle of that box, metres, AI2-THOR's world frame.
+        controlled: ids of the objects that it switches, as a StoveKnob switches its StoveBurner.
+        volume: of its axis-aligned bounding box, m³.
+        x, z: the centre of that box, metres, AI2-THOR's world frame.
     """
 
     id: str
@@ -52,42 +58,42 @@ class Thing:
 
 
 @dataclass(frozen=True)
-class Room:
-    """A scene's things by id, in scene order, and what goes where."""
+class SceneGraph:
+    """The objects of a scene by id, in the order of the metadata, and what receptacles accept."""
 
-    things: Mapping[str, Thing]
+    objects: Mapping[str, SceneObject]
     accepts: Accepts
 
-    def parents(self, thing: Thing) -> list[Thing]:
-        """What a thing lies in, as far as that is in the scene."""
-        return [self.things[parent] for parent in thing.parents if parent in self.things]
+    def parents(self, obj: SceneObject) -> list[SceneObject]:
+        """The parent receptacles of an object that are in the scene."""
+        return [self.objects[parent] for parent in obj.parents if parent in self.objects]
 
-    def of_type(self, *types: str) -> list[Thing]:
-        """All things of these types."""
-        return [thing for thing in self.things.values() if thing.type in types]
+    def of_type(self, *types: str) -> list[SceneObject]:
+        """All objects of these types."""
+        return [obj for obj in self.objects.values() if obj.type in types]
 
-    def others(self, thing: Thing) -> list[Thing]:
-        """All other things of its type."""
-        return [other for other in self.of_type(thing.type) if other != thing]
+    def others_of_type(self, obj: SceneObject) -> list[SceneObject]:
+        """All other objects of its type."""
+        return [other for other in self.of_type(obj.type) if other != obj]
 
-    def stands_free(self, thing: Thing) -> bool:
-        """Whether a thing stands on the floor or on nothing."""
-        parents = self.parents(thing)
+    def stands_free(self, obj: SceneObject) -> bool:
+        """Whether an object stands on the floor or on nothing."""
+        parents = self.parents(obj)
         return not parents or any(parent.type == "Floor" for parent in parents)
 
-    def place_of(self, thing: Thing) -> Thing:
-        """What one goes to for a thing: the receptacle that it lies in, else the thing itself.
+    def place_of(self, obj: SceneObject) -> SceneObject:
+        """The object to navigate to for an object: its receptacle, else the object itself.
 
-        Of several, what is closed comes first, then what stands free, then what is not carried
-        about itself, then what the metadata names first; a chair or the like only if there is
-        nothing else.
+        Among several receptacles, closed ones come first, then free-standing ones, then those that
+        cannot be picked up, then the metadata's order decides. Those of :data:`NEVER_VISITED` come
+        last, and the Floor never.
         """
-        parents = [parent for parent in self.parents(thing) if parent.receptacle]
+        parents = [parent for parent in self.parents(obj) if parent.receptacle]
         fit = [parent for parent in parents if may_visit(parent)] or [
             parent for parent in parents if parent.type != "Floor"
         ]
         if not fit:
-            return thing
+            return obj
         return max(
             fit,
             key=lambda parent: (
@@ -97,39 +103,39 @@ class Room:
             ),
         )
 
-    def is_exposed(self, thing: Thing) -> bool:
-        """Whether it lies in something that does not open and that stands free."""
-        return not any(parent.openable for parent in self.parents(thing)) and any(
-            may_visit(parent) and self.stands_free(parent) for parent in self.parents(thing)
+    def is_exposed(self, obj: SceneObject) -> bool:
+        """Whether an object lies in a free-standing receptacle that does not open."""
+        return not any(parent.openable for parent in self.parents(obj)) and any(
+            may_visit(parent) and self.stands_free(parent) for parent in self.parents(obj)
         )
 
-    def is_enclosed(self, thing: Thing) -> bool:
-        """Whether it lies in something closed that stands free."""
+    def is_enclosed(self, obj: SceneObject) -> bool:
+        """Whether an object lies in a free-standing receptacle that is closed."""
         return any(
             parent.receptacle and parent.closed and may_visit(parent) and self.stands_free(parent)
-            for parent in self.parents(thing)
+            for parent in self.parents(obj)
         )
 
-    def carried(self, hidden: bool) -> Iterator[Thing]:
-        """What there is to pick up: the enclosed things or the exposed ones."""
+    def pickupable_objects(self, hidden: bool) -> Iterator[SceneObject]:
+        """The pickupable objects that are enclosed (``hidden``) or exposed."""
         qualifies = self.is_enclosed if hidden else self.is_exposed
-        return (thing for thing in self.things.values() if thing.pickupable and qualifies(thing))
+        return (obj for obj in self.objects.values() if obj.pickupable and qualifies(obj))
 
-    def is_in(self, thing: Thing, target: Thing) -> bool:
-        """Whether a thing is, or lies in, that target or another part of it (a Sink's basin)."""
-        return any(same_whole(target.id, holder) for holder in (thing.id, *thing.parents))
+    def is_in(self, obj: SceneObject, target: SceneObject) -> bool:
+        """Whether an object is or lies in a target, or another part of it (a Sink's basin)."""
+        return any(same_whole(target.id, holder) for holder in (obj.id, *obj.parents))
 
-    def washing_place(self) -> tuple[Thing, Thing] | None:
-        """The SinkBasin and its Faucet, which is off: the scene has one of each, that one can name.
+    def sink_and_faucet(self) -> tuple[SceneObject, SceneObject] | None:
+        """The SinkBasin and its Faucet, if the scene has exactly one of each and the Faucet is off.
 
-        None where a bathtub's basin is nearer to the Faucet: the water runs into that.
+        None if a BathtubBasin is nearer to the Faucet: the water runs into the bathtub.
         """
         sinks, faucets = self.of_type("SinkBasin"), self.of_type("Faucet")
         if len(sinks) != 1 or len(faucets) != 1 or faucets[0].on:
             return None
         faucet = faucets[0]
 
-        def gap(basin: Thing) -> float:
+        def gap(basin: SceneObject) -> float:
             return hypot(basin.x - faucet.x, basin.z - faucet.z)
 
         nearest = min(self.of_type("SinkBasin", "BathtubBasin"), key=gap)
@@ -137,15 +143,15 @@ class Room:
         return (nearest, faucet) if fed else None
 
 
-def read_room(objects: Sequence[Mapping[str, Any]], accepts: Accepts) -> Room:
+def read_scene_graph(objects: Sequence[Mapping[str, Any]], accepts: Accepts) -> SceneGraph:
     """Read ``metadata["objects"]``."""
-    return Room({item["objectId"]: _thing(item) for item in objects}, accepts)
+    return SceneGraph({item["objectId"]: _scene_object(item) for item in objects}, accepts)
 
 
-def _thing(item: Mapping[str, Any]) -> Thing:
+def _scene_object(item: Mapping[str, Any]) -> SceneObject:
     box = item["axisAlignedBoundingBox"]
     size = box["size"]
-    return Thing(
+    return SceneObject(
         id=item["objectId"],
         type=item["objectType"],
         parents=tuple(item["parentReceptacles"] or ()),
@@ -166,26 +172,21 @@ def _thing(item: Mapping[str, Any]) -> Thing:
     )
 
 
-def largest(things: Iterable[Thing]) -> Thing:
-    """The thing with the largest box; the last id decides between equals."""
-    return max(things, key=lambda thing: (thing.volume, thing.id))
+def largest(objects: Iterable[SceneObject]) -> SceneObject:
+    """The object with the largest bounding box; the last id decides between equals."""
+    return max(objects, key=lambda obj: (obj.volume, obj.id))
 
 
-def may_visit(thing: Thing) -> bool:
-    """Whether tasks may send the agent to a thing."""
-    return thing.type not in NEVER_VISITED
+def may_visit(obj: SceneObject) -> bool:
+    """Whether tasks may send the agent to an object."""
+    return obj.type not in NEVER_VISITED
 
 
-def may_fill(thing: Thing) -> bool:
-    """Whether tasks may put something there, a receptacle given."""
-    return may_visit(thing) and thing.type not in WHOLES
+def may_put_into(obj: SceneObject) -> bool:
+    """Whether tasks may put objects into a receptacle."""
+    return may_visit(obj) and obj.type not in NEVER_FILLED
 
 
 def same_whole(one_id: str, other_id: str) -> bool:
-    """Whether two ids name one object or parts of it, as a Sink and its basin."""
-    return _whole(one_id) == _whole(other_id)
-
-
-def _whole(object_id: str) -> str:
-    """The id of what an object is a part of: type and coordinates, without a part's name."""
-    return "|".join(object_id.split("|")[:4])
+    """Whether two ids name the same object or parts of it, as a Sink and its SinkBasin."""
+    return whole_id(one_id) == whole_id(other_id)

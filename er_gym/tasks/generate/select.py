@@ -1,4 +1,4 @@
-"""Choosing a suite's tasks from those of many scenes."""
+"""Choose a suite's tasks from the tasks of many scenes."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from er_gym.tasks.types import BY_NAME, TaskType
 
 
 def select_balanced(tasks: Iterable[Task], total: int, rng: random.Random) -> list[Task]:
-    """Choose tasks so that types, kinds of room, scenes and objects come evenly.
+    """Choose tasks that are balanced by type, kind of room, scene and object.
 
-    Types get equal shares; where one has fewer tasks, the others share the rest. Each choice within
-    a type takes the kind of room chosen least for this type, in it the scene chosen least for this
-    type and then of all, there the recipe chosen least, and the task whose words have been used
-    least for this type; ``rng`` decides between equals.
+    All types get equal shares; if a type has fewer tasks, the others share the rest. Within a type,
+    tasks are chosen one after another. Each choice takes the kind of room that this type has used
+    least, then the scene that this type has used least, then the scene that all types have used
+    least, then the recipe used least, then the task whose object types and verbs this type has used
+    least. ``rng`` decides between equals.
 
     Args:
-        tasks: to choose from.
-        total: how many to choose; fewer where they run out.
-        rng: the only source of chance.
+        tasks: the candidates.
+        total: how many tasks to choose; fewer are chosen if the candidates run out.
+        rng: the only source of randomness.
 
     Returns:
-        The tasks, in the order of task types, then of scenes.
+        The tasks in the order of task types, then of scenes.
     """
     pools: defaultdict[TaskType, defaultdict[str, list[Task]]]
     pools = defaultdict(lambda: defaultdict(list))
@@ -46,7 +47,7 @@ def select_balanced(tasks: Iterable[Task], total: int, rng: random.Random) -> li
 
 
 def shares(total: int, sizes: Mapping[TaskType, int]) -> dict[TaskType, int]:
-    """How many of each type to take, equally many as far as there are so many."""
+    """How many tasks of each type to choose: equal numbers, as far as a type has enough."""
     quotas = dict.fromkeys(sizes, 0)
     left = min(total, sum(sizes.values()))
     while left:
@@ -62,10 +63,10 @@ def shares(total: int, sizes: Mapping[TaskType, int]) -> dict[TaskType, int]:
 def _evenly(
     pool: dict[str, list[Task]], scene_uses: Counter[str], rng: random.Random
 ) -> Iterator[Task]:
-    """Draw the tasks of one type out of ``pool`` until it is empty."""
+    """Yield the tasks of one type in a balanced order; empties ``pool``."""
     kind_uses: Counter[str] = Counter()
     type_uses: Counter[str] = Counter()
-    row_uses: Counter[str] = Counter()
+    rule_uses: Counter[str] = Counter()
     word_uses: Counter[str] = Counter()
     while pool:
         scene = min(
@@ -75,8 +76,8 @@ def _evenly(
         task = min(
             pool[scene],
             key=lambda task: (
-                row_uses[_row(task)],
-                # The mean, not the sum: that would prefer the shortest tasks.
+                rule_uses[_rule(task)],
+                # The mean: the sum would favour short tasks.
                 fmean(word_uses[word] for word in _words(task)),
             ),
         )
@@ -85,19 +86,19 @@ def _evenly(
             del pool[scene]
         kind_uses[room_kind(scene)] += 1
         type_uses[scene] += 1
-        row_uses[_row(task)] += 1
+        rule_uses[_rule(task)] += 1
         scene_uses[scene] += 1
         word_uses.update(_words(task))
         yield task
 
 
-def _row(task: Task) -> str:
-    """What made it: types of long-range tasks have several recipes."""
+def _rule(task: Task) -> str:
+    """The rule that made the task: long-range tasks come from several recipes."""
     return str(task.extra.get("made_by", ""))
 
 
 def _words(task: Task) -> set[str]:
-    """The types that a task is about, and what is done to them."""
+    """The object types and the verbs of a task's key actions."""
     acted_on = {action.object_type for action in task.key_actions if action.verb != verbs.END}
     return acted_on | {action.verb for action in task.key_actions}
 

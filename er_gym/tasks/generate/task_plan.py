@@ -1,4 +1,4 @@
-"""What the families make of a room, and what becomes a task."""
+"""A plan for one task, and the rule from which such plans follow."""
 
 from __future__ import annotations
 
@@ -6,91 +6,103 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from er_gym.tasks import verbs
-from er_gym.tasks.generate.scene_graph import Room, Thing
-from er_gym.tasks.generate.script import Script
+from er_gym.tasks.generate.plan_builder import PlanBuilder
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.task import KeyAction
 
 
 @dataclass(frozen=True)
-class Plan:
-    """How a task is done, and what its instruction is about.
+class TaskPlan:
+    """How a task is done, and the words for its instruction.
 
     Attributes:
-        subjects: what the instruction speaks of by type alone, so that one has to know which is
-            meant: the things that are searched, taken or switched, not where they are put.
-        related: ids of what it handles that one does not go to itself.
-        words: for the templates, besides the usual ones.
-        dirty: ids of what has to be dirty when it begins.
+        key_actions: in order, ``end`` included.
+        goal: the conditions on the final state.
+        subjects: the objects that the instruction names by type and that must not be ambiguous:
+            those that the agent searches for, picks up or switches, not the receptacles.
+        related: ids of the objects that the agent handles without navigating to them.
+        words: further words for the templates, such as ``place``.
+        dirty: ids of the objects that must be dirty when the episode begins.
     """
 
     key_actions: tuple[KeyAction, ...]
     goal: tuple[Condition, ...]
-    subjects: tuple[Thing, ...]
+    subjects: tuple[SceneObject, ...]
     related: tuple[str, ...]
     words: Mapping[str, str | Sequence[str]] = field(default_factory=dict)
     dirty: tuple[str, ...] = ()
 
     @property
-    def names_one_place_each(self) -> bool:
-        """Whether no type stands for two objects among those that the plan acts on."""
+    def one_object_per_type(self) -> bool:
+        """Whether the objects of the plan's key actions all differ in type."""
         named = {(action.object_type, action.object_id) for action in self.key_actions}
         return len(named) == len({object_type for object_type, _ in named})
 
     @property
     def scored(self) -> tuple[tuple[str, str], ...]:
-        """Verb and type of each key action that success asks for."""
+        """Verb and object type of each key action that success requires."""
         return tuple(
             (a.verb, a.object_type) for a in self.key_actions if a.verb not in verbs.UNSCORED
         )
 
 
-def plan_of(
-    script: Script,
-    *subjects: Thing,
+def plan_from(
+    builder: PlanBuilder,
+    *subjects: SceneObject,
     goal: tuple[Condition, ...] | None = None,
     dirty: Iterable[str] = (),
     **words: str | Sequence[str],
-) -> Plan:
-    """What a script has done, as a plan; its goal is how things are in the end, unless given."""
-    handled = dict.fromkeys((*subjects, *script.handled))
-    return Plan(
-        script.key_actions(),
-        script.goal() if goal is None else goal,
+) -> TaskPlan:
+    """The plan that a builder has collected.
+
+    Args:
+        builder: the key actions so far.
+        subjects: see :class:`TaskPlan`.
+        goal: the goal; by default the builder's final state.
+        dirty: ids of the objects that must be dirty when the episode begins.
+        words: see :class:`TaskPlan`.
+    """
+    handled = dict.fromkeys((*subjects, *builder.handled))
+    return TaskPlan(
+        builder.key_actions(),
+        builder.goal() if goal is None else goal,
         subjects,
-        tuple(thing.id for thing in handled),
+        tuple(obj.id for obj in handled),
         words,
         tuple(dirty),
     )
 
 
 @dataclass(frozen=True)
-class Row:
-    """A type of task that can be generated.
+class TaskRule:
+    """How tasks of one kind are generated.
 
     Attributes:
         type: a name in :data:`~er_gym.tasks.types.TASK_TYPES`.
-        choices: which objects of a room qualify; each choice is a tuple of arguments for ``plan``.
-        plan: which key actions follow from a choice. It takes any things at all, those that do not
-            qualify too; it may raise :class:`~er_gym.tasks.generate.script.Impossible`.
-        sayings: all instructions for a plan, at least a dozen, given the words; the first one words
-            the task's name.
-        slug: stands for the type in task ids, where its name is no good as a part of a file name or
-            says too little; the type's name by default.
-        names_places: whether the words may say where a subject is ("the Book that is on the Desk")
-            where there are several. In a search they must not.
+        choices: yields the choices of objects in a scene; each is a tuple of arguments for
+            ``plan``.
+        plan: returns the plan for a choice. It also takes objects that ``choices`` would not yield.
+            It raises :class:`~er_gym.tasks.generate.plan_builder.ImpossiblePlan` if they cannot be
+            used.
+        instructions: returns all instructions for a plan's words, at least twelve. The first is
+            also the task's name.
+        slug: replaces the type's name in task ids, if that name is too vague or cannot be part of a
+            file name.
+        may_name_places: whether an instruction may say where an object is ("the Book that is on the
+            Desk") to tell it from others. Searches must not.
     """
 
     type: str
-    choices: Callable[[Room], Iterable[tuple[Thing, ...]]]
-    plan: Callable[..., Plan]
-    sayings: Callable[[Mapping[str, str | Sequence[str]]], Sequence[str]]
+    choices: Callable[[SceneGraph], Iterable[tuple[SceneObject, ...]]]
+    plan: Callable[..., TaskPlan]
+    instructions: Callable[[Mapping[str, str | Sequence[str]]], Sequence[str]]
     slug: str = ""
-    names_places: bool = True
+    may_name_places: bool = True
 
 
 def from_templates(
     templates: Sequence[str],
 ) -> Callable[[Mapping[str, str | Sequence[str]]], Sequence[str]]:
-    """Sayings that are templates to be filled with the words."""
+    """Instructions from templates, which are filled with the plan's words."""
     return lambda words: [template.format_map(words) for template in templates]

@@ -1,16 +1,16 @@
-"""Instruction templates: how generated tasks are worded.
+"""Instruction templates for generated tasks.
 
-The templates are filled by ``str.format_map`` with
+``str.format_map`` fills the templates with
 
-- {object}: a type, or what tells a thing from its like ("Book that is on the Desk");
+- {object}: a type, or a type with its place ("Book that is on the Desk");
 - {an_object}: the same with its article ("a Book", "some Bread", "the Book that is on the Desk");
 - {it}, {is}: its pronoun, never a subject ("it", "them"), and its verb ("is", "are");
 - {room}: the room's kind; {way}: "on" or "off"; {place}: "in the Fridge", "on the Shelf";
 - {second_object}, {second_an_object}, {second_it}, {second_place}: those of the second transfer.
 
-The first template of each wording also words the task's name. Since {object} may end in "that is
-on the Desk", no verb or particle that belongs to what comes before follows it on its own: "switch
-on the {object}", not "switch the {object} on".
+The first template of each tuple also gives the task's name. {object} may end in "that is on the
+Desk". So no particle that belongs to an earlier verb follows it: "switch on the {object}", not
+"switch the {object} on".
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import cycle, islice
 
-# A search ends when the thing is seen: nothing here may sound as if one should take it.
+# A search ends when the object is in view: no template may ask the agent to pick it up.
 FIND = (
     "Find the {object} in the {room}.",
     "Can you find {an_object} in this {room}?",
@@ -40,7 +40,7 @@ FIND = (
     "It would help if you found the {object} somewhere in this {room}.",
 )
 
-# Finding the thing is not enough: each of these says that it is to be in the hand.
+# Finding the object is not enough: each template asks to have it in the hand.
 PICK_UP = (
     "Pick up the {object} in the {room}.",
     "Please find the {object} and pick {it} up.",
@@ -79,7 +79,7 @@ TOGGLE = (
     "I do not want to get up. Could you go to the {object} and turn {it} {way}?",
 )
 
-# None says "have the {object} {place}" or the like: "the Bread on the Plate" may be which one.
+# No template says "have the {object} {place}": "the Bread on the Plate" could name one of several.
 MOVE = (
     "Put the {object} {place}.",
     "Please take the {object} and put {it} {place}.",
@@ -99,7 +99,7 @@ MOVE = (
     "Go and get {an_object}, and do not stop before you have put {it} {place}.",
 )
 
-# Both transfers keep their verbs: "the Pen that is in the Mug in the Drawer" would be one thing.
+# Both transfers keep their verbs: "the Pen that is in the Mug in the Drawer" would be one object.
 MOVE_TWO = (
     "First, put the {object} {place}; then, put the {second_object} {second_place}.",
     "Please put the {object} {place}, and after that put the {second_object} {second_place}.",
@@ -135,14 +135,14 @@ MOVE_TWO = (
 
 @dataclass(frozen=True)
 class _Style:
-    """How clauses are joined; each part holds {clause}, and may hold its {number} from 1.
+    """A way to join clauses. Each part holds {clause}, and may hold {number}, counted from 1.
 
     Attributes:
-        alone: the whole instruction where there is one clause.
-        first: what several begin with.
-        between: those after the first, in turn, each with what parts it from the one before.
-        last: the last of three or more.
-        end: the mark behind it.
+        alone: the whole instruction if there is only one clause.
+        first: the first of several clauses.
+        between: the clauses after the first, used in turn, each with its separator.
+        last: the last of three or more clauses.
+        end: the final punctuation mark.
     """
 
     alone: str
@@ -243,15 +243,15 @@ _STYLES = (
 )
 
 STYLES = len(_STYLES)
-"""How many ways :func:`in_order` has to join clauses."""
+"""The number of styles of :func:`in_order`."""
 
 
 def in_order(clauses: Sequence[str], style: int) -> str:
-    """Join things to do, one after the other, into an instruction that makes their order plain.
+    """Join clauses into an instruction that makes their order plain.
 
     Args:
-        clauses: imperatives in lower case without a mark at the end ("slice the Lettuce"); they may
-            hold commas and "and".
+        clauses: imperatives in lower case without a final punctuation mark ("slice the Lettuce");
+            they may hold commas and "and".
         style: 0 to :data:`STYLES` - 1.
 
     Raises:

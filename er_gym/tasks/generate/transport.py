@@ -1,71 +1,75 @@
-"""Transfers: fetch a thing, put it somewhere else."""
+"""Transfers: fetch an object and put it into another receptacle."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import partial
 
-from er_gym.tasks.generate.scene_graph import Room, Thing, largest, may_fill
-from er_gym.tasks.generate.script import Script
-from er_gym.tasks.generate.task_plan import Plan, Row, from_templates, plan_of
+from er_gym.tasks.generate.plan_builder import PlanBuilder
+from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject, largest, may_put_into
+from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
 from er_gym.tasks.generate.templates import MOVE
-from er_gym.tasks.generate.words import in_the
+from er_gym.tasks.generate.words import in_or_on_the
 
 
-def transfer(room: Room, thing: Thing, target: Thing) -> Plan:
-    """Fetch a thing and put it into a target."""
-    script = Script(room)
-    script.fetch(thing)
-    script.put(target)
-    return plan_of(script, thing, place=in_the(target.type))
+def transfer(graph: SceneGraph, obj: SceneObject, target: SceneObject) -> TaskPlan:
+    """The plan to fetch an object and put it into a target."""
+    builder = PlanBuilder(graph)
+    builder.fetch(obj)
+    builder.put(target)
+    return plan_from(builder, obj, place=in_or_on_the(target.type))
 
 
-def transfers(room: Room, hidden: bool) -> Iterator[tuple[Thing, Thing]]:
-    """Every exposed or enclosed thing, with one target of each receptacle type that takes it."""
-    targets = [target for group in _by_type(room) if (target := _target_of(room, group))]
-    for thing in room.carried(hidden):
+def transfers(graph: SceneGraph, hidden: bool) -> Iterator[tuple[SceneObject, SceneObject]]:
+    """Every exposed or enclosed object, with one target of each receptacle type that accepts it."""
+    targets = [target for group in _by_type(graph) if (target := _target_of(graph, group))]
+    for obj in graph.pickupable_objects(hidden):
         for target in targets:
-            if room.accepts(thing.type, target.type) and not room.is_in(thing, target):
-                yield thing, target
+            if graph.accepts(obj.type, target.type) and not graph.is_in(obj, target):
+                yield obj, target
 
 
-def _target_of(room: Room, group: list[Thing]) -> Thing | None:
-    """The largest of some receptacles of one type, if a transfer may go there.
+def _target_of(graph: SceneGraph, group: list[SceneObject]) -> SceneObject | None:
+    """The largest receptacle of one type that can be a target; None if there is none.
 
-    None may be open where another is shut: the words do not say which.
+    All receptacles of the type must be open, or all closed: the instruction does not say which one
+    is meant.
     """
-    alike = len({thing.closed for thing in group}) == 1
-    fit = [thing for thing in group if _is_target(room, thing)]
+    alike = len({obj.closed for obj in group}) == 1
+    fit = [obj for obj in group if _is_target(graph, obj)]
     return largest(fit) if fit and alike else None
 
 
-def _is_target(room: Room, thing: Thing) -> bool:
-    """Whether transfers may go to a thing: a receptacle that stands somewhere one can say.
+def _is_target(graph: SceneGraph, obj: SceneObject) -> bool:
+    """Whether an object can be the target of transfers.
 
-    What can be carried is gone to where it stands, unless that is the floor.
+    The agent reaches a pickupable receptacle by way of the place where it stands, so that place
+    must be exposed, or the receptacle must stand free.
     """
-    return (thing.receptacle and may_fill(thing)) and (
-        not thing.pickupable or room.is_exposed(thing) or room.stands_free(thing)
+    return (obj.receptacle and may_put_into(obj)) and (
+        not obj.pickupable or graph.is_exposed(obj) or graph.stands_free(obj)
     )
 
 
-def _by_type(room: Room) -> Iterable[list[Thing]]:
-    groups: dict[str, list[Thing]] = {}
-    for thing in room.things.values():
-        groups.setdefault(thing.type, []).append(thing)
+def _by_type(graph: SceneGraph) -> Iterable[list[SceneObject]]:
+    groups: dict[str, list[SceneObject]] = {}
+    for obj in graph.objects.values():
+        groups.setdefault(obj.type, []).append(obj)
     return groups.values()
 
 
-def _moves(room: Room, hidden: bool, into_closed: bool) -> Iterator[tuple[Thing, Thing]]:
-    return (move for move in transfers(room, hidden) if move[1].closed == into_closed)
+def _moves(
+    graph: SceneGraph, hidden: bool, into_closed: bool
+) -> Iterator[tuple[SceneObject, SceneObject]]:
+    return (move for move in transfers(graph, hidden) if move[1].closed == into_closed)
 
 
-ROWS = tuple(
-    Row(
+RULES = tuple(
+    TaskRule(
         name,
         choices=partial(_moves, hidden=hidden, into_closed=into_closed),
         plan=transfer,
-        sayings=from_templates(MOVE),
+        instructions=from_templates(MOVE),
     )
     for name, hidden, into_closed in (
         ("pickup_and_put", False, False),
