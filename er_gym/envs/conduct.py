@@ -17,7 +17,7 @@ from er_gym.envs import legality, skills
 from er_gym.envs import object_selection as which
 from er_gym.envs.actions import Action
 from er_gym.envs.legality import Known, Surroundings
-from er_gym.envs.perception import Percept
+from er_gym.envs.perception import Perception
 from er_gym.envs.skills import Outcome, Reachable
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose, KeyAction, Task
@@ -56,7 +56,7 @@ class Conduct(Protocol):
 
     at: str
 
-    def around(self, percept: Percept) -> Surroundings:
+    def around(self, perception: Perception) -> Surroundings:
         """What can be gone to and interacted with, given what is perceived."""
 
     def objection(self, action: Action, around: Surroundings, known: Known) -> str:
@@ -66,7 +66,11 @@ class Conduct(Protocol):
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
 
     def do(
-        self, action: Action, percept: Percept, around: Surroundings, left: Sequence[KeyAction]
+        self,
+        action: Action,
+        perception: Perception,
+        around: Surroundings,
+        left: Sequence[KeyAction],
     ) -> Done:
         """Carry out a legal action; ``left``: the key actions that are still to be done."""
 
@@ -83,9 +87,9 @@ class DefaultConduct:
         self._setting = setting
         self._visited: dict[str, list[str]] = {}
 
-    def around(self, percept: Percept) -> Surroundings:
+    def around(self, perception: Perception) -> Surroundings:
         """See :func:`~er_gym.envs.legality.surroundings`."""
-        return legality.surroundings(percept, self.at)
+        return legality.surroundings(perception, self.at)
 
     def objection(self, action: Action, around: Surroundings, known: Known) -> str:
         """See :func:`~er_gym.envs.legality.objection`."""
@@ -96,10 +100,14 @@ class DefaultConduct:
         return legality.legal_actions(around, known)
 
     def do(
-        self, action: Action, percept: Percept, around: Surroundings, left: Sequence[KeyAction]
+        self,
+        action: Action,
+        perception: Perception,
+        around: Surroundings,
+        left: Sequence[KeyAction],
     ) -> Done:
         """Carry out a legal action by the skills of :mod:`er_gym.envs.skills`."""
-        setting, objects = self._setting, percept.objects
+        setting, objects = self._setting, perception.objects
         if action.verb == verbs.OBSERVE:
             return "", skills.observe(setting.controller)
         if action.verb == verbs.MOVE_FORWARD:
@@ -109,17 +117,19 @@ class DefaultConduct:
         if action.verb in verbs.BARE_VERBS:
             return "", skills.do_alone(setting.controller, action.verb)
         if action.verb == verbs.NAVIGATE:
-            return self._navigate(action.object_type, percept, left)
+            return self._navigate(action.object_type, perception, left)
         able = legality.suited(action, around)
         if setting.instances == which.TARGET:
             chosen = which.by_task(setting.task, left, action.verb, able, objects)
         else:
-            chosen = which.nearest(able, objects, percept.pose)
+            chosen = which.nearest(able, objects, perception.pose)
         done = skills.interact(setting.controller, action.verb, objects, chosen)
         return objects.ids[chosen], done
 
-    def _navigate(self, object_type: str, percept: Percept, left: Sequence[KeyAction]) -> Done:
-        setting, objects = self._setting, percept.objects
+    def _navigate(
+        self, object_type: str, perception: Perception, left: Sequence[KeyAction]
+    ) -> Done:
+        setting, objects = self._setting, perception.objects
         able = objects.of_type(object_type)
         if not able:
             return "", Outcome(None, False, f"there is no {object_type} any more")
@@ -130,7 +140,7 @@ class DefaultConduct:
             visited = self._visited.setdefault(object_type, [])
             if len(visited) >= len(able):
                 visited.clear()
-            aim = goal = which.nearest(able, objects, percept.pose, visited)
+            aim = goal = which.nearest(able, objects, perception.pose, visited)
             visited.append(objects.ids[goal])
         goal_id = objects.ids[goal]
         pose = setting.task.poses.get(goal_id)
@@ -140,7 +150,7 @@ class DefaultConduct:
         else:
             container = which.container_in_the_way(aim, objects)
             aim = aim if container is None else container
-            outcome = skills.navigate(setting.controller, percept, aim, setting.floor)
+            outcome = skills.navigate(setting.controller, perception, aim, setting.floor)
         if outcome.success:
             self.at = goal_id
         return goal_id, outcome

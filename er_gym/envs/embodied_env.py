@@ -29,7 +29,7 @@ from er_gym.envs.observations import (
     goal_row,
     parse_obs_mode,
 )
-from er_gym.envs.perception import Percept
+from er_gym.envs.perception import Perception
 from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.tasks import verbs
@@ -222,7 +222,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._generates = isinstance(episode_source, str) and episode_source == GENERATE
         self._source = self._from(episode_source)
         self._controller: Any = None
-        self._percept: Percept  # what was taken in last; nothing before the first reset
+        self._percept: Perception  # what was taken in last; nothing before the first reset
         self._alone = threading.RLock()
         self._missing = _NOT_BEGUN  # why there is no episode, "" if there is one
         self._end_reason = ""
@@ -476,12 +476,12 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     def _take_in(self, outcome: skills.Outcome) -> None:
         """Remember what can be seen after a step, and in the views of an "observe"."""
-        for percept in (*outcome.views.values(), outcome.percept):
-            if percept is not None:
-                self._percept = percept
-                self._around = self._conduct.around(percept)
-                self._known.add(percept.objects.kinds[self._around.navigable])
-                self._memory.look(percept, self._at_kind)
+        for perception in (*outcome.views.values(), outcome.perception):
+            if perception is not None:
+                self._percept = perception
+                self._around = self._conduct.around(perception)
+                self._known.add(perception.objects.kinds[self._around.navigable])
+                self._memory.look(perception, self._at_kind)
 
     @property
     def _at_kind(self) -> int | None:
@@ -543,7 +543,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         object_id: str,
         feedback: str,
         reward: float,
-        views: Mapping[str, Percept] | None = None,
+        views: Mapping[str, Perception] | None = None,
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         truncated = self._end_reason == "step limit"
         terminated = bool(self._end_reason) and not truncated
@@ -563,7 +563,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     def _observation(self, feedback: str, success: bool) -> dict[str, Any]:
         situation = Situation(
-            percept=self._percept,
+            perception=self._percept,
             around=self._around,
             memory=self._memory,
             known=self._known,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs.actions import ACTIONS, INDEX, INDICES, Action, applies
-from er_gym.envs.perception import Percept, marked, names
+from er_gym.envs.perception import Perception, marked, names
 from er_gym.tasks import verbs
 from er_gym.tasks.verbs import Verb
 from er_gym.thor.objects import KIND_OF, PROPERTY_OF_STATE, TYPES, ObjectTable
@@ -176,16 +176,18 @@ class Surroundings:
         return names(self.interactable_types)
 
 
-def surroundings(percept: Percept, at: str = "") -> Surroundings:
+def surroundings(perception: Perception, at: str = "") -> Surroundings:
     """Judge what is perceived.
 
     Args:
         at: id of the receptacle last navigated to. Things of the types that lie in it can be
             interacted with wherever they are visible.
     """
-    table, visible = percept.objects, percept.visible
+    table, visible = perception.objects, perception.visible
     can = affordances(table)
-    distance = np.hypot(table.centre[:, 0] - percept.pose.x, table.centre[:, 2] - percept.pose.z)
+    distance = np.hypot(
+        table.centre[:, 0] - perception.pose.x, table.centre[:, 2] - perception.pose.z
+    )
     plain = visible & (distance < can.within)
     reach = plain
     row = table.row.get(at)

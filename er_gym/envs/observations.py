@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from er_gym.envs.actions import Action
 from er_gym.envs.arguments import shown
 from er_gym.envs.legality import Known, Surroundings
-from er_gym.envs.perception import Percept
+from er_gym.envs.perception import Perception
 from er_gym.plugins import PluginError, Registry, is_dotted
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
@@ -120,17 +120,17 @@ class Memory:
     last: Action | None = None
     repeats: int = 0
 
-    def look(self, percept: Percept, at: int | None = None) -> None:
+    def look(self, perception: Perception, at: int | None = None) -> None:
         """Take in what is visible now; ``at``: the type of what was last navigated to."""
-        objects, visible = percept.objects, percept.visible
-        self.seen |= percept.visible_types
-        out_of_sight = ~percept.visible_types
+        objects, visible = perception.objects, perception.visible
+        self.seen |= perception.visible_types
+        out_of_sight = ~perception.visible_types
         is_open, is_on = objects.has["isOpen"], objects.has["isToggled"]
         for remembered, now in ((self.is_open, is_open), (self.is_on, is_on)):
             remembered &= out_of_sight
             remembered[objects.kinds[visible & now]] = True
         if at is not None:
-            weights = self.wanted * percept.visible_types
+            weights = self.wanted * perception.visible_types
             weights[at] = 0.0
             if objects.held >= 0:
                 weights[objects.kinds[objects.held]] = 0.0
@@ -157,7 +157,7 @@ class Situation:
         at: index of the type of what was last navigated to, None before that.
     """
 
-    percept: Percept
+    perception: Perception
     around: Surroundings
     memory: Memory
     known: Known
@@ -206,7 +206,7 @@ def goal_row(instruction: str) -> NDArray[np.float32]:
 
 def _relative_pose(situation: Situation) -> tuple[float, ...]:
     """The agent's pose in the frame of where it began."""
-    pose, start = situation.percept.pose, situation.memory.start
+    pose, start = situation.perception.pose, situation.memory.start
     dx, dz = pose.x - start.x, pose.z - start.z
     heading = radians(start.rotation)
     turned = radians(pose.rotation) - heading
@@ -223,7 +223,7 @@ def _relative_pose(situation: Situation) -> tuple[float, ...]:
 
 
 def _state(situation: Situation) -> NDArray[np.float32]:
-    memory, objects = situation.memory, situation.percept.objects
+    memory, objects = situation.memory, situation.perception.objects
     last = memory.last
     scalars = (
         *_relative_pose(situation),
@@ -239,7 +239,7 @@ def _state(situation: Situation) -> NDArray[np.float32]:
     if last is not None and last.verb in _LAST:  # the paper's protocol has other verbs and types
         vector[_LAST[last.verb]] = 1.0
     table = vector[len(SCALARS) :].reshape(len(FEATURES), len(TYPES))
-    table[_ROW["visible"]] = situation.percept.visible_types
+    table[_ROW["visible"]] = situation.perception.visible_types
     table[_ROW["seen"]] = memory.seen
     table[_ROW["navigable"]] = situation.known.types
     table[_ROW["interactable"]] = situation.around.interactable_types
@@ -273,12 +273,12 @@ def _plain(text: str) -> str:
 
 
 def _text(situation: Situation) -> str:
-    percept = situation.percept
+    perception = situation.perception
     lines = (
         f"Task: {situation.instruction}",
         f"Step {situation.steps} of {situation.max_steps}. {situation.feedback}",
-        f"You see: {', '.join(percept.visible_names) or 'nothing'}.",
-        f"You hold: {percept.held_name or 'nothing'}.",
+        f"You see: {', '.join(perception.visible_names) or 'nothing'}.",
+        f"You hold: {perception.held_name or 'nothing'}.",
         f"You can navigate to: {', '.join(situation.known.names) or 'nothing'}.",
         f"Within reach: {', '.join(situation.around.in_reach) or 'nothing'}.",
     )
@@ -292,7 +292,7 @@ class Observation:
     Attributes:
         space: its space, given the width and height of frames, pixels.
         build: makes it.
-        draws: whether ``situation.percept`` must have a picture.
+        draws: whether ``situation.perception`` must have a picture.
     """
 
     space: Callable[[int, int], spaces.Space[Any]]
@@ -306,8 +306,8 @@ OBSERVATIONS: Registry[Observation] = Registry(
     own={
         "rgb": Observation(
             lambda width, height: spaces.Box(0, 255, (height, width, 3), np.uint8),
-            # A copy: after an illegal action the percept is that of the step before.
-            lambda situation: np.array(situation.percept.picture),
+            # A copy: after an illegal action the perception is that of the step before.
+            lambda situation: np.array(situation.perception.picture),
             draws=True,
         ),
         "state": Observation(

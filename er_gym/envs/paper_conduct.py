@@ -16,7 +16,7 @@ from er_gym.envs.conduct import Done, Setting
 from er_gym.envs.legality import Known, Surroundings, navigable_within
 from er_gym.envs.paper_approach import Thing, approach, current, thing_of
 from er_gym.envs.paper_skills import interact, move_forward, observe, start_again
-from er_gym.envs.perception import Percept, marked
+from er_gym.envs.perception import Perception, marked
 from er_gym.envs.skills import Outcome
 from er_gym.tasks import verbs
 from er_gym.tasks.task import KeyAction
@@ -97,10 +97,12 @@ class PaperConduct:
             if entry["objectType"] not in self._first:
                 self._first[entry["objectType"]] = thing_of(entry)
 
-    def around(self, percept: Percept) -> Surroundings:
+    def around(self, perception: Perception) -> Surroundings:
         """What is plain to see, what is in the hand included; and what lay in the receptacle."""
-        table, visible = percept.objects, percept.visible
-        away = np.hypot(table.centre[:, 0] - percept.pose.x, table.centre[:, 2] - percept.pose.z)
+        table, visible = perception.objects, perception.visible
+        away = np.hypot(
+            table.centre[:, 0] - perception.pose.x, table.centre[:, 2] - perception.pose.z
+        )
         plain = visible & (away < _within(table))
         inside = visible & self._inside[table.kinds]
         return Surroundings(
@@ -131,7 +133,11 @@ class PaperConduct:
         return legal
 
     def do(
-        self, action: Action, percept: Percept, around: Surroundings, left: Sequence[KeyAction]
+        self,
+        action: Action,
+        perception: Perception,
+        around: Surroundings,
+        left: Sequence[KeyAction],
     ) -> Done:
         """Carry out a legal action."""
         setting, controller = self._setting, self._setting.controller
@@ -143,7 +149,7 @@ class PaperConduct:
             return "", Outcome(None, True)
         if action.verb == verbs.INIT:
             return "", start_again(controller, setting.start)
-        thing = self._choose(action, percept.objects)
+        thing = self._choose(action, perception.objects)
         if thing is None:
             return "", Outcome(None, False, f"there is no such {action.object_type}")
         if action.verb != verbs.NAVIGATE:

@@ -11,7 +11,7 @@ from math import hypot
 from typing import Any
 
 from er_gym.envs.paper_approach import Thing, stand_at, unseen
-from er_gym.envs.perception import Percept, perceive
+from er_gym.envs.perception import Perception, perceive
 from er_gym.envs.skills import FORWARD_STEP, VIEWS, Outcome
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
@@ -39,7 +39,7 @@ def observe(controller: Any) -> Outcome:
     The views are handed over in the order in which agents are told of them.
     """
 
-    def turned() -> Percept:
+    def turned() -> Perception:
         return perceive(controller.step(action="RotateLeft", degrees=90))
 
     left, behind, right, last = turned(), turned(), turned(), turned()

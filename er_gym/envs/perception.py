@@ -20,7 +20,7 @@ from er_gym.thor.objects import TYPES, ObjectTable, objects_of
 
 
 @dataclass(frozen=True, eq=False)
-class Percept:
+class Perception:
     """What an event tells the agent.
 
     Attributes:
@@ -63,7 +63,7 @@ class Percept:
         return marked(self.objects.kinds[self.visible])
 
 
-def perceive(event: Any) -> Percept:
+def perceive(event: Any) -> Perception:
     """What an AI2-THOR event tells the agent."""
     objects, visible, interactable = objects_of(event)
     agent = event.metadata["agent"]
@@ -76,7 +76,9 @@ def perceive(event: Any) -> Percept:
         agent["cameraHorizon"],
         agent["isStanding"],
     )
-    return Percept(objects, visible, interactable, pose, event.frame, event.instance_detections2D)
+    return Perception(
+        objects, visible, interactable, pose, event.frame, event.instance_detections2D
+    )
 
 
 def marked(kinds: NDArray[np.intp]) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.perception import Percept, perceive
+from er_gym.envs.perception import Perception, perceive
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.tasks.task import AgentPose
@@ -83,16 +83,16 @@ class Outcome:
     """What came of a skill.
 
     Attributes:
-        percept: what the agent perceives after it; None when it perceives what it did before.
+        perception: what the agent perceives after it; None when it perceives what it did before.
         success: whether it was done.
         problem: if not, why not.
         views: for "observe", direction to what is perceived there.
     """
 
-    percept: Percept | None
+    perception: Perception | None
     success: bool
     problem: str = ""
-    views: Mapping[str, Percept] = field(default_factory=dict)
+    views: Mapping[str, Perception] = field(default_factory=dict)
 
 
 def _outcome(event: Any) -> Outcome:
@@ -141,20 +141,20 @@ def _start_pose(
     return AgentPose(x, y, z, rotation)
 
 
-def navigate(controller: Any, percept: Percept, goal: int, floor: Reachable) -> Outcome:
+def navigate(controller: Any, perception: Perception, goal: int, floor: Reachable) -> Outcome:
     """Go to where an object can best be seen and handled, facing it.
 
     Positions are tried from the nearest to the object's middle outwards; among the first from which
     it can be interacted with, the one that is at a comfortable distance and has it in the middle of
     the picture is taken.
     """
-    objects = percept.objects
+    objects = perception.objects
     object_id, centre = objects.ids[goal], tuple(objects.centre[goal].tolist())
     # The pose that one would choose were nothing in the way is mostly possible, and whether it is,
     # one sees from there. What is in the hand one sees from everywhere.
     if goal != objects.held:
         there = place(controller, _best_view(floor, *centre))
-        if there.success and _can_handle(there.percept, object_id):
+        if there.success and _can_handle(there.perception, object_id):
             return there
 
     def discomfort(pose: AgentPose) -> float:
@@ -166,12 +166,12 @@ def navigate(controller: Any, percept: Percept, goal: int, floor: Reachable) -> 
         if found:
             return place(controller, min(found, key=discomfort))
     problem = f"no way was found to where {objects.type_of(goal)} can be seen"
-    return replace(place(controller, percept.pose), success=False, problem=problem)
+    return replace(place(controller, perception.pose), success=False, problem=problem)
 
 
-def _can_handle(percept: Percept | None, object_id: str) -> bool:
-    row = None if percept is None else percept.objects.row.get(object_id)
-    return percept is not None and row is not None and bool(percept.interactable[row])
+def _can_handle(perception: Perception | None, object_id: str) -> bool:
+    row = None if perception is None else perception.objects.row.get(object_id)
+    return perception is not None and row is not None and bool(perception.interactable[row])
 
 
 def _interactable_poses(
@@ -241,7 +241,7 @@ def _best_view(floor: Reachable, x: float, y: float, z: float) -> AgentPose:
 def observe(controller: Any) -> Outcome:
     """Look right, behind and left, and turn back to where one looked before."""
 
-    def turned() -> Percept:
+    def turned() -> Perception:
         return perceive(controller.step(action="RotateRight", degrees=90))
 
     views = {view: turned() for view in VIEWS}
