@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from er_gym.envs import object_selection as which
 from er_gym.envs import skills
+from er_gym.envs.action_handler import Setting
 from er_gym.envs.actions import ACTIONS, Action, AnyAction
 from er_gym.envs.arguments import flag, number, one_of, shown, whole
-from er_gym.envs.conduct import Setting
 from er_gym.envs.errors import ResetNeeded
 from er_gym.envs.info import Info, LegalActions
 from er_gym.envs.legality import Known
@@ -270,7 +270,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
         with self._alone:
             self._need_episode("action_masks()")
-            return self._conduct.legal(self._around, self._known)
+            return self._handler.legal(self._around, self._known)
 
     @property
     def task(self) -> Task:
@@ -383,7 +383,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._memory = Memory(pose, goal_row(task.instruction))
         self._progress = Progress.start(Criteria.of(task))
         self._known = Known(task.navigable_objects)
-        self._conduct = self._protocol.conduct(
+        self._handler = self._protocol.action_handler(
             Setting(task, controller, floor, pose, self._grid_size, self._instances)
         )
         self._steps = 1
@@ -420,11 +420,11 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             said = self._protocol.repeated or understood
             return self._reply(said, text, False, "", feedback, 0.0)
         self._steps += understood.verb != verbs.END or self._protocol.end_is_step
-        refused = self._conduct.objection(understood, self._around, self._known)
+        refused = self._handler.objection(understood, self._around, self._known)
         if refused:
             object_id, outcome = "", skills.Outcome(None, False, refused)
         else:
-            object_id, outcome = self._conduct.do(
+            object_id, outcome = self._handler.do(
                 understood, self._percept, self._around, self._progress.left
             )
         self._memory.act(understood, outcome.success)
@@ -479,7 +479,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         for perception in (*outcome.views.values(), outcome.perception):
             if perception is not None:
                 self._percept = perception
-                self._around = self._conduct.around(perception)
+                self._around = self._handler.around(perception)
                 self._known.add(perception.objects.kinds[self._around.navigable])
                 self._memory.look(perception, self._at_kind)
 
@@ -487,7 +487,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _at_kind(self) -> int | None:
         """The type of what was last navigated to, if that is still there."""
         objects = self._percept.objects
-        row = objects.row.get(self._conduct.at)
+        row = objects.row.get(self._handler.at)
         return None if row is None else int(objects.kinds[row])
 
     def _judge(self, action: Action, outcome: skills.Outcome, object_id: str) -> float:
@@ -579,7 +579,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _info(
         self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
     ) -> Info:
-        mask = self._conduct.legal(self._around, self._known)
+        mask = self._handler.legal(self._around, self._known)
         return {
             "task": self._task,
             "action": action,

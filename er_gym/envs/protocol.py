@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from er_gym.envs.action_handler import ActionHandler, DefaultActionHandler, Setting
 from er_gym.envs.actions import Action, AnyAction, understand
 from er_gym.envs.arguments import one_of
-from er_gym.envs.conduct import Conduct, DefaultConduct, Setting
+from er_gym.envs.paper_action_handler import PaperActionHandler, understand_as_paper
 from er_gym.envs.paper_approach import start_in_corner
-from er_gym.envs.paper_conduct import PaperConduct, understand_as_paper
 from er_gym.envs.skills import Reachable, start_pose
 from er_gym.tasks.task import AgentPose
 from er_gym.tasks.verbs import END
@@ -29,7 +29,7 @@ class EpisodeProtocol:
     Attributes:
         name: as ``--protocol`` and ``EmbodiedEnv(protocol=…)`` take it.
         understand: the action that is meant, None if none is; and its text.
-        conduct: how actions are judged and carried out in an episode.
+        action_handler: how actions are judged and carried out in an episode.
         start: where an episode begins, given the scene's bounds and where the agent can stand.
         chooses_instances: whether it decides itself which object a type name stands for.
         unknown_breaks_runs: whether a reply that names no action comes between two same actions.
@@ -41,7 +41,7 @@ class EpisodeProtocol:
 
     name: str
     understand: Callable[[AnyAction, ObjectTable], tuple[Action | None, str]]
-    conduct: Callable[[Setting], Conduct]
+    action_handler: Callable[[Setting], ActionHandler]
     start: Callable[[Mapping[str, Any], Reachable], AgentPose]
     chooses_instances: bool = False
     unknown_breaks_runs: bool = False
@@ -53,13 +53,13 @@ class EpisodeProtocol:
 DEFAULT = EpisodeProtocol(
     name="default",
     understand=lambda action, _: understand(action),
-    conduct=DefaultConduct,
+    action_handler=DefaultActionHandler,
     start=start_pose,
 )
 PAPER = EpisodeProtocol(
     name="paper",
     understand=understand_as_paper,
-    conduct=PaperConduct,
+    action_handler=PaperActionHandler,
     start=start_in_corner,
     chooses_instances=True,
     unknown_breaks_runs=True,

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.envs.action_handler import Done, Setting
 from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
-from er_gym.envs.conduct import Done, Setting
 from er_gym.envs.legality import Known, Surroundings, navigable_within
 from er_gym.envs.paper_approach import Thing, approach, current, thing_of
 from er_gym.envs.paper_skills import interact, move_forward, observe, start_again
@@ -69,7 +69,7 @@ def understand_as_paper(action: AnyAction, objects: ObjectTable) -> tuple[Action
     return Action(verb, word if word in there else next(alike, NO_OBJECT)), text
 
 
-class PaperConduct:
+class PaperActionHandler:
     """The paper's way to judge and carry out actions.
 
     - A type may be gone to once it has been plain to see, or where the task lists it.

@@ -1,6 +1,6 @@
 """How actions are judged legal and carried out in one episode.
 
-:class:`Conduct` is what the environment asks for; :class:`DefaultConduct` is the default protocol's
+:class:`ActionHandler` is what the environment asks for; :class:`DefaultActionHandler` is the default protocol's
 (:mod:`er_gym.envs.protocol`). It holds what lasts for an episode: where the agent went.
 """
 
@@ -47,7 +47,7 @@ class Setting:
     instances: str
 
 
-class Conduct(Protocol):
+class ActionHandler(Protocol):
     """How actions are judged and carried out in one episode.
 
     Attributes:
@@ -75,7 +75,7 @@ class Conduct(Protocol):
         """Carry out a legal action; ``left``: the key actions that are still to be done."""
 
 
-class DefaultConduct:
+class DefaultActionHandler:
     """The default protocol's.
 
     Args:
