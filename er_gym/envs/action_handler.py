@@ -27,7 +27,7 @@ Done = tuple[str, Outcome]
 
 
 @dataclass(frozen=True)
-class Setting:
+class EpisodeSetup:
     """An episode as it begins.
 
     Attributes:
@@ -79,12 +79,12 @@ class DefaultActionHandler:
     """The default protocol's.
 
     Args:
-        setting: of the episode.
+        setup: of the episode.
     """
 
-    def __init__(self, setting: Setting) -> None:
+    def __init__(self, setup: EpisodeSetup) -> None:
         self.at = ""
-        self._setting = setting
+        self._setup = setup
         self._visited: dict[str, list[str]] = {}
 
     def around(self, perception: Perception) -> Surroundings:
@@ -107,35 +107,35 @@ class DefaultActionHandler:
         left: Sequence[KeyAction],
     ) -> Done:
         """Carry out a legal action by the skills of :mod:`er_gym.envs.skills`."""
-        setting, objects = self._setting, perception.objects
+        setup, objects = self._setup, perception.objects
         if action.verb == verbs.OBSERVE:
-            return "", skills.observe(setting.controller)
+            return "", skills.observe(setup.controller)
         if action.verb == verbs.MOVE_FORWARD:
-            return "", skills.move_forward(setting.controller, setting.grid_size)
+            return "", skills.move_forward(setup.controller, setup.grid_size)
         if action.verb == verbs.END:
             return "", Outcome(None, True)
         if action.verb in verbs.BARE_VERBS:
-            return "", skills.do_alone(setting.controller, action.verb)
+            return "", skills.do_alone(setup.controller, action.verb)
         if action.verb == verbs.NAVIGATE:
             return self._navigate(action.object_type, perception, left)
         able = legality.suited(action, around)
-        if setting.instances == which.TARGET:
-            chosen = which.by_task(setting.task, left, action.verb, able, objects)
+        if setup.instances == which.TARGET:
+            chosen = which.by_task(setup.task, left, action.verb, able, objects)
         else:
             chosen = which.nearest(able, objects, perception.pose)
-        done = skills.interact(setting.controller, action.verb, objects, chosen)
+        done = skills.interact(setup.controller, action.verb, objects, chosen)
         return objects.ids[chosen], done
 
     def _navigate(
         self, object_type: str, perception: Perception, left: Sequence[KeyAction]
     ) -> Done:
-        setting, objects = self._setting, perception.objects
+        setup, objects = self._setup, perception.objects
         able = objects.of_type(object_type)
         if not able:
             return "", Outcome(None, False, f"there is no {object_type} any more")
-        if setting.instances == which.TARGET:
-            goal = which.by_task(setting.task, left, verbs.NAVIGATE, able, objects)
-            aim = which.redirected(setting.task, goal, objects)
+        if setup.instances == which.TARGET:
+            goal = which.by_task(setup.task, left, verbs.NAVIGATE, able, objects)
+            aim = which.redirected(setup.task, goal, objects)
         else:
             visited = self._visited.setdefault(object_type, [])
             if len(visited) >= len(able):
@@ -143,14 +143,14 @@ class DefaultActionHandler:
             aim = goal = which.nearest(able, objects, perception.pose, visited)
             visited.append(objects.ids[goal])
         goal_id = objects.ids[goal]
-        pose = setting.task.poses.get(goal_id)
+        pose = setup.task.poses.get(goal_id)
         if pose is not None:
             # AI2-THOR's agent stood there, so there is room, whatever our boxes say.
-            outcome = skills.place(setting.controller, pose, force=True)
+            outcome = skills.place(setup.controller, pose, force=True)
         else:
             container = which.container_in_the_way(aim, objects)
             aim = aim if container is None else container
-            outcome = skills.navigate(setting.controller, perception, aim, setting.floor)
+            outcome = skills.navigate(setup.controller, perception, aim, setup.floor)
         if outcome.success:
             self.at = goal_id
         return goal_id, outcome

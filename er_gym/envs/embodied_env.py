@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from er_gym.envs import object_selection as which
 from er_gym.envs import skills
-from er_gym.envs.action_handler import Setting
+from er_gym.envs.action_handler import EpisodeSetup
 from er_gym.envs.actions import ACTIONS, Action, AnyAction
 from er_gym.envs.arguments import flag, number, one_of, shown, whole
 from er_gym.envs.errors import ResetNeeded
@@ -384,7 +384,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._progress = Progress.start(Criteria.of(task))
         self._known = Known(task.navigable_objects)
         self._handler = self._protocol.action_handler(
-            Setting(task, controller, floor, pose, self._grid_size, self._instances)
+            EpisodeSetup(task, controller, floor, pose, self._grid_size, self._instances)
         )
         self._steps = 1
         self._limit = self._max_steps or task.max_steps

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.action_handler import Done, Setting
+from er_gym.envs.action_handler import Done, EpisodeSetup
 from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
 from er_gym.envs.legality import Known, Surroundings, navigable_within
 from er_gym.envs.paper_approach import Thing, approach, current, thing_of
@@ -81,19 +81,19 @@ class PaperActionHandler:
       switched on, is not heeded.
 
     Args:
-        setting: of the episode; its ``instances`` means nothing here.
+        setup: of the episode; its ``instances`` means nothing here.
     """
 
-    def __init__(self, setting: Setting) -> None:
+    def __init__(self, setup: EpisodeSetup) -> None:
         self.at = ""
-        self._setting, task = setting, setting.task
+        self._setup, task = setup, setup.task
         self._inside = marked(np.array([], np.intp))  # types that lay in the last receptacle
         self._second = str(task.extra.get("identity")) in _SECOND_WHEN_HOLDING
         self._targets: dict[str, list[str]] = {}
         for object_id in task.target_objects:
             self._targets.setdefault(object_id.split("|")[0], []).append(object_id)
         self._first: dict[str, Thing] = {}
-        for entry in setting.controller.last_event.metadata["objects"]:
+        for entry in setup.controller.last_event.metadata["objects"]:
             if entry["objectType"] not in self._first:
                 self._first[entry["objectType"]] = thing_of(entry)
 
@@ -140,22 +140,22 @@ class PaperActionHandler:
         left: Sequence[KeyAction],
     ) -> Done:
         """Carry out a legal action."""
-        setting, controller = self._setting, self._setting.controller
+        setup, controller = self._setup, self._setup.controller
         if action.verb == verbs.OBSERVE:
             return "", observe(controller)
         if action.verb == verbs.MOVE_FORWARD:
-            return "", move_forward(controller, setting.task.related_objects)
+            return "", move_forward(controller, setup.task.related_objects)
         if action.verb == verbs.END:
             return "", Outcome(None, True)
         if action.verb == verbs.INIT:
-            return "", start_again(controller, setting.start)
+            return "", start_again(controller, setup.start)
         thing = self._choose(action, perception.objects)
         if thing is None:
             return "", Outcome(None, False, f"there is no such {action.object_type}")
         if action.verb != verbs.NAVIGATE:
             return thing.object_id, interact(controller, action.verb, thing)
         aim = self._on_it(thing)
-        outcome = approach(controller, aim, setting.task.poses.get(aim.object_id))
+        outcome = approach(controller, aim, setup.task.poses.get(aim.object_id))
         if outcome.success:
             self.at = thing.object_id
             if aim.receptacle:
@@ -171,15 +171,15 @@ class PaperActionHandler:
         second = self._second and action.verb == verbs.NAVIGATE and objects.held >= 0
         if second and len(targets) < 2:
             return None
-        return current(self._setting.controller, targets[1 if second else 0])
+        return current(self._setup.controller, targets[1 if second else 0])
 
     def _on_it(self, thing: Thing) -> Thing:
         """Where going to an object leads: to the first of the task's related objects that lies in
         it, if it is a receptacle that does not open."""
         if thing.receptacle and not thing.openable:
-            for object_id in self._setting.task.related_objects:
+            for object_id in self._setup.task.related_objects:
                 if object_id in thing.contents:
-                    return current(self._setting.controller, object_id) or thing
+                    return current(self._setup.controller, object_id) or thing
         return thing
 
 

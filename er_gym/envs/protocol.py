@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from er_gym.envs.action_handler import ActionHandler, DefaultActionHandler, Setting
+from er_gym.envs.action_handler import ActionHandler, DefaultActionHandler, EpisodeSetup
 from er_gym.envs.actions import Action, AnyAction, understand
 from er_gym.envs.arguments import one_of
 from er_gym.envs.paper_action_handler import PaperActionHandler, understand_as_paper
@@ -41,7 +41,7 @@ class EpisodeProtocol:
 
     name: str
     understand: Callable[[AnyAction, ObjectTable], tuple[Action | None, str]]
-    action_handler: Callable[[Setting], ActionHandler]
+    action_handler: Callable[[EpisodeSetup], ActionHandler]
     start: Callable[[Mapping[str, Any], Reachable], AgentPose]
     chooses_instances: bool = False
     unknown_breaks_runs: bool = False
