@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from er_gym.envs import legality, skills
 from er_gym.envs import object_selection as which
 from er_gym.envs.actions import Action
-from er_gym.envs.legality import Known, Surroundings
+from er_gym.envs.legality import AvailableObjects, Known
 from er_gym.envs.perception import Perception
 from er_gym.envs.skills import Outcome, Reachable
 from er_gym.tasks import verbs
@@ -56,20 +56,20 @@ class ActionHandler(Protocol):
 
     at: str
 
-    def around(self, perception: Perception) -> Surroundings:
+    def available_objects(self, perception: Perception) -> AvailableObjects:
         """What can be gone to and interacted with, given what is perceived."""
 
-    def objection(self, action: Action, around: Surroundings, known: Known) -> str:
+    def objection(self, action: Action, available: AvailableObjects, known: Known) -> str:
         """Why an action is illegal now, in words for the agent; "" when it is legal."""
 
-    def legal(self, around: Surroundings, known: Known) -> NDArray[np.int8]:
+    def legal(self, available: AvailableObjects, known: Known) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
 
     def do(
         self,
         action: Action,
         perception: Perception,
-        around: Surroundings,
+        available: AvailableObjects,
         left: Sequence[KeyAction],
     ) -> Done:
         """Carry out a legal action; ``left``: the key actions that are still to be done."""
@@ -87,23 +87,23 @@ class DefaultActionHandler:
         self._setup = setup
         self._visited: dict[str, list[str]] = {}
 
-    def around(self, perception: Perception) -> Surroundings:
-        """See :func:`~er_gym.envs.legality.surroundings`."""
-        return legality.surroundings(perception, self.at)
+    def available_objects(self, perception: Perception) -> AvailableObjects:
+        """See :func:`~er_gym.envs.legality.available_objects`."""
+        return legality.available_objects(perception, self.at)
 
-    def objection(self, action: Action, around: Surroundings, known: Known) -> str:
+    def objection(self, action: Action, available: AvailableObjects, known: Known) -> str:
         """See :func:`~er_gym.envs.legality.objection`."""
-        return legality.objection(action, around, known)
+        return legality.objection(action, available, known)
 
-    def legal(self, around: Surroundings, known: Known) -> NDArray[np.int8]:
+    def legal(self, available: AvailableObjects, known: Known) -> NDArray[np.int8]:
         """See :func:`~er_gym.envs.legality.legal_actions`."""
-        return legality.legal_actions(around, known)
+        return legality.legal_actions(available, known)
 
     def do(
         self,
         action: Action,
         perception: Perception,
-        around: Surroundings,
+        available: AvailableObjects,
         left: Sequence[KeyAction],
     ) -> Done:
         """Carry out a legal action by the skills of :mod:`er_gym.envs.skills`."""
@@ -118,7 +118,7 @@ class DefaultActionHandler:
             return "", skills.do_alone(setup.controller, action.verb)
         if action.verb == verbs.NAVIGATE:
             return self._navigate(action.object_type, perception, left)
-        able = legality.suited(action, around)
+        able = legality.suited(action, available)
         if setup.instances == which.TARGET:
             chosen = which.by_task(setup.task, left, action.verb, able, objects)
         else:

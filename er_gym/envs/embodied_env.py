@@ -270,7 +270,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
         with self._alone:
             self._need_episode("action_masks()")
-            return self._handler.legal(self._around, self._known)
+            return self._handler.legal(self._available, self._known)
 
     @property
     def task(self) -> Task:
@@ -420,12 +420,12 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             said = self._protocol.repeated or understood
             return self._reply(said, text, False, "", feedback, 0.0)
         self._steps += understood.verb != verbs.END or self._protocol.end_is_step
-        refused = self._handler.objection(understood, self._around, self._known)
+        refused = self._handler.objection(understood, self._available, self._known)
         if refused:
             object_id, outcome = "", skills.Outcome(None, False, refused)
         else:
             object_id, outcome = self._handler.do(
-                understood, self._percept, self._around, self._progress.left
+                understood, self._percept, self._available, self._progress.left
             )
         self._memory.act(understood, outcome.success)
         self._take_in(outcome)
@@ -479,8 +479,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         for perception in (*outcome.views.values(), outcome.perception):
             if perception is not None:
                 self._percept = perception
-                self._around = self._handler.around(perception)
-                self._known.add(perception.objects.kinds[self._around.navigable])
+                self._available = self._handler.available_objects(perception)
+                self._known.add(perception.objects.kinds[self._available.navigable])
                 self._memory.look(perception, self._at_kind)
 
     @property
@@ -496,13 +496,13 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             return 0.0
         if action.verb == verbs.END and self._task.goal:
             self._goal_unmet = unmet(
-                self._task.goal, self._objects_of_goal(), self._around.in_reach
+                self._task.goal, self._objects_of_goal(), self._available.in_reach
             )
         self._progress, reward = self._progress.after(
             action.verb,
             action.object_type,
             object_id,
-            in_reach=self._around.in_reach,
+            in_reach=self._available.in_reach,
             goal_holds=not self._goal_unmet,
         )
         return reward
@@ -564,7 +564,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _observation(self, feedback: str, success: bool) -> dict[str, Any]:
         situation = Situation(
             perception=self._percept,
-            around=self._around,
+            available=self._available,
             memory=self._memory,
             known=self._known,
             instruction=self._task.instruction,
@@ -579,7 +579,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _info(
         self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
     ) -> Info:
-        mask = self._handler.legal(self._around, self._known)
+        mask = self._handler.legal(self._available, self._known)
         return {
             "task": self._task,
             "action": action,
@@ -594,7 +594,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             "visible": self._percept.visible_names,
             "held": self._percept.held_name,
             "navigable": self._known.names,
-            "interactable": self._around.in_reach,
+            "interactable": self._available.in_reach,
             "legal": LegalActions(mask),
             "action_mask": mask,
             "steps": self._steps,

@@ -149,7 +149,7 @@ def affordances(table: ObjectTable) -> Affordances:
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
+class AvailableObjects:
     """What the agent can do things to, now.
 
     Attributes:
@@ -176,7 +176,7 @@ class Surroundings:
         return names(self.interactable_types)
 
 
-def surroundings(perception: Perception, at: str = "") -> Surroundings:
+def available_objects(perception: Perception, at: str = "") -> AvailableObjects:
     """Judge what is perceived.
 
     Args:
@@ -199,7 +199,7 @@ def surroundings(perception: Perception, at: str = "") -> Surroundings:
         reach = plain | (visible & alike)
     navigable = plain.nonzero()[0]
     standing, burners = can.on_burners
-    return Surroundings(
+    return AvailableObjects(
         objects=table,
         navigable=navigable,
         interactable=navigable if reach is plain else reach.nonzero()[0],
@@ -238,14 +238,14 @@ class Known:
         return object_type in self._names
 
 
-def suited(action: Action, around: Surroundings) -> list[int]:
+def suited(action: Action, available: AvailableObjects) -> list[int]:
     """Rows of the objects that an interaction can be done to as things are now."""
-    rows, held = around.interactable, around.objects.held
-    if action.verb == verbs.TOGGLE and len(around.covered):
-        rows = np.union1d(rows, around.covered)
+    rows, held = available.interactable, available.objects.held
+    if action.verb == verbs.TOGGLE and len(available.covered):
+        rows = np.union1d(rows, available.covered)
     if held >= 0 and verbs.verb_named(action.verb).in_hand:
         rows = np.union1d(rows, [held])
-    actions = affordances(around.objects).actions[rows, _NUMBER[action.verb]]
+    actions = affordances(available.objects).actions[rows, _NUMBER[action.verb]]
     index = INDEX.get(action)
     return [
         row
@@ -254,9 +254,9 @@ def suited(action: Action, around: Surroundings) -> list[int]:
     ]
 
 
-def objection(action: Action, around: Surroundings, known: Known) -> str:
+def objection(action: Action, available: AvailableObjects, known: Known) -> str:
     """Why an action is illegal now, in words for the agent; "" when it is legal."""
-    name, objects = action.object_type, around.objects
+    name, objects = action.object_type, available.objects
     verb = verbs.verb_named(action.verb)
     if verb.alone:
         return "" if _hand_fits(verb, objects) else _hand_objection(action, verb, objects)
@@ -267,27 +267,27 @@ def objection(action: Action, around: Surroundings, known: Known) -> str:
             f"You cannot navigate to {name}: none has been close enough to see clearly. "
             f"You could go to: {_listing(known.names)}."
         )
-    if suited(action, around):
+    if suited(action, available):
         return ""
     if applies(action.verb, name):
         if not _hand_fits(verb, objects):
             return _hand_objection(action, verb, objects)
         in_hand = verb.in_hand and objects.held >= 0 and objects.type_of(objects.held) == name
-        if not around.interactable_types[KIND_OF[name]] and not in_hand:
+        if not available.interactable_types[KIND_OF[name]] and not in_hand:
             return (
                 f"You cannot {action}: none is within reach and in view. "
-                f"There is: {_listing(around.in_reach)}."
+                f"There is: {_listing(available.in_reach)}."
             )
     return f"You cannot {action}. {verb.otherwise or 'It is not in the state for that.'}"
 
 
-def legal_actions(around: Surroundings, known: Known) -> NDArray[np.int8]:
+def legal_actions(available: AvailableObjects, known: Known) -> NDArray[np.int8]:
     """(len(ACTIONS),) int8: 1 for each action to which :func:`objection` has none."""
-    legal, objects = known.legal.copy(), around.objects
+    legal, objects = known.legal.copy(), available.objects
     possible = affordances(objects).actions
-    interactions = possible[around.interactable]
+    interactions = possible[available.interactable]
     legal[interactions[interactions >= 0]] = 1
-    if len(around.covered):
+    if len(available.covered):
         legal[_TOGGLE_BURNER] = 1
     if _IN_HAND and objects.held >= 0:
         with_held = possible[objects.held, _IN_HAND]

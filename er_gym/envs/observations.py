@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from er_gym.envs.actions import Action
 from er_gym.envs.arguments import shown
-from er_gym.envs.legality import Known, Surroundings
+from er_gym.envs.legality import AvailableObjects, Known
 from er_gym.envs.perception import Perception
 from er_gym.plugins import PluginError, Registry, is_dotted
 from er_gym.tasks import verbs
@@ -158,7 +158,7 @@ class Situation:
     """
 
     perception: Perception
-    around: Surroundings
+    available: AvailableObjects
     memory: Memory
     known: Known
     instruction: str
@@ -242,7 +242,7 @@ def _state(situation: Situation) -> NDArray[np.float32]:
     table[_ROW["visible"]] = situation.perception.visible_types
     table[_ROW["seen"]] = memory.seen
     table[_ROW["navigable"]] = situation.known.types
-    table[_ROW["interactable"]] = situation.around.interactable_types
+    table[_ROW["interactable"]] = situation.available.interactable_types
     table[_ROW["open"]] = memory.is_open
     table[_ROW["on"]] = memory.is_on
     table[_ROW["goal"]] = memory.wanted
@@ -280,7 +280,7 @@ def _text(situation: Situation) -> str:
         f"You see: {', '.join(perception.visible_names) or 'nothing'}.",
         f"You hold: {perception.held_name or 'nothing'}.",
         f"You can navigate to: {', '.join(situation.known.names) or 'nothing'}.",
-        f"Within reach: {', '.join(situation.around.in_reach) or 'nothing'}.",
+        f"Within reach: {', '.join(situation.available.in_reach) or 'nothing'}.",
     )
     return _plain("\n".join(lines))
 

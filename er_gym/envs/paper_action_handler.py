@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from er_gym.envs.action_handler import Done, EpisodeSetup
 from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
-from er_gym.envs.legality import Known, Surroundings, navigable_within
+from er_gym.envs.legality import AvailableObjects, Known, navigable_within
 from er_gym.envs.paper_approach import Thing, approach, current, thing_of
 from er_gym.envs.paper_skills import interact, move_forward, observe, start_again
 from er_gym.envs.perception import Perception, marked
@@ -97,7 +97,7 @@ class PaperActionHandler:
             if entry["objectType"] not in self._first:
                 self._first[entry["objectType"]] = thing_of(entry)
 
-    def around(self, perception: Perception) -> Surroundings:
+    def available_objects(self, perception: Perception) -> AvailableObjects:
         """What is plain to see, what is in the hand included; and what lay in the receptacle."""
         table, visible = perception.objects, perception.visible
         away = np.hypot(
@@ -105,30 +105,30 @@ class PaperActionHandler:
         )
         plain = visible & (away < _within(table))
         inside = visible & self._inside[table.kinds]
-        return Surroundings(
+        return AvailableObjects(
             objects=table,
             navigable=plain.nonzero()[0],
             interactable=(plain | inside).nonzero()[0],
             covered=np.array([], np.intp),  # AI2-THOR refuses what a pan hides
         )
 
-    def objection(self, action: Action, around: Surroundings, known: Known) -> str:
+    def objection(self, action: Action, available: AvailableObjects, known: Known) -> str:
         """A type must be known to go there, and at hand to do anything else to it."""
         name = action.object_type
         if action.verb in (verbs.INIT, *_BARE):
             return ""
         if action.verb == verbs.NAVIGATE:
             return "" if name in known else f"You cannot navigate to {name or 'nothing'}."
-        if name in around.in_reach:
+        if name in available.in_reach:
             return ""
         return f"You cannot {action.verb} {name or 'nothing'}: it is not available for interaction."
 
-    def legal(self, around: Surroundings, known: Known) -> NDArray[np.int8]:
+    def legal(self, available: AvailableObjects, known: Known) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: the paper's interactions with what is at hand are legal."""
         legal = known.legal.copy()
         legal[_NOT_BARE] = 0
         for verb in _INTERACTIONS:
-            indices = INDICES[verb][around.interactable_types]
+            indices = INDICES[verb][available.interactable_types]
             legal[indices[indices >= 0]] = 1
         return legal
 
@@ -136,7 +136,7 @@ class PaperActionHandler:
         self,
         action: Action,
         perception: Perception,
-        around: Surroundings,
+        available: AvailableObjects,
         left: Sequence[KeyAction],
     ) -> Done:
         """Carry out a legal action."""

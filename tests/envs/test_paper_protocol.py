@@ -215,9 +215,9 @@ def test_init_begins_where_the_episode_began(env: EmbodiedEnv, play: Play) -> No
 
 def test_the_mask_allows_what_would_be_tried(env: EmbodiedEnv, play: Play) -> None:
     play(TAKE_APPLE, "navigate to CounterTop", "pickup Apple")
-    around, known = env._around, env._known
+    available, known = env._available, env._known
     assert env.action_masks().tolist() == [
-        int(action.verb != "slice" and not env._handler.objection(action, around, known))
+        int(action.verb != "slice" and not env._handler.objection(action, available, known))
         for action in ACTIONS
     ]
 

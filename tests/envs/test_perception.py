@@ -14,7 +14,7 @@ import pytest
 from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.legality import Known, legal_actions, navigable_within, surroundings
+from er_gym.envs.legality import Known, available_objects, legal_actions, navigable_within
 from er_gym.envs.observations import Memory
 from er_gym.envs.perception import Perception, names, perceive
 from er_gym.sim.lazy_metadata import LazyMetadata
@@ -93,8 +93,8 @@ def box(x: float, y: float, z: float, distance: float, **fields: Any) -> Entry:
     ],
 )
 def test_navigable_rule(entry: Entry, expected: bool) -> None:
-    around = surroundings(perception_of(entry))
-    assert around.navigable.tolist() == around.interactable.tolist() == [0] * expected
+    available = available_objects(perception_of(entry))
+    assert available.navigable.tolist() == available.interactable.tolist() == [0] * expected
 
 
 def rule(volume: float, face: float, distance: float) -> bool:
@@ -130,11 +130,11 @@ def test_what_is_like_the_contents_of_where_one_is_can_be_handled_wherever_it_is
         make_entry("Apple|1", centre=FAR),
         make_entry("Egg|4"),
     )
-    around = surroundings(perception, "Bowl|1")
-    assert [perception.objects.ids[k] for k in around.navigable] == ["Egg|4"]
-    assert [perception.objects.ids[k] for k in around.interactable] == ["Egg|2", "Egg|4"]
+    available = available_objects(perception, "Bowl|1")
+    assert [perception.objects.ids[k] for k in available.navigable] == ["Egg|4"]
+    assert [perception.objects.ids[k] for k in available.interactable] == ["Egg|2", "Egg|4"]
     for elsewhere in ("", "Egg|4", "Bowl|2"):
-        found = surroundings(perception, elsewhere).interactable
+        found = available_objects(perception, elsewhere).interactable
         assert [perception.objects.ids[k] for k in found] == ["Egg|4"]
 
 
@@ -146,7 +146,7 @@ def test_the_hand_decides_between_picking_up_and_putting() -> None:
     near = (make_entry("Apple|1", pickupable=True), make_entry("Bowl|1", receptacle=True))
     held = make_entry("Egg|1", pickupable=True, isPickedUp=True)
     for entries, legal in ((near, "pickup Apple"), ((*near, held), "put in Bowl")):
-        mask = legal_actions(surroundings(perception_of(*entries)), Known(["Narnia", "Floor"]))
+        mask = legal_actions(available_objects(perception_of(*entries)), Known(["Narnia", "Floor"]))
         assert set(told(mask)) == {"observe", "move forward", "end", legal}
 
 
@@ -217,7 +217,7 @@ class Twin:
         assert (ours.visible_types == plain.visible_types).all()
         known = Known([])
         for at in ("", *ours.objects.ids):
-            one, other = surroundings(ours, at), surroundings(plain, at)
+            one, other = available_objects(ours, at), available_objects(plain, at)
             assert [ours.objects.ids[k] for k in one.navigable] == navigable_ids(metadata)
             assert one.interactable.tolist() == other.interactable.tolist()
             assert one.in_reach == other.in_reach
