@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from er_gym.envs import legality, skills
 from er_gym.envs import object_selection as which
 from er_gym.envs.actions import Action
-from er_gym.envs.legality import AvailableObjects, Known
+from er_gym.envs.legality import AvailableObjects, KnownTypes
 from er_gym.envs.perception import Perception
 from er_gym.envs.skills import Outcome, Reachable
 from er_gym.tasks import verbs
@@ -59,10 +59,10 @@ class ActionHandler(Protocol):
     def available_objects(self, perception: Perception) -> AvailableObjects:
         """What can be gone to and interacted with, given what is perceived."""
 
-    def objection(self, action: Action, available: AvailableObjects, known: Known) -> str:
+    def illegal_reason(self, action: Action, available: AvailableObjects, known: KnownTypes) -> str:
         """Why an action is illegal now, in words for the agent; "" when it is legal."""
 
-    def legal(self, available: AvailableObjects, known: Known) -> NDArray[np.int8]:
+    def legal(self, available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
 
     def do(
@@ -91,11 +91,11 @@ class DefaultActionHandler:
         """See :func:`~er_gym.envs.legality.available_objects`."""
         return legality.available_objects(perception, self.at)
 
-    def objection(self, action: Action, available: AvailableObjects, known: Known) -> str:
-        """See :func:`~er_gym.envs.legality.objection`."""
-        return legality.objection(action, available, known)
+    def illegal_reason(self, action: Action, available: AvailableObjects, known: KnownTypes) -> str:
+        """See :func:`~er_gym.envs.legality.illegal_reason`."""
+        return legality.illegal_reason(action, available, known)
 
-    def legal(self, available: AvailableObjects, known: Known) -> NDArray[np.int8]:
+    def legal(self, available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
         """See :func:`~er_gym.envs.legality.legal_actions`."""
         return legality.legal_actions(available, known)
 
@@ -118,7 +118,7 @@ class DefaultActionHandler:
             return "", skills.do_alone(setup.controller, action.verb)
         if action.verb == verbs.NAVIGATE:
             return self._navigate(action.object_type, perception, left)
-        able = legality.suited(action, available)
+        able = legality.candidate_rows(action, available)
         if setup.instances == which.TARGET:
             chosen = which.by_task(setup.task, left, action.verb, able, objects)
         else:

@@ -21,7 +21,7 @@ from er_gym.envs.actions import ACTIONS, Action, AnyAction
 from er_gym.envs.arguments import flag, number, one_of, shown, whole
 from er_gym.envs.errors import ResetNeeded
 from er_gym.envs.info import Info, LegalActions
-from er_gym.envs.legality import Known
+from er_gym.envs.legality import KnownTypes
 from er_gym.envs.observations import (
     MAX_REPEATS,
     Memory,
@@ -382,7 +382,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         pose = self._protocol.start(bounds, floor)
         self._memory = Memory(pose, goal_row(task.instruction))
         self._progress = Progress.start(Criteria.of(task))
-        self._known = Known(task.navigable_objects)
+        self._known = KnownTypes(task.navigable_objects)
         self._handler = self._protocol.action_handler(
             EpisodeSetup(task, controller, floor, pose, self._grid_size, self._instances)
         )
@@ -420,7 +420,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             said = self._protocol.repeated or understood
             return self._reply(said, text, False, "", feedback, 0.0)
         self._steps += understood.verb != verbs.END or self._protocol.end_is_step
-        refused = self._handler.objection(understood, self._available, self._known)
+        refused = self._handler.illegal_reason(understood, self._available, self._known)
         if refused:
             object_id, outcome = "", skills.Outcome(None, False, refused)
         else:

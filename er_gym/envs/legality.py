@@ -84,7 +84,7 @@ def _hand_fits(verb: Verb, table: ObjectTable) -> bool:
     return table.held >= 0 and table.type_of(table.held) in verb.hand
 
 
-def _hand_objection(action: Action, verb: Verb, table: ObjectTable) -> str:
+def _hand_problem(action: Action, verb: Verb, table: ObjectTable) -> str:
     """What is wrong with the hand, in words for the agent."""
     if verb.hand == verbs.EMPTY:
         return f"You hold {table.type_of(table.held)} already; put it down first."
@@ -207,7 +207,7 @@ def available_objects(perception: Perception, at: str = "") -> AvailableObjects:
     )
 
 
-class Known:
+class KnownTypes:
     """The types that may be navigated to: what was plain to see once in an episode stays so.
 
     Attributes:
@@ -238,7 +238,7 @@ class Known:
         return object_type in self._names
 
 
-def suited(action: Action, available: AvailableObjects) -> list[int]:
+def candidate_rows(action: Action, available: AvailableObjects) -> list[int]:
     """Rows of the objects that an interaction can be done to as things are now."""
     rows, held = available.interactable, available.objects.held
     if action.verb == verbs.TOGGLE and len(available.covered):
@@ -254,12 +254,12 @@ def suited(action: Action, available: AvailableObjects) -> list[int]:
     ]
 
 
-def objection(action: Action, available: AvailableObjects, known: Known) -> str:
+def illegal_reason(action: Action, available: AvailableObjects, known: KnownTypes) -> str:
     """Why an action is illegal now, in words for the agent; "" when it is legal."""
     name, objects = action.object_type, available.objects
     verb = verbs.verb_named(action.verb)
     if verb.alone:
-        return "" if _hand_fits(verb, objects) else _hand_objection(action, verb, objects)
+        return "" if _hand_fits(verb, objects) else _hand_problem(action, verb, objects)
     if action.verb == verbs.NAVIGATE:
         if name in known:
             return ""
@@ -267,11 +267,11 @@ def objection(action: Action, available: AvailableObjects, known: Known) -> str:
             f"You cannot navigate to {name}: none has been close enough to see clearly. "
             f"You could go to: {_listing(known.names)}."
         )
-    if suited(action, available):
+    if candidate_rows(action, available):
         return ""
     if applies(action.verb, name):
         if not _hand_fits(verb, objects):
-            return _hand_objection(action, verb, objects)
+            return _hand_problem(action, verb, objects)
         in_hand = verb.in_hand and objects.held >= 0 and objects.type_of(objects.held) == name
         if not available.interactable_types[KIND_OF[name]] and not in_hand:
             return (
@@ -281,8 +281,8 @@ def objection(action: Action, available: AvailableObjects, known: Known) -> str:
     return f"You cannot {action}. {verb.otherwise or 'It is not in the state for that.'}"
 
 
-def legal_actions(available: AvailableObjects, known: Known) -> NDArray[np.int8]:
-    """(len(ACTIONS),) int8: 1 for each action to which :func:`objection` has none."""
+def legal_actions(available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
+    """(len(ACTIONS),) int8: 1 for each action to which :func:`illegal_reason` has none."""
     legal, objects = known.legal.copy(), available.objects
     possible = affordances(objects).actions
     interactions = possible[available.interactable]

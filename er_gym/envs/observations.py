@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from er_gym.envs.actions import Action
 from er_gym.envs.arguments import shown
-from er_gym.envs.legality import AvailableObjects, Known
+from er_gym.envs.legality import AvailableObjects, KnownTypes
 from er_gym.envs.perception import Perception
 from er_gym.plugins import PluginError, Registry, is_dotted
 from er_gym.tasks import verbs
@@ -160,7 +160,7 @@ class Situation:
     perception: Perception
     available: AvailableObjects
     memory: Memory
-    known: Known
+    known: KnownTypes
     instruction: str
     feedback: str
     at: int | None

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from er_gym.envs.action_handler import Done, EpisodeSetup
 from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
-from er_gym.envs.legality import AvailableObjects, Known, navigable_within
+from er_gym.envs.legality import AvailableObjects, KnownTypes, navigable_within
 from er_gym.envs.paper_approach import Thing, approach, current, thing_of
 from er_gym.envs.paper_skills import interact, move_forward, observe, start_again
 from er_gym.envs.perception import Perception, marked
@@ -112,7 +112,7 @@ class PaperActionHandler:
             covered=np.array([], np.intp),  # AI2-THOR refuses what a pan hides
         )
 
-    def objection(self, action: Action, available: AvailableObjects, known: Known) -> str:
+    def illegal_reason(self, action: Action, available: AvailableObjects, known: KnownTypes) -> str:
         """A type must be known to go there, and at hand to do anything else to it."""
         name = action.object_type
         if action.verb in (verbs.INIT, *_BARE):
@@ -123,7 +123,7 @@ class PaperActionHandler:
             return ""
         return f"You cannot {action.verb} {name or 'nothing'}: it is not available for interaction."
 
-    def legal(self, available: AvailableObjects, known: Known) -> NDArray[np.int8]:
+    def legal(self, available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: the paper's interactions with what is at hand are legal."""
         legal = known.legal.copy()
         legal[_NOT_BARE] = 0

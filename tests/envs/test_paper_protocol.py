@@ -217,7 +217,7 @@ def test_the_mask_allows_what_would_be_tried(env: EmbodiedEnv, play: Play) -> No
     play(TAKE_APPLE, "navigate to CounterTop", "pickup Apple")
     available, known = env._available, env._known
     assert env.action_masks().tolist() == [
-        int(action.verb != "slice" and not env._handler.objection(action, available, known))
+        int(action.verb != "slice" and not env._handler.illegal_reason(action, available, known))
         for action in ACTIONS
     ]
 

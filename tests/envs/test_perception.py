@@ -14,7 +14,7 @@ import pytest
 from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.legality import Known, available_objects, legal_actions, navigable_within
+from er_gym.envs.legality import KnownTypes, available_objects, legal_actions, navigable_within
 from er_gym.envs.observations import Memory
 from er_gym.envs.perception import Perception, names, perceive
 from er_gym.sim.lazy_metadata import LazyMetadata
@@ -146,12 +146,14 @@ def test_the_hand_decides_between_picking_up_and_putting() -> None:
     near = (make_entry("Apple|1", pickupable=True), make_entry("Bowl|1", receptacle=True))
     held = make_entry("Egg|1", pickupable=True, isPickedUp=True)
     for entries, legal in ((near, "pickup Apple"), ((*near, held), "put in Bowl")):
-        mask = legal_actions(available_objects(perception_of(*entries)), Known(["Narnia", "Floor"]))
+        mask = legal_actions(
+            available_objects(perception_of(*entries)), KnownTypes(["Narnia", "Floor"])
+        )
         assert set(told(mask)) == {"observe", "move forward", "end", legal}
 
 
 def test_known_types_grow_and_are_told_in_order() -> None:
-    known = Known(["Mug", "Narnia", "Floor"])
+    known = KnownTypes(["Mug", "Narnia", "Floor"])
     assert known.names == ("Mug", "Narnia")
     known.add(np.array([KIND_OF["Apple"], KIND_OF["Mug"], KIND_OF["Apple"]]))
     assert known.names == ("Apple", "Mug", "Narnia")
@@ -215,7 +217,7 @@ class Twin:
         assert ours.pose == plain.pose
         assert np.allclose(ours.objects.centre, plain.objects.centre)  # what is carried moves
         assert (ours.visible_types == plain.visible_types).all()
-        known = Known([])
+        known = KnownTypes([])
         for at in ("", *ours.objects.ids):
             one, other = available_objects(ours, at), available_objects(plain, at)
             assert [ours.objects.ids[k] for k in one.navigable] == navigable_ids(metadata)
