@@ -22,7 +22,7 @@ from er_gym.envs.skills import Outcome, Reachable
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose, KeyAction, Task
 
-Done = tuple[str, Outcome]
+ExecutedAction = tuple[str, Outcome]
 """The id of the object that an action was done to, ``""`` for none, and what came of it."""
 
 
@@ -51,10 +51,10 @@ class ActionHandler(Protocol):
     """How actions are judged and carried out in one episode.
 
     Attributes:
-        at: id of the object last navigated to, ``""`` before that.
+        navigated_to: id of the object last navigated to, ``""`` before that.
     """
 
-    at: str
+    navigated_to: str
 
     def available_objects(self, perception: Perception) -> AvailableObjects:
         """What can be gone to and interacted with, given what is perceived."""
@@ -65,13 +65,13 @@ class ActionHandler(Protocol):
     def legal(self, available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
 
-    def do(
+    def execute(
         self,
         action: Action,
         perception: Perception,
         available: AvailableObjects,
         left: Sequence[KeyAction],
-    ) -> Done:
+    ) -> ExecutedAction:
         """Carry out a legal action; ``left``: the key actions that are still to be done."""
 
 
@@ -83,13 +83,13 @@ class DefaultActionHandler:
     """
 
     def __init__(self, setup: EpisodeSetup) -> None:
-        self.at = ""
+        self.navigated_to = ""
         self._setup = setup
         self._visited: dict[str, list[str]] = {}
 
     def available_objects(self, perception: Perception) -> AvailableObjects:
         """See :func:`~er_gym.envs.legality.available_objects`."""
-        return legality.available_objects(perception, self.at)
+        return legality.available_objects(perception, self.navigated_to)
 
     def illegal_reason(self, action: Action, available: AvailableObjects, known: KnownTypes) -> str:
         """See :func:`~er_gym.envs.legality.illegal_reason`."""
@@ -99,13 +99,13 @@ class DefaultActionHandler:
         """See :func:`~er_gym.envs.legality.legal_actions`."""
         return legality.legal_actions(available, known)
 
-    def do(
+    def execute(
         self,
         action: Action,
         perception: Perception,
         available: AvailableObjects,
         left: Sequence[KeyAction],
-    ) -> Done:
+    ) -> ExecutedAction:
         """Carry out a legal action by the skills of :mod:`er_gym.envs.skills`."""
         setup, objects = self._setup, perception.objects
         if action.verb == verbs.OBSERVE:
@@ -115,7 +115,7 @@ class DefaultActionHandler:
         if action.verb == verbs.END:
             return "", Outcome(None, True)
         if action.verb in verbs.BARE_VERBS:
-            return "", skills.do_alone(setup.controller, action.verb)
+            return "", skills.act_without_object(setup.controller, action.verb)
         if action.verb == verbs.NAVIGATE:
             return self._navigate(action.object_type, perception, left)
         able = legality.candidate_rows(action, available)
@@ -128,7 +128,7 @@ class DefaultActionHandler:
 
     def _navigate(
         self, object_type: str, perception: Perception, left: Sequence[KeyAction]
-    ) -> Done:
+    ) -> ExecutedAction:
         setup, objects = self._setup, perception.objects
         able = objects.of_type(object_type)
         if not able:
@@ -152,5 +152,5 @@ class DefaultActionHandler:
             aim = aim if container is None else container
             outcome = skills.navigate(setup.controller, perception, aim, setup.floor)
         if outcome.success:
-            self.at = goal_id
+            self.navigated_to = goal_id
         return goal_id, outcome

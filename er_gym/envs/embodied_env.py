@@ -424,7 +424,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         if refused:
             object_id, outcome = "", skills.Outcome(None, False, refused)
         else:
-            object_id, outcome = self._handler.do(
+            object_id, outcome = self._handler.execute(
                 understood, self._percept, self._available, self._progress.left
             )
         self._memory.act(understood, outcome.success)
@@ -481,13 +481,13 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                 self._percept = perception
                 self._available = self._handler.available_objects(perception)
                 self._known.add(perception.objects.kinds[self._available.navigable])
-                self._memory.look(perception, self._at_kind)
+                self._memory.look(perception, self._navigated_to_kind)
 
     @property
-    def _at_kind(self) -> int | None:
+    def _navigated_to_kind(self) -> int | None:
         """The type of what was last navigated to, if that is still there."""
         objects = self._percept.objects
-        row = objects.row.get(self._handler.at)
+        row = objects.row.get(self._handler.navigated_to)
         return None if row is None else int(objects.kinds[row])
 
     def _judge(self, action: Action, outcome: skills.Outcome, object_id: str) -> float:
@@ -569,7 +569,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             known=self._known,
             instruction=self._task.instruction,
             feedback=feedback,
-            at=self._at_kind,
+            at=self._navigated_to_kind,
             success=success,
             steps=self._steps,
             max_steps=self._limit,
@@ -623,7 +623,7 @@ def _checked(options: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _feedback(action: Action, outcome: skills.Outcome) -> str:
     if outcome.success:
-        return f"Done: {action}."
+        return f"ExecutedAction: {action}."
     return f"You could not {action}: {outcome.problem}"
 
 

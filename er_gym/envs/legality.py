@@ -176,11 +176,11 @@ class AvailableObjects:
         return names(self.interactable_types)
 
 
-def available_objects(perception: Perception, at: str = "") -> AvailableObjects:
+def available_objects(perception: Perception, navigated_to: str = "") -> AvailableObjects:
     """Judge what is perceived.
 
     Args:
-        at: id of the receptacle last navigated to. Things of the types that lie in it can be
+        navigated_to: id of the receptacle last navigated to. Things of the types that lie in it can be
             interacted with wherever they are visible.
     """
     table, visible = perception.objects, perception.visible

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.action_handler import Done, EpisodeSetup
+from er_gym.envs.action_handler import EpisodeSetup, ExecutedAction
 from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
 from er_gym.envs.legality import AvailableObjects, KnownTypes, navigable_within
 from er_gym.envs.paper_approach import Thing, approach, current, thing_of
@@ -85,7 +85,7 @@ class PaperActionHandler:
     """
 
     def __init__(self, setup: EpisodeSetup) -> None:
-        self.at = ""
+        self.navigated_to = ""
         self._setup, task = setup, setup.task
         self._inside = marked(np.array([], np.intp))  # types that lay in the last receptacle
         self._second = str(task.extra.get("identity")) in _SECOND_WHEN_HOLDING
@@ -132,13 +132,13 @@ class PaperActionHandler:
             legal[indices[indices >= 0]] = 1
         return legal
 
-    def do(
+    def execute(
         self,
         action: Action,
         perception: Perception,
         available: AvailableObjects,
         left: Sequence[KeyAction],
-    ) -> Done:
+    ) -> ExecutedAction:
         """Carry out a legal action."""
         setup, controller = self._setup, self._setup.controller
         if action.verb == verbs.OBSERVE:
@@ -157,7 +157,7 @@ class PaperActionHandler:
         aim = self._on_it(thing)
         outcome = approach(controller, aim, setup.task.poses.get(aim.object_id))
         if outcome.success:
-            self.at = thing.object_id
+            self.navigated_to = thing.object_id
             if aim.receptacle:
                 types = (object_id.split("|")[0] for object_id in aim.contents)
                 self._inside = marked(np.array([KIND_OF[t] for t in types if t in KIND_OF], int))

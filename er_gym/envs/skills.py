@@ -304,7 +304,7 @@ def interact(controller: Any, name: str, objects: ObjectTable, row: int) -> Outc
     )
 
 
-def do_alone(controller: Any, name: str) -> Outcome:
+def act_without_object(controller: Any, name: str) -> Outcome:
     """Do a verb that goes with no object, by its AI2-THOR action."""
     verb = verbs.verb_named(name)
     return _outcome(controller.step(action=verb.thor_action, **verb.parameters))
