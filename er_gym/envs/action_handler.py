@@ -1,7 +1,8 @@
-"""How actions are judged legal and carried out in one episode.
+"""How one episode judges which actions are legal, and carries them out.
 
-:class:`ActionHandler` is what the environment asks for; :class:`DefaultActionHandler` is the default protocol's
-(:mod:`er_gym.envs.protocol`). It holds what lasts for an episode: where the agent went.
+The environment calls an :class:`ActionHandler`. :class:`DefaultActionHandler` has the rules of the
+default protocol (:mod:`er_gym.envs.protocol`). A handler lives for one episode and remembers where
+the agent went.
 """
 
 from __future__ import annotations

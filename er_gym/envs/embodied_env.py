@@ -623,7 +623,7 @@ def _checked(options: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _feedback(action: Action, outcome: skills.Outcome) -> str:
     if outcome.success:
-        return f"ExecutedAction: {action}."
+        return f"Done: {action}."
     return f"You could not {action}: {outcome.problem}"
 
 

@@ -180,8 +180,8 @@ def available_objects(perception: Perception, navigated_to: str = "") -> Availab
     """Judge what is perceived.
 
     Args:
-        navigated_to: id of the receptacle last navigated to. Things of the types that lie in it can be
-            interacted with wherever they are visible.
+        navigated_to: id of the receptacle last navigated to. Objects of the types that lie in it
+            can be interacted with wherever they are visible.
     """
     table, visible = perception.objects, perception.visible
     can = affordances(table)
@@ -190,7 +190,7 @@ def available_objects(perception: Perception, navigated_to: str = "") -> Availab
     )
     plain = visible & (distance < can.within)
     reach = plain
-    row = table.row.get(at)
+    row = table.row.get(navigated_to)
     if row is not None and table.contents[row]:
         alike = can.alike.get(row)
         if alike is None:

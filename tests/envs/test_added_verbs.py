@@ -67,8 +67,8 @@ def test_models_are_told(seen: Any) -> None:
 
 def test_they_are_played_by_hand(seen: Any) -> None:
     said = {(action, success): feedback for action, success, feedback, _ in seen["played"]}
-    assert said["crouch", True] == "ExecutedAction: crouch."
-    assert said["fill Mug", True] == "ExecutedAction: fill Mug."
+    assert said["crouch", True] == "Done: crouch."
+    assert said["fill Mug", True] == "Done: fill Mug."
     assert said["fill Mug", False] == "You cannot fill Mug. It is not in the state for that."
     assert said["clean Mug", False] == (
         "You cannot clean Mug without a sponge or a cloth in your hand; "
