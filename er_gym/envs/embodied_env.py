@@ -218,15 +218,15 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         one_of("render_device", render_device, RENDER_DEVICES)
         if self._draws and backend == "embedded":
             self._controller_arguments["render_device"] = render_device
-        self._live: EpisodeSource | None = None
+        self._generator: EpisodeSource | None = None
         self._generates = isinstance(episode_source, str) and episode_source == GENERATE
-        self._source = self._from(episode_source)
+        self._source = self._resolve_source(episode_source)
         self._controller: Any = None
-        self._percept: Perception  # what was taken in last; nothing before the first reset
-        self._alone = threading.RLock()
-        self._missing = _NOT_BEGUN  # why there is no episode, "" if there is one
+        self._perception: Perception  # what was taken in last; nothing before the first reset
+        self._lock = threading.RLock()
+        self._no_episode = _NOT_BEGUN  # why there is no episode, "" if there is one
         self._end_reason = ""
-        self._done: list[AnyAction] = []  # in this episode, so that a copy can do it again
+        self._actions_taken: list[AnyAction] = []  # in this episode, so that a copy can do it again
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = spaces.Dict(
             {name: kind.space(width, height) for name, kind in self._obs.items()}
@@ -245,7 +245,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             gymnasium.error.Error: the seed is no whole number from 0.
         """
         checked = _checked({} if options is None else options)
-        with self._alone:
+        with self._lock:
             super().reset(seed=seed)
             return self._begin(self._choose(**checked))
 
@@ -258,7 +258,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                 no action at all; the episode goes on. (Text that names no known action is answered,
                 not raised, numbers included: models write them.)
         """
-        with self._alone:
+        with self._lock:
             self._need_episode("step()")
             if self._end_reason:
                 raise ResetNeeded(
@@ -268,7 +268,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     def action_masks(self) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
-        with self._alone:
+        with self._lock:
             self._need_episode("action_masks()")
             return self._handler.legal(self._available, self._known)
 
@@ -282,12 +282,12 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def agent_pose(self) -> AgentPose:
         """Where the agent is now."""
         self._need_episode("asking for the agent's pose")
-        return self._percept.pose
+        return self._perception.pose
 
     @property
     def objects(self) -> Sequence[Mapping[str, Any]]:
         """AI2-THOR's metadata of all objects, as they are now; a copy of the caller's own."""
-        with self._alone:
+        with self._lock:
             self._need_episode("asking for the objects")
             # Nine times as quick as deepcopy, and metadata are plain.
             return pickle.loads(pickle.dumps(self._all_objects()))  # type: ignore[no-any-return]
@@ -295,7 +295,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def render(self) -> NDArray[np.uint8] | None:
         """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``; the array
         is the caller's own."""
-        with self._alone:
+        with self._lock:
             self._need_episode("render()")
             if self.render_mode is None:
                 gymnasium.logger.warn(
@@ -303,21 +303,21 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                     "make it with render_mode='rgb_array'"
                 )
                 return None
-            if self._percept.frame is None:
+            if self._perception.frame is None:
                 headless, self._controller.headless = self._controller.headless, False
                 frame = self._controller.step(action="Pass").frame
                 self._controller.headless = headless
-                self._percept = replace(self._percept, frame=frame)
-            return np.array(self._percept.picture)
+                self._perception = replace(self._perception, frame=frame)
+            return np.array(self._perception.picture)
 
     def close(self) -> None:
         """Stop the controller, and the generator if there is one; ``reset`` opens them again."""
-        with self._alone:
+        with self._lock:
             if self._controller is not None:
                 self._controller.stop()
                 self._controller = None
-            self._missing = _CLOSED
-            live, self._live = self._live, None
+            self._no_episode = _CLOSED
+            live, self._generator = self._generator, None
             getattr(live, "close", lambda: None)()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -326,8 +326,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         Raises:
             gymnasium.error.Error: there is an episode, and it is Unity's.
         """
-        with self._alone:
-            if not self._missing and self._backend != "embedded":
+        with self._lock:
+            if not self._no_episode and self._backend != "embedded":
                 raise gymnasium.error.Error(
                     f"an episode on backend {self._backend!r} cannot be copied, since it does not "
                     "repeat itself exactly: copy the environment before reset(), or reset another "
@@ -336,8 +336,10 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             return {
                 **EzPickle.__getstate__(self),
                 "random": (self._np_random, self._np_random_seed, self.action_space),
-                "missing": self._missing,
-                "episode": None if self._missing else (self._task, self._done, self._standing),
+                "missing": self._no_episode,
+                "episode": None
+                if self._no_episode
+                else (self._task, self._actions_taken, self._fingerprint),
             }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -352,30 +354,30 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             self._begin(task)
             for action in done:
                 self._do(action)
-            if self._standing != standing:
+            if self._fingerprint != standing:
                 self.close()
                 raise gymnasium.error.Error(
                     f"the episode of task {task.id} did not come out the same when it was played "
                     "again; reset a new environment instead"
                 )
-        self._missing = state["missing"]
+        self._no_episode = state["missing"]
         self._np_random, self._np_random_seed, self.action_space = state["random"]
 
     # -- the loop's parts ------------------------------------------------------------------------
 
     def _need_episode(self, before: str) -> None:
-        if self._missing:
-            raise ResetNeeded(f"{self._missing}: call reset() before {before}")
+        if self._no_episode:
+            raise ResetNeeded(f"{self._no_episode}: call reset() before {before}")
 
     @property
-    def _standing(self) -> tuple[Any, ...]:
+    def _fingerprint(self) -> tuple[Any, ...]:
         """What tells two courses of an episode apart."""
-        return self._percept.pose, self._steps, self._end_reason, self._known.names
+        return self._perception.pose, self._steps, self._end_reason, self._known.names
 
     def _begin(self, task: Task) -> tuple[dict[str, Any], dict[str, Any]]:
-        self._missing = _BROKEN_OFF  # until all of it is done
+        self._no_episode = _BROKEN_OFF  # until all of it is done
         self._task = task
-        self._done = []
+        self._actions_taken = []
         controller = self._started_controller(task.scene)
         bounds = begin(controller, task.scene, task.start).metadata["sceneBounds"]
         floor = skills.reachable(controller, (self._backend, task.scene, self._grid_size))
@@ -387,24 +389,24 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             EpisodeSetup(task, controller, floor, pose, self._grid_size, self._instances)
         )
         self._steps = 1
-        self._limit = self._max_steps or task.max_steps
-        self._unknown = 0
+        self._step_limit = self._max_steps or task.max_steps
+        self._unknown_replies = 0
         self._end_reason = ""
         self._goal_unmet: tuple[Condition, ...] = ()
         placed = skills.place(controller, pose)
-        self._take_in(placed)
+        self._perceive(placed)
         feedback = "You look around the room."
         info = self._info(None, "", placed.success, "", feedback)
         answer = self._observation(feedback, True), cast(dict[str, Any], info)
-        self._missing = ""
+        self._no_episode = ""
         return answer
 
     def _do(self, action: AnyAction) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        understood, text = self._protocol.understand(action, self._percept.objects)
-        self._missing = _BROKEN_OFF  # until all of it is done
-        self._done.append(int(action.item()) if isinstance(action, np.ndarray) else action)
+        understood, text = self._protocol.understand(action, self._perception.objects)
+        self._no_episode = _BROKEN_OFF  # until all of it is done
+        self._actions_taken.append(int(action.item()) if isinstance(action, np.ndarray) else action)
         answer = self._answer(understood, text)
-        self._missing = ""
+        self._no_episode = ""
         return answer
 
     def _answer(
@@ -412,7 +414,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         if understood is None:
             return self._not_understood(text)
-        self._unknown = 0
+        self._unknown_replies = 0
         if understood == self._memory.last and self._memory.repeats >= MAX_REPEATS:
             self._end_reason = "repeated action"
             times = self._memory.repeats + 1
@@ -425,16 +427,16 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             object_id, outcome = "", skills.Outcome(None, False, refused)
         else:
             object_id, outcome = self._handler.execute(
-                understood, self._percept, self._available, self._progress.left
+                understood, self._perception, self._available, self._progress.left
             )
         self._memory.act(understood, outcome.success)
-        self._take_in(outcome)
+        self._perceive(outcome)
         reward = self._judge(understood, outcome, object_id) - self._step_penalty
         if refused:
             reward -= self._illegal_penalty
         if understood.verb == verbs.END:
             self._end_reason = "end"
-        elif self._steps >= self._limit:
+        elif self._steps >= self._step_limit:
             self._end_reason = "step limit"
         feedback = refused or _feedback(understood, outcome)
         return self._reply(
@@ -448,13 +450,13 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             )
         return self._controller
 
-    def _from(self, source: Source) -> EpisodeSource:
+    def _resolve_source(self, source: Source) -> EpisodeSource:
         """Where to draw from; the generator is made once for an environment, which closes it."""
         if not isinstance(source, str) or source != GENERATE:
             return make_source(source, verification_env)
-        if self._live is None:
-            self._live = make_source(GENERATE, verification_env)
-        return self._live
+        if self._generator is None:
+            self._generator = make_source(GENERATE, verification_env)
+        return self._generator
 
     def _choose(
         self,
@@ -464,9 +466,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     ) -> Task:
         source = self._source
         if suite is not None:
-            source = self._from(suite)
-        elif self._generates and self._live is None:  # closed, and begun again
-            source = self._source = self._from(GENERATE)
+            source = self._resolve_source(suite)
+        elif self._generates and self._generator is None:  # closed, and begun again
+            source = self._source = self._resolve_source(GENERATE)
         if task is None:
             return source.draw(self.np_random, self._task_type, scene)
         wanted = source.find(task) if isinstance(task, str) else task
@@ -474,11 +476,11 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             raise ValueError(f"task {wanted.id} plays in {wanted.scene}, not in {scene}")
         return wanted
 
-    def _take_in(self, outcome: skills.Outcome) -> None:
+    def _perceive(self, outcome: skills.Outcome) -> None:
         """Remember what can be seen after a step, and in the views of an "observe"."""
         for perception in (*outcome.views.values(), outcome.perception):
             if perception is not None:
-                self._percept = perception
+                self._perception = perception
                 self._available = self._handler.available_objects(perception)
                 self._known.add(perception.objects.kinds[self._available.navigable])
                 self._memory.look(perception, self._navigated_to_kind)
@@ -486,7 +488,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     @property
     def _navigated_to_kind(self) -> int | None:
         """The type of what was last navigated to, if that is still there."""
-        objects = self._percept.objects
+        objects = self._perception.objects
         row = objects.row.get(self._handler.navigated_to)
         return None if row is None else int(objects.kinds[row])
 
@@ -512,7 +514,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         at hand, since that takes longer than the rest of a step."""
         goal = self._task.goal
         if all(name in ENTRY_KEYS for condition in goal for name, _ in condition.state):
-            return self._percept.objects.entries({condition.object_type for condition in goal})
+            return self._perception.objects.entries({condition.object_type for condition in goal})
         return self._all_objects()
 
     def _all_objects(self) -> Sequence[Mapping[str, Any]]:
@@ -521,10 +523,10 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def _not_understood(
         self, text: str
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        self._unknown += 1
+        self._unknown_replies += 1
         if self._protocol.unknown_breaks_runs:
             self._memory.forget_last()
-        if self._unknown >= MAX_UNKNOWN:
+        if self._unknown_replies >= MAX_UNKNOWN:
             self._end_reason = "no known action"
         quoted = text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
         feedback = (
@@ -563,7 +565,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     def _observation(self, feedback: str, success: bool) -> dict[str, Any]:
         situation = Situation(
-            perception=self._percept,
+            perception=self._perception,
             available=self._available,
             memory=self._memory,
             known=self._known,
@@ -572,7 +574,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             at=self._navigated_to_kind,
             success=success,
             steps=self._steps,
-            max_steps=self._limit,
+            max_steps=self._step_limit,
         )
         return {name: kind.build(situation) for name, kind in self._obs.items()}
 
@@ -591,14 +593,14 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             "goal_unmet": self._goal_unmet,
             "key_actions_done": self._progress.done,
             "key_actions_left": self._progress.left,
-            "visible": self._percept.visible_names,
-            "held": self._percept.held_name,
+            "visible": self._perception.visible_names,
+            "held": self._perception.held_name,
             "navigable": self._known.names,
             "interactable": self._available.in_reach,
             "legal": LegalActions(mask),
             "action_mask": mask,
             "steps": self._steps,
-            "max_steps": self._limit,
+            "max_steps": self._step_limit,
             "end_reason": self._end_reason,
         }
 

@@ -186,7 +186,7 @@ def test_texts_are_read_as_the_papers_runner_reads_them(
     env: EmbodiedEnv, text: str, meant: str | None
 ) -> None:
     env.reset(options={"task": TAKE_APPLE})
-    action, said = understand_as_paper(text, env._percept.objects)
+    action, said = understand_as_paper(text, env._perception.objects)
     assert said == text
     assert (None if action is None else str(action)) == meant
 
