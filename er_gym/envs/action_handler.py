@@ -14,8 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs import legality, skills
-from er_gym.envs import object_selection as which
+from er_gym.envs import legality, object_selection, skills
 from er_gym.envs.actions import Action
 from er_gym.envs.legality import AvailableObjects, KnownTypes
 from er_gym.envs.perception import Perception
@@ -120,10 +119,10 @@ class DefaultActionHandler:
         if action.verb == verbs.NAVIGATE:
             return self._navigate(action.object_type, perception, left)
         able = legality.candidate_rows(action, available)
-        if setup.instances == which.TARGET:
-            chosen = which.by_task(setup.task, left, action.verb, able, objects)
+        if setup.instances == object_selection.TARGET:
+            chosen = object_selection.select_for_task(setup.task, left, action.verb, able, objects)
         else:
-            chosen = which.nearest(able, objects, perception.pose)
+            chosen = object_selection.select_nearest(able, objects, perception.pose)
         done = skills.interact(setup.controller, action.verb, objects, chosen)
         return objects.ids[chosen], done
 
@@ -134,14 +133,14 @@ class DefaultActionHandler:
         able = objects.of_type(object_type)
         if not able:
             return "", Outcome(None, False, f"there is no {object_type} any more")
-        if setup.instances == which.TARGET:
-            goal = which.by_task(setup.task, left, verbs.NAVIGATE, able, objects)
-            aim = which.redirected(setup.task, goal, objects)
+        if setup.instances == object_selection.TARGET:
+            goal = object_selection.select_for_task(setup.task, left, verbs.NAVIGATE, able, objects)
+            aim = object_selection.navigation_target(setup.task, goal, objects)
         else:
             visited = self._visited.setdefault(object_type, [])
             if len(visited) >= len(able):
                 visited.clear()
-            aim = goal = which.nearest(able, objects, perception.pose, visited)
+            aim = goal = object_selection.select_nearest(able, objects, perception.pose, visited)
             visited.append(objects.ids[goal])
         goal_id = objects.ids[goal]
         pose = setup.task.poses.get(goal_id)
@@ -149,7 +148,7 @@ class DefaultActionHandler:
             # AI2-THOR's agent stood there, so there is room, whatever our boxes say.
             outcome = skills.place(setup.controller, pose, force=True)
         else:
-            container = which.container_in_the_way(aim, objects)
+            container = object_selection.closed_container_of(aim, objects)
             aim = aim if container is None else container
             outcome = skills.navigate(setup.controller, perception, aim, setup.floor)
         if outcome.success:

@@ -14,8 +14,7 @@ from gymnasium import spaces
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from er_gym.envs import object_selection as which
-from er_gym.envs import skills
+from er_gym.envs import object_selection, skills
 from er_gym.envs.action_handler import EpisodeSetup
 from er_gym.envs.actions import ACTIONS, Action, AnyAction
 from er_gym.envs.arguments import flag, number, one_of, shown, whole
@@ -163,7 +162,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         field_of_view: float = 90.0,
         grid_size: float = 0.1,
         visibility_distance: float = 20.0,
-        instances: str = which.TARGET,
+        instances: str = object_selection.TARGET,
         protocol: str = DEFAULT.name,
         max_steps: int | None = None,
         step_penalty: float = 0.0,
@@ -180,9 +179,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             annotate=annotate, render_device=render_device, render_mode=render_mode,
         )  # fmt: skip
         # Everything is looked at before anything is started.
-        one_of("instances", instances, which.POLICIES)
+        one_of("instances", instances, object_selection.POLICIES)
         self._protocol = protocol_named(protocol)
-        if self._protocol.chooses_instances and instances != which.TARGET:
+        if self._protocol.chooses_instances and instances != object_selection.TARGET:
             raise ValueError(
                 f"the {protocol} protocol decides itself what a type name stands for; "
                 f"leave out instances={instances!r}"

@@ -13,7 +13,7 @@ POLICIES = (TARGET, EXPLORE)
 """``target`` looks at the task, as the paper does; ``explore`` never does."""
 
 
-def by_task(
+def select_for_task(
     task: Task,
     pending: Sequence[KeyAction],
     verb: str,
@@ -26,13 +26,13 @@ def by_task(
     to come, then the task's other objects.
     """
     allowed = {objects.ids[row]: row for row in candidates}
-    for object_id in _of_interest(task, pending, verb):
+    for object_id in _by_relevance(task, pending, verb):
         if object_id in allowed:
             return allowed[object_id]
     return candidates[0]
 
 
-def _of_interest(task: Task, pending: Sequence[KeyAction], verb: str) -> Iterable[str]:
+def _by_relevance(task: Task, pending: Sequence[KeyAction], verb: str) -> Iterable[str]:
     yield from (action.object_id for action in pending if action.verb == verb)
     yield from (action.object_id for action in pending)
     for action in pending:
@@ -42,7 +42,7 @@ def _of_interest(task: Task, pending: Sequence[KeyAction], verb: str) -> Iterabl
     yield from task.related_objects
 
 
-def nearest(
+def select_nearest(
     candidates: Sequence[int],
     objects: ObjectTable,
     agent: AgentPose,
@@ -63,7 +63,7 @@ def distance(objects: ObjectTable, row: int, agent: AgentPose) -> float:
     return hypot(x - agent.x, z - agent.z)
 
 
-def redirected(task: Task, goal: int, objects: ObjectTable) -> int:
+def navigation_target(task: Task, goal: int, objects: ObjectTable) -> int:
     """Where going to an object leads.
 
     Going to a receptacle that does not open and holds one of the task's related objects means going
@@ -77,7 +77,7 @@ def redirected(task: Task, goal: int, objects: ObjectTable) -> int:
     return goal
 
 
-def container_in_the_way(goal: int, objects: ObjectTable) -> int | None:
+def closed_container_of(goal: int, objects: ObjectTable) -> int | None:
     """The outermost closed receptacle that an object is in, None if it is in none."""
     shut = [
         parent
