@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs.actions import ACTIONS, INDEX, INDICES, Action, applies
-from er_gym.envs.perception import Perception, marked, names
+from er_gym.envs.perception import Perception, type_mask, type_names
 from er_gym.tasks import verbs
 from er_gym.tasks.verbs import Verb
 from er_gym.thor.objects import KIND_OF, PROPERTY_OF_STATE, TYPES, ObjectTable
@@ -45,7 +45,7 @@ def navigable_within(volume: NDArray[np.float64], face: NDArray[np.float64]) -> 
 
 
 def _of_type(object_types: Iterable[str]) -> NDArray[np.bool_]:
-    return marked(np.array([KIND_OF[name] for name in object_types], np.intp))
+    return type_mask(np.array([KIND_OF[name] for name in object_types], np.intp))
 
 
 _INTERACTIONS = tuple(map(verbs.verb_named, verbs.INTERACTIONS))
@@ -168,12 +168,12 @@ class AvailableObjects:
     @cached_property
     def interactable_types(self) -> NDArray[np.bool_]:
         """(T,) bool: the types of the interactable objects."""
-        return marked(self.objects.kinds[self.interactable])
+        return type_mask(self.objects.kinds[self.interactable])
 
     @cached_property
     def in_reach(self) -> tuple[str, ...]:
         """The names of the same types, in alphabetical order."""
-        return names(self.interactable_types)
+        return type_names(self.interactable_types)
 
 
 def available_objects(perception: Perception, navigated_to: str = "") -> AvailableObjects:
@@ -194,7 +194,7 @@ def available_objects(perception: Perception, navigated_to: str = "") -> Availab
     if row is not None and table.contents[row]:
         alike = can.alike.get(row)
         if alike is None:
-            kinds = marked(table.kinds[list(table.contents[row])])
+            kinds = type_mask(table.kinds[list(table.contents[row])])
             alike = can.alike[row] = kinds[table.kinds] & (can.within > 0)
         reach = plain | (visible & alike)
     navigable = plain.nonzero()[0]
@@ -219,7 +219,7 @@ class KnownTypes:
 
     def __init__(self, object_types: Iterable[str]) -> None:
         self._told = {*object_types} - verbs.NOWHERE  # tasks name types that no scene has, too
-        self.types = marked(np.array([KIND_OF[t] for t in self._told & KIND_OF.keys()], np.intp))
+        self.types = type_mask(np.array([KIND_OF[t] for t in self._told & KIND_OF.keys()], np.intp))
         self._update()
 
     def add(self, kinds: NDArray[np.intp]) -> None:
@@ -229,7 +229,7 @@ class KnownTypes:
             self._update()
 
     def _update(self) -> None:
-        self._names = self._told.union(names(self.types))
+        self._names = self._told.union(type_names(self.types))
         self.names = tuple(sorted(self._names))
         self.legal = np.zeros(len(ACTIONS), dtype=np.int8)
         self.legal[_BARE] = self.legal[INDICES[verbs.NAVIGATE][self.types]] = 1

@@ -16,7 +16,7 @@ from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, te
 from er_gym.envs.legality import AvailableObjects, KnownTypes, navigable_within
 from er_gym.envs.paper_approach import Thing, approach, current, thing_of
 from er_gym.envs.paper_skills import interact, move_forward, observe, start_again
-from er_gym.envs.perception import Perception, marked
+from er_gym.envs.perception import Perception, type_mask
 from er_gym.envs.skills import Outcome
 from er_gym.tasks import verbs
 from er_gym.tasks.task import KeyAction
@@ -87,7 +87,7 @@ class PaperActionHandler:
     def __init__(self, setup: EpisodeSetup) -> None:
         self.navigated_to = ""
         self._setup, task = setup, setup.task
-        self._inside = marked(np.array([], np.intp))  # types that lay in the last receptacle
+        self._inside = type_mask(np.array([], np.intp))  # types that lay in the last receptacle
         self._second = str(task.extra.get("identity")) in _SECOND_WHEN_HOLDING
         self._targets: dict[str, list[str]] = {}
         for object_id in task.target_objects:
@@ -160,7 +160,7 @@ class PaperActionHandler:
             self.navigated_to = thing.object_id
             if aim.receptacle:
                 types = (object_id.split("|")[0] for object_id in aim.contents)
-                self._inside = marked(np.array([KIND_OF[t] for t in types if t in KIND_OF], int))
+                self._inside = type_mask(np.array([KIND_OF[t] for t in types if t in KIND_OF], int))
         return thing.object_id, outcome
 
     def _choose(self, action: Action, objects: ObjectTable) -> Thing | None:
@@ -183,7 +183,7 @@ class PaperActionHandler:
         return thing
 
 
-_FLOOR = marked(np.array([KIND_OF[name] for name in verbs.NOWHERE]))
+_FLOOR = type_mask(np.array([KIND_OF[name] for name in verbs.NOWHERE]))
 
 
 def _within(table: ObjectTable) -> NDArray[np.float64]:

@@ -49,7 +49,7 @@ class Perception:
     @cached_property
     def visible_names(self) -> tuple[str, ...]:
         """The names of the types of which something is visible, in alphabetical order."""
-        return names(self.visible_types)
+        return type_names(self.visible_types)
 
     @property
     def held_name(self) -> str:
@@ -60,7 +60,7 @@ class Perception:
     @cached_property
     def visible_types(self) -> NDArray[np.bool_]:
         """(T,) bool: the types of which something is visible."""
-        return marked(self.objects.kinds[self.visible])
+        return type_mask(self.objects.kinds[self.visible])
 
 
 def perceive(event: Any) -> Perception:
@@ -81,13 +81,13 @@ def perceive(event: Any) -> Perception:
     )
 
 
-def marked(kinds: NDArray[np.intp]) -> NDArray[np.bool_]:
+def type_mask(kinds: NDArray[np.intp]) -> NDArray[np.bool_]:
     """(T,) bool: True for the types that occur among some kinds, indices into ``TYPES``."""
     mark = np.zeros(len(TYPES), dtype=bool)
     mark[kinds] = True
     return mark
 
 
-def names(mark: NDArray[np.bool_]) -> tuple[str, ...]:
+def type_names(mark: NDArray[np.bool_]) -> tuple[str, ...]:
     """The names of the types that are marked in (T,) bool, in alphabetical order."""
     return tuple([TYPES[kind] for kind in mark.nonzero()[0].tolist()])

@@ -16,7 +16,7 @@ from er_gym.envs.actions import ACTIONS
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.legality import KnownTypes, available_objects, legal_actions, navigable_within
 from er_gym.envs.observations import Memory
-from er_gym.envs.perception import Perception, names, perceive
+from er_gym.envs.perception import Perception, perceive, type_names
 from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import AgentPose
@@ -173,8 +173,8 @@ def test_memory_is_of_what_was_seen_last() -> None:
         ((shut, unseen), False),
     ):
         memory.look(perception_of(*entries))
-        assert names(memory.is_open) == names(memory.is_on) == ("Cabinet",) * remembered
-    assert names(memory.seen) == ("Apple", "Cabinet")
+        assert type_names(memory.is_open) == type_names(memory.is_on) == ("Cabinet",) * remembered
+    assert type_names(memory.seen) == ("Apple", "Cabinet")
 
 
 # -- random play -----------------------------------------------------------------------------------
