@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from er_gym.envs.action_handler import EpisodeSetup, ExecutedAction
 from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
 from er_gym.envs.legality import AvailableObjects, KnownTypes, navigable_within
-from er_gym.envs.paper_approach import Thing, approach, current, thing_of
+from er_gym.envs.paper_approach import ObjectSnapshot, approach, current_snapshot, snapshot_of
 from er_gym.envs.paper_skills import interact, move_forward, observe, start_again
 from er_gym.envs.perception import Perception, type_mask
 from er_gym.envs.skills import Outcome
@@ -92,10 +92,10 @@ class PaperActionHandler:
         self._targets: dict[str, list[str]] = {}
         for object_id in task.target_objects:
             self._targets.setdefault(object_id.split("|")[0], []).append(object_id)
-        self._first: dict[str, Thing] = {}
+        self._first: dict[str, ObjectSnapshot] = {}
         for entry in setup.controller.last_event.metadata["objects"]:
             if entry["objectType"] not in self._first:
-                self._first[entry["objectType"]] = thing_of(entry)
+                self._first[entry["objectType"]] = snapshot_of(entry)
 
     def available_objects(self, perception: Perception) -> AvailableObjects:
         """What is plain to see, what is in the hand included; and what lay in the receptacle."""
@@ -149,21 +149,21 @@ class PaperActionHandler:
             return "", Outcome(None, True)
         if action.verb == verbs.INIT:
             return "", start_again(controller, setup.start)
-        thing = self._choose(action, perception.objects)
-        if thing is None:
+        target = self._choose(action, perception.objects)
+        if target is None:
             return "", Outcome(None, False, f"there is no such {action.object_type}")
         if action.verb != verbs.NAVIGATE:
-            return thing.object_id, interact(controller, action.verb, thing)
-        aim = self._on_it(thing)
+            return target.object_id, interact(controller, action.verb, target)
+        aim = self._on_it(target)
         outcome = approach(controller, aim, setup.task.poses.get(aim.object_id))
         if outcome.success:
-            self.navigated_to = thing.object_id
+            self.navigated_to = target.object_id
             if aim.receptacle:
                 types = (object_id.split("|")[0] for object_id in aim.contents)
                 self._inside = type_mask(np.array([KIND_OF[t] for t in types if t in KIND_OF], int))
-        return thing.object_id, outcome
+        return target.object_id, outcome
 
-    def _choose(self, action: Action, objects: ObjectTable) -> Thing | None:
+    def _choose(self, action: Action, objects: ObjectTable) -> ObjectSnapshot | None:
         """The object that a type stands for; None if a task names one that the scene lacks."""
         targets = self._targets.get(action.object_type)
         if targets is None:
@@ -171,16 +171,16 @@ class PaperActionHandler:
         second = self._second and action.verb == verbs.NAVIGATE and objects.held >= 0
         if second and len(targets) < 2:
             return None
-        return current(self._setup.controller, targets[1 if second else 0])
+        return current_snapshot(self._setup.controller, targets[1 if second else 0])
 
-    def _on_it(self, thing: Thing) -> Thing:
+    def _on_it(self, target: ObjectSnapshot) -> ObjectSnapshot:
         """Where going to an object leads: to the first of the task's related objects that lies in
         it, if it is a receptacle that does not open."""
-        if thing.receptacle and not thing.openable:
+        if target.receptacle and not target.openable:
             for object_id in self._setup.task.related_objects:
-                if object_id in thing.contents:
-                    return current(self._setup.controller, object_id) or thing
-        return thing
+                if object_id in target.contents:
+                    return current_snapshot(self._setup.controller, object_id) or target
+        return target
 
 
 _FLOOR = type_mask(np.array([KIND_OF[name] for name in verbs.NOWHERE]))

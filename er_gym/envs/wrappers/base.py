@@ -27,7 +27,7 @@ class TaskWrapper(gymnasium.Wrapper[Any, Any, Any, Any]):
         return masks
 
 
-def told(info: Mapping[str, Any], key: str) -> Any:
+def info_entry(info: Mapping[str, Any], key: str) -> Any:
     """An entry of ``info``.
 
     Raises:
