@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from benchmarks.cli.vlm_run import VLMRun
     from er_gym.rollout.events import Cost
     from er_gym.rollout.run_directory import Manifest, RunDirectory
-    from er_gym.rollout.runner import Outcome
+    from er_gym.rollout.runner import RunSummary
     from er_gym.tasks.suites import Suite
     from er_gym.tasks.task import Task
 
@@ -249,7 +249,7 @@ def _player(
     agent: str,
     voice: VLMRun | None,
     trust: bool,
-) -> Iterator[tuple[Callable[[Progress], Outcome], Callable[[], Cost | None]]]:
+) -> Iterator[tuple[Callable[[Progress], RunSummary], Callable[[], Cost | None]]]:
     """How the chosen tasks are played, and how to hear what that has cost."""
     from agents import NamedAgent
     from er_gym.rollout.agent import CannotGoOn

@@ -15,7 +15,7 @@ from agents.vlm.settings import AgentSettings
 from er_gym.rollout.events import Emit
 from er_gym.rollout.executor import Size
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.runner import Outcome, run
+from er_gym.rollout.runner import RunSummary, run
 from er_gym.tasks.task import Task
 
 _CONCURRENCY = 8
@@ -85,7 +85,7 @@ class VLMRun:
         workers: int,
         listeners: Iterable[Emit] = (),
         say: Callable[[object], None] | None = None,
-    ) -> Outcome:
+    ) -> RunSummary:
         """Play the tasks that the run directory has no finished episode of.
 
         ``say`` is called with what a user should hear of the server, from any thread; without it,

@@ -27,7 +27,7 @@ EXECUTORS: dict[str, Executor] = {
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunSummary:
     """What :func:`run` did.
 
     Attributes:
@@ -45,7 +45,7 @@ class Outcome:
 class Stopped(CannotGoOn):
     """An agent could not go on, so the run has stopped; ``outcome`` says what it did till then."""
 
-    def __init__(self, message: str, outcome: Outcome) -> None:
+    def __init__(self, message: str, outcome: RunSummary) -> None:
         super().__init__(message)
         self.outcome = outcome
 
@@ -65,7 +65,7 @@ def run(
     size: Size = Size(),  # noqa: B008 (frozen)
     listeners: Iterable[Emit] = (),
     cost: Callable[[], Cost | None] = lambda: None,
-) -> Outcome:
+) -> RunSummary:
     """Play the tasks that the run directory has no finished episode of.
 
     Each episode is in the run directory before the next result is looked at, so a run that is
@@ -148,5 +148,5 @@ class _Sink:
         if total is not None:
             self.emit(total)
 
-    def outcome(self, kept: int) -> Outcome:
-        return Outcome(self.played, kept, tuple(self.crashed))
+    def outcome(self, kept: int) -> RunSummary:
+        return RunSummary(self.played, kept, tuple(self.crashed))

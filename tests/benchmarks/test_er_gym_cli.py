@@ -17,11 +17,11 @@ import pytest
 from benchmarks.cli import main as cli
 from er_gym.rollout import runner
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.runner import Outcome
+from er_gym.rollout.runner import RunSummary
 from er_gym.tasks.types import TASK_TYPES
 
 COUNTER = "CounterTop|-00.08|+01.15|00.00"
-NOTHING = Outcome(0, 0, ())
+NOTHING = RunSummary(0, 0, ())
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "benchmarks.cli"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
@@ -355,7 +355,7 @@ def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, epi
 
     def run(store, tasks, make_agent, **how):
         store.write(crashed)
-        return Outcome(played=7, kept=0, crashed=(crashed,))
+        return RunSummary(played=7, kept=0, crashed=(crashed,))
 
     monkeypatch.setattr(runner, "run", run)
     out = tmp_path / "run"

@@ -21,7 +21,7 @@ from er_gym.rollout.executor import Size
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.runner import Outcome
+from er_gym.rollout.runner import RunSummary
 from er_gym.rollout.selection import Shard, select
 from er_gym.rollout.worker_pool import Lost
 from er_gym.tasks.paper_format import read_tasks
@@ -58,7 +58,7 @@ def new_store(tmp_path, manifest):
     return make
 
 
-def run(store: RunDirectory, tasks, *, workers=1, on_episode=lambda event: None) -> Outcome:
+def run(store: RunDirectory, tasks, *, workers=1, on_episode=lambda event: None) -> RunSummary:
     """Play with the agent that the manifest names; hear of episodes that end."""
 
     def listen(event):
@@ -207,8 +207,8 @@ def test_workers_play_what_is_played_here(new_store, tasks, short_env):
 
     seen = []
     one, two = new_store("random", "one"), new_store("random", "two")
-    assert run(one, tasks, workers=1, on_episode=seen.append) == Outcome(7, 0, ())
-    assert run(two, tasks[::-1], workers=2) == Outcome(7, 0, ())
+    assert run(one, tasks, workers=1, on_episode=seen.append) == RunSummary(7, 0, ())
+    assert run(two, tasks[::-1], workers=2) == RunSummary(7, 0, ())
     assert [timeless(each) for each in one.episodes()] == here
     assert [timeless(each) for each in two.episodes()] == here
     assert sorted(each.task_id for each in seen) == [task.id for task in tasks]
@@ -219,12 +219,12 @@ def test_running_again_plays_nothing_again(new_store, tasks):
     run(store, tasks[:4], workers=2)
     before = modified(store)
     assert len(before) == 4
-    assert run(store, tasks, workers=2) == Outcome(3, 4, ())
+    assert run(store, tasks, workers=2) == RunSummary(3, 4, ())
     after = modified(store)
     assert len(after) == 7
     assert {name: after[name] for name in before} == before
     started = time.monotonic()
-    assert run(store, tasks, workers=2) == Outcome(0, 7, ())
+    assert run(store, tasks, workers=2) == RunSummary(0, 7, ())
     assert time.monotonic() - started < 0.5  # no process was started
     assert modified(store) == after
 
@@ -235,7 +235,7 @@ def test_a_crashed_episode_is_played_again(new_store, tasks, episode):
     (first, *_) = store.episodes()
     store.write(first.model_copy(update={"error": "ValueError: no"}))
     before = modified(store)
-    assert run(store, tasks, workers=1) == Outcome(1, 6, ())
+    assert run(store, tasks, workers=1) == RunSummary(1, 6, ())
     assert not any(each.error for each in store.episodes())
     changed = {name for name, when in modified(store).items() if when != before[name]}
     assert changed == {"paper-0.json"}
@@ -251,7 +251,7 @@ def test_killed_workers_are_replaced(new_store, tasks):
                 victims.append(child.pid)
                 os.kill(child.pid, signal.SIGKILL)
 
-    assert run(store, tasks, workers=2, on_episode=kill_all_once) == Outcome(7, 0, ())
+    assert run(store, tasks, workers=2, on_episode=kill_all_once) == RunSummary(7, 0, ())
     assert len(victims) == 2
     assert len(modified(store)) == 7
 
@@ -269,7 +269,7 @@ def test_a_task_that_kills_its_worker_is_reported(new_store, tasks, monkeypatch)
     assert record.error == "the worker process died 3 times, last with exit code -9"
     assert list(store.episodes()) == [record]
     monkeypatch.undo()
-    assert run(store, tasks[:1]) == Outcome(1, 0, ())
+    assert run(store, tasks[:1]) == RunSummary(1, 0, ())
 
 
 def test_crashes_do_not_end_a_run(new_store, tasks):
@@ -291,4 +291,4 @@ def test_ctrl_c_keeps_what_is_done(new_store, tasks):
         run(store, tasks, workers=2, on_episode=interrupt)
     assert multiprocessing.active_children() == []
     assert len(modified(store)) == 1
-    assert run(store, tasks, workers=2) == Outcome(6, 1, ())
+    assert run(store, tasks, workers=2) == RunSummary(6, 1, ())

@@ -23,7 +23,7 @@ from er_gym.rollout.events import EpisodeEnded
 from er_gym.rollout.executor import Size
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.runner import Outcome, Stopped, run
+from er_gym.rollout.runner import RunSummary, Stopped, run
 from er_gym.rollout.worker_pool import WorkerSetupError
 from er_gym.tasks.paper_format import read_tasks
 
@@ -105,7 +105,7 @@ class Leaving:
 
 def run_threaded(
     store, tasks, make, *, workers=1, concurrency=8, on_episode=lambda event: None, keep=None
-) -> Outcome:
+) -> RunSummary:
     """Play in threads; hear of episodes that end, and of what agents are asked to leave."""
 
     def listen(event):
@@ -165,7 +165,7 @@ def test_what_is_played_is_what_is_played_here(store, tasks, monkeypatch):
     outcome = run_threaded(
         store, tasks, at_random, workers=2, concurrency=3, keep=keep, on_episode=on_episode
     )
-    assert outcome == Outcome(7, 0, ())
+    assert outcome == RunSummary(7, 0, ())
     assert [each.model_copy(update={"seconds": 0.0}) for each in store.episodes()] == here
     assert sorted(each[:2] for each in talks) == [(each, False) for each in ids(tasks)]
     assert sorted(each[:2] for each in seen) == [(each, True) for each in ids(tasks)]
@@ -173,7 +173,7 @@ def test_what_is_played_is_what_is_played_here(store, tasks, monkeypatch):
     assert threading.main_thread() not in {thread for *_, thread in talks}
 
     monkeypatch.setattr(thread_executor, "EnvPool", None)  # no process is started
-    assert run_threaded(store, tasks, at_random) == Outcome(0, 7, ())
+    assert run_threaded(store, tasks, at_random) == RunSummary(0, 7, ())
 
 
 def test_a_slow_reply_stops_nobody(store, many):
@@ -196,7 +196,7 @@ def test_a_slow_reply_stops_nobody(store, many):
         concurrency=3,
         on_episode=on_episode,
     )
-    assert outcome == Outcome(31, 0, ())
+    assert outcome == RunSummary(31, 0, ())
     assert seen[-1] == "paper-0-0"
     assert ids(many[:31]) == sorted(seen)
 
@@ -228,7 +228,7 @@ def test_killed_processes_lose_and_repeat_nothing(store, many):
         on_episode=lambda episode: seen.append(episode.task_id),
         keep=lambda episode, agent: talks.append(episode.task_id),
     )
-    assert outcome == Outcome(64, 0, ())
+    assert outcome == RunSummary(64, 0, ())
     assert sorted(seen) == sorted(talks) == kept(store) == ids(many)
     assert made["paper-6-20"] >= 2
     assert made["paper-5-40"] >= 2
@@ -351,12 +351,12 @@ def test_an_agent_that_cannot_go_on_stops_the_run(new_store, tasks):
             concurrency=3,
             keep=lambda episode, agent: talks.append(episode.task_id),
         )
-    assert stopped.value.outcome == Outcome(2, 0, ())
+    assert stopped.value.outcome == RunSummary(2, 0, ())
     assert talks == ["paper-0", "paper-2"]
     assert kept(store) == ["paper-0", "paper-2"]
     assert agents == {"paper-0", "paper-1", "paper-2", "paper-3"}
     assert no_process()
-    assert run_threaded(store, tasks, ending) == Outcome(5, 2, ())
+    assert run_threaded(store, tasks, ending) == RunSummary(5, 2, ())
 
 
 def test_a_refused_key_ends_it_before_anything_is_played(store, tasks):
@@ -459,7 +459,7 @@ def test_a_run_that_is_ended_goes_on_where_it_was(store, tasks, tmp_path):
     assert done == ["paper-0", "paper-1", "paper-3"]
     assert run_until(signal.SIGKILL, store, tmp_path) == ""
     assert kept(store) == done
-    assert run_threaded(store, tasks, ending) == Outcome(4, 3, ())
+    assert run_threaded(store, tasks, ending) == RunSummary(4, 3, ())
     assert kept(store) == ids(tasks)
 
 
