@@ -32,13 +32,13 @@ class RunSummary:
 
     Attributes:
         played: how many episodes it played.
-        kept: how many it found done.
+        already_done: how many were finished before it started.
         crashed: of those played, the episodes that crashed or whose worker died again and again.
             They are in the run directory, count as failures, and are played again by the next run.
     """
 
     played: int
-    kept: int
+    already_done: int
     crashed: tuple[EpisodeRecord, ...]
 
 
@@ -104,13 +104,13 @@ def run(
                 EXECUTORS[executor](directory, todo, make_agent, sink, size)
         except CannotGoOn as stop:
             stopped = str(stop)
-            raise Stopped(stopped, sink.outcome(len(done))) from stop
+            raise Stopped(stopped, sink.summary(len(done))) from stop
         except BaseException as error:  # Ctrl-C too
             stopped = f"{type(error).__name__}: {error}"
             raise
         finally:
             emit(RunEnded(played=sink.played, crashed=len(sink.crashed), stopped=stopped))
-    return sink.outcome(len(done))
+    return sink.summary(len(done))
 
 
 @dataclass
@@ -148,5 +148,5 @@ class _Sink:
         if total is not None:
             self.emit(total)
 
-    def outcome(self, kept: int) -> RunSummary:
-        return RunSummary(self.played, kept, tuple(self.crashed))
+    def summary(self, already_done: int) -> RunSummary:
+        return RunSummary(self.played, already_done, tuple(self.crashed))

@@ -355,7 +355,7 @@ def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, epi
 
     def run(store, tasks, make_agent, **how):
         store.write(crashed)
-        return RunSummary(played=7, kept=0, crashed=(crashed,))
+        return RunSummary(played=7, already_done=0, crashed=(crashed,))
 
     monkeypatch.setattr(runner, "run", run)
     out = tmp_path / "run"
