@@ -32,7 +32,7 @@ from benchmarks.checks.fuzz_report import Plan, Report, Step, show
 from benchmarks.checks.fuzz_requests import Request, Room, draw_request
 from benchmarks.checks.scene_jobs import choose_scenes, do_all
 from benchmarks.cli.progress import bar
-from er_gym.rollout.worker_pool import Lost
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.sim.controller import EmbeddedController
 from er_gym.sim.engine import Engine
 from er_gym.sim.errors import CLIENT_ERRORS
@@ -180,7 +180,7 @@ def _player(plan: Plan) -> Callable[[int], Report]:
 def fuzz(plan: Plan, workers: int) -> Iterator[Report]:
     """Every run's report, as they are done, in so many processes (1: in this one)."""
     for run, report in do_all(partial(_player, plan), range(plan.runs), workers):
-        if isinstance(report, Lost):
+        if isinstance(report, LostJob):
             died = f"the process died, exit code {report.exitcode}"
             report = Report(wrong=[Step(run, 0, "?", {}, "", [died], 0.0)])
         yield report

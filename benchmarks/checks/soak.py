@@ -30,7 +30,7 @@ from benchmarks.checks.invariants import (
 from benchmarks.checks.scene_jobs import choose_scenes, do_all
 from benchmarks.cli.progress import bar
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.rollout.worker_pool import Lost
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.sim.space.walkable_floor import standing_places
 from er_gym.tasks import verbs
 from er_gym.tasks.task import KeyAction, Task
@@ -263,7 +263,7 @@ def soak(
 ) -> Iterator[Report]:
     """Play in all scenes, each whole in one of so many processes (1: in this one)."""
     for scene, report in do_all(partial(_player, level, actions, seed), scenes, workers):
-        if isinstance(report, Lost):
+        if isinstance(report, LostJob):
             report = Report(scene, 0, 0, 0.0, f"the process died, exit code {report.exitcode}")
         yield report
 

@@ -253,12 +253,15 @@ def _player(
     """How the chosen tasks are played, and how to hear what that has cost."""
     from agents import NamedAgent
     from er_gym.rollout.agent import CannotGoOn
-    from er_gym.rollout.executor import Size
+    from er_gym.rollout.executor import Parallelism
     from er_gym.rollout.runner import run
 
     if voice is None:
-        make, size = NamedAgent(agent, trust), Size(workers)
-        yield lambda shown: run(store, chosen, make, size=size, listeners=[shown]), lambda: None
+        make, parallelism = NamedAgent(agent, trust), Parallelism(workers)
+        yield (
+            lambda shown: run(store, chosen, make, parallelism=parallelism, listeners=[shown]),
+            lambda: None,
+        )
         return
     with bad_input(CannotGoOn):  # no key, no such model
         factory = voice.factory(store.path)

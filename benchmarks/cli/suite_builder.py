@@ -22,7 +22,7 @@ from pathlib import Path
 from er_gym import __version__
 from er_gym.envs.verify import unwanted, with_difficulty
 from er_gym.rollout.verification import make_verifier
-from er_gym.rollout.worker_pool import Lost, do_jobs
+from er_gym.rollout.worker_pool import LostJob, run_jobs
 from er_gym.tasks import jsonl_format
 from er_gym.tasks.arrangement import Start
 from er_gym.tasks.generate import Generator, arranged, select_balanced
@@ -126,9 +126,9 @@ def make_suite(
     for scene, part in done.items():
         on_room(scene, part)
     todo = [scene for scene in making.rooms if scene not in done]
-    with closing(do_jobs(partial(Maker, making, seed), todo, workers=workers)) as results:
+    with closing(run_jobs(partial(Maker, making, seed), todo, workers=workers)) as results:
         for scene, made in results:
-            if isinstance(made, Lost):
+            if isinstance(made, LostJob):
                 raise RuntimeError(
                     f"the worker that made {scene} died {made.tries} times, last with exit code "
                     f"{made.exitcode}"

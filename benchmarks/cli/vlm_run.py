@@ -13,7 +13,7 @@ from agents.vlm.factory import AgentFactory, consequential, load_settings
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.events import Emit
-from er_gym.rollout.executor import Size
+from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.runner import RunSummary, run
 from er_gym.tasks.task import Task
@@ -98,7 +98,7 @@ class VLMRun:
             tasks,
             lambda task, seed: factory.agent(seed),
             executor="threads",
-            size=Size(workers, self.concurrency),
+            parallelism=Parallelism(workers, self.concurrency),
             listeners=listeners,
             cost=lambda: factory.cost,
         )

@@ -35,7 +35,7 @@ from benchmarks.scoring.curves import draw_curves
 from benchmarks.scoring.metrics import Score, score_episode, wilson
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym import __version__
-from er_gym.rollout.executor import Size
+from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.run_directory import Manifest, RunDirectory, claimed
 from er_gym.rollout.runner import finished, run
 from er_gym.tasks import jsonl_format, load_suite
@@ -135,8 +135,11 @@ class Player:
         before = finished(store, tasks)
         progress = Progress(self._console, f"{where}, {name}", len(tasks), len(before), 0)
         with progress:
-            make, size = NamedAgent(store.manifest.agent, trust=self._trust), Size(self._workers)
-            run(store, tasks, make, size=size, listeners=[progress])
+            make, parallelism = (
+                NamedAgent(store.manifest.agent, trust=self._trust),
+                Parallelism(self._workers),
+            )
+            run(store, tasks, make, parallelism=parallelism, listeners=[progress])
         wanted = {task.id for task in tasks}
         return [
             score_episode(episode, CORRECTED)

@@ -10,13 +10,13 @@ from er_gym.rollout.agent import Agent, Attachments, LeavesAttachments, MakeAgen
 from er_gym.rollout.play import episode_seed
 from er_gym.rollout.records import EpisodeRecord, record_episode
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.worker_pool import Lost
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.task import Task
 from er_gym.writing import file_stem
 
 
 @dataclass(frozen=True)
-class Played:
+class PlayedEpisode:
     """An episode that is over or has crashed.
 
     Attributes:
@@ -30,7 +30,7 @@ class Played:
     folders: Sequence[str] = ()
 
     @classmethod
-    def by(cls, agent: Agent | None, record: EpisodeRecord) -> Played:
+    def by(cls, agent: Agent | None, record: EpisodeRecord) -> PlayedEpisode:
         """An episode with the files that its agent leaves; None if it could not be made."""
         if not isinstance(agent, LeavesAttachments):
             return cls(record)
@@ -38,18 +38,18 @@ class Played:
         return cls(record, files, agent.attachment_folders)
 
 
-class Sink(Protocol):
+class EpisodeSink(Protocol):
     """Takes episodes, in the thread that called the executor."""
 
-    def save(self, played: Played) -> None:
+    def save(self, played: PlayedEpisode) -> None:
         """Put an episode into the run directory; doing it twice does no harm."""
 
-    def ended(self, played: Played) -> None:
+    def ended(self, played: PlayedEpisode) -> None:
         """Count an episode that has been saved, and tell whoever listens."""
 
 
 @dataclass(frozen=True)
-class Size:
+class Parallelism:
     """How much is done at once.
 
     Attributes:
@@ -72,8 +72,8 @@ class Executor(Protocol):
         directory: RunDirectory,
         tasks: Sequence[Task],
         make_agent: MakeAgent,
-        sink: Sink,
-        size: Size,
+        sink: EpisodeSink,
+        parallelism: Parallelism,
     ) -> None:
         """Play every task and hand each episode to ``sink``, saved before the next is looked at.
 
@@ -84,7 +84,7 @@ class Executor(Protocol):
         """
 
 
-def lost_episode(task: Task, lost: Lost, directory: RunDirectory) -> EpisodeRecord:
+def lost_episode(task: Task, lost: LostJob, directory: RunDirectory) -> EpisodeRecord:
     """The record of an episode whose worker died every time."""
     return record_episode(
         task,

@@ -12,11 +12,11 @@ from typing import Any
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
 from er_gym.rollout.events import EventLog
-from er_gym.rollout.executor import Played, Sink, Size, lost_episode
+from er_gym.rollout.executor import EpisodeSink, Parallelism, PlayedEpisode, lost_episode
 from er_gym.rollout.play import episode_seed, one_line, play_episode
 from er_gym.rollout.records import record_episode
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.worker_pool import Lost, do_jobs
+from er_gym.rollout.worker_pool import LostJob, run_jobs
 from er_gym.tasks.task import Task
 
 
@@ -24,20 +24,20 @@ def play_in_processes(
     directory: RunDirectory,
     tasks: Sequence[Task],
     make_agent: MakeAgent,
-    sink: Sink,
-    size: Size,
+    sink: EpisodeSink,
+    parallelism: Parallelism,
 ) -> None:
-    """Play each task in one of ``size.workers`` processes; see :class:`.executor.Executor`."""
+    """Play each task in one of ``parallelism.workers`` processes. See :class:`.Executor`."""
     manifest = directory.manifest
     worker = partial(
         EpisodeWorker, make_agent, manifest.agent, manifest.env, manifest.seed, directory.path
     )
-    with closing(do_jobs(worker, tasks, workers=size.workers)) as results:
+    with closing(run_jobs(worker, tasks, workers=parallelism.workers)) as results:
         for task, result in results:
             if isinstance(result, _Stop):
                 raise CannotGoOn(result.message)
-            lost = isinstance(result, Lost)
-            played = Played(lost_episode(task, result, directory)) if lost else result
+            lost = isinstance(result, LostJob)
+            played = PlayedEpisode(lost_episode(task, result, directory)) if lost else result
             sink.save(played)
             sink.ended(played)
 
@@ -81,7 +81,7 @@ class EpisodeWorker:
     def _make_env(self) -> EmbodiedEnv:
         return EmbodiedEnv((), **self._kwargs)
 
-    def __call__(self, task: Task) -> Played | _Stop:
+    def __call__(self, task: Task) -> PlayedEpisode | _Stop:
         seed = episode_seed(self._seed, task.id)
         try:
             if self._env is None:
@@ -90,7 +90,7 @@ class EpisodeWorker:
         except CannotGoOn as stop:
             return _Stop(str(stop))
         except Exception as error:  # as in play_episode, one must not end the run
-            return Played(
+            return PlayedEpisode(
                 record_episode(
                     task,
                     agent=self._name,
@@ -113,7 +113,7 @@ class EpisodeWorker:
             return _Stop(str(stop))
         if record.error:
             self._close_env()
-        return Played.by(agent, record)
+        return PlayedEpisode.by(agent, record)
 
     def _close_env(self) -> None:
         """The next episode makes another."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
 from er_gym.rollout.events import Cost, Emit, EpisodeEnded, EventLog, RunBegun, RunEnded
-from er_gym.rollout.executor import Executor, Played, Size
+from er_gym.rollout.executor import Executor, Parallelism, PlayedEpisode
 from er_gym.rollout.process_executor import play_in_processes
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import RunDirectory
@@ -62,7 +62,7 @@ def run(
     make_agent: MakeAgent,
     *,
     executor: str = "processes",
-    size: Size = Size(),  # noqa: B008 (frozen)
+    parallelism: Parallelism = Parallelism(),  # noqa: B008 (frozen)
     listeners: Iterable[Emit] = (),
     cost: Callable[[], Cost | None] = lambda: None,
 ) -> RunSummary:
@@ -78,7 +78,7 @@ def run(
         tasks: what to play.
         make_agent: makes the agent of an episode, given its task and seed.
         executor: one of :data:`EXECUTORS`.
-        size: how much at once.
+        parallelism: how much runs at once.
         listeners: called in this process with the run's events: those of episodes that end, and,
             where the agents act in this process, of every step.
         cost: what the run has cost so far, asked after each episode.
@@ -101,7 +101,7 @@ def run(
         stopped = ""
         try:
             if todo:
-                EXECUTORS[executor](directory, todo, make_agent, sink, size)
+                EXECUTORS[executor](directory, todo, make_agent, sink, parallelism)
         except CannotGoOn as stop:
             stopped = str(stop)
             raise Stopped(stopped, sink.summary(len(done))) from stop
@@ -123,11 +123,11 @@ class _Sink:
     played: int = 0
     crashed: list[EpisodeRecord] = field(default_factory=list)
 
-    def save(self, played: Played) -> None:
+    def save(self, played: PlayedEpisode) -> None:
         self.directory.attach(played.record.task_id, played.attachments, played.folders)
         self.directory.write(played.record)
 
-    def ended(self, played: Played) -> None:
+    def ended(self, played: PlayedEpisode) -> None:
         record = played.record
         self.played += 1
         if record.error:

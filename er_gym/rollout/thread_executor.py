@@ -15,11 +15,11 @@ from typing import Any
 from er_gym.rollout.agent import Agent, CannotGoOn, Decision, MakeAgent
 from er_gym.rollout.env_pool import EnvLost, EnvPool, RemoteEnv
 from er_gym.rollout.events import EventLog
-from er_gym.rollout.executor import Played, Sink, Size, lost_episode
+from er_gym.rollout.executor import EpisodeSink, Parallelism, PlayedEpisode, lost_episode
 from er_gym.rollout.play import episode_seed, one_line, play_episode
 from er_gym.rollout.records import EpisodeRecord, record_episode
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.worker_pool import Lost
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.task import Task
 
 _TRIES = 3
@@ -30,20 +30,20 @@ def play_in_threads(
     directory: RunDirectory,
     tasks: Sequence[Task],
     make_agent: MakeAgent,
-    sink: Sink,
-    size: Size,
+    sink: EpisodeSink,
+    parallelism: Parallelism,
 ) -> None:
-    """Play ``size.concurrency`` tasks at once; see :class:`.executor.Executor`.
+    """Play ``parallelism.concurrency`` tasks at once; see :class:`.executor.Executor`.
 
     Agents are made, and asked, in the thread of their episode. When one cannot go on, the others'
     next replies are waited for; episodes that are not over with these leave no record. At Ctrl-C
     nothing is waited for.
     """
     todo = deque(tasks)
-    slots = talking = min(size.concurrency, len(todo))
+    slots = talking = min(parallelism.concurrency, len(todo))
     stopped: CannotGoOn | None = None
     env = directory.manifest.env
-    with EnvPool(size.workers, slots, env, deadline=size.deadline) as pool:
+    with EnvPool(parallelism.workers, slots, env, deadline=parallelism.deadline) as pool:
         events = EventLog(directory.path)
         threads = _Threads(directory, pool, make_agent, events, todo)
         try:
@@ -53,7 +53,7 @@ def play_in_threads(
             while talking:
                 threads.told.acquire()
                 result = threads.results[0]
-                if isinstance(result, Played):
+                if isinstance(result, PlayedEpisode):
                     sink.save(result)
                     sink.ended(result)
                 elif result is None:
@@ -67,7 +67,7 @@ def play_in_threads(
             threads.stopping.set()
             # What is over is saved, also the episode whose saving Ctrl-C interrupted.
             for result in tuple(threads.results):
-                if isinstance(result, Played):
+                if isinstance(result, PlayedEpisode):
                     sink.save(result)
             events.close()
     if stopped is not None:
@@ -94,7 +94,7 @@ class _Threads:
     make_agent: MakeAgent
     events: EventLog
     todo: deque[Task]
-    results: deque[Played | BaseException | None] = field(default_factory=deque)
+    results: deque[PlayedEpisode | BaseException | None] = field(default_factory=deque)
     told: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
     stopping: threading.Event = field(default_factory=threading.Event)
 
@@ -115,11 +115,11 @@ class _Threads:
         finally:
             self._tell(None)
 
-    def _tell(self, result: Played | BaseException | None) -> None:
+    def _tell(self, result: PlayedEpisode | BaseException | None) -> None:
         self.results.append(result)
         self.told.release()
 
-    def _episode(self, slot: int, task: Task) -> Played:
+    def _episode(self, slot: int, task: Task) -> PlayedEpisode:
         """Play a task, again with a new agent if its process dies."""
         seed = episode_seed(self.directory.manifest.seed, task.id)
         tries = 0
@@ -143,8 +143,8 @@ class _Threads:
                     if self.stopping.is_set():
                         raise _Stopping
                     continue
-                record = lost_episode(task, Lost(tries, lost.exitcode), self.directory)
-            return Played.by(agent, record)
+                record = lost_episode(task, LostJob(tries, lost.exitcode), self.directory)
+            return PlayedEpisode.by(agent, record)
 
     def _play(self, env: RemoteEnv, task: Task, seed: int) -> tuple[Agent | None, EpisodeRecord]:
         manifest = self.directory.manifest

@@ -21,7 +21,7 @@ Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
-class Lost:
+class LostJob:
     """What is returned for a job whose worker died every time.
 
     Attributes:
@@ -83,13 +83,13 @@ class _Worker(Generic[Job, Result]):
         return self.process.exitcode
 
 
-def do_jobs(
+def run_jobs(
     make: Callable[[], Callable[[Job], Result]],
     jobs: Iterable[Job],
     *,
     workers: int,
     tries: int = 3,
-) -> Generator[tuple[Job, Result | Lost], None, None]:
+) -> Generator[tuple[Job, Result | LostJob], None, None]:
     """Do every job in one of ``workers`` spawned processes; yield each when it is done.
 
     Leaving the iterator early (an exception, Ctrl-C, ``close()``) ends the processes. They ignore
@@ -103,7 +103,7 @@ def do_jobs(
         tries: how often a job is tried when the process that does it dies.
 
     Yields:
-        The job, and its result or :class:`Lost`.
+        The job, and its result or :class:`LostJob`.
 
     Raises:
         WorkerSetupError: ``make`` raised.
@@ -130,7 +130,7 @@ def do_jobs(
                     if attempt.number < tries:
                         waiting.append(_Try(attempt.job, attempt.number + 1))
                     else:
-                        yield attempt.job, Lost(attempt.number, exitcode)
+                        yield attempt.job, LostJob(attempt.number, exitcode)
                     continue
                 if isinstance(result, _SetupFailed):
                     raise WorkerSetupError(result.message)

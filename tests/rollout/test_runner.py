@@ -17,13 +17,13 @@ from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout import process_executor, runner
 from er_gym.rollout.events import EpisodeEnded
-from er_gym.rollout.executor import Size
+from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.runner import RunSummary
 from er_gym.rollout.selection import Shard, select
-from er_gym.rollout.worker_pool import Lost
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.paper_format import read_tasks
 
 
@@ -66,7 +66,7 @@ def run(store: RunDirectory, tasks, *, workers=1, on_episode=lambda event: None)
             on_episode(event)
 
     agent = NamedAgent(store.manifest.agent)
-    return runner.run(store, tasks, agent, size=Size(workers), listeners=[listen])
+    return runner.run(store, tasks, agent, parallelism=Parallelism(workers), listeners=[listen])
 
 
 def modified(store: RunDirectory) -> dict[str, int]:
@@ -261,9 +261,9 @@ def test_a_task_that_kills_its_worker_is_reported(new_store, tasks, monkeypatch)
 
     def give_up(make, jobs, workers):
         for job in jobs:
-            yield job, Lost(tries=3, exitcode=-9)
+            yield job, LostJob(tries=3, exitcode=-9)
 
-    monkeypatch.setattr(process_executor, "do_jobs", give_up)
+    monkeypatch.setattr(process_executor, "run_jobs", give_up)
     outcome = run(store, tasks[:1])
     (record,) = outcome.crashed
     assert record.error == "the worker process died 3 times, last with exit code -9"

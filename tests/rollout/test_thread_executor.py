@@ -20,7 +20,7 @@ from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout import thread_executor
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.events import EpisodeEnded
-from er_gym.rollout.executor import Size
+from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.runner import RunSummary, Stopped, run
@@ -116,8 +116,10 @@ def run_threaded(
         agent = make(task, seed)
         return agent if keep is None else Leaving(agent, keep)
 
-    size = Size(workers, concurrency)
-    return run(store, tasks, make_leaving, executor="threads", size=size, listeners=[listen])
+    parallelism = Parallelism(workers, concurrency)
+    return run(
+        store, tasks, make_leaving, executor="threads", parallelism=parallelism, listeners=[listen]
+    )
 
 
 def kept(store: RunDirectory) -> list[str]:
@@ -412,7 +414,7 @@ import os, socket
 from pathlib import Path
 from agents import Decision
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.executor import Size
+from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.runner import run
 from er_gym.tasks.paper_format import read_tasks
 
@@ -446,7 +448,7 @@ if __name__ == "__main__":
         read_tasks(folder / "tasks.json"),
         lambda task, seed: Agent(task),
         executor="threads",
-        size=Size(workers=2, concurrency=2),
+        parallelism=Parallelism(workers=2, concurrency=2),
     )
 """
 
