@@ -12,7 +12,7 @@ from agents.vlm.clients.budget import Budget
 from agents.vlm.factory import AgentFactory, consequential, load_settings
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import AgentSettings
-from er_gym.rollout.events import Emit
+from er_gym.rollout.events import EventListener
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.runner import RunSummary, run
@@ -83,7 +83,7 @@ class VLMRun:
         directory: RunDirectory,
         tasks: Sequence[Task],
         workers: int,
-        listeners: Iterable[Emit] = (),
+        listeners: Iterable[EventListener] = (),
         say: Callable[[object], None] | None = None,
     ) -> RunSummary:
         """Play the tasks that the run directory has no finished episode of.

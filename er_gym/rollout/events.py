@@ -151,12 +151,12 @@ class RunEnded(_Event):
 
 
 Event: TypeAlias = RunBegun | EpisodeBegun | Reply | StepDone | EpisodeEnded | Cost | RunEnded
-Emit: TypeAlias = Callable[[Event], None]
+EventListener: TypeAlias = Callable[[Event], None]
 """Whoever wants to hear of events."""
 _ANY: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="kind")])
 
 
-def nobody(event: Event) -> None:
+def ignore_event(event: Event) -> None:
     """Listen to nothing."""
 
 
@@ -172,7 +172,7 @@ class EventLog:
         OSError: it cannot be written.
     """
 
-    def __init__(self, directory: Path, listeners: Iterable[Emit] = ()) -> None:
+    def __init__(self, directory: Path, listeners: Iterable[EventListener] = ()) -> None:
         self._lines = JsonLines(directory / EVENTS)
         self._listeners = tuple(listeners)
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 from er_gym.rollout.agent import Agent, CannotGoOn, Decision
-from er_gym.rollout.events import Emit, EpisodeBegun, Reply, StepDone, nobody
+from er_gym.rollout.events import EpisodeBegun, EventListener, Reply, StepDone, ignore_event
 from er_gym.rollout.loop import transitions
 from er_gym.rollout.records import ERROR, EpisodeRecord, StepRecord, record_episode
 from er_gym.tasks.task import Task
@@ -44,7 +44,7 @@ def play_episode(
     *,
     agent_name: str = "",
     max_steps: int | None = None,
-    emit: Emit = nobody,
+    emit: EventListener = ignore_event,
 ) -> EpisodeRecord:
     """Play ``task`` from ``reset`` to its end.
 
@@ -116,7 +116,9 @@ def _begun(task: Task, max_steps: int | None) -> EpisodeBegun:
     )
 
 
-def _emit_step(emit: Emit, task_id: str, number: int, decision: Decision, step: StepRecord) -> None:
+def _emit_step(
+    emit: EventListener, task_id: str, number: int, decision: Decision, step: StepRecord
+) -> None:
     if decision.reply is not None:
         emit(Reply(task_id=task_id, step=number, **vars(decision.reply)))
     emit(

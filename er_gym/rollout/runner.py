@@ -11,7 +11,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
-from er_gym.rollout.events import Cost, Emit, EpisodeEnded, EventLog, RunBegun, RunEnded
+from er_gym.rollout.events import Cost, EpisodeEnded, EventListener, EventLog, RunBegun, RunEnded
 from er_gym.rollout.executor import Executor, Parallelism, PlayedEpisode
 from er_gym.rollout.process_executor import play_in_processes
 from er_gym.rollout.records import EpisodeRecord
@@ -63,7 +63,7 @@ def run(
     *,
     executor: str = "processes",
     parallelism: Parallelism = Parallelism(),  # noqa: B008 (frozen)
-    listeners: Iterable[Emit] = (),
+    listeners: Iterable[EventListener] = (),
     cost: Callable[[], Cost | None] = lambda: None,
 ) -> RunSummary:
     """Play the tasks that the run directory has no finished episode of.
