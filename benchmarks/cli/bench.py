@@ -187,7 +187,7 @@ def bench(
         console.print(note, style="dim", soft_wrap=True)
 
     try:
-        with _claimed(out, manifest) as store:
+        with _locked(out, manifest) as store:
             for line in store.move_aside(task.id for task in chosen):
                 complain(line)
             before = finished(store, chosen)
@@ -220,13 +220,13 @@ def bench(
 
 
 @contextmanager
-def _claimed(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
+def _locked(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
     """The run directory; what keeps it from being used is the user's to mend."""
-    from er_gym.rollout.run_directory import claimed
+    from er_gym.rollout.run_directory import locked_run_directory
 
     with ExitStack() as stack:
         with bad_input():
-            store = stack.enter_context(claimed(out, manifest))
+            store = stack.enter_context(locked_run_directory(out, manifest))
         yield store
 
 

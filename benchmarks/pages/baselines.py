@@ -36,7 +36,7 @@ from benchmarks.scoring.metrics import Score, score_episode, wilson
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym import __version__
 from er_gym.rollout.executor import Parallelism
-from er_gym.rollout.run_directory import Manifest, RunDirectory, claimed
+from er_gym.rollout.run_directory import Manifest, RunDirectory, locked_run_directory
 from er_gym.rollout.runner import finished, run
 from er_gym.tasks import jsonl_format, load_suite
 from er_gym.tasks.task import Task
@@ -126,7 +126,7 @@ class Player:
             seed=_SEED,
             er_gym=__version__,
         )
-        with claimed(self._work / f"{file_stem(name)}-{where}", manifest) as store:
+        with locked_run_directory(self._work / f"{file_stem(name)}-{where}", manifest) as store:
             return self._play(store, tasks, where, name)
 
     def _play(

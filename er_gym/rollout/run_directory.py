@@ -12,7 +12,7 @@ An agent may leave other files beside the records: :class:`.agent.LeavesAttachme
 written to a temporary file and moved to its name, so a file under its name is whole; what a killed
 run left half-written has another name and is never read. The same run continues where it was:
 :meth:`RunDirectory.read` tells what is there. One process at a time plays in a directory:
-:func:`claimed`.
+:func:`locked_run_directory`.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class Manifest(BaseModel):
 
 
 @dataclass(frozen=True)
-class Unusable:
+class UnusableFile:
     """A file among a run's episodes that is none of them.
 
     Attributes:
@@ -115,7 +115,7 @@ class Unusable:
 
 
 @dataclass(frozen=True)
-class Found:
+class RunContents:
     """What is in a run directory.
 
     Attributes:
@@ -124,7 +124,7 @@ class Found:
     """
 
     episodes: tuple[EpisodeRecord, ...]
-    unusable: tuple[Unusable, ...]
+    unusable: tuple[UnusableFile, ...]
 
 
 class RunDirectory:
@@ -220,15 +220,15 @@ class RunDirectory:
             make_folder(place.parent)
             write_whole(place, data)
 
-    def read(self) -> Found:
+    def read(self) -> RunContents:
         """Every episode there is, and what else is among them: broken, copied and foreign files."""
         episodes, unusable = [], []
         for path in sorted((self.path / EPISODES).glob("*.json")):
             try:
                 episodes.append(self._episode(path))
             except ValueError as error:
-                unusable.append(Unusable(path, str(error)))
-        return Found(tuple(episodes), tuple(unusable))
+                unusable.append(UnusableFile(path, str(error)))
+        return RunContents(tuple(episodes), tuple(unusable))
 
     def episodes(self) -> Iterator[EpisodeRecord]:
         """Every episode there is, by file name; files that hold none of this run's are left out."""
@@ -290,7 +290,7 @@ class RunDirectory:
 
 
 @contextlib.contextmanager
-def claimed(path: Path, manifest: Manifest) -> Iterator[RunDirectory]:
+def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirectory]:
     """A run directory to play in, which nobody else plays in meanwhile.
 
     Where it ends with an exception before anything is there that could be lost (an episode that did

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from er_gym.locking import Locked
 from er_gym.rollout.records import EpisodeRecord
-from er_gym.rollout.run_directory import RunDirectory, RunDirectoryError, claimed
+from er_gym.rollout.run_directory import RunDirectory, RunDirectoryError, locked_run_directory
 from er_gym.writing import file_stem
 
 GOLDEN = """
@@ -221,27 +221,30 @@ def test_it_is_moved_out_of_the_way_and_not_lost(store, odd_files, episode):
 
 
 def test_a_start_that_is_refused_claims_nothing(tmp_path, manifest):
-    with pytest.raises(ValueError, match="no such model"), claimed(tmp_path / "a" / "x", manifest):
+    with (
+        pytest.raises(ValueError, match="no such model"),
+        locked_run_directory(tmp_path / "a" / "x", manifest),
+    ):
         raise ValueError("no such model")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_what_was_there_before_stays(tmp_path, store, manifest, episode):
     (tmp_path / "run" / "notes.md").write_text("mine")
-    with pytest.raises(KeyboardInterrupt), claimed(store.path, manifest):
+    with pytest.raises(KeyboardInterrupt), locked_run_directory(store.path, manifest):
         raise KeyboardInterrupt
     assert [path.name for path in store.path.iterdir()] == ["notes.md"]
     for error in ("", "ValueError: no"):
-        with claimed(store.path, manifest) as mine:
+        with locked_run_directory(store.path, manifest) as mine:
             mine.write(episode(("end",), (), error=error))
-        with pytest.raises(KeyboardInterrupt), claimed(store.path, manifest):
+        with pytest.raises(KeyboardInterrupt), locked_run_directory(store.path, manifest):
             raise KeyboardInterrupt
         assert len(list(RunDirectory.open(store.path).episodes())) == 1
 
 
 def test_a_run_killed_before_it_had_anything_gives_way(store, manifest):
     other = manifest.model_copy(update={"agent": "random"})
-    with claimed(store.path, other):
+    with locked_run_directory(store.path, other):
         pass
     assert RunDirectory.open(store.path).manifest == other
 
@@ -250,10 +253,10 @@ def test_what_was_paid_for_stays(store, manifest):
     (store.path / "spending.jsonl").write_text("{}\n")
     with (
         pytest.raises(RunDirectoryError, match="its agent is"),
-        claimed(store.path, manifest.model_copy(update={"agent": "random"})),
+        locked_run_directory(store.path, manifest.model_copy(update={"agent": "random"})),
     ):
         pass
-    with pytest.raises(KeyboardInterrupt), claimed(store.path, manifest):
+    with pytest.raises(KeyboardInterrupt), locked_run_directory(store.path, manifest):
         raise KeyboardInterrupt
     assert (store.path / "run.json").exists()
 
@@ -270,8 +273,8 @@ def test_files_of_unknown_origin_are_refused(tmp_path, manifest, name):
 
 def test_two_do_not_play_in_one_directory(store, manifest):
     with (
-        claimed(store.path, manifest),
+        locked_run_directory(store.path, manifest),
         pytest.raises(Locked, match=f"in use by process {os.getpid()};"),
-        claimed(store.path, manifest),
+        locked_run_directory(store.path, manifest),
     ):
         pass
