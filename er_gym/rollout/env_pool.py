@@ -25,7 +25,7 @@ from er_gym.rollout.worker_pool import WorkerSetupError
 _PROTOCOL = 5
 """Pickle's: takes half as long for pictures as what ``Connection.send`` uses."""
 _NOBODY = -1
-DEADLINE = 600.0
+DEADLINE_SECONDS = 600.0
 """Seconds after which an environment that has not answered is taken for stuck."""
 
 
@@ -62,7 +62,12 @@ class EnvPool:
     """
 
     def __init__(
-        self, workers: int, slots: int, env: Mapping[str, Any], *, deadline: float = DEADLINE
+        self,
+        workers: int,
+        slots: int,
+        env: Mapping[str, Any],
+        *,
+        deadline: float = DEADLINE_SECONDS,
     ) -> None:
         self.deadline = deadline
         self.closed = False

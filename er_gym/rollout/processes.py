@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 
 CONTEXT = multiprocessing.get_context("spawn")
 """Processes are spawned, not forked: a forked renderer or torch does not work."""
-GRACE = 5.0
+GRACE_SECONDS = 5.0
 """Seconds that a process has to end by itself before it is killed."""
 
 
@@ -37,7 +37,7 @@ def start_process(target: Callable[..., None], *args: Any) -> SpawnProcess:
     return process
 
 
-def end_processes(processes: Iterable[SpawnProcess], grace: float = GRACE) -> None:
+def end_processes(processes: Iterable[SpawnProcess], grace: float = GRACE_SECONDS) -> None:
     """Wait for processes that have been told to end; kill those that have not after ``grace`` s."""
     deadline = time.monotonic() + grace
     for process in processes:
@@ -82,5 +82,5 @@ def _follow_parent() -> None:
     assert parent is not None
     parent.join()
     os.kill(os.getpid(), signal.SIGTERM)
-    time.sleep(GRACE)
+    time.sleep(GRACE_SECONDS)
     os._exit(1)
