@@ -26,7 +26,7 @@ class Locked(ValueError):
 
 
 @contextlib.contextmanager
-def sole_user(folder: Path) -> Iterator[None]:
+def exclusive_use(folder: Path) -> Iterator[None]:
     """Have a folder to oneself.
 
     The folder is made where it is not there. The operating system holds the lock on the file

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from er_gym.locking import LOCK, Locked, sole_user
+from er_gym.locking import LOCK, Locked, exclusive_use
 from er_gym.writing import (
     MARKDOWN_MARK,
     YAML_MARK,
@@ -170,8 +170,8 @@ def test_the_longest_name_there_may_be(tmp_path: Path) -> None:
 _HOLD = """
 import sys, time
 from pathlib import Path
-from er_gym.locking import sole_user
-with sole_user(Path(sys.argv[1])):
+from er_gym.locking import exclusive_use
+with exclusive_use(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
 """
@@ -189,24 +189,24 @@ def test_another_process_is_refused_until_it_is_dead(tmp_path: Path) -> None:
         assert process.stdout is not None
         assert process.stdout.readline() == "held\n"
         with pytest.raises(Locked, match=rf"run is in use by process {process.pid};.*--out"):
-            sole_user(folder).__enter__()
+            exclusive_use(folder).__enter__()
     finally:
         process.kill()
         process.communicate()
     assert (folder / LOCK).exists()
-    with sole_user(folder):
+    with exclusive_use(folder):
         (folder / "kept").touch()
     assert [path.name for path in folder.iterdir()] == ["kept"]
 
 
 def test_nothing_is_left_of_a_folder_that_was_made_for_nothing(tmp_path: Path) -> None:
-    with sole_user(tmp_path / "a" / "b"), pytest.raises(Locked, match="in use by process"):
-        sole_user(tmp_path / "a" / "b").__enter__()
+    with exclusive_use(tmp_path / "a" / "b"), pytest.raises(Locked, match="in use by process"):
+        exclusive_use(tmp_path / "a" / "b").__enter__()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_lock_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / LOCK).write_text("my own lock\n")
     with pytest.raises(NotOurs, match=r"run\.lock is there"):
-        sole_user(tmp_path).__enter__()
+        exclusive_use(tmp_path).__enter__()
     assert (tmp_path / LOCK).read_text() == "my own lock\n"

@@ -45,7 +45,7 @@ from agents.rl.policy_observation import Perception
 from agents.rl.saved import FOREIGN, MODEL, nothing, restore, save, untrusted
 from agents.rl.vec_env import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS
-from er_gym.locking import sole_user
+from er_gym.locking import exclusive_use
 from er_gym.writing import YAML_MARK, is_ours, make_folder, write_whole
 
 CONFIG = "config.yaml"
@@ -99,7 +99,7 @@ def train(
         Locked: another process trains in it.
         KeyboardInterrupt: Ctrl-C; what has been learnt is saved.
     """
-    with sole_user(run):
+    with exclusive_use(run):
         new = prepare(config, run)
         try:
             return _train(config, run, show_progress, trust, more)

@@ -29,7 +29,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from er_gym.envs.protocol import DEFAULT
-from er_gym.locking import sole_user
+from er_gym.locking import exclusive_use
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.events import EVENTS
 from er_gym.rollout.play import episode_seed
@@ -303,7 +303,7 @@ def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirector
         RunDirectoryError: another run's results are there; nothing is changed.
         OSError: the directory cannot be made or written to.
     """
-    with sole_user(path):
+    with exclusive_use(path):
         if (path / MANIFEST).exists():
             begun = RunDirectory.open(path)
             if not any(_holds_something(path / name) for name in (EPISODES, SPENDING, REPLIES)):
