@@ -11,7 +11,7 @@ import socket
 from collections.abc import Iterator
 from pathlib import Path
 
-from er_gym.writing import NotOurs, make_folder
+from er_gym.writing import ForeignFile, make_folder
 
 LOCK = "run.lock"
 _FLAGS = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
@@ -37,7 +37,7 @@ def exclusive_use(folder: Path) -> Iterator[None]:
 
     Raises:
         Locked: another process, or another part of this one, uses it.
-        NotOurs: a ``run.lock`` is there that er-gym did not write.
+        ForeignFile: a ``run.lock`` is there that er-gym did not write.
         OSError: the folder cannot be made or written to.
     """
     # The library `filelock` neither tells who holds a lock nor removes its file; it would be ten
@@ -86,7 +86,7 @@ def _lock(folder: Path) -> int:
                     raise
             if _is_at(handle, path):
                 if not _OURS.fullmatch(os.pread(handle, _LONGEST, 0)):
-                    raise NotOurs(
+                    raise ForeignFile(
                         f"{path} is there, and er-gym did not write it; choose another --out"
                     )
                 os.ftruncate(handle, 0)

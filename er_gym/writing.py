@@ -1,6 +1,6 @@
 """Files that are written whole or not at all, and only over what er-gym wrote.
 
-Every file goes through :func:`write_whole`: it is written beside its place and moved there, so that
+Every file goes through :func:`write_atomic`. It is written beside its place and moved there, so
 neither a full disk nor a kill leaves half a file or harms the old one. A file that the user named,
 or that is derived from such a name, goes through :func:`write_output`, which replaces nothing that
 er-gym did not write unless it is told to.
@@ -58,7 +58,7 @@ class CannotWrite(OSError):
     """A file cannot be written; the message is one line that names it. The old one is whole."""
 
 
-class NotOurs(ValueError):
+class ForeignFile(ValueError):
     """er-gym did not write what is there, so it does not replace it; nothing is changed."""
 
 
@@ -71,7 +71,7 @@ def file_stem(name: str) -> str:
     return f"{stem.lstrip('.')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
-def write_whole(path: Path, data: str | bytes, *, mode: int | None = None) -> None:
+def write_atomic(path: Path, data: str | bytes, *, mode: int | None = None) -> None:
     """Write a file so that it is found whole or not at all, power cuts included.
 
     Args:
@@ -119,15 +119,15 @@ def write_output(path: str | Path, data: str | bytes, *, force: bool = False) ->
         force: whether to replace also what er-gym did not write.
 
     Raises:
-        NotOurs: it did not write what is there.
-        CannotWrite: as :func:`write_whole`; or a device or a pipe is there, or a file that may not
+        ForeignFile: it did not write what is there.
+        CannotWrite: as :func:`write_atomic`; or a device or a pipe is there, or a file that may not
             be written to.
     """
     path = Path(path)
     content = data.encode() if isinstance(data, str) else data
     if not _holds(path, content):
         check_output(path, force=force)
-        write_whole(Path(os.path.realpath(path)), content)
+        write_atomic(Path(os.path.realpath(path)), content)
 
 
 def check_output(path: str | Path, data: bytes | None = None, *, force: bool = False) -> None:
@@ -157,7 +157,7 @@ def check_output(path: str | Path, data: bytes | None = None, *, force: bool = F
         if not os.access(path, os.W_OK):
             raise CannotWrite(f"{path}: cannot be written: the file is read-only")
         if not (force or is_ours(path)):
-            raise NotOurs(
+            raise ForeignFile(
                 f"{path} is there already, and er-gym did not write it; choose another name or "
                 "move it away (commands that have --force then replace it)"
             )
@@ -223,7 +223,7 @@ def write_picture(path: Path, picture: Image, *, force: bool = False, **options:
         options: of Pillow's writer.
 
     Raises:
-        NotOurs, CannotWrite: as :func:`write_output`.
+        ForeignFile, CannotWrite: as :func:`write_output`.
         ValueError: there is no such kind of picture, or it cannot hold this one.
     """
     from PIL.PngImagePlugin import PngInfo
@@ -253,7 +253,7 @@ def write_figure(path: Path, figure: Figure, *, force: bool = False, **options: 
         options: of ``savefig``.
 
     Raises:
-        NotOurs, CannotWrite: as :func:`write_output`.
+        ForeignFile, CannotWrite: as :func:`write_output`.
     """
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata=dict(PICTURE_MARK), **options)

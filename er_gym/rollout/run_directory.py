@@ -36,7 +36,7 @@ from er_gym.rollout.play import episode_seed
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.errors import SetAside, Taken, TaskFileError
 from er_gym.tasks.reading import read_bytes, read_text
-from er_gym.writing import file_stem, make_folder, write_whole
+from er_gym.writing import file_stem, make_folder, write_atomic
 
 MANIFEST = "run.json"
 EPISODES = "episodes"
@@ -170,7 +170,7 @@ class RunDirectory:
             )
         else:
             make_folder(path / EPISODES)
-            write_whole(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
+            write_atomic(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
         return cls(path, manifest)
 
     @classmethod
@@ -199,7 +199,7 @@ class RunDirectory:
         path = self._file(episode.task_id)
         make_folder(path.parent)
         told = episode.model_copy(update={"run": self.manifest.digest})
-        write_whole(path, told.model_dump_json(indent=1) + "\n")
+        write_atomic(path, told.model_dump_json(indent=1) + "\n")
         return path
 
     def attach(
@@ -218,7 +218,7 @@ class RunDirectory:
         for name, data in attachments.items():
             place = self.path / name
             make_folder(place.parent)
-            write_whole(place, data)
+            write_atomic(place, data)
 
     def read(self) -> RunContents:
         """Every episode there is, and what else is among them: broken, copied and foreign files."""

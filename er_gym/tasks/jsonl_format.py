@@ -174,7 +174,7 @@ def write_tasks(
     Raises:
         ValueError: two tasks name different arrangements alike, or a text is none that UTF-8 can
             hold.
-        NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
+        ForeignFile, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     path, tasks = Path(path), list(tasks)
     header = json.dumps({"format": FORMAT, "tasks": len(tasks), **made}, ensure_ascii=False)

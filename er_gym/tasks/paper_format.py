@@ -133,7 +133,7 @@ def write_tasks(path: str | Path, tasks: Iterable[Task], *, force: bool = True) 
 
     Raises:
         TaskFileError: a task could not be read again, for what its ``extra`` says.
-        NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
+        ForeignFile, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     path, tasks = Path(path), list(tasks)
     records = [

@@ -96,7 +96,7 @@ def write_generator_tasks(
 
     Raises:
         TaskFileError: a task could not be read again, for what its ``extra`` says.
-        NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
+        ForeignFile, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     groups: dict[Path, list[Task]] = {}
     for task in tasks:

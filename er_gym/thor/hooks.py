@@ -12,7 +12,7 @@ from pathlib import Path
 
 from er_gym.thor import client_hook
 from er_gym.thor.places import PlayerError, client_home
-from er_gym.writing import write_whole
+from er_gym.writing import write_atomic
 
 _HOOK = "er_gym_player_hook"
 """What the module is called where it is copied to."""
@@ -63,9 +63,9 @@ def write_hook(folders: Sequence[Path]) -> Path | None:
             if os.access(folder, os.W_OK):
                 # First it is written down, so that uninstall finds what a kill leaves behind.
                 hooks = sorted({*_hooks(), str(folder)})
-                write_whole(_record(), json.dumps({"hooks": hooks}) + "\n", mode=_FOR_ALL)
+                write_atomic(_record(), json.dumps({"hooks": hooks}) + "\n", mode=_FOR_ALL)
                 for name, text in _hook_files().items():
-                    write_whole(folder / name, text, mode=_FOR_ALL)
+                    write_atomic(folder / name, text, mode=_FOR_ALL)
                 return folder / f"{_HOOK}.pth"
     return None
 

@@ -8,7 +8,7 @@ import sys
 from hashlib import sha256
 from pathlib import Path
 
-from er_gym.writing import write_whole
+from er_gym.writing import write_atomic
 
 EXECUTABLE = 0o755
 _START = Path(__file__).with_name("start_player.py")
@@ -28,7 +28,7 @@ def thor_executable() -> str:
     try:
         if not (os.access(path, os.X_OK) and path.read_text() == text):
             cache.mkdir(parents=True, exist_ok=True)
-            write_whole(path, text, mode=EXECUTABLE)
+            write_atomic(path, text, mode=EXECUTABLE)
     except OSError:
         return shlex.join(_command())
     return shlex.quote(str(path))

@@ -19,7 +19,7 @@ from typing import Any
 
 from er_gym.thor.client_hook import MARKER
 from er_gym.thor.launcher import EXECUTABLE, launcher
-from er_gym.writing import write_whole
+from er_gym.writing import write_atomic
 
 _GPUS = 256
 """As many device numbers as the mapping knows; no machine has more."""
@@ -146,7 +146,7 @@ class Release(Place):
 
     def write(self, path: Path) -> None:
         path.mkdir()
-        write_whole(path / self.name, launcher(), mode=EXECUTABLE)
+        write_atomic(path / self.name, launcher(), mode=EXECUTABLE)
         # How the build can be spoken to; without this file the client goes to the network for it.
         (path / "metadata.json").write_text(json.dumps({"server_types": ["FIFO", "WSGI"]}) + "\n")
         (path / MARKER).write_text(json.dumps({"python": sys.executable}) + "\n")
