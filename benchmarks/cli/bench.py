@@ -187,14 +187,14 @@ def bench(
         console.print(note, style="dim", soft_wrap=True)
 
     try:
-        with _locked(out, manifest) as store:
-            for line in store.move_aside(task.id for task in chosen):
+        with _locked(out, manifest) as run_directory:
+            for line in run_directory.move_aside(task.id for task in chosen):
                 complain(line)
-            before = finished(store, chosen)
+            before = finished(run_directory, chosen)
             succeeded = sum(episode.success for episode in before)
             title = f"{asked.name}, {agent}"
             progress = Progress(console, title, len(chosen), len(before), succeeded)
-            with _player(store, chosen, workers, agent, voice, trust) as (play, cost):
+            with _player(run_directory, chosen, workers, agent, voice, trust) as (play, cost):
                 with progress:
                     outcome = play(progress)
                 bill = cost()
@@ -226,8 +226,8 @@ def _locked(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
 
     with ExitStack() as stack:
         with bad_input():
-            store = stack.enter_context(locked_run_directory(out, manifest))
-        yield store
+            run_directory = stack.enter_context(locked_run_directory(out, manifest))
+        yield run_directory
 
 
 def _left_in(out: Path, chosen: Sequence[Task]) -> str:
@@ -243,7 +243,7 @@ def _left_in(out: Path, chosen: Sequence[Task]) -> str:
 
 @contextmanager
 def _player(
-    store: RunDirectory,
+    run_directory: RunDirectory,
     chosen: Sequence[Task],
     workers: int,
     agent: str,
@@ -259,15 +259,17 @@ def _player(
     if voice is None:
         make, parallelism = NamedAgent(agent, trust), Parallelism(workers)
         yield (
-            lambda shown: run(store, chosen, make, parallelism=parallelism, listeners=[shown]),
+            lambda shown: run(
+                run_directory, chosen, make, parallelism=parallelism, listeners=[shown]
+            ),
             lambda: None,
         )
         return
     with bad_input(CannotGoOn):  # no key, no such model
-        factory = voice.factory(store.path)
+        factory = voice.factory(run_directory.path)
     with closing(factory):
         yield (
-            lambda shown: voice.play(factory, store, chosen, workers, [shown], shown.say),
+            lambda shown: voice.play(factory, run_directory, chosen, workers, [shown], shown.say),
             lambda: factory.cost,
         )
 

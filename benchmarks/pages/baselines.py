@@ -126,24 +126,26 @@ class Player:
             seed=_SEED,
             er_gym=__version__,
         )
-        with locked_run_directory(self._work / f"{file_stem(name)}-{where}", manifest) as store:
-            return self._play(store, tasks, where, name)
+        with locked_run_directory(
+            self._work / f"{file_stem(name)}-{where}", manifest
+        ) as run_directory:
+            return self._play(run_directory, tasks, where, name)
 
     def _play(
-        self, store: RunDirectory, tasks: Sequence[Task], where: str, name: str
+        self, run_directory: RunDirectory, tasks: Sequence[Task], where: str, name: str
     ) -> list[Score]:
-        before = finished(store, tasks)
+        before = finished(run_directory, tasks)
         progress = Progress(self._console, f"{where}, {name}", len(tasks), len(before), 0)
         with progress:
             make, parallelism = (
-                NamedAgent(store.manifest.agent, trust=self._trust),
+                NamedAgent(run_directory.manifest.agent, trust=self._trust),
                 Parallelism(self._workers),
             )
-            run(store, tasks, make, parallelism=parallelism, listeners=[progress])
+            run(run_directory, tasks, make, parallelism=parallelism, listeners=[progress])
         wanted = {task.id for task in tasks}
         return [
             score_episode(episode, CORRECTED)
-            for episode in store.episodes()
+            for episode in run_directory.episodes()
             if episode.task_id in wanted
         ]
 

@@ -138,15 +138,15 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
             suite=suite.name, suite_digest=suite.digest, suite_size=len(suite.tasks),
             agent=voice.name, env=env, seed=0, er_gym=__version__,
         )  # fmt: skip
-        store = RunDirectory.create(Path(place), manifest)
+        run_directory = RunDirectory.create(Path(place), manifest)
         began = time.perf_counter()
 
         def note(event: Event) -> None:
             if isinstance(event, EpisodeEnded):
                 ended.append((time.perf_counter(), event.steps))
 
-        with closing(voice.factory(store.path)) as factory:
-            outcome = voice.play(factory, store, tasks, workers, [note])
+        with closing(voice.factory(run_directory.path)) as factory:
+            outcome = voice.play(factory, run_directory, tasks, workers, [note])
     ours.close()
     process.join(5)
     whole = ended[-1][0] - began

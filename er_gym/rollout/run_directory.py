@@ -309,15 +309,15 @@ def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirector
             if not any(_holds_something(path / name) for name in (EPISODES, SPENDING, REPLIES)):
                 begun._withdraw()
         new = not (path / MANIFEST).exists()
-        store = RunDirectory.create(path, manifest)
+        run_directory = RunDirectory.create(path, manifest)
         try:
-            yield store
+            yield run_directory
         except BaseException as error:  # Ctrl-C too
             paid = _holds_something(path / SPENDING)
             # What crashed since nobody answered says no more than the error does.
             refused = isinstance(error, CannotGoOn)
-            if new and not paid and all(one.error and refused for one in store.episodes()):
-                store._withdraw()
+            if new and not paid and all(one.error and refused for one in run_directory.episodes()):
+                run_directory._withdraw()
             raise
 
 

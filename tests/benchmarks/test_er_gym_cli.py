@@ -157,15 +157,15 @@ def test_a_bad_command(er_gym, arguments, words):
     assert all(word in one_line(err) for word in words)
 
 
-def test_the_directory_of_another_run_is_left_alone(er_gym, tasks_file, store, episode):
-    store.write(episode(("end",), ("end",)))
-    before = {path: path.read_bytes() for path in store.path.rglob("*.json")}
+def test_the_directory_of_another_run_is_left_alone(er_gym, tasks_file, run_directory, episode):
+    run_directory.write(episode(("end",), ("end",)))
+    before = {path: path.read_bytes() for path in run_directory.path.rglob("*.json")}
     code, shown, err = er_gym(
-        *("bench", "--tasks-file", tasks_file, "--agent", "oracle", "--out", store.path)
+        *("bench", "--tasks-file", tasks_file, "--agent", "oracle", "--out", run_directory.path)
     )
     assert (code, shown) == (2, "")
     assert "its suite is 'hand-made', this one's 'tasks'; choose another --out" in one_line(err)
-    assert {path: path.read_bytes() for path in store.path.rglob("*.json")} == before
+    assert {path: path.read_bytes() for path in run_directory.path.rglob("*.json")} == before
 
 
 def test_a_directory_that_cannot_be_made(er_gym, tasks_file, tmp_path):
@@ -295,7 +295,9 @@ def test_a_run_is_played_and_continued_under_one_protocol(
         assert words in one_line(err)
 
     played = []
-    monkeypatch.setattr(runner, "run", lambda store, tasks, **_: played.extend(tasks) or NOTHING)
+    monkeypatch.setattr(
+        runner, "run", lambda run_directory, tasks, **_: played.extend(tasks) or NOTHING
+    )
     for protocol, states in (("paper", True), ("default", False)):
         code, _, err = er_gym(
             *command, "--out", tmp_path / protocol, "--limit", "1", "--protocol", protocol
@@ -353,8 +355,8 @@ def test_an_ended_run_continues(tasks_file, tmp_path, signum):
 def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, episode):
     crashed = episode(("end",), (), task_id="paper-2", error="ValueError: no")
 
-    def run(store, tasks, make_agent, **how):
-        store.write(crashed)
+    def run(run_directory, tasks, make_agent, **how):
+        run_directory.write(crashed)
         return RunSummary(played=7, already_done=0, crashed=(crashed,))
 
     monkeypatch.setattr(runner, "run", run)
@@ -371,7 +373,7 @@ def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, epi
 
 
 def test_a_full_disk_is_told_in_one_line(tasks_file, tmp_path, er_gym, monkeypatch):
-    def run(store, tasks, make_agent, **how):
+    def run(run_directory, tasks, make_agent, **how):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(runner, "run", run)
