@@ -20,7 +20,7 @@ from itertools import islice
 from pathlib import Path
 
 from er_gym import __version__
-from er_gym.envs.verify import unwanted, with_difficulty
+from er_gym.envs.verify import rejection_reason, with_difficulty
 from er_gym.rollout.verification import make_verifier
 from er_gym.rollout.worker_pool import LostJob, run_jobs
 from er_gym.tasks import jsonl_format
@@ -85,7 +85,7 @@ class Maker:
         """The tasks that are wanted and can be done; not too many are played."""
         tries = self._making.per_layout * _TRIES
         for task in candidates:
-            problem = unwanted(task, room, self._making, self._verify)
+            problem = rejection_reason(task, room, self._making, self._verify)
             if not problem:
                 if not tries:
                     return

@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.arguments import shown
+from er_gym.envs.arguments import short_repr
 from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
 
@@ -101,8 +101,8 @@ def text_of(action: AnyAction) -> str:
     if 0 <= index < len(ACTIONS):
         return str(ACTIONS[index])
     raise gymnasium.error.InvalidAction(
-        f"{shown(action)} is no action: give an index from 0 to {len(ACTIONS) - 1} (an int, or an "
-        "array with one integer), an Action, or text such as 'navigate to Fridge'"
+        f"{short_repr(action)} is no action: give an index from 0 to {len(ACTIONS) - 1} (an int or "
+        "an array with one integer), an Action, or text such as 'navigate to Fridge'"
     )
 
 

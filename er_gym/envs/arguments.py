@@ -17,7 +17,7 @@ import numpy as np
 _LONGEST = 80
 
 
-def shown(value: object) -> str:
+def short_repr(value: object) -> str:
     """A value for a message: on one line, cut short."""
     try:
         text = " ".join(reprlib.repr(value).split())
@@ -26,11 +26,11 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
-def whole(name: str, value: Any, least: int, most: int | None = None) -> int:
+def whole_number(name: str, value: Any, least: int, most: int | None = None) -> int:
     """A whole number, ``least`` to ``most``; Booleans are none."""
     fits = not isinstance(value, bool) and isinstance(value, Integral)
     if not fits or value < least or (most is not None and value > most):
-        raise ValueError(f"{name} is {shown(value)}; give a whole number {_span(least, most)}")
+        raise ValueError(f"{name} is {short_repr(value)}; give a whole number {_span(least, most)}")
     return int(value)
 
 
@@ -54,21 +54,21 @@ def number(
         fits = low and (most is None or (value < most if above else value <= most))
     if not fits:
         allowed = allowed or f"a number {_span(least, most, above)}"
-        raise ValueError(f"{name} is {shown(value)}; give {allowed}")
+        raise ValueError(f"{name} is {short_repr(value)}; give {allowed}")
     return float(value)
 
 
 def flag(name: str, value: Any) -> bool:
     """True or False."""
     if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{name} is {shown(value)}; give True or False")
+        raise ValueError(f"{name} is {short_repr(value)}; give True or False")
     return bool(value)
 
 
 def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
     """One of some names."""
     if not isinstance(value, str) or value not in allowed:
-        raise ValueError(f"unknown {name} {shown(value)}; choose one of: {', '.join(allowed)}")
+        raise ValueError(f"unknown {name} {short_repr(value)}; choose one of: {', '.join(allowed)}")
     return value
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from er_gym.envs import object_selection, skills
 from er_gym.envs.action_handler import EpisodeSetup
 from er_gym.envs.actions import ACTIONS, Action, AnyAction
-from er_gym.envs.arguments import flag, number, one_of, shown, whole
+from er_gym.envs.arguments import flag, number, one_of, short_repr, whole_number
 from er_gym.envs.errors import ResetNeeded
 from er_gym.envs.info import Info, LegalActions
 from er_gym.envs.legality import KnownTypes
@@ -188,15 +188,15 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             )
         if render_mode is not None:
             one_of("render_mode", render_mode, self.metadata["render_modes"])
-        width = whole("width", width, 1, _LARGEST_SIDE)
-        height = whole("height", height, 1, _LARGEST_SIDE)
+        width = whole_number("width", width, 1, _LARGEST_SIDE)
+        height = whole_number("height", height, 1, _LARGEST_SIDE)
         check_size(width, height)
         annotate = flag("annotate", annotate)
         self._backend = one_of("backend", backend, BACKENDS)
         self._grid_size = number("grid_size", grid_size, _SMALLEST_GRID, _LARGEST_GRID)
         self._step_penalty = number("step_penalty", step_penalty, 0)
         self._illegal_penalty = number("illegal_penalty", illegal_penalty, 0)
-        self._max_steps = None if max_steps is None else whole("max_steps", max_steps, 1)
+        self._max_steps = None if max_steps is None else whole_number("max_steps", max_steps, 1)
         self._task_type: TaskType | None = None
         if task_type is not None:
             self._task_type = look_up_type(task_type)
@@ -607,16 +607,16 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 def _checked(options: Mapping[str, Any]) -> Mapping[str, Any]:
     if not isinstance(options, Mapping):
         raise ValueError(
-            f"options at reset are {shown(options)}; give a dictionary such as "
+            f"options at reset are {short_repr(options)}; give a dictionary such as "
             "{'scene': 'FloorPlan1'}"
         )
-    unknown = sorted(shown(name) for name in options if name not in ("task", "scene", "suite"))
+    unknown = sorted(short_repr(name) for name in options if name not in ("task", "scene", "suite"))
     if unknown:
         raise ValueError(f"unknown option {unknown[0]} at reset; there are: task, scene, suite")
     for name, kinds in (("task", Task | str), ("scene", str)):
         if not isinstance(options.get(name), kinds | None) or options.get(name) == "":
             raise ValueError(
-                f"option {name!r} at reset is {shown(options[name])}; give a "
+                f"option {name!r} at reset is {short_repr(options[name])}; give a "
                 f"{'Task or its id' if name == 'task' else 'scene such as FloorPlan1'}"
             )
     return options

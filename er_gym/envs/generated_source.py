@@ -7,8 +7,8 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from er_gym.envs.arguments import shown
-from er_gym.envs.verify import PlayableEnv, Verifier, unwanted, with_difficulty
+from er_gym.envs.arguments import short_repr
+from er_gym.envs.verify import PlayableEnv, Verifier, rejection_reason, with_difficulty
 from er_gym.tasks.generate import Generator, arranged
 from er_gym.tasks.suite_spec import Making
 from er_gym.tasks.task import Task
@@ -54,7 +54,7 @@ class GeneratedSource:
     def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
         """A task that the solver has just done."""
         if scene and scene not in SCENE_NAMES:
-            raise ValueError(f"unknown scene {shown(scene)}; give a name such as FloorPlan1")
+            raise ValueError(f"unknown scene {short_repr(scene)}; give a name such as FloorPlan1")
         kinds = [task_type] if task_type else self._kinds
         rooms = (scene,) if scene else self._making.rooms
         for _ in range(_ROOMS):
@@ -64,7 +64,7 @@ class GeneratedSource:
             tasks = [
                 task
                 for task in room.tasks([kind.name])
-                if not unwanted(task, room, self._making, self._verify)
+                if not rejection_reason(task, room, self._making, self._verify)
             ]
             order: list[int] = rng.permutation(len(tasks)).tolist()
             for task in (tasks[number] for number in order[:_CANDIDATES]):
@@ -80,8 +80,8 @@ class GeneratedSource:
     def find(self, task_id: str) -> Task:
         """There are no tasks to be found by their ids."""
         raise ValueError(
-            f"no task {shown(task_id)}: tasks that are generated live cannot be asked for by id; "
-            "pass the Task itself"
+            f"no task {short_repr(task_id)}: tasks that are generated live cannot be asked for "
+            "by id; pass the Task itself"
         )
 
     def close(self) -> None:

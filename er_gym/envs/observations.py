@@ -19,7 +19,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from er_gym.envs.actions import Action
-from er_gym.envs.arguments import shown
+from er_gym.envs.arguments import short_repr
 from er_gym.envs.legality import AvailableObjects, KnownTypes
 from er_gym.envs.perception import Perception
 from er_gym.plugins import PluginError, Registry, is_dotted
@@ -344,6 +344,6 @@ def parse_obs_mode(obs_mode: str) -> dict[str, Observation]:
 
 def _unknown_mode(obs_mode: object) -> str:
     return (
-        f"unknown obs_mode {shown(obs_mode)}; join any of {', '.join(OBSERVATIONS.names())} and "
-        "package.module:ROW with '+', such as 'rgb+text'"
+        f"unknown obs_mode {short_repr(obs_mode)}; join any of {', '.join(OBSERVATIONS.names())} "
+        "and package.module:ROW with '+', such as 'rgb+text'"
     )

@@ -17,7 +17,7 @@ import numpy as np
 from er_gym.envs.perception import perceive
 from er_gym.envs.skills import Outcome, Reachable
 from er_gym.tasks.task import AgentPose
-from er_gym.thor.objects import is_there
+from er_gym.thor.objects import is_present
 
 _FARTHEST, _NEAR = 1.5, 1.0
 """How far from an object the agent may stand, and may if the object is large; metres."""
@@ -94,7 +94,7 @@ def current_snapshot(controller: Any, object_id: str) -> ObjectSnapshot | None:
 def _entry(controller: Any, object_id: str) -> Mapping[str, Any] | None:
     objects = controller.last_event.metadata["objects"]
     entry = next((entry for entry in objects if entry["objectId"] == object_id), None)
-    return entry if entry is not None and is_there(entry) else None
+    return entry if entry is not None and is_present(entry) else None
 
 
 def step_undrawn(controller: Any, action: str, **arguments: Any) -> bool:

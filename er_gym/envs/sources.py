@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from er_gym.envs.arguments import shown
+from er_gym.envs.arguments import short_repr
 from er_gym.tasks.errors import TaskFileError, in_short, told_once
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite, suite_file, suite_from_file, suite_names
@@ -103,7 +103,9 @@ class TaskList:
         for task in self.tasks:
             if task.id == task_id:
                 return task
-        raise ValueError(f"no task {shown(task_id)} among the {len(self.tasks)} of {self._name}")
+        raise ValueError(
+            f"no task {short_repr(task_id)} among the {len(self.tasks)} of {self._name}"
+        )
 
 
 def make_source(source: Source, make_env: Callable[[], PlayableEnv]) -> EpisodeSource:
@@ -142,7 +144,7 @@ def make_source(source: Source, make_env: Callable[[], PlayableEnv]) -> EpisodeS
         if len(tasks) == len(source):
             return TaskList(tasks)
     raise ValueError(
-        f"{shown(source)} is no source of episodes; give a suite's name, a task file, "
+        f"{short_repr(source)} is no source of episodes; give a suite's name, a task file, "
         f"{GENERATE!r}, a list of tasks, or an EpisodeSource"
     )
 

@@ -123,7 +123,7 @@ class Verifier:
         self._env.close()
 
 
-def unwanted(task: Task, room: Generator, making: Making, verify: Verifier) -> str:
+def rejection_reason(task: Task, room: Generator, making: Making, verify: Verifier) -> str:
     """Why a generated task is not one that is wanted, ``""`` if it is; nothing is played."""
     if not making.unseen_objects and UNSEEN_TYPES & subject_types(task):
         return "it is about things that training never sees"

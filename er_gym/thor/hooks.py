@@ -55,7 +55,7 @@ def hook_folders(python: str) -> list[Path]:
 def write_hook(folders: Sequence[Path]) -> Path | None:
     """See to it that there is a hook in one of the folders; where, or None."""
     for folder in folders:
-        if all(_says(folder / name, text) for name, text in _hook_files().items()):
+        if all(_has_text(folder / name, text) for name, text in _hook_files().items()):
             return folder / f"{_HOOK}.pth"  # it is whose it is: only its owner removes it
     for folder in folders:
         with contextlib.suppress(OSError):
@@ -76,7 +76,7 @@ def _hook_files() -> dict[str, str]:
     return {f"{_HOOK}.py": module, f"{_HOOK}.pth": f"import {_HOOK}; {_HOOK}.activate()\n"}
 
 
-def _says(path: Path, text: str) -> bool:
+def _has_text(path: Path, text: str) -> bool:
     try:
         return path.read_text(encoding="utf-8") == text
     except (OSError, ValueError):

@@ -51,11 +51,11 @@ def install(*, force: bool = False, python: str = sys.executable) -> Installed:
     for release in RELEASES:
         _check_path(release)
     folders = hook_folders(python)
-    with _alone():
+    with _installation_lock():
         for release in RELEASES:
             _check_build(release, force)
         if GpuMapping().is_foreign and os.path.lexists(GpuMapping().set_aside):
-            raise _two_of(GpuMapping())
+            raise _both_occupied(GpuMapping())
         for place in _PLACES:
             place.put()
         return Installed(RELEASES, write_hook(folders), tuple(_soon_pruned()))
@@ -78,10 +78,10 @@ def _check_build(release: Release, force: bool) -> None:
                 "aside, and uninstall brings it back"
             )
         if os.path.lexists(release.set_aside):
-            raise _two_of(release)
+            raise _both_occupied(release)
 
 
-def _two_of(place: Place) -> PlayerError:
+def _both_occupied(place: Place) -> PlayerError:
     return PlayerError(
         f"{place.path} is not er-gym's, and neither is {place.set_aside}, which is set aside "
         "already; move one of the two away"
@@ -102,7 +102,7 @@ def uninstall() -> tuple[Release, ...]:
     nothing = PlayerError(f"nothing of er-gym's is in {client_home()}{others}")
     if not client_home().is_dir():
         raise nothing
-    with _alone():
+    with _installation_lock():
         removed = [sweep(), *(place.clear() for place in _PLACES), remove_hooks()]
     if not any(removed):
         raise nothing
@@ -118,7 +118,7 @@ def still_aside() -> list[Path]:
 
 
 @contextlib.contextmanager
-def _alone() -> Iterator[None]:
+def _installation_lock() -> Iterator[None]:
     """Keep out another er-gym that does the same, and say in one line what the disk refuses."""
     try:
         client_home().mkdir(parents=True, exist_ok=True)
