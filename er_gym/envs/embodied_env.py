@@ -1,4 +1,4 @@
-"""The environment: it owns the loop, and nothing but the loop."""
+"""The environment: Gymnasium's interface, the controller, and where tasks come from."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pickle
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -14,37 +14,19 @@ from gymnasium import spaces
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from er_gym.envs import object_selection, skills
-from er_gym.envs.action_handler import EpisodeSetup
-from er_gym.envs.actions import ACTIONS, Action, AnyAction
+from er_gym.envs import object_selection
+from er_gym.envs.actions import ACTIONS, AnyAction
 from er_gym.envs.arguments import flag, number, one_of, short_repr, whole_number
+from er_gym.envs.episode import Episode, EpisodeSettings, ResetResult, StepResult
 from er_gym.envs.errors import ResetNeeded
-from er_gym.envs.info import Info, LegalActions
-from er_gym.envs.legality import KnownTypes
-from er_gym.envs.observations import (
-    MAX_REPEATS,
-    Memory,
-    Situation,
-    goal_row,
-    parse_obs_mode,
-)
-from er_gym.envs.perception import Perception
+from er_gym.envs.observations import parse_obs_mode
 from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
-from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import begin
-from er_gym.tasks.goal import Condition, unmet
-from er_gym.tasks.judge import Criteria, Progress
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import TaskType
 from er_gym.tasks.types import task_type as look_up_type
 from er_gym.thor import BACKENDS, RENDER_DEVICES, check_size, make_controller
-from er_gym.thor.objects import ENTRY_KEYS
 
-MAX_UNKNOWN = 3
-"""So many replies in a row that name no known action end the episode."""
-_CUT_OFF = frozenset({"step limit", "no known action"})
-"""Why an episode ends that the agent does not end."""
 _NOT_BEGUN, _CLOSED = "no episode has begun", "the environment is closed"
 _BROKEN_OFF = "the last reset or step was broken off by an error"
 """Why there is no episode to ask about."""
@@ -52,8 +34,6 @@ _LARGEST_SIDE = 4096
 """Of a picture, pixels."""
 _SMALLEST_GRID, _LARGEST_GRID = 0.01, 5.0
 """Metres. AI2-THOR allows less, but working out where the agent can stand then takes minutes."""
-_LONGEST_QUOTE = 200
-"""An answer quotes no more characters than this of what it does not understand."""
 
 
 class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
@@ -180,8 +160,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         )  # fmt: skip
         # Everything is looked at before anything is started.
         one_of("instances", instances, object_selection.POLICIES)
-        self._protocol = protocol_named(protocol)
-        if self._protocol.chooses_instances and instances != object_selection.TARGET:
+        rules = protocol_named(protocol)
+        if rules.chooses_instances and instances != object_selection.TARGET:
             raise ValueError(
                 f"the {protocol} protocol decides itself what a type name stands for; "
                 f"leave out instances={instances!r}"
@@ -193,22 +173,30 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         check_size(width, height)
         annotate = flag("annotate", annotate)
         self._backend = one_of("backend", backend, BACKENDS)
-        self._grid_size = number("grid_size", grid_size, _SMALLEST_GRID, _LARGEST_GRID)
-        self._step_penalty = number("step_penalty", step_penalty, 0)
-        self._illegal_penalty = number("illegal_penalty", illegal_penalty, 0)
-        self._max_steps = None if max_steps is None else whole_number("max_steps", max_steps, 1)
+        grid_size = number("grid_size", grid_size, _SMALLEST_GRID, _LARGEST_GRID)
+        step_penalty = number("step_penalty", step_penalty, 0)
+        illegal_penalty = number("illegal_penalty", illegal_penalty, 0)
+        max_steps = None if max_steps is None else whole_number("max_steps", max_steps, 1)
         self._task_type: TaskType | None = None
         if task_type is not None:
             self._task_type = look_up_type(task_type)
         self._obs = parse_obs_mode(obs_mode)
         self._draws = any(kind.draws for kind in self._obs.values())
-        self._instances = instances
+        self._settings = EpisodeSettings(
+            protocol=rules,
+            observations=self._obs,
+            instances=instances,
+            grid_size=grid_size,
+            max_steps=max_steps,
+            step_penalty=step_penalty,
+            illegal_penalty=illegal_penalty,
+        )
         self.render_mode = render_mode
         self._controller_arguments: dict[str, Any] = {
             "width": width,
             "height": height,
             "fieldOfView": number("field_of_view", field_of_view, 0, 180, above=True),
-            "gridSize": self._grid_size,
+            "gridSize": grid_size,
             "visibilityDistance": number("visibility_distance", visibility_distance, 0, above=True),
             "snapToGrid": False,
             "headless": not self._draws,
@@ -221,10 +209,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._generates = isinstance(episode_source, str) and episode_source == GENERATE
         self._source = self._resolve_source(episode_source)
         self._controller: Any = None
-        self._perception: Perception  # what was taken in last; nothing before the first reset
+        self._episode: Episode | None = None
         self._lock = threading.RLock()
         self._no_episode = _NOT_BEGUN  # why there is no episode, "" if there is one
-        self._end_reason = ""
         self._actions_taken: list[AnyAction] = []  # in this episode, so that a copy can do it again
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = spaces.Dict(
@@ -235,7 +222,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
+    ) -> ResetResult:
         """Begin an episode; ``options`` may pin its ``task``, ``scene`` or ``suite``.
 
         Raises:
@@ -248,7 +235,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             super().reset(seed=seed)
             return self._begin(self._choose(**checked))
 
-    def step(self, action: AnyAction) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: AnyAction) -> StepResult:
         """Do an action: an index, an :class:`~er_gym.envs.actions.Action` or its text.
 
         Raises:
@@ -258,56 +245,53 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                 not raised, numbers included: models write them.)
         """
         with self._lock:
-            self._need_episode("step()")
-            if self._end_reason:
+            episode = self._current("step()")
+            if episode.end_reason:
                 raise ResetNeeded(
-                    f"the episode is over ({self._end_reason}): call reset() before step()"
+                    f"the episode is over ({episode.end_reason}): call reset() before step()"
                 )
-            return self._do(action)
+            return self._do(episode, action)
 
     def action_masks(self) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
         with self._lock:
-            self._need_episode("action_masks()")
-            return self._handler.legal(self._available, self._known)
+            return self._current("action_masks()").action_mask()
 
     @property
     def task(self) -> Task:
         """The task of the episode."""
-        self._need_episode("asking for the task")
-        return self._task
+        return self._current("asking for the task").task
 
     @property
     def agent_pose(self) -> AgentPose:
         """Where the agent is now."""
-        self._need_episode("asking for the agent's pose")
-        return self._perception.pose
+        return self._current("asking for the agent's pose").perception.pose
 
     @property
     def objects(self) -> Sequence[Mapping[str, Any]]:
         """AI2-THOR's metadata of all objects, as they are now; a copy of the caller's own."""
         with self._lock:
-            self._need_episode("asking for the objects")
-            # Nine times as quick as deepcopy, and metadata are plain.
-            return pickle.loads(pickle.dumps(self._all_objects()))  # type: ignore[no-any-return]
+            objects = self._current("asking for the objects").all_objects()
+            # Pickling is nine times as quick as deepcopy, and metadata are plain data.
+            return pickle.loads(pickle.dumps(objects))  # type: ignore[no-any-return]
 
     def render(self) -> NDArray[np.uint8] | None:
         """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``; the array
         is the caller's own."""
         with self._lock:
-            self._need_episode("render()")
+            episode = self._current("render()")
             if self.render_mode is None:
                 gymnasium.logger.warn(
                     "render() draws nothing, since the environment was made without a render_mode; "
                     "make it with render_mode='rgb_array'"
                 )
                 return None
-            if self._perception.frame is None:
+            if episode.perception.frame is None:
                 headless, self._controller.headless = self._controller.headless, False
                 frame = self._controller.step(action="Pass").frame
                 self._controller.headless = headless
-                self._perception = replace(self._perception, frame=frame)
-            return np.array(self._perception.picture)
+                episode.perception = replace(episode.perception, frame=frame)
+            return np.array(episode.perception.picture)
 
     def close(self) -> None:
         """Stop the controller, and the generator if there is one; ``reset`` opens them again."""
@@ -332,13 +316,12 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                     "repeat itself exactly: copy the environment before reset(), or reset another "
                     "with options={'task': env.unwrapped.task} and do the same actions there"
                 )
+            episode = None if self._no_episode else self._current("copying")
             return {
                 **EzPickle.__getstate__(self),
                 "random": (self._np_random, self._np_random_seed, self.action_space),
-                "missing": self._no_episode,
-                "episode": None
-                if self._no_episode
-                else (self._task, self._actions_taken, self._fingerprint),
+                "no_episode": self._no_episode,
+                "episode": episode and (episode.task, self._actions_taken, episode.fingerprint),
             }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -349,98 +332,44 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         """
         EzPickle.__setstate__(self, state)
         if state["episode"] is not None:
-            task, done, standing = state["episode"]
+            task, actions, fingerprint = state["episode"]
             self._begin(task)
-            for action in done:
-                self._do(action)
-            if self._fingerprint != standing:
+            episode = self._current("copying")
+            for action in actions:
+                self._do(episode, action)
+            if episode.fingerprint != fingerprint:
                 self.close()
                 raise gymnasium.error.Error(
                     f"the episode of task {task.id} did not come out the same when it was played "
                     "again; reset a new environment instead"
                 )
-        self._no_episode = state["missing"]
+        self._no_episode = state["no_episode"]
         self._np_random, self._np_random_seed, self.action_space = state["random"]
 
     # -- the loop's parts ------------------------------------------------------------------------
 
-    def _need_episode(self, before: str) -> None:
-        if self._no_episode:
+    def _current(self, before: str) -> Episode:
+        """The episode that is under way; ResetNeeded if there is none."""
+        if self._no_episode or self._episode is None:
             raise ResetNeeded(f"{self._no_episode}: call reset() before {before}")
+        return self._episode
 
-    @property
-    def _fingerprint(self) -> tuple[Any, ...]:
-        """What tells two courses of an episode apart."""
-        return self._perception.pose, self._steps, self._end_reason, self._known.names
-
-    def _begin(self, task: Task) -> tuple[dict[str, Any], dict[str, Any]]:
+    def _begin(self, task: Task) -> ResetResult:
         self._no_episode = _BROKEN_OFF  # until all of it is done
-        self._task = task
         self._actions_taken = []
         controller = self._started_controller(task.scene)
-        bounds = begin(controller, task.scene, task.start).metadata["sceneBounds"]
-        floor = skills.reachable(controller, (self._backend, task.scene, self._grid_size))
-        pose = self._protocol.start(bounds, floor)
-        self._memory = Memory(pose, goal_row(task.instruction))
-        self._progress = Progress.start(Criteria.of(task))
-        self._known = KnownTypes(task.navigable_objects)
-        self._handler = self._protocol.action_handler(
-            EpisodeSetup(task, controller, floor, pose, self._grid_size, self._instances)
-        )
-        self._steps = 1
-        self._step_limit = self._max_steps or task.max_steps
-        self._unknown_replies = 0
-        self._end_reason = ""
-        self._goal_unmet: tuple[Condition, ...] = ()
-        placed = skills.place(controller, pose)
-        self._perceive(placed)
-        feedback = "You look around the room."
-        info = self._info(None, "", placed.success, "", feedback)
-        answer = self._observation(feedback, True), cast(dict[str, Any], info)
+        self._episode = Episode(self._settings, task, controller, self._backend)
+        answer = self._episode.begin()
         self._no_episode = ""
         return answer
 
-    def _do(self, action: AnyAction) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        understood, text = self._protocol.understand(action, self._perception.objects)
+    def _do(self, episode: Episode, action: AnyAction) -> StepResult:
+        understood, text = episode.understand(action)
         self._no_episode = _BROKEN_OFF  # until all of it is done
         self._actions_taken.append(int(action.item()) if isinstance(action, np.ndarray) else action)
-        answer = self._answer(understood, text)
+        answer = episode.step(understood, text)
         self._no_episode = ""
         return answer
-
-    def _answer(
-        self, understood: Action | None, text: str
-    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        if understood is None:
-            return self._not_understood(text)
-        self._unknown_replies = 0
-        if understood == self._memory.last and self._memory.repeats >= MAX_REPEATS:
-            self._end_reason = "repeated action"
-            times = self._memory.repeats + 1
-            feedback = f"You have tried to {understood} {times} times in a row; that is it."
-            said = self._protocol.repeated or understood
-            return self._reply(said, text, False, "", feedback, 0.0)
-        self._steps += understood.verb != verbs.END or self._protocol.end_is_step
-        refused = self._handler.illegal_reason(understood, self._available, self._known)
-        if refused:
-            object_id, outcome = "", skills.Outcome(None, False, refused)
-        else:
-            object_id, outcome = self._handler.execute(
-                understood, self._perception, self._available, self._progress.left
-            )
-        self._memory.act(understood, outcome.success)
-        self._perceive(outcome)
-        reward = self._judge(understood, outcome, object_id) - self._step_penalty
-        if refused:
-            reward -= self._illegal_penalty
-        if understood.verb == verbs.END:
-            self._end_reason = "end"
-        elif self._steps >= self._step_limit:
-            self._end_reason = "step limit"
-        feedback = refused or _feedback(understood, outcome)
-        return self._reply(
-            understood, text, outcome.success, object_id, feedback, reward, outcome.views
-        )
 
     def _started_controller(self, scene: str) -> Any:
         if self._controller is None:
@@ -475,134 +404,6 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             raise ValueError(f"task {wanted.id} plays in {wanted.scene}, not in {scene}")
         return wanted
 
-    def _perceive(self, outcome: skills.Outcome) -> None:
-        """Remember what can be seen after a step, and in the views of an "observe"."""
-        for perception in (*outcome.views.values(), outcome.perception):
-            if perception is not None:
-                self._perception = perception
-                self._available = self._handler.available_objects(perception)
-                self._known.add(perception.objects.kinds[self._available.navigable])
-                self._memory.look(perception, self._navigated_to_kind)
-
-    @property
-    def _navigated_to_kind(self) -> int | None:
-        """The type of what was last navigated to, if that is still there."""
-        objects = self._perception.objects
-        row = objects.row.get(self._handler.navigated_to)
-        return None if row is None else int(objects.kinds[row])
-
-    def _judge(self, action: Action, outcome: skills.Outcome, object_id: str) -> float:
-        """The reward that an action earned, by the rules of :mod:`er_gym.tasks.judge`."""
-        if not outcome.success:
-            return 0.0
-        if action.verb == verbs.END and self._task.goal:
-            self._goal_unmet = unmet(
-                self._task.goal, self._objects_of_goal(), self._available.in_reach
-            )
-        self._progress, reward = self._progress.after(
-            action.verb,
-            action.object_type,
-            object_id,
-            in_reach=self._available.in_reach,
-            goal_holds=not self._goal_unmet,
-        )
-        return reward
-
-    def _objects_of_goal(self) -> Sequence[Mapping[str, Any]]:
-        """Metadata of the objects that the goal is about; of all, where it asks for more than is
-        at hand, since that takes longer than the rest of a step."""
-        goal = self._task.goal
-        if all(name in ENTRY_KEYS for condition in goal for name, _ in condition.state):
-            return self._perception.objects.entries({condition.object_type for condition in goal})
-        return self._all_objects()
-
-    def _all_objects(self) -> Sequence[Mapping[str, Any]]:
-        return self._controller.last_event.metadata["objects"]  # type: ignore[no-any-return]
-
-    def _not_understood(
-        self, text: str
-    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        self._unknown_replies += 1
-        if self._protocol.unknown_breaks_runs:
-            self._memory.forget_last()
-        if self._unknown_replies >= MAX_UNKNOWN:
-            self._end_reason = "no known action"
-        quoted = text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
-        feedback = (
-            f"{quoted!r} names no action. Say one of: {', '.join(verbs.BARE_VERBS)}; or one of "
-            f"{', '.join(verbs.OBJECT_VERBS)} with an object type, such as 'navigate to Fridge'."
-        )
-        return self._reply(None, text, False, "", feedback, 0.0)
-
-    # -- what is handed out ----------------------------------------------------------------------
-
-    def _reply(
-        self,
-        action: Action | None,
-        text: str,
-        success: bool,
-        object_id: str,
-        feedback: str,
-        reward: float,
-        views: Mapping[str, Perception] | None = None,
-    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        truncated = self._end_reason == "step limit"
-        terminated = bool(self._end_reason) and not truncated
-        appended = self._protocol.appends_end and self._end_reason in _CUT_OFF
-        if appended:
-            reward += self._judge(Action(verbs.END), skills.Outcome(None, True), "")
-        info = self._info(action, text, success, object_id, feedback)
-        info["end_appended"] = appended
-        if views:
-            # Copies: a view's frame may be what the next observation is made of.
-            info["views"] = {
-                name: None if view.picture is None else np.array(view.picture)
-                for name, view in views.items()
-            }
-        obs = self._observation(feedback, success)
-        return obs, reward, terminated, truncated, cast(dict[str, Any], info)
-
-    def _observation(self, feedback: str, success: bool) -> dict[str, Any]:
-        situation = Situation(
-            perception=self._perception,
-            available=self._available,
-            memory=self._memory,
-            known=self._known,
-            instruction=self._task.instruction,
-            feedback=feedback,
-            at=self._navigated_to_kind,
-            success=success,
-            steps=self._steps,
-            max_steps=self._step_limit,
-        )
-        return {name: kind.build(situation) for name, kind in self._obs.items()}
-
-    def _info(
-        self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
-    ) -> Info:
-        mask = self._handler.legal(self._available, self._known)
-        return {
-            "task": self._task,
-            "action": action,
-            "action_text": text,
-            "action_success": success,
-            "object_id": object_id,
-            "feedback": feedback,
-            "success": self._progress.success,
-            "goal_unmet": self._goal_unmet,
-            "key_actions_done": self._progress.done,
-            "key_actions_left": self._progress.left,
-            "visible": self._perception.visible_names,
-            "held": self._perception.held_name,
-            "navigable": self._known.names,
-            "interactable": self._available.in_reach,
-            "legal": LegalActions(mask),
-            "action_mask": mask,
-            "steps": self._steps,
-            "max_steps": self._step_limit,
-            "end_reason": self._end_reason,
-        }
-
 
 def _checked(options: Mapping[str, Any]) -> Mapping[str, Any]:
     if not isinstance(options, Mapping):
@@ -620,12 +421,6 @@ def _checked(options: Mapping[str, Any]) -> Mapping[str, Any]:
                 f"{'Task or its id' if name == 'task' else 'scene such as FloorPlan1'}"
             )
     return options
-
-
-def _feedback(action: Action, outcome: skills.Outcome) -> str:
-    if outcome.success:
-        return f"Done: {action}."
-    return f"You could not {action}: {outcome.problem}"
 
 
 def verification_env() -> EmbodiedEnv:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import PurePosixPath
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 from er_gym.envs.actions import Action
@@ -83,13 +84,45 @@ class LeavesAttachments(Protocol):
     """An agent that leaves files of its own, such as its conversation and the pictures it saw."""
 
     attachment_folders: Sequence[str]
-    """Folders of the run directory that its files go to. In each, the files of an episode are
-    ``STEM.*`` or in the folder ``STEM/``."""
+    """Folders of the run directory that its files go to: plain names, none of them er-gym's own.
+    In each folder, the files of an episode are ``STEM.SUFFIX``, or lie in the folder ``STEM/``."""
 
     def attachments(self, episode: EpisodeRecord, stem: str) -> Attachments:
-        """The files of the episode that is over or has crashed.
+        """The files of an episode that is over or has crashed.
 
         Args:
             episode: its record.
             stem: what the names of its files begin with (:func:`.run_directory.file_stem`).
         """
+
+
+_RESERVED = frozenset({"episodes", "run.json", "run.lock", "events.jsonl"})
+"""Names in a run directory that no attachment may use."""
+
+
+def check_attachments(files: Attachments, folders: Sequence[str], stem: str) -> None:
+    """Check where an agent wants its files.
+
+    Raises:
+        ValueError: a folder is no plain name or one of er-gym's own, or a path is not
+            ``FOLDER/STEM.SUFFIX`` or within ``FOLDER/STEM/``.
+        TypeError: a file's content is not bytes.
+    """
+    for folder in folders:
+        if folder in ("", ".", "..") or "/" in folder or folder in _RESERVED:
+            raise ValueError(
+                f"attachment folder {folder!r} is not allowed; give a plain name that is none of: "
+                f"{', '.join(sorted(_RESERVED))}"
+            )
+    for path, data in files.items():
+        folder, *inner = path.split("/")
+        # With one suffix only, a file of task "a" is never taken for one of task "a.b".
+        beside = len(inner) == 1 and PurePosixPath(inner[0]).stem == stem and "." in inner[0]
+        within = len(inner) > 1 and inner[0] == stem and not {"", ".", ".."}.intersection(inner)
+        if folder not in folders or not (beside or within):
+            raise ValueError(
+                f"attachment {path!r} is not allowed; give FOLDER/{stem}.SUFFIX or "
+                f"FOLDER/{stem}/NAME, with FOLDER one of: {', '.join(folders) or '(none declared)'}"
+            )
+        if not isinstance(data, bytes):
+            raise TypeError(f"attachment {path!r} is {type(data).__name__}; give bytes")

@@ -1,7 +1,8 @@
-"""Play whole episodes in worker processes: for agents that compute."""
+"""The executor for agents that compute: whole episodes in worker processes."""
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -29,6 +30,7 @@ def play_in_processes(
 ) -> None:
     """Play each task in one of ``parallelism.workers`` processes. See :class:`.Executor`."""
     manifest = directory.manifest
+    _check_picklable(make_agent)
     worker = partial(
         EpisodeWorker, make_agent, manifest.agent, manifest.env, manifest.seed, directory.path
     )
@@ -42,25 +44,36 @@ def play_in_processes(
             sink.ended(played)
 
 
+def _check_picklable(make_agent: MakeAgent) -> None:
+    """Raise ValueError if worker processes cannot be sent what makes agents."""
+    try:
+        pickle.dumps(make_agent)
+    except Exception as error:  # pickle raises PicklingError, AttributeError, TypeError and others
+        raise ValueError(
+            f"make_agent cannot be sent to worker processes ({type(error).__name__}: {error}); "
+            "give a function or a frozen dataclass at the top of a module, or executor='threads'"
+        ) from error
+
+
 @dataclass(frozen=True)
 class _Stop:
-    """In place of an episode: its agent cannot go on."""
+    """A worker returns it in place of an episode whose agent raised CannotGoOn."""
 
     message: str
 
 
 class EpisodeWorker:
-    """Plays one episode after another in one environment, made anew only after a crash.
+    """Plays one episode after another in one environment, which it makes anew after a crash.
 
-    The agent is made for each episode, from the episode's seed, so that an episode's outcome does
+    It makes a new agent for each episode from the episode's seed. An episode's outcome thus does
     not depend on what this worker played before.
 
     Args:
-        make_agent: makes it.
-        agent: how records name it.
+        make_agent: makes the agent of an episode.
+        agent: how records name the agent.
         env: the keyword arguments of :class:`~er_gym.envs.embodied_env.EmbodiedEnv`.
-        seed: the run's.
-        directory: the run's, whose event stream is written to.
+        seed: the run's seed.
+        directory: the run directory; events are appended to its stream.
     """
 
     def __init__(
@@ -116,7 +129,7 @@ class EpisodeWorker:
         return PlayedEpisode.by(agent, record)
 
     def _close_env(self) -> None:
-        """The next episode makes another."""
+        """Close the environment; the next episode makes another."""
         env, self._env = self._env, None
         if env is not None:
             env.close()

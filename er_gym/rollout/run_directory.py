@@ -209,12 +209,17 @@ class RunDirectory:
 
         Args:
             task_id: of the episode.
-            attachments: bytes by path from the run directory on; the last is written last.
-            folders: the folders that such files go to; what they hold of the task is removed.
+            attachments: bytes by path in the run directory, written in this order.
+            folders: the folders that such files go to. The task's earlier files there are removed.
         """
         stem = file_stem(task_id)
+        played_before = self._file(task_id).exists()
         for folder in folders:
             shutil.rmtree(self.path / folder / stem, ignore_errors=True)
+            if played_before:
+                for old in (self.path / folder).glob("*.*"):
+                    if old.stem == stem and f"{folder}/{old.name}" not in attachments:
+                        old.unlink()
         for name, data in attachments.items():
             place = self.path / name
             make_folder(place.parent)

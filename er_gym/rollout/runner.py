@@ -31,10 +31,10 @@ class RunSummary:
     """What :func:`run` did.
 
     Attributes:
-        played: how many episodes it played.
+        played: the number of episodes played.
         already_done: how many were finished before it started.
-        crashed: of those played, the episodes that crashed or whose worker died again and again.
-            They are in the run directory, count as failures, and are played again by the next run.
+        crashed: of those played, the episodes that crashed or whose worker died three times. They
+            are in the run directory and count as failures. The next run plays them again.
     """
 
     played: int
@@ -43,7 +43,7 @@ class RunSummary:
 
 
 class Stopped(CannotGoOn):
-    """An agent could not go on, so the run has stopped; ``outcome`` says what it did till then."""
+    """An agent could not go on, so the run has stopped; ``outcome`` says what was played before."""
 
     def __init__(self, message: str, outcome: RunSummary) -> None:
         super().__init__(message)
@@ -51,7 +51,7 @@ class Stopped(CannotGoOn):
 
 
 def finished(directory: RunDirectory, tasks: Iterable[Task]) -> list[EpisodeRecord]:
-    """The episodes of these tasks that need not be played again: those that did not crash."""
+    """The recorded episodes of these tasks that did not crash; they are not played again."""
     ids = {task.id for task in tasks}
     return [each for each in directory.episodes() if each.task_id in ids and not each.error]
 
@@ -68,26 +68,28 @@ def run(
 ) -> RunSummary:
     """Play the tasks that the run directory has no finished episode of.
 
-    Each episode is in the run directory before the next result is looked at, so a run that is
-    interrupted or killed loses no more than the episodes being played. An episode whose process
-    died is played again with a new agent; one whose process died three times is recorded as lost.
+    Each episode is written before the next result is looked at. A run that is interrupted or killed
+    thus loses no more than the episodes under way. If a worker process dies, its episode is played
+    again with a new agent. After the third death the episode is recorded as crashed.
 
     Args:
-        directory: where to, and, in its manifest, with which environment and seed; the manifest's
-            agent is how records name the agent.
+        directory: the run directory. Its manifest states the environment, the seed, and how records
+            name the agent.
         tasks: what to play.
-        make_agent: makes the agent of an episode, given its task and seed.
-        executor: one of :data:`EXECUTORS`.
+        make_agent: makes the agent of an episode from the episode's task and seed. For
+            ``"processes"`` it must be picklable.
+        executor: a name in :data:`EXECUTORS`.
         parallelism: how much runs at once.
-        listeners: called in this process with the run's events: those of episodes that end, and,
-            where the agents act in this process, of every step.
-        cost: what the run has cost so far, asked after each episode.
+        listeners: called in this thread with the events of the run and of each episode that ends.
+            Steps and replies are in the run directory's event stream
+            (:func:`er_gym.rollout.events.read_events`).
+        cost: returns what the run has cost so far; called after each episode.
 
     Raises:
         Stopped: an agent raised :class:`~er_gym.rollout.agent.CannotGoOn`.
         WorkerSetupError: the environment cannot be made.
-        KeyboardInterrupt: Ctrl-C; what was over is in the run directory, no process is left.
-        ValueError: there is no such executor.
+        KeyboardInterrupt: Ctrl-C. The episodes that were over are saved, and no process is left.
+        ValueError: there is no such executor, or it cannot use ``make_agent``.
         OSError: the run directory cannot be written.
     """
     if executor not in EXECUTORS:
@@ -115,7 +117,7 @@ def run(
 
 @dataclass
 class _Sink:
-    """Writes episodes into the run directory, and tells of them."""
+    """Writes episodes into the run directory, and emits their events."""
 
     directory: RunDirectory
     emit: EventLog
@@ -139,7 +141,7 @@ class _Sink:
                 success=record.success,
                 end_reason=record.end_reason,
                 total_reward=record.total_reward,
-                steps=max(0, len(record.steps) - 1),
+                steps=sum(not step.appended for step in record.steps[1:]),
                 seconds=record.seconds,
                 error=record.error,
             )
