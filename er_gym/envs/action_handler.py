@@ -23,18 +23,18 @@ from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose, KeyAction, Task
 
 ExecutedAction = tuple[str, Outcome]
-"""The id of the object that an action was done to, ``""`` for none, and what came of it."""
+"""The id of the object that an action was done to, ``""`` for none; and the outcome."""
 
 
 @dataclass(frozen=True)
 class EpisodeSetup:
-    """An episode as it begins.
+    """What an action handler knows when an episode begins.
 
     Attributes:
-        task: what is asked.
-        controller: its scene is arranged; the agent is not placed yet.
-        floor: where the agent can stand.
-        start: where it will be placed.
+        task: the episode's task.
+        controller: an AI2-THOR controller whose scene is arranged; the agent is not placed yet.
+        floor: the positions where the agent can stand.
+        start: the pose in which the agent will be placed.
         grid_size: metres.
         instances: which object a type name stands for, see :mod:`er_gym.envs.object_selection`.
     """
@@ -51,16 +51,16 @@ class ActionHandler(Protocol):
     """How actions are judged and carried out in one episode.
 
     Attributes:
-        navigated_to: id of the object last navigated to, ``""`` before that.
+        navigated_to: the id of the object last navigated to, ``""`` at first.
     """
 
     navigated_to: str
 
     def available_objects(self, perception: Perception) -> AvailableObjects:
-        """What can be gone to and interacted with, given what is perceived."""
+        """The objects that the agent can navigate to and interact with now."""
 
     def illegal_reason(self, action: Action, available: AvailableObjects, known: KnownTypes) -> str:
-        """Why an action is illegal now, in words for the agent; "" when it is legal."""
+        """Why an action is illegal now, in words for the agent; ``""`` if it is legal."""
 
     def legal(self, available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
@@ -72,14 +72,14 @@ class ActionHandler(Protocol):
         available: AvailableObjects,
         left: Sequence[KeyAction],
     ) -> ExecutedAction:
-        """Carry out a legal action; ``left``: the key actions that are still to be done."""
+        """Carry out a legal action; ``left`` are the key actions not done yet."""
 
 
 class DefaultActionHandler:
-    """The default protocol's.
+    """The rules of the default protocol.
 
     Args:
-        setup: of the episode.
+        setup: the episode's setup.
     """
 
     def __init__(self, setup: EpisodeSetup) -> None:
@@ -145,7 +145,7 @@ class DefaultActionHandler:
         goal_id = objects.ids[goal]
         pose = setup.task.poses.get(goal_id)
         if pose is not None:
-            # AI2-THOR's agent stood there, so there is room, whatever our boxes say.
+            # AI2-THOR's agent stood there, so there is room even if our boxes say otherwise.
             outcome = skills.place(setup.controller, pose, force=True)
         else:
             container = object_selection.closed_container_of(aim, objects)

@@ -29,9 +29,9 @@ from er_gym.thor import BACKENDS, RENDER_DEVICES, check_size, make_controller
 
 _NOT_BEGUN, _CLOSED = "no episode has begun", "the environment is closed"
 _BROKEN_OFF = "the last reset or step was broken off by an error"
-"""Why there is no episode to ask about."""
+"""The reasons why no episode is under way."""
 _LARGEST_SIDE = 4096
-"""Of a picture, pixels."""
+"""The longest side of a picture, pixels."""
 _SMALLEST_GRID, _LARGEST_GRID = 0.01, 5.0
 """Metres. AI2-THOR allows less, but working out where the agent can stand then takes minutes."""
 
@@ -40,9 +40,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     """A household task in an AI2-THOR room, played with high-level actions.
 
     ## Description
-    The agent stands in a corner of a room and is told what to do: find a thing, pick one up, switch
-    one on, carry one somewhere. It walks, opens, takes and puts by naming object types, as in the
-    paper *Embodied-Reasoner* (arXiv 2503.21696), and is judged by the task's key actions.
+    The agent stands in a corner of a room and gets an instruction: find an object, pick it up,
+    switch it on, carry it somewhere. It walks, opens, picks up and puts by naming object types, as
+    in the paper *Embodied-Reasoner* (arXiv 2503.21696). The task's key actions decide its success.
 
     ## Action Space
     ``Discrete`` over :data:`er_gym.envs.actions.ACTIONS`, the same in every scene: ``observe``,
@@ -52,67 +52,67 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     array of one integer, as learners' ``predict`` returns it.
     ``info["action_mask"]`` and :meth:`action_masks` say which are legal now.
 
-    - ``navigate to`` goes to where the object can be handled. Legal for what is, or was once in
-      this episode, plain to see (:func:`er_gym.envs.legality.navigable_within`), and for the task's
-      own ``navigable_objects``.
-    - ``pickup``, ``put in``, ``open``, ``close``, ``toggle``, ``slice`` need the object to be plain
-      to see now, or visible and of a type that lies in the receptacle last navigated to; ``slice``,
-      which the paper does not have, needs a knife in the hand. A stove burner can be toggled, too,
-      where what stands on it and hides it is in reach.
+    - ``navigate to`` goes to where the agent can handle the object. It is legal for types that have
+      been clearly visible in this episode (:func:`er_gym.envs.legality.navigable_within`), and for
+      the task's ``navigable_objects``.
+    - ``pickup``, ``put in``, ``open``, ``close``, ``toggle``, ``slice`` are legal if the object is
+      clearly visible now, or if it is visible and of a type that lies in the receptacle last
+      navigated to. ``slice``, which the paper does not have, needs a knife in the hand. A stove
+      burner can also be toggled if the object that stands on it is in reach.
     - ``observe`` looks right, behind and left; ``info["views"]`` has the pictures.
     - ``end`` says that the task is done.
 
-    An illegal action costs a step, changes nothing and is answered in words.
+    An illegal action costs a step and changes nothing; ``info["feedback"]`` says why.
 
     ## Observation Space
     ``Dict`` of what ``obs_mode`` asks for, joined with ``+``:
 
     - ``rgb``: the agent's view, ``(height, width, 3)`` uint8.
     - ``state``: ``(D,)`` float32 in [-1, 1], see :data:`er_gym.envs.observations.STATE_LAYOUT`.
-    - ``text``: the task, what is seen, held and possible, and feedback, in words.
-    - the name of another package's, or ``package.module:ROW`` (docs/extending.md).
+    - ``text``: the task, what the agent sees, holds and can do, and feedback, in words.
+    - an observation of another package, by name or as ``package.module:ROW`` (docs/extending.md).
 
     ## Info
     ``reset`` and ``step`` return an :class:`er_gym.envs.info.Info`: what is ``visible``, ``held``,
-    ``navigable``, ``interactable`` and ``legal`` now, what came of the action, the steps taken and
-    allowed, and how far the task has come.
+    ``navigable``, ``interactable`` and ``legal`` now, the result of the action, the steps taken and
+    allowed, and the key actions done and left.
 
     ## Rewards
     Each key action of the task is worth its reward (1) once, in any order unless the type of task
-    is ordered; which instance of a type it is done to does not matter, unless the task singles one
-    out. ``end`` is worth its own only when all others but navigation are done, the task's goal
-    holds (``info["goal_unmet"]`` says what of it does not), and, for a search, when the target can
-    be interacted with. :mod:`er_gym.tasks.judge` states the rules in full. ``step_penalty`` and
+    is ordered. Any instance of its object type counts, unless the task names one. ``end`` earns its
+    reward only if all key actions but navigation are done, the task's goal holds
+    (``info["goal_unmet"]`` lists what does not), and, in a search, the agent can interact with the
+    target. :mod:`er_gym.tasks.judge` states the rules in full. ``step_penalty`` and
     ``illegal_penalty`` are subtracted for each counted step and each illegal action.
 
     ## Starting State
     The agent stands at the reachable position nearest to a corner of the scene's bounds and looks
     diagonally into the room, which is as recorded or rearranged as the task says. ``reset(seed=…)``
-    draws a task from ``episode_source``, of ``task_type`` if that is given. ``options`` pins it:
+    draws a task from ``episode_source``, of ``task_type`` if given. ``options`` pins the task:
     ``{"task": task}`` (a :class:`~er_gym.tasks.task.Task`, or its id), ``{"scene": "FloorPlan1"}``,
-    ``{"suite": name or file}`` to draw from that one this time, or any of them together.
+    ``{"suite": name or file}`` to draw from that suite this time, or any of them together.
 
     ## Episode End
-    Terminates on ``end``; on the fourth same action in a row; on the third reply in a row that
-    names no known action (such a reply costs no step). Truncates at ``max_steps``, placing the
-    agent counting as the first step. ``info["end_reason"]`` says which, and ``info["max_steps"]``
-    how many steps this episode has.
+    The episode terminates on ``end``, on the fourth same action in a row, and on the third reply in
+    a row that names no known action (such a reply costs no step). It truncates at ``max_steps``;
+    placing the agent counts as the first step. ``info["end_reason"]`` names the reason, and
+    ``info["max_steps"]`` the step limit.
 
     ## Copies and Threads
-    ``copy.deepcopy`` and ``pickle`` keep the episode: the copy plays the same task and the same
-    actions again when it is made, and goes on with equal observations. On ``backend="unity"``,
-    which does not repeat itself exactly, only an environment without an episode can be copied.
-    Threads that share an environment wait for each other.
+    ``copy.deepcopy`` and ``pickle`` keep the episode: a new copy replays the task's actions and
+    continues with equal observations. ``backend="unity"`` does not repeat itself exactly, so there
+    only an environment without an episode can be copied. Threads that share an environment wait for
+    each other.
 
     ## Arguments
-    - ``episode_source``: what episodes are drawn from: a list of tasks; the name of a suite
-      (default ``"mini"``); the path of a task file; ``"generate"``: the generator, live, an endless
-      stream of verified tasks in the training rooms; or an
+    - ``episode_source``: where tasks are drawn from: a list of tasks; the name of a suite (default
+      ``"mini"``); the path of a task file; ``"generate"``, an endless stream of tasks in the
+      training rooms, each generated and verified when it is drawn; or an
       :class:`~er_gym.envs.sources.EpisodeSource`.
     - ``task_type``: draw tasks of this type only.
     - ``backend``: ``"embedded"`` or ``"unity"`` (:func:`er_gym.thor.make_controller`).
-    - ``width``, ``height`` pixels, such as 4096 by 4096 at most; ``field_of_view`` degrees,
-      vertical; ``grid_size`` and ``visibility_distance`` metres.
+    - ``width``, ``height``: pixels, at most 4096 each; ``field_of_view``: degrees,
+      vertical; ``grid_size`` and ``visibility_distance``: metres.
     - ``instances``: ``"target"``: a type name stands for the task's object of that type first, as
       in the paper; ``"explore"``: for the nearest not yet visited (navigation) or the nearest
       (interaction), whatever the task.
@@ -120,12 +120,12 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
       program (:mod:`er_gym.envs.protocol`).
     - ``max_steps``: 1 or more; default: the task type's own.
     - ``step_penalty``, ``illegal_penalty``: 0 or more, see Rewards.
-    - ``render_device``: what the embedded engine draws with, one for all environments of a process:
-      ``"cpu"``, or ``"gpu"`` where there is one with EGL.
-    - ``annotate``: write the types of things into the pictures, as set-of-marks prompting does.
+    - ``render_device``: the device that the embedded engine draws with, the same for all
+      environments of a process: ``"cpu"``, or ``"gpu"`` on a machine that has one with EGL.
+    - ``annotate``: write the object types into the pictures, as set-of-marks prompting does.
 
     ## Version History
-    - v0: first.
+    - v0: the first version.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012  (Gymnasium's own)
@@ -158,12 +158,12 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             max_steps=max_steps, step_penalty=step_penalty, illegal_penalty=illegal_penalty,
             annotate=annotate, render_device=render_device, render_mode=render_mode,
         )  # fmt: skip
-        # Everything is looked at before anything is started.
+        # Check every argument before anything is started.
         one_of("instances", instances, object_selection.POLICIES)
         rules = protocol_named(protocol)
         if rules.chooses_instances and instances != object_selection.TARGET:
             raise ValueError(
-                f"the {protocol} protocol decides itself what a type name stands for; "
+                f"the {protocol} protocol decides which object a type name stands for; "
                 f"leave out instances={instances!r}"
             )
         if render_mode is not None:
@@ -211,8 +211,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._controller: Any = None
         self._episode: Episode | None = None
         self._lock = threading.RLock()
-        self._no_episode = _NOT_BEGUN  # why there is no episode, "" if there is one
-        self._actions_taken: list[AnyAction] = []  # in this episode, so that a copy can do it again
+        self._no_episode = _NOT_BEGUN  # why no episode is under way; "" if one is
+        self._actions_taken: list[AnyAction] = []  # in this episode, for copies to replay
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = spaces.Dict(
             {name: kind.space(width, height) for name, kind in self._obs.items()}
@@ -226,7 +226,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         """Begin an episode; ``options`` may pin its ``task``, ``scene`` or ``suite``.
 
         Raises:
-            ValueError: an option does not fit, or there is no such task; what was under way goes
+            ValueError: an option does not fit, or there is no such task. The episode under way goes
                 on.
             gymnasium.error.Error: the seed is no whole number from 0.
         """
@@ -240,9 +240,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
         Raises:
             ResetNeeded: there is no episode, or it is over.
-            gymnasium.error.InvalidAction: an index that is out of range, or something else that is
-                no action at all; the episode goes on. (Text that names no known action is answered,
-                not raised, numbers included: models write them.)
+            gymnasium.error.InvalidAction: the index is out of range, or the value is no action at
+                all. The episode goes on. (Text that names no known action, such as a number, raises
+                nothing: models write it, and the feedback answers it.)
         """
         with self._lock:
             episode = self._current("step()")
@@ -269,15 +269,17 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     @property
     def objects(self) -> Sequence[Mapping[str, Any]]:
-        """AI2-THOR's metadata of all objects, as they are now; a copy of the caller's own."""
+        """AI2-THOR's metadata of all objects now, as a copy that the caller may change."""
         with self._lock:
             objects = self._current("asking for the objects").all_objects()
             # Pickling is nine times as quick as deepcopy, and metadata are plain data.
             return pickle.loads(pickle.dumps(objects))  # type: ignore[no-any-return]
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``; the array
-        is the caller's own."""
+        """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``.
+
+        The array is a copy that the caller may change.
+        """
         with self._lock:
             episode = self._current("render()")
             if self.render_mode is None:
@@ -304,10 +306,10 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             getattr(live, "close", lambda: None)()
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy is made of: the arguments, the task, and what has been done so far.
+        """The state of a copy: the arguments, the task, and the actions taken so far.
 
         Raises:
-            gymnasium.error.Error: there is an episode, and it is Unity's.
+            gymnasium.error.Error: an episode is under way on ``backend="unity"``.
         """
         with self._lock:
             if not self._no_episode and self._backend != "embedded":
@@ -325,10 +327,10 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Make the environment anew, and do again what has been done.
+        """Make the environment anew, and replay the actions taken.
 
         Raises:
-            gymnasium.error.Error: that has led elsewhere, as in a changed version of er-gym.
+            gymnasium.error.Error: the replay led elsewhere, as in another version of er-gym.
         """
         EzPickle.__setstate__(self, state)
         if state["episode"] is not None:
@@ -355,7 +357,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         return self._episode
 
     def _begin(self, task: Task) -> ResetResult:
-        self._no_episode = _BROKEN_OFF  # until all of it is done
+        self._no_episode = _BROKEN_OFF  # until this has succeeded
         self._actions_taken = []
         controller = self._started_controller(task.scene)
         self._episode = Episode(self._settings, task, controller, self._backend)
@@ -365,7 +367,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     def _do(self, episode: Episode, action: AnyAction) -> StepResult:
         understood, text = episode.understand(action)
-        self._no_episode = _BROKEN_OFF  # until all of it is done
+        self._no_episode = _BROKEN_OFF  # until this has succeeded
         self._actions_taken.append(int(action.item()) if isinstance(action, np.ndarray) else action)
         answer = episode.step(understood, text)
         self._no_episode = ""
@@ -379,7 +381,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         return self._controller
 
     def _resolve_source(self, source: Source) -> EpisodeSource:
-        """Where to draw from; the generator is made once for an environment, which closes it."""
+        """The source to draw from. An environment makes one generator and closes it."""
         if not isinstance(source, str) or source != GENERATE:
             return make_source(source, verification_env)
         if self._generator is None:
@@ -395,7 +397,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         source = self._source
         if suite is not None:
             source = self._resolve_source(suite)
-        elif self._generates and self._generator is None:  # closed, and begun again
+        elif self._generates and self._generator is None:  # close() has closed it
             source = self._source = self._resolve_source(GENERATE)
         if task is None:
             return source.draw(self.np_random, self._task_type, scene)
@@ -424,5 +426,5 @@ def _checked(options: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def verification_env() -> EmbodiedEnv:
-    """An environment in which a verifier plays generated tasks; nothing is drawn in it."""
+    """An environment in which a verifier plays generated tasks; it draws no pictures."""
     return EmbodiedEnv((), obs_mode="state")

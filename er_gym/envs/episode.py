@@ -167,7 +167,7 @@ class Episode:
         )
 
     def _perceive(self, outcome: skills.Outcome) -> None:
-        """Remember what can be seen after a step, and in the views of an "observe"."""
+        """Remember what the agent perceives after a step, and in the views of an ``observe``."""
         for perception in (*outcome.views.values(), outcome.perception):
             if perception is not None:
                 self.perception = perception
@@ -177,7 +177,7 @@ class Episode:
 
     @property
     def _navigated_to_kind(self) -> int | None:
-        """The type of what was last navigated to, if that is still there."""
+        """The type of the object last navigated to, None if that object is gone."""
         objects = self.perception.objects
         row = objects.row.get(self._handler.navigated_to)
         return None if row is None else int(objects.kinds[row])
@@ -200,8 +200,11 @@ class Episode:
         return reward
 
     def _objects_of_goal(self) -> Sequence[Mapping[str, Any]]:
-        """Metadata of the objects that the goal is about; of all, where it asks for more than is
-        at hand, since that takes longer than the rest of a step."""
+        """Metadata of the objects that the goal is about.
+
+        The metadata of all objects takes longer than the rest of a step, so it is made only for a
+        goal that needs more than :data:`~er_gym.thor.objects.ENTRY_KEYS`.
+        """
         goal = self.task.goal
         if all(name in ENTRY_KEYS for condition in goal for name, _ in condition.state):
             return self.perception.objects.entries({condition.object_type for condition in goal})
@@ -220,7 +223,7 @@ class Episode:
         )
         return self._reply(None, text, False, "", feedback, 0.0)
 
-    # -- what is handed out ----------------------------------------------------------------------
+    # -- observations, info, rewards -------------------------------------------------------------
 
     def _reply(
         self,
@@ -240,7 +243,7 @@ class Episode:
         info = self._info(action, text, success, object_id, feedback)
         info["end_appended"] = appended
         if views:
-            # Copies: a view's frame may be what the next observation is made of.
+            # Copies, since the next observation may be built from a view's frame.
             info["views"] = {
                 name: None if view.picture is None else np.array(view.picture)
                 for name, view in views.items()

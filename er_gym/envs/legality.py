@@ -1,7 +1,7 @@
-"""What may be navigated to and interacted with now: the paper's rules.
+"""Which objects the agent may navigate to and interact with now: the paper's rules.
 
-Whole columns of objects are judged at once (:class:`~er_gym.thor.objects.ObjectTable`); objects are
-given by their rows there. Positions are metres in AI2-THOR's world frame.
+The functions judge all objects of an :class:`~er_gym.thor.objects.ObjectTable` at once. They name
+an object by its row there. Positions are metres in AI2-THOR's world frame.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ _VOLUME_PER_METRE = 0.02
 
 
 def navigable_within(volume: NDArray[np.float64], face: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N,) how near the agent must be to visible objects, metres, to walk to them: nearer than so.
+    """(N,) the distance below which the agent may go to a visible object, metres.
 
-    The paper's rule: an object is plain enough to see if d < 1, or S > 0.5 and d < 10, or S > 0.15
-    and d < 4, or S > 0.08 and d < 2.5, or V > 0.005 and d < 2, or V > 0.001 and d < 1.5, or
-    V / d > 0.02 (with V at least 0.01; less than that has d < 1 anyhow).
+    The paper's rule: a visible object is clearly visible if d < 1, or S > 0.5 and d < 10, or
+    S > 0.15 and d < 4, or S > 0.08 and d < 2.5, or V > 0.005 and d < 2, or V > 0.001 and d < 1.5,
+    or V / d > 0.02 (with V at least 0.01; for a smaller V this means d < 0.5).
 
     Args:
-        volume: (N,) V, of each one's axis-aligned box, m³.
-        face: (N,) S, of the box's largest face, m². And d is the horizontal distance from the agent
-            to the box's centre, m.
+        volume: (N,) V, the volume of each object's axis-aligned box, m³.
+        face: (N,) S, the area of the box's largest face, m². In the rule, d is the horizontal
+            distance from the agent to the box's centre, m.
     """
     # searchsorted counts the bounds that are less than a value.
     within = np.maximum(
@@ -64,7 +64,7 @@ _NO_GOAL = _of_type(verbs.NOWHERE)
 
 
 def _possible(verb: Verb, table: ObjectTable) -> NDArray[np.bool_]:
-    """(N,) which objects a verb can be done to in their present state, whatever the hand does."""
+    """(N,) bool: the objects that a verb can apply to in their present state, for any hand."""
     if verb.object_property:
         able = table.has[verb.object_property] | _ALSO[verb.name][table.kinds]
     else:
@@ -76,7 +76,7 @@ def _possible(verb: Verb, table: ObjectTable) -> NDArray[np.bool_]:
 
 
 def _hand_fits(verb: Verb, table: ObjectTable) -> bool:
-    """Whether the hand is as a verb needs it."""
+    """Whether the hand holds what a verb needs."""
     if verb.hand == verbs.ANY:
         return True
     if verb.hand in (verbs.EMPTY, verbs.FULL):
@@ -85,7 +85,7 @@ def _hand_fits(verb: Verb, table: ObjectTable) -> bool:
 
 
 def _hand_problem(action: Action, verb: Verb, table: ObjectTable) -> str:
-    """What is wrong with the hand, in words for the agent."""
+    """Why the hand does not fit a verb, in words for the agent."""
     if verb.hand == verbs.EMPTY:
         return f"You hold {table.type_of(table.held)} already; put it down first."
     if verb.hand == verbs.FULL:
@@ -99,16 +99,16 @@ def _hand_problem(action: Action, verb: Verb, table: ObjectTable) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Affordances:
-    """What could be done with the N objects of a table, wherever the agent is.
+    """What the agent could do with the N objects of a table from anywhere.
 
     Attributes:
-        within: (N,) how near one must be to walk there, metres, see :func:`navigable_within`; 0 for
-            what is in the hand, and for the floor.
-        actions: (N, len(INTERACTIONS)) index of the action that does each verb to each object; -1
-            where it cannot be done in the object's present state, and that of the hand.
-        on_burners: (2, C) rows of what stands on a stove burner, and of the burner under each.
-        alike: row of a receptacle to (N,) bool, which objects are of types that lie in it; less the
-            floor and what is in the hand. Filled as it is asked for.
+        within: (N,) metres, see :func:`navigable_within`; 0 for the held object and the floor.
+        actions: (N, len(INTERACTIONS)) the index of the action that applies each verb to each
+            object; -1 if the state of the object or of the hand does not allow it.
+        on_burners: (2, C) the rows of the objects on stove burners, and the row of each one's
+            burner.
+        alike: row of a receptacle to (N,) bool: the objects of the types that lie in it, without
+            the floor and the held object. Computed on demand.
     """
 
     within: NDArray[np.float64]
@@ -118,7 +118,7 @@ class Affordances:
 
     @staticmethod
     def of(table: ObjectTable) -> Affordances:
-        """Work them out."""
+        """Compute the affordances of a table."""
         within = navigable_within(table.volume, table.face)
         within[_NO_GOAL[table.kinds]] = 0.0
         possible = np.zeros((len(table), len(_INTERACTIONS)), dtype=bool)
@@ -141,7 +141,7 @@ def _on_burners(table: ObjectTable) -> NDArray[np.intp]:
 
 
 def affordances(table: ObjectTable) -> Affordances:
-    """What could be done with a table's objects: worked out once, and kept with the table."""
+    """The affordances of a table's objects, computed once and stored with the table."""
     found = table.derived.get("affordances")
     if not isinstance(found, Affordances):
         found = table.derived["affordances"] = Affordances.of(table)
@@ -150,14 +150,14 @@ def affordances(table: ObjectTable) -> Affordances:
 
 @dataclass(frozen=True, eq=False)
 class AvailableObjects:
-    """What the agent can do things to, now.
+    """The objects that the agent can act on now.
 
     Attributes:
-        objects: all of the scene.
-        navigable: rows of objects that are plain enough to see to be walked to.
-        interactable: rows of objects that may be interacted with; the navigable are among them.
-        covered: rows of the stove burners that are under one of these. Whether a pan hides its
-            burner or not, the knob of that burner can be turned.
+        objects: all objects of the scene.
+        navigable: rows of the objects that the agent sees clearly enough to navigate to them.
+        interactable: rows of the objects that the agent may interact with, the navigable included.
+        covered: rows of the stove burners under an interactable object. The agent can turn the knob
+            of such a burner even if a pan hides the burner.
     """
 
     objects: ObjectTable
@@ -167,19 +167,20 @@ class AvailableObjects:
 
     @cached_property
     def interactable_types(self) -> NDArray[np.bool_]:
-        """(T,) bool: the types of the interactable objects."""
+        """(T,) bool: True for the types of the interactable objects."""
         return type_mask(self.objects.kinds[self.interactable])
 
     @cached_property
     def in_reach(self) -> tuple[str, ...]:
-        """The names of the same types, in alphabetical order."""
+        """The names of these types, in alphabetical order."""
         return type_names(self.interactable_types)
 
 
 def available_objects(perception: Perception, navigated_to: str = "") -> AvailableObjects:
-    """Judge what is perceived.
+    """The objects that the agent can navigate to and interact with.
 
     Args:
+        perception: what the agent perceives now.
         navigated_to: id of the receptacle last navigated to. Objects of the types that lie in it
             can be interacted with wherever they are visible.
     """
@@ -208,22 +209,22 @@ def available_objects(perception: Perception, navigated_to: str = "") -> Availab
 
 
 class KnownTypes:
-    """The types that may be navigated to: what was plain to see once in an episode stays so.
+    """The types that the agent may navigate to: all that were clearly visible in the episode.
 
     Attributes:
-        names: theirs, in alphabetical order.
-        types: (T,) bool, the same.
-        legal: (len(ACTIONS),) int8, 1 for each action that is legal whatever is in reach: to go to
-            one of these types, and those that name none.
+        names: the names of the types, in alphabetical order.
+        types: (T,) bool: True for each of these types.
+        legal: (len(ACTIONS),) int8: 1 for each action that is legal whatever is in reach: going to
+            one of these types, and the actions that name no type.
     """
 
     def __init__(self, object_types: Iterable[str]) -> None:
-        self._told = {*object_types} - verbs.NOWHERE  # tasks name types that no scene has, too
+        self._told = {*object_types} - verbs.NOWHERE  # tasks also name types that no scene has
         self.types = type_mask(np.array([KIND_OF[t] for t in self._told & KIND_OF.keys()], np.intp))
         self._update()
 
     def add(self, kinds: NDArray[np.intp]) -> None:
-        """Some objects are plain to see now, of these kinds."""
+        """Add the types of objects that are clearly visible now, by index into ``TYPES``."""
         if not self.types[kinds].all():
             self.types[kinds] = True
             self._update()
@@ -239,7 +240,7 @@ class KnownTypes:
 
 
 def candidate_rows(action: Action, available: AvailableObjects) -> list[int]:
-    """Rows of the objects that an interaction can be done to as things are now."""
+    """The rows of the objects that an interaction can be done to now."""
     rows, held = available.interactable, available.objects.held
     if action.verb == verbs.TOGGLE and len(available.covered):
         rows = np.union1d(rows, available.covered)
@@ -255,7 +256,7 @@ def candidate_rows(action: Action, available: AvailableObjects) -> list[int]:
 
 
 def illegal_reason(action: Action, available: AvailableObjects, known: KnownTypes) -> str:
-    """Why an action is illegal now, in words for the agent; "" when it is legal."""
+    """Why an action is illegal now, in words for the agent; ``""`` if it is legal."""
     name, objects = action.object_type, available.objects
     verb = verbs.verb_named(action.verb)
     if verb.alone:
@@ -282,7 +283,7 @@ def illegal_reason(action: Action, available: AvailableObjects, known: KnownType
 
 
 def legal_actions(available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
-    """(len(ACTIONS),) int8: 1 for each action to which :func:`illegal_reason` has none."""
+    """(len(ACTIONS),) int8: 1 for each action without an :func:`illegal_reason`."""
     legal, objects = known.legal.copy(), available.objects
     possible = affordances(objects).actions
     interactions = possible[available.interactable]

@@ -1,7 +1,8 @@
-"""What the agent perceives, taken out of an event at once.
+"""What the agent perceives, read from an AI2-THOR event.
 
-The event can then be let go. One that somebody keeps has to have all its metadata worked out before
-the world changes, which costs the embedded engine more than the action itself.
+Nothing keeps the event. The embedded engine makes an event's metadata lazily, and must complete the
+metadata of an event that is still referenced before the world changes. That takes longer than the
+action itself.
 """
 
 from __future__ import annotations
@@ -21,15 +22,15 @@ from er_gym.thor.objects import TYPES, ObjectTable, objects_of
 
 @dataclass(frozen=True, eq=False)
 class Perception:
-    """What an event tells the agent.
+    """What the agent perceives in one state of the world.
 
     Attributes:
-        objects: the N objects of the scene, as they are then.
-        visible, interactable: (N,) bool, as the simulator has them.
-        pose: the agent's.
-        frame: its view, (height, width, 3) uint8; None when none was drawn.
-        boxes: object id to what is seen of it, in pixels (left, upper, right, lower); None unless
-            the picture is to name things.
+        objects: the N objects of the scene.
+        visible, interactable: (N,) bool, AI2-THOR's ``visible`` and ``isInteractable``.
+        pose: the agent's pose, metres and degrees in the world frame.
+        frame: the agent's view, (height, width, 3) uint8; None if it was not drawn.
+        boxes: object id to the box of its visible part, pixels (left, upper, right, lower); None
+            unless the environment annotates pictures.
     """
 
     objects: ObjectTable
@@ -41,30 +42,30 @@ class Perception:
 
     @cached_property
     def picture(self) -> NDArray[np.uint8] | None:
-        """The frame, with things named in it if they are to be."""
+        """The frame, annotated with object types if the environment asks for it."""
         if self.frame is None or self.boxes is None:
             return self.frame
         return annotated(self.frame, self.boxes)
 
     @cached_property
     def visible_names(self) -> tuple[str, ...]:
-        """The names of the types of which something is visible, in alphabetical order."""
+        """The names of the visible object types, in alphabetical order."""
         return type_names(self.visible_types)
 
     @property
     def held_name(self) -> str:
-        """The type of what is in the hand, ``""`` when that is empty."""
+        """The type of the object in the agent's hand, ``""`` if the hand is empty."""
         held = self.objects.held
         return "" if held < 0 else self.objects.type_of(held)
 
     @cached_property
     def visible_types(self) -> NDArray[np.bool_]:
-        """(T,) bool: the types of which something is visible."""
+        """(T,) bool: True for each visible object type."""
         return type_mask(self.objects.kinds[self.visible])
 
 
 def perceive(event: Any) -> Perception:
-    """What an AI2-THOR event tells the agent."""
+    """Read what the agent perceives from an AI2-THOR event."""
     objects, visible, interactable = objects_of(event)
     agent = event.metadata["agent"]
     position = agent["position"]
@@ -82,12 +83,12 @@ def perceive(event: Any) -> Perception:
 
 
 def type_mask(kinds: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """(T,) bool: True for the types that occur among some kinds, indices into ``TYPES``."""
+    """(T,) bool: True for the types at the given indices into ``TYPES``."""
     mark = np.zeros(len(TYPES), dtype=bool)
     mark[kinds] = True
     return mark
 
 
 def type_names(mark: NDArray[np.bool_]) -> tuple[str, ...]:
-    """The names of the types that are marked in (T,) bool, in alphabetical order."""
+    """The names of the types that are True in a (T,) bool mask, in alphabetical order."""
     return tuple([TYPES[kind] for kind in mark.nonzero()[0].tolist()])

@@ -94,7 +94,7 @@ def test_text_that_no_file_can_hold_is_escaped(new, tasks):
 
 
 def test_attachments_replace_those_of_the_same_task(new, episode):
-    record = episode().model_copy(update={"task_id": "paper-0"})
+    record = episode((), ("end",), task_id="paper-0")
     notes = new.path / "notes"
     for name in ("paper-0.old", "paper-0/2.txt", "paper-0.5.txt", "other.txt"):
         (notes / name).parent.mkdir(parents=True, exist_ok=True)
@@ -117,7 +117,7 @@ def test_an_agent_that_fails_to_leave_its_files_costs_one_episode(episode):
     def fail():
         raise OSError("the files are gone")
 
-    record = episode().model_copy(update={"success": True, "end_reason": "end"})
+    record = episode((), ("end",)).model_copy(update={"success": True, "end_reason": "end"})
     crashed = PlayedEpisode.by(by_hand.Leaving(fail), record).record
     assert crashed.error.startswith("OSError: the files are gone (")
     assert (crashed.success, crashed.end_reason) == (False, "")
@@ -143,7 +143,7 @@ def test_an_agent_that_fails_to_leave_its_files_costs_one_episode(episode):
 def test_attachments_outside_the_agents_folders_are_refused(episode, path, folders):
     with pytest.raises(ValueError, match="is not allowed; give"):
         check_attachments({path: b""}, folders, "paper-0")
-    record = episode().model_copy(update={"task_id": "paper-0"})
+    record = episode((), ("end",), task_id="paper-0")
     played = PlayedEpisode.by(by_hand.Leaving({path: b""}, folders), record)
     assert "is not allowed" in played.record.error
     assert (dict(played.attachments), played.folders) == ({}, ())
