@@ -48,23 +48,26 @@ _LONGEST_NAME = 200
 """Bytes that a draft's name takes from the file's; file systems allow 255, the rest included."""
 _LONGEST_STEM = 120
 _HEAD = 4096
-"""So many bytes of a file are looked at for a mark."""
+"""The number of bytes at the beginning of a file in which its mark is looked for."""
 _COMMENT = b"Written by er-gym"
 _OURS = re.compile(rb'\s*\{\s*"format"\s*:\s*"er-gym/|(<!--|#) Written by er-gym\b')
 _PNG, _JPEG, _GZIP = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\x1f\x8b"
 
 
 class CannotWrite(OSError):
-    """A file cannot be written; the message is one line that names it. The old one is whole."""
+    """A file cannot be written; the message names it in one line. The old file is unchanged."""
 
 
 class ForeignFile(ValueError):
-    """er-gym did not write what is there, so it does not replace it; nothing is changed."""
+    """er-gym did not write the file at the path, so it does not replace it; nothing is changed."""
 
 
 def file_stem(name: str) -> str:
-    """A file's name for what has a name, less an ending: its name, or, where that is not fit, a
-    readable unique one of at most 129 characters."""
+    """A file name without suffix for any name.
+
+    It is the name itself if that is fit for a file; else a readable, unique one of at most 129
+    characters.
+    """
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", name)[:_LONGEST_STEM]
     if stem == name and not stem.startswith("."):
         return stem
@@ -131,7 +134,7 @@ def write_output(path: str | Path, data: str | bytes, *, force: bool = False) ->
 
 
 def check_output(path: str | Path, data: bytes | None = None, *, force: bool = False) -> None:
-    """Raise what :func:`write_output` would, as far as can be known beforehand.
+    """Raise the exception that :func:`write_output` would, as far as can be known beforehand.
 
     Args:
         path: the file.
@@ -179,7 +182,7 @@ def make_folder(path: Path) -> None:
 
 
 def is_ours(path: Path) -> bool:
-    """Whether er-gym wrote a file, by what the file says of itself; an empty one counts as such."""
+    """Whether er-gym wrote a file, by the mark in the file; an empty file counts as er-gym's."""
     try:
         with open(path, "rb") as file:
             head = file.read(_HEAD)
@@ -271,7 +274,7 @@ def _holds(path: Path, content: bytes) -> bool:
 
 
 def _reason(error: OSError, path: Path) -> str:
-    """Why, in words; what the system says of the draft is said of the file's folder."""
+    """The reason of an error, in words; it names the file's folder, not the draft."""
     if isinstance(error, (FileNotFoundError, NotADirectoryError)):
         return f"there is no folder {path.parent}; make it first"
     if isinstance(error, IsADirectoryError):

@@ -1,4 +1,4 @@
-"""The protocol that every agent follows, whatever is inside it."""
+"""The protocol that every agent follows."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from er_gym.tasks.task import Task
 
 @dataclass(frozen=True)
 class ModelReply:
-    """What a model's reply took.
+    """What a model's reply cost.
 
     Attributes:
         model: the model's name, as its server gives it.
         seconds: how long the reply took.
-        prompt_tokens, completion_tokens: as counted, or upper bounds.
-        cost: in US dollars, 0 where no price is known.
-        cached: whether an earlier request paid for it.
+        prompt_tokens, completion_tokens: as the server counted them, or upper bounds.
+        cost: US dollars; 0 if no price is known.
+        cached: whether the reply came from the cache, so that an earlier request paid for it.
     """
 
     model: str = ""
@@ -39,8 +39,8 @@ class Decision:
     Attributes:
         action: anything that ``EmbodiedEnv.step`` takes: an :class:`~er_gym.envs.actions.Action`,
             its text, or its index.
-        thought: what the agent said to itself; kept in the episode's record, never read by the env.
-        reply: of an agent that asks a model, what its reply took.
+        thought: the agent's reasoning; it goes into the episode's record, not to the environment.
+        reply: the cost of the model's reply, if the agent asks a model.
     """
 
     action: Action | str | int
@@ -49,9 +49,9 @@ class Decision:
 
 
 class CannotGoOn(Exception):
-    """No further episode can be played, this one included: a budget is spent, a key is refused.
+    """The agent can play no further episode, nor finish this one: a budget is spent, a key refused.
 
-    The run stops and shows the message. What has been played is kept.
+    The run stops and shows the message. The episodes played before stay in the run directory.
     """
 
 
@@ -59,17 +59,17 @@ class Agent(Protocol):
     """Plays episodes: ``reset`` once for each, then ``act`` until the episode is over."""
 
     obs_mode: str
-    """The observations it needs, as ``EmbodiedEnv(obs_mode=…)`` names them."""
+    """The observations that the agent needs, as ``EmbodiedEnv(obs_mode=…)`` names them."""
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Begin an episode; ``obs`` and ``info`` are what ``env.reset`` returned."""
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """Decide, given what the last ``env.reset`` or ``env.step`` returned."""
+        """Choose an action; ``obs`` and ``info`` are what the last reset or step returned."""
 
 
 class MakeAgent(Protocol):
-    """Makes the agent of one episode. To play in other processes it has to be picklable."""
+    """Makes the agent of one episode. It must be picklable to play in worker processes."""
 
     def __call__(self, task: Task, seed: int) -> Agent:
         """Make an agent, given the task and the seed of the episode."""

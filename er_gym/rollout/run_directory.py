@@ -8,11 +8,10 @@
     runs/x/conversations/<task id>.json  with a vision-language agent: what was said,
     runs/x/pictures/<task id>/           and the pictures that were shown
 
-An agent may leave other files beside the records: :class:`.agent.LeavesAttachments`. A file is
-written to a temporary file and moved to its name, so a file under its name is whole; what a killed
-run left half-written has another name and is never read. The same run continues where it was:
-:meth:`RunDirectory.read` tells what is there. One process at a time plays in a directory:
-:func:`locked_run_directory`.
+An agent may leave other files beside the records (:class:`.agent.LeavesAttachments`). A file is
+written under a temporary name and then moved, so each file is whole. Readers ignore the temporary
+files of a killed run. The same run continues where it stopped: :meth:`RunDirectory.read` returns
+the episodes it has. One process at a time plays in a directory (:func:`locked_run_directory`).
 """
 
 from __future__ import annotations
@@ -46,11 +45,11 @@ SPENDING = "spending.jsonl"
 REPLIES = "replies"
 SERVER_EVENTS = "server-events.jsonl"
 _KEPT = (EPISODES, CONVERSATIONS, PICTURES, SPENDING, SERVER_EVENTS, REPLIES, EVENTS)
-"""What a run directory holds beside its manifest."""
+"""The files and folders of a run directory beside its manifest."""
 
 
 class RunDirectoryError(ValueError):
-    """A directory that cannot be used as this run's; the message says why and what to do."""
+    """The directory cannot be used for this run; the message says why and what to do."""
 
 
 class Manifest(BaseModel):
@@ -99,11 +98,11 @@ class Manifest(BaseModel):
 
 @dataclass(frozen=True)
 class UnusableFile:
-    """A file among a run's episodes that is none of them.
+    """A file in the folder of episodes that is no episode of this run.
 
     Attributes:
-        path: of the file.
-        reason: what is wrong with it.
+        path: the file.
+        reason: why it is not usable.
     """
 
     path: Path
@@ -116,11 +115,11 @@ class UnusableFile:
 
 @dataclass(frozen=True)
 class RunContents:
-    """What is in a run directory.
+    """The contents of a run directory.
 
     Attributes:
-        episodes: by file name.
-        unusable: the other files among them.
+        episodes: the episodes, sorted by file name.
+        unusable: the other files in their folder.
     """
 
     episodes: tuple[EpisodeRecord, ...]
@@ -195,7 +194,7 @@ class RunDirectory:
             ) from error
 
     def write(self, episode: EpisodeRecord) -> Path:
-        """Keep an episode, in place of an earlier one of the same task."""
+        """Write an episode; it replaces an earlier one of the same task."""
         path = self._file(episode.task_id)
         make_folder(path.parent)
         told = episode.model_copy(update={"run": self.manifest.digest})
@@ -205,7 +204,7 @@ class RunDirectory:
     def attach(
         self, task_id: str, attachments: Mapping[str, bytes], folders: Sequence[str]
     ) -> None:
-        """Keep the files that an agent leaves, in place of earlier ones of the same task.
+        """Write the files that an agent leaves; they replace earlier ones of the same task.
 
         Args:
             task_id: of the episode.
@@ -226,7 +225,7 @@ class RunDirectory:
             write_atomic(place, data)
 
     def read(self) -> RunContents:
-        """Every episode there is, and what else is among them: broken, copied and foreign files."""
+        """All episodes, and the unusable files among them: broken, copied or foreign."""
         episodes, unusable = [], []
         for path in sorted((self.path / EPISODES).glob("*.json")):
             try:
@@ -236,7 +235,7 @@ class RunDirectory:
         return RunContents(tuple(episodes), tuple(unusable))
 
     def episodes(self) -> Iterator[EpisodeRecord]:
-        """Every episode there is, by file name; files that hold none of this run's are left out."""
+        """All episodes of this run, sorted by file name."""
         yield from self.read().episodes
 
     def move_aside(self, task_ids: Iterable[str]) -> list[str]:
@@ -296,12 +295,11 @@ class RunDirectory:
 
 @contextlib.contextmanager
 def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirectory]:
-    """A run directory to play in, which nobody else plays in meanwhile.
+    """A run directory to play in, locked against other processes.
 
-    Where it ends with an exception before anything is there that could be lost (an episode that did
-    not crash, a reply that was paid for), a run that was begun here is removed, so that a
-    mistyped command leaves nothing in the way of the right one. A run that was killed so early
-    gives way, too.
+    If the block raises before there is anything to lose (an episode that did not crash, a reply
+    that was paid for), a run that was begun here is removed. A mistyped command thus leaves nothing
+    in the way of the right one. A run that was killed that early is replaced, too.
 
     Raises:
         Locked: another process plays in it.
