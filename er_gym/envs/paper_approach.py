@@ -31,7 +31,7 @@ _HEADINGS = (0, 45, 90, 135, 180, 225, 270, 315, 360)
 _UP, _DOWN = 30, -60
 """How far the head tilts, degrees upwards."""
 _BELOW = 0.44
-"""The agent crouches for an object whose top is lower than its own centre by more, metres."""
+"""The agent crouches if the object's top is this far below the agent's centre, metres."""
 _HORIZON = 60.0
 
 _CORNERS = ((2, 225.0), (3, 315.0), (6, 135.0), (7, 45.0))
@@ -44,7 +44,7 @@ Pose = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class ObjectSnapshot:
-    """An object as the paper's agent knows it, now or as it was when the episode began.
+    """An object as the paper's agent knows it: now, or when the episode began.
 
     Attributes:
         object_id, object_type: AI2-THOR's.
@@ -98,13 +98,13 @@ def _entry(controller: Any, object_id: str) -> Mapping[str, Any] | None:
 
 
 def step_undrawn(controller: Any, action: str, **arguments: Any) -> bool:
-    """Make a call whose picture nobody wants; whether AI2-THOR reports no error."""
+    """Make a call without drawing; return whether AI2-THOR reports no error."""
     event = controller.step(action=action, renderImage=False, **arguments)
     return not event.metadata["errorMessage"]
 
 
 def teleport(controller: Any, pose: AgentPose) -> bool:
-    """Teleport; the agent stands or crouches as it did, whatever the pose says."""
+    """Teleport; the agent keeps standing or crouching as before, whatever the pose says."""
     return step_undrawn(
         controller,
         "Teleport",
@@ -115,9 +115,9 @@ def teleport(controller: Any, pose: AgentPose) -> bool:
 
 
 def start_in_corner(bounds: Mapping[str, Any], floor: Reachable) -> AgentPose:
-    """Where episodes begin: the reachable position nearest to a corner of the scene's bounds.
+    """The start pose: the reachable position nearest to a corner of the scene's bounds.
 
-    It is that of :func:`er_gym.envs.skills.start_pose`, but where two corners are as near.
+    It equals :func:`er_gym.envs.skills.start_pose` unless two corners are equally near.
 
     Args:
         bounds: ``sceneBounds`` of an event's metadata.
@@ -193,7 +193,7 @@ def _choose(controller: Any, target: ObjectSnapshot, refused: Sequence[Pose]) ->
     """The pose from which to reach an object; None where there is none within reach.
 
     Args:
-        refused: positions that turned out to be impossible.
+        refused: positions to which AI2-THOR refused to teleport the agent.
     """
     event = controller.step(
         action="GetInteractablePoses", objectId=target.object_id, renderImage=False
@@ -310,7 +310,7 @@ def _straight_ahead(target: ObjectSnapshot, poses: Sequence[Pose], size: _Size) 
 
 
 def _adjust_height(controller: Any, target: ObjectSnapshot) -> None:
-    """Crouch for what is low, and stand up again if it is then out of sight."""
+    """Crouch for a low object, and stand up again if the object is then out of sight."""
     low = controller.last_event.metadata["agent"]["position"]["y"] > target.top + _BELOW
     step_undrawn(controller, "Crouch" if low else "Stand")
     entry = _entry(controller, target.object_id)

@@ -20,10 +20,10 @@ _LEFT, _RIGHT = "Left", "Right"
 
 
 def outcome_after(controller: Any) -> Outcome:
-    """What is perceived after the calls of a skill, and what the last one's error was."""
+    """The outcome of a skill after its calls: the perception, and the error of the last call."""
     problem = controller.last_event.metadata["errorMessage"]
     if not controller.headless:
-        controller.step(action="Pass")  # for the one picture that is wanted
+        controller.step(action="Pass")  # to draw the one picture needed
     return Outcome(perceive(controller.last_event), not problem, problem)
 
 
@@ -34,9 +34,9 @@ def start_again(controller: Any, start: AgentPose) -> Outcome:
 
 
 def observe(controller: Any) -> Outcome:
-    """Look left, behind and right, and turn back to where one looked before.
+    """Look left, behind and right, and turn back.
 
-    The views are handed over in the order in which agents are told of them.
+    The views are returned in the order of :data:`er_gym.envs.skills.VIEWS`.
     """
 
     def turned() -> Perception:

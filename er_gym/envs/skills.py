@@ -263,7 +263,7 @@ def move_forward(controller: Any, grid_size: float) -> Outcome:
         taken += step
     problem = "" if taken else controller.last_event.metadata["errorMessage"]
     if not controller.headless:
-        controller.step(action="Pass")  # for the one picture that is wanted
+        controller.step(action="Pass")  # to draw the one picture needed
     return replace(_outcome(controller.last_event), success=taken > 0, problem=problem)
 
 

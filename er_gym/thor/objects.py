@@ -1,8 +1,8 @@
-"""The objects of an AI2-THOR event as columns.
+"""The objects of an AI2-THOR event as arrays.
 
-What asks about all objects at every step (what may be navigated to, what is seen) asks arrays, not
-a dictionary for each object. Events of the embedded engine hand over the engine's own arrays, and
-their metadata need not be made at all; those of Unity are read entry by entry.
+The environment judges all objects at every step, which is faster with arrays than with a dictionary
+for each object. An event of the embedded engine hands over the engine's own arrays, so its metadata
+need not be made. An event of Unity is read entry by entry.
 """
 
 from __future__ import annotations

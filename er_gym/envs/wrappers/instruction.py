@@ -67,7 +67,7 @@ class InstructionEmbedding(TaskWrapper, RecordConstructorArgs):
         return self._with_instruction(obs), float(reward), terminated, truncated, info
 
     def _with_instruction(self, obs: dict[str, Any]) -> dict[str, Any]:
-        # A copy: whoever writes into one observation must not change the next.
+        # A copy, so that writing into one observation does not change the next.
         return {**obs, KEY: self._embedding.copy()}
 
 
