@@ -1,4 +1,4 @@
-"""A folder is used by one process at a time."""
+"""Locks a folder, so that one process at a time uses it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import socket
 from collections.abc import Iterator
 from pathlib import Path
 
-from er_gym.writing import NotOurs, make_folder
+from er_gym.writing import ForeignFile, make_folder
 
 LOCK = "run.lock"
 _FLAGS = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
@@ -26,18 +26,17 @@ class Locked(ValueError):
 
 
 @contextlib.contextmanager
-def sole_user(folder: Path) -> Iterator[None]:
-    """Have a folder to oneself.
+def exclusive_use(folder: Path) -> Iterator[None]:
+    """Lock a folder for this process.
 
-    The folder is made where it is not there. The operating system holds the lock on the file
-    ``run.lock`` in it and lets go of it when the process ends, however that ends. The file names
-    the process, and is removed at the end; where a killed process left it, it does not matter. A
-    folder made here that is empty at the end is removed. On a file system without locks nobody is
-    kept out.
+    The folder is made if it is missing. The operating system locks the file ``run.lock`` in it, and
+    releases the lock when the process ends, in any way. The file names the process and is removed
+    at the end; a file that a killed process left does no harm. A folder made here that is empty at
+    the end is removed. A file system without locks keeps nobody out.
 
     Raises:
         Locked: another process, or another part of this one, uses it.
-        NotOurs: a ``run.lock`` is there that er-gym did not write.
+        ForeignFile: er-gym did not write the ``run.lock`` in the folder.
         OSError: the folder cannot be made or written to.
     """
     # The library `filelock` neither tells who holds a lock nor removes its file; it would be ten
@@ -59,7 +58,7 @@ def sole_user(folder: Path) -> Iterator[None]:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and those above it; which have been made, the innermost first."""
+    """Make a folder and its parents; return the folders made, innermost first."""
     absent = [path for path in (folder, *folder.parents) if not path.exists()]
     make_folder(folder)
     return absent
@@ -86,7 +85,7 @@ def _lock(folder: Path) -> int:
                     raise
             if _is_at(handle, path):
                 if not _OURS.fullmatch(os.pread(handle, _LONGEST, 0)):
-                    raise NotOurs(
+                    raise ForeignFile(
                         f"{path} is there, and er-gym did not write it; choose another --out"
                     )
                 os.ftruncate(handle, 0)
@@ -99,7 +98,7 @@ def _lock(folder: Path) -> int:
 
 
 def _is_at(handle: int, path: Path) -> bool:
-    """Whether an open file is still the one of that name."""
+    """Whether an open file is still the file at a path."""
     try:
         return os.path.samestat(os.fstat(handle), os.stat(path))
     except FileNotFoundError:
@@ -107,7 +106,7 @@ def _is_at(handle: int, path: Path) -> bool:
 
 
 def _holder(handle: int) -> str:
-    """Who holds the lock, in words."""
+    """The process that holds the lock, in words."""
     told = _OURS.fullmatch(os.pread(handle, _LONGEST, 0))
     if told is None or not told["pid"]:
         return "another process"

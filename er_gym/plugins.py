@@ -1,12 +1,12 @@
-"""What other packages add to er-gym, found by name.
+"""Plugins: objects that other packages add to er-gym, found by name.
 
-There are two ways to name a thing that er-gym does not bring itself:
+There are two ways to name a plugin:
 
 - ``package.module:Name``, a dotted name: the module is imported, and has ``Name``;
 - the name of an entry point that an installed package declares in one of er-gym's groups, such as
   ``er_gym.agents``.
 
-A :class:`Registry` looks a name up among er-gym's own things, then in both of these ways.
+A :class:`Registry` looks a name up among er-gym's own objects, then in both of these ways.
 Tables that are complete before anything is looked up take everything that :func:`added` finds.
 ``docs/extending.md`` has a walk-through for each registry.
 """
@@ -27,19 +27,19 @@ T = TypeVar("T")
 
 
 class PluginError(ValueError):
-    """A name stands for nothing that can be used; the message says why, and what can be given."""
+    """A name stands for no usable plugin; the message says why, and which names are allowed."""
 
 
 @dataclass(frozen=True)
 class Registry(Generic[T]):
-    """Things of one kind that a user chooses by name.
+    """Objects of one kind that a user chooses by name.
 
     Attributes:
         kind: what they are, for messages: ``"agent"``.
         group: the group of entry points in which other packages declare theirs.
         own: those that come with er-gym, by name.
         expected: what one has to be, for messages: ``"a class with reset and act"``.
-        fits: whether an object is one, as far as that can be told without calling it.
+        fits: whether an object is of this kind, as far as can be told without calling it.
         others: further ways to name one, for messages.
     """
 
@@ -210,6 +210,6 @@ def _package(entry: metadata.EntryPoint) -> str:
 
 
 def reason(error: BaseException) -> str:
-    """What was raised, in one line."""
+    """The type and the first line of an exception."""
     first_line = (str(error).strip().splitlines() or [""])[0]
     return f"{type(error).__name__}: {first_line}"

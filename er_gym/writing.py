@@ -1,6 +1,6 @@
 """Files that are written whole or not at all, and only over what er-gym wrote.
 
-Every file goes through :func:`write_whole`: it is written beside its place and moved there, so that
+Every file goes through :func:`write_atomic`. It is written beside its place and moved there, so
 neither a full disk nor a kill leaves half a file or harms the old one. A file that the user named,
 or that is derived from such a name, goes through :func:`write_output`, which replaces nothing that
 er-gym did not write unless it is told to.
@@ -48,30 +48,33 @@ _LONGEST_NAME = 200
 """Bytes that a draft's name takes from the file's; file systems allow 255, the rest included."""
 _LONGEST_STEM = 120
 _HEAD = 4096
-"""So many bytes of a file are looked at for a mark."""
+"""The number of bytes at the beginning of a file in which its mark is looked for."""
 _COMMENT = b"Written by er-gym"
 _OURS = re.compile(rb'\s*\{\s*"format"\s*:\s*"er-gym/|(<!--|#) Written by er-gym\b')
 _PNG, _JPEG, _GZIP = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\x1f\x8b"
 
 
 class CannotWrite(OSError):
-    """A file cannot be written; the message is one line that names it. The old one is whole."""
+    """A file cannot be written; the message names it in one line. The old file is unchanged."""
 
 
-class NotOurs(ValueError):
-    """er-gym did not write what is there, so it does not replace it; nothing is changed."""
+class ForeignFile(ValueError):
+    """er-gym did not write the file at the path, so it does not replace it; nothing is changed."""
 
 
 def file_stem(name: str) -> str:
-    """A file's name for what has a name, less an ending: its name, or, where that is not fit, a
-    readable unique one of at most 129 characters."""
+    """A file name without suffix for any name.
+
+    It is the name itself if that is fit for a file; else a readable, unique one of at most 129
+    characters.
+    """
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", name)[:_LONGEST_STEM]
     if stem == name and not stem.startswith("."):
         return stem
     return f"{stem.lstrip('.')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
-def write_whole(path: Path, data: str | bytes, *, mode: int | None = None) -> None:
+def write_atomic(path: Path, data: str | bytes, *, mode: int | None = None) -> None:
     """Write a file so that it is found whole or not at all, power cuts included.
 
     Args:
@@ -119,19 +122,19 @@ def write_output(path: str | Path, data: str | bytes, *, force: bool = False) ->
         force: whether to replace also what er-gym did not write.
 
     Raises:
-        NotOurs: it did not write what is there.
-        CannotWrite: as :func:`write_whole`; or a device or a pipe is there, or a file that may not
+        ForeignFile: it did not write what is there.
+        CannotWrite: as :func:`write_atomic`; or a device or a pipe is there, or a file that may not
             be written to.
     """
     path = Path(path)
     content = data.encode() if isinstance(data, str) else data
     if not _holds(path, content):
         check_output(path, force=force)
-        write_whole(Path(os.path.realpath(path)), content)
+        write_atomic(Path(os.path.realpath(path)), content)
 
 
 def check_output(path: str | Path, data: bytes | None = None, *, force: bool = False) -> None:
-    """Raise what :func:`write_output` would, as far as can be known beforehand.
+    """Raise the exception that :func:`write_output` would, as far as can be known beforehand.
 
     Args:
         path: the file.
@@ -157,7 +160,7 @@ def check_output(path: str | Path, data: bytes | None = None, *, force: bool = F
         if not os.access(path, os.W_OK):
             raise CannotWrite(f"{path}: cannot be written: the file is read-only")
         if not (force or is_ours(path)):
-            raise NotOurs(
+            raise ForeignFile(
                 f"{path} is there already, and er-gym did not write it; choose another name or "
                 "move it away (commands that have --force then replace it)"
             )
@@ -179,7 +182,7 @@ def make_folder(path: Path) -> None:
 
 
 def is_ours(path: Path) -> bool:
-    """Whether er-gym wrote a file, by what the file says of itself; an empty one counts as such."""
+    """Whether er-gym wrote a file, by the mark in the file; an empty file counts as er-gym's."""
     try:
         with open(path, "rb") as file:
             head = file.read(_HEAD)
@@ -223,7 +226,7 @@ def write_picture(path: Path, picture: Image, *, force: bool = False, **options:
         options: of Pillow's writer.
 
     Raises:
-        NotOurs, CannotWrite: as :func:`write_output`.
+        ForeignFile, CannotWrite: as :func:`write_output`.
         ValueError: there is no such kind of picture, or it cannot hold this one.
     """
     from PIL.PngImagePlugin import PngInfo
@@ -253,7 +256,7 @@ def write_figure(path: Path, figure: Figure, *, force: bool = False, **options: 
         options: of ``savefig``.
 
     Raises:
-        NotOurs, CannotWrite: as :func:`write_output`.
+        ForeignFile, CannotWrite: as :func:`write_output`.
     """
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata=dict(PICTURE_MARK), **options)
@@ -271,7 +274,7 @@ def _holds(path: Path, content: bytes) -> bool:
 
 
 def _reason(error: OSError, path: Path) -> str:
-    """Why, in words; what the system says of the draft is said of the file's folder."""
+    """The reason of an error, in words; it names the file's folder, not the draft."""
     if isinstance(error, (FileNotFoundError, NotADirectoryError)):
         return f"there is no folder {path.parent}; make it first"
     if isinstance(error, IsADirectoryError):

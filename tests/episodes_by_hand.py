@@ -97,7 +97,7 @@ def manifest() -> Manifest:
 
 
 @pytest.fixture
-def store(tmp_path: Path, manifest: Manifest) -> RunDirectory:
+def run_directory(tmp_path: Path, manifest: Manifest) -> RunDirectory:
     return RunDirectory.create(tmp_path / "run", manifest)
 
 

@@ -178,7 +178,9 @@ def test_other_wrong_names() -> None:
         load_suite("household:ask")
     with pytest.raises(PluginError, match=r"unknown suite 'er-1'.*er-1k"):
         EmbodiedEnv("er-1")
-    with pytest.raises(ValueError, match=r"unknown obs_mode 'rgb\+hand'.*rgb, state, text, hands"):
+    with pytest.raises(
+        ValueError, match=r"unknown obs_mode 'rgb\+hand'.*rgb, depth, instance, state, text, hands"
+    ):
         EmbodiedEnv(obs_mode="rgb+hand")
     with pytest.raises(PluginError, match="observation 'household:ECHO' is ModelClient"):
         EmbodiedEnv(obs_mode="household:ECHO")

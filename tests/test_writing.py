@@ -15,17 +15,17 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from er_gym.locking import LOCK, Locked, sole_user
+from er_gym.locking import LOCK, Locked, exclusive_use
 from er_gym.writing import (
     MARKDOWN_MARK,
     YAML_MARK,
     CannotWrite,
-    NotOurs,
+    ForeignFile,
     check_output,
     is_ours,
+    write_atomic,
     write_output,
     write_picture,
-    write_whole,
 )
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -74,7 +74,7 @@ def test_what_is_ours_is_replaced(tmp_path: Path, content: bytes) -> None:
 def test_what_is_theirs_is_replaced_with_force_only(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "file"
     path.write_bytes(content)
-    with pytest.raises(NotOurs, match=r"file is there already.*--force"):
+    with pytest.raises(ForeignFile, match=r"file is there already.*--force"):
         write_output(path, "new")
     assert path.read_bytes() == content
     write_output(path, content)  # what is there already
@@ -87,7 +87,7 @@ def test_pictures_say_whose_they_are(tmp_path: Path, name: str) -> None:
     path, picture = tmp_path / name, Image.new("RGB", (9, 9), "red")
     picture.save(path)
     assert not is_ours(path)
-    with pytest.raises(NotOurs):
+    with pytest.raises(ForeignFile):
         write_picture(path, picture.rotate(1))
     write_picture(path, picture, force=True)
     assert is_ours(path)
@@ -161,7 +161,7 @@ def test_links_are_followed_and_permissions_kept(tmp_path: Path) -> None:
 
 def test_the_longest_name_there_may_be(tmp_path: Path) -> None:
     path = tmp_path / ("ü" * 127)
-    write_whole(path, "x")
+    write_atomic(path, "x")
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
 
 
@@ -170,8 +170,8 @@ def test_the_longest_name_there_may_be(tmp_path: Path) -> None:
 _HOLD = """
 import sys, time
 from pathlib import Path
-from er_gym.locking import sole_user
-with sole_user(Path(sys.argv[1])):
+from er_gym.locking import exclusive_use
+with exclusive_use(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
 """
@@ -189,24 +189,24 @@ def test_another_process_is_refused_until_it_is_dead(tmp_path: Path) -> None:
         assert process.stdout is not None
         assert process.stdout.readline() == "held\n"
         with pytest.raises(Locked, match=rf"run is in use by process {process.pid};.*--out"):
-            sole_user(folder).__enter__()
+            exclusive_use(folder).__enter__()
     finally:
         process.kill()
         process.communicate()
     assert (folder / LOCK).exists()
-    with sole_user(folder):
+    with exclusive_use(folder):
         (folder / "kept").touch()
     assert [path.name for path in folder.iterdir()] == ["kept"]
 
 
 def test_nothing_is_left_of_a_folder_that_was_made_for_nothing(tmp_path: Path) -> None:
-    with sole_user(tmp_path / "a" / "b"), pytest.raises(Locked, match="in use by process"):
-        sole_user(tmp_path / "a" / "b").__enter__()
+    with exclusive_use(tmp_path / "a" / "b"), pytest.raises(Locked, match="in use by process"):
+        exclusive_use(tmp_path / "a" / "b").__enter__()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_lock_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / LOCK).write_text("my own lock\n")
-    with pytest.raises(NotOurs, match=r"run\.lock is there"):
-        sole_user(tmp_path).__enter__()
+    with pytest.raises(ForeignFile, match=r"run\.lock is there"):
+        exclusive_use(tmp_path).__enter__()
     assert (tmp_path / LOCK).read_text() == "my own lock\n"

@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from agents.rl.config import Phase
 from agents.rl.saved import save
 from er_gym.tasks.reading import read_bytes
-from er_gym.writing import write_whole
+from er_gym.writing import write_atomic
 
 CURVE = "curve.jsonl"
 
@@ -65,7 +65,7 @@ class Curve(KVWriter):
     def __init__(self, run: Path, steps: int) -> None:
         self._file = run / CURVE
         kept = [line for line in read_curve(run) if line["steps"] <= steps]
-        write_whole(self._file, "".join(json.dumps(line) + "\n" for line in kept))
+        write_atomic(self._file, "".join(json.dumps(line) + "\n" for line in kept))
         self._before = kept[-1]["seconds"] if kept else 0.0
         self._began = time.monotonic()
 

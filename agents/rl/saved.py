@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
-from er_gym.writing import write_whole
+from er_gym.writing import write_atomic
 
 MODEL = "model.npz"
 FOREIGN = "model.zip"
@@ -65,7 +65,7 @@ def save(model: BaseAlgorithm, run: Path) -> None:
     about = np.frombuffer(json.dumps(_about(model)).encode(), np.uint8)
     archive = io.BytesIO()
     np.savez(archive, **{_ABOUT: about}, **_arrays(model))
-    write_whole(run / MODEL, archive.getvalue())
+    write_atomic(run / MODEL, archive.getvalue())
 
 
 def _arrays(model: BaseAlgorithm) -> Arrays:

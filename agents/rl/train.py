@@ -45,8 +45,8 @@ from agents.rl.policy_observation import Perception
 from agents.rl.saved import FOREIGN, MODEL, nothing, restore, save, untrusted
 from agents.rl.vec_env import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS
-from er_gym.locking import sole_user
-from er_gym.writing import YAML_MARK, is_ours, make_folder, write_whole
+from er_gym.locking import exclusive_use
+from er_gym.writing import YAML_MARK, is_ours, make_folder, write_atomic
 
 CONFIG = "config.yaml"
 WARM_START = "warm_start.json"
@@ -99,7 +99,7 @@ def train(
         Locked: another process trains in it.
         KeyboardInterrupt: Ctrl-C; what has been learnt is saved.
     """
-    with sole_user(run):
+    with exclusive_use(run):
         new = prepare(config, run)
         try:
             return _train(config, run, show_progress, trust, more)
@@ -194,7 +194,7 @@ def _warm(model: BaseAlgorithm, config: TrainConfig, how: WarmStart, run: Path, 
         "unread": seen.unread,
         "agreement": agreement,
     }
-    write_whole(run / WARM_START, json.dumps(told))
+    write_atomic(run / WARM_START, json.dumps(told))
     if seen.refused or seen.unread:
         warnings.warn(
             f"cloning {how.teacher}: of its {len(seen) + seen.refused + seen.unread:,} steps "
@@ -238,7 +238,7 @@ def prepare(config: TrainConfig, run: Path) -> bool:
                 "or the configuration that it was begun with"
             )
     make_folder(run)
-    write_whole(file, YAML_MARK + dump(config))
+    write_atomic(file, YAML_MARK + dump(config))
     return new
 
 

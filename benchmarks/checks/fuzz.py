@@ -30,9 +30,9 @@ from rich.console import Console
 from benchmarks.checks.fuzz_checks import Pictures, RoomChecker, floor, scene_of
 from benchmarks.checks.fuzz_report import FuzzPlan, FuzzReport, FuzzStep, show
 from benchmarks.checks.fuzz_requests import Request, Room, draw_request
-from benchmarks.checks.scene_jobs import choose_scenes, run_jobs
+from benchmarks.checks.scene_jobs import choose_scenes, run_scene_jobs
 from benchmarks.cli.progress import bar
-from er_gym.rollout.worker_pool import Lost
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.sim.controller import EmbeddedController
 from er_gym.sim.engine import Engine
 from er_gym.sim.errors import CLIENT_ERRORS
@@ -179,8 +179,8 @@ def _player(plan: FuzzPlan) -> Callable[[int], FuzzReport]:
 
 def fuzz(plan: FuzzPlan, workers: int) -> Iterator[FuzzReport]:
     """Every run's report, as they are done, in so many processes (1: in this one)."""
-    for run, report in run_jobs(partial(_player, plan), range(plan.runs), workers):
-        if isinstance(report, Lost):
+    for run, report in run_scene_jobs(partial(_player, plan), range(plan.runs), workers):
+        if isinstance(report, LostJob):
             died = f"the process died, exit code {report.exitcode}"
             report = FuzzReport(wrong=[FuzzStep(run, 0, "?", {}, "", [died], 0.0)])
         yield report

@@ -44,7 +44,7 @@ from benchmarks.checks.output import Output, write_figures
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import PAPER
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.paper_conduct import NO_OBJECT
+from er_gym.envs.paper_action_handler import NO_OBJECT
 from er_gym.rollout.agent import Decision
 from er_gym.rollout.play import play_episode
 from er_gym.rollout.records import EpisodeRecord, StepRecord

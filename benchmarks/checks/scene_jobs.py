@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from er_gym.rollout.worker_pool import Lost, do_jobs
+from er_gym.rollout.worker_pool import LostJob, run_jobs
 from er_gym.thor import SCENE_NAMES
 
 Job = TypeVar("Job")
@@ -35,11 +35,11 @@ def choose_scenes(asked: str) -> list[str]:
     return names
 
 
-def run_jobs(
+def run_scene_jobs(
     make: Callable[[], Callable[[Job], Result]], jobs: Sequence[Job], workers: int
-) -> Iterator[tuple[Job, Result | Lost]]:
+) -> Iterator[tuple[Job, Result | LostJob]]:
     """Do every job once, each whole in one of so many processes (1: in this one)."""
     if workers == 1:
         do = make()
         return ((job, do(job)) for job in jobs)
-    return do_jobs(make, jobs, workers=workers, tries=1)
+    return run_jobs(make, jobs, workers=workers, tries=1)

@@ -27,10 +27,10 @@ from benchmarks.checks.invariants import (
     broken,
     stands_on_the_floor,
 )
-from benchmarks.checks.scene_jobs import choose_scenes, run_jobs
+from benchmarks.checks.scene_jobs import choose_scenes, run_scene_jobs
 from benchmarks.cli.progress import bar
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.rollout.worker_pool import Lost
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.sim.space.walkable_floor import standing_places
 from er_gym.tasks import verbs
 from er_gym.tasks.task import KeyAction, Task
@@ -262,8 +262,8 @@ def soak(
     scenes: Sequence[str], *, level: str, actions: int, seed: int, workers: int
 ) -> Iterator[SoakReport]:
     """Play in all scenes, each whole in one of so many processes (1: in this one)."""
-    for scene, report in run_jobs(partial(_player, level, actions, seed), scenes, workers):
-        if isinstance(report, Lost):
+    for scene, report in run_scene_jobs(partial(_player, level, actions, seed), scenes, workers):
+        if isinstance(report, LostJob):
             report = SoakReport(scene, 0, 0, 0.0, f"the process died, exit code {report.exitcode}")
         yield report
 

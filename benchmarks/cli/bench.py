@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from benchmarks.cli.vlm_run import VLMRun
     from er_gym.rollout.events import Cost
     from er_gym.rollout.run_directory import Manifest, RunDirectory
-    from er_gym.rollout.runner import Outcome
+    from er_gym.rollout.runner import RunSummary
     from er_gym.tasks.suites import Suite
     from er_gym.tasks.task import Task
 
@@ -197,14 +197,15 @@ def bench(
         console.print(note, style="dim", soft_wrap=True)
 
     try:
-        with _claimed(out, manifest) as store:
-            for line in store.move_aside(task.id for task in chosen):
+        with _locked(out, manifest) as run_directory:
+            for line in run_directory.move_aside(task.id for task in chosen):
                 print_problem(line)
-            before = finished(store, chosen)
+            before = finished(run_directory, chosen)
             succeeded = sum(episode.success for episode in before)
             title = f"{asked.name}, {agent}"
             progress = Progress(console, title, len(chosen), len(before), succeeded)
-            with _prepared_run(store, chosen, workers, agent, vlm_run, trust) as (play, cost):
+            prepared = _prepared_run(run_directory, chosen, workers, agent, vlm_run, trust)
+            with prepared as (play, cost):
                 with progress:
                     outcome = play(progress)
                 bill = cost()
@@ -230,14 +231,14 @@ def bench(
 
 
 @contextmanager
-def _claimed(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
+def _locked(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
     """The run directory, for this process alone; a directory that cannot be used is bad input."""
-    from er_gym.rollout.run_directory import claimed
+    from er_gym.rollout.run_directory import locked_run_directory
 
     with ExitStack() as stack:
         with bad_input():
-            store = stack.enter_context(claimed(out, manifest))
-        yield store
+            run_directory = stack.enter_context(locked_run_directory(out, manifest))
+        yield run_directory
 
 
 def _left_in(out: Path, chosen: Sequence[Task]) -> str:
@@ -253,28 +254,33 @@ def _left_in(out: Path, chosen: Sequence[Task]) -> str:
 
 @contextmanager
 def _prepared_run(
-    store: RunDirectory,
+    run_directory: RunDirectory,
     chosen: Sequence[Task],
     workers: int,
     agent: str,
     vlm_run: VLMRun | None,
     trust: bool,
-) -> Iterator[tuple[Callable[[Progress], Outcome], Callable[[], Cost | None]]]:
+) -> Iterator[tuple[Callable[[Progress], RunSummary], Callable[[], Cost | None]]]:
     """A function that plays the chosen tasks, and one that says what that has cost."""
     from agents import NamedAgent
     from er_gym.rollout.agent import CannotGoOn
-    from er_gym.rollout.executor import Size
+    from er_gym.rollout.executor import Parallelism
     from er_gym.rollout.runner import run
 
     if vlm_run is None:
-        make, size = NamedAgent(agent, trust), Size(workers)
-        yield lambda shown: run(store, chosen, make, size=size, listeners=[shown]), lambda: None
+        make, parallelism = NamedAgent(agent, trust), Parallelism(workers)
+        yield (
+            lambda shown: run(
+                run_directory, chosen, make, parallelism=parallelism, listeners=[shown]
+            ),
+            lambda: None,
+        )
         return
     with bad_input(CannotGoOn):  # no key, no such model
-        factory = vlm_run.factory(store.path)
+        factory = vlm_run.factory(run_directory.path)
     with closing(factory):
         yield (
-            lambda shown: vlm_run.play(factory, store, chosen, workers, [shown], shown.say),
+            lambda shown: vlm_run.play(factory, run_directory, chosen, workers, [shown], shown.say),
             lambda: factory.cost,
         )
 

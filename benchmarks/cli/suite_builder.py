@@ -20,9 +20,9 @@ from itertools import islice
 from pathlib import Path
 
 from er_gym import __version__
-from er_gym.envs.verify import unwanted, with_difficulty
+from er_gym.envs.verify import rejection_reason, with_difficulty
 from er_gym.rollout.verification import make_verifier
-from er_gym.rollout.worker_pool import Lost, do_jobs
+from er_gym.rollout.worker_pool import LostJob, run_jobs
 from er_gym.tasks import jsonl_format
 from er_gym.tasks.arrangement import Arrangement
 from er_gym.tasks.generate import Generator, generator_for, select_balanced
@@ -85,7 +85,7 @@ class RoomBuilder:
         """The tasks that fit the spec and can be done; plays a limited number of them."""
         tries = self._spec.per_layout * _TRIES
         for task in candidates:
-            problem = unwanted(task, room, self._spec, self._verify)
+            problem = rejection_reason(task, room, self._spec, self._verify)
             if not problem:
                 if not tries:
                     return
@@ -126,9 +126,9 @@ def build_suite(
     for scene, part in done.items():
         on_room(scene, part)
     todo = [scene for scene in spec.rooms if scene not in done]
-    with closing(do_jobs(partial(RoomBuilder, spec, seed), todo, workers=workers)) as results:
+    with closing(run_jobs(partial(RoomBuilder, spec, seed), todo, workers=workers)) as results:
         for scene, made in results:
-            if isinstance(made, Lost):
+            if isinstance(made, LostJob):
                 raise RuntimeError(
                     f"the worker that made {scene} died {made.tries} times, last with exit code "
                     f"{made.exitcode}"

@@ -39,7 +39,7 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
 
     from benchmarks.cli.progress import Progress
     from er_gym.rollout.verification import make_verifier
-    from er_gym.rollout.worker_pool import Lost, do_jobs
+    from er_gym.rollout.worker_pool import LostJob, run_jobs
     from er_gym.tasks.errors import summarise_set_aside
     from er_gym.tasks.resolve import resolve_tasks
 
@@ -58,14 +58,14 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
         solved = 0
         with (
             Progress(console, suite.name, len(todo)) as progress,
-            closing(do_jobs(make_verifier, todo, workers=workers)) as results,
+            closing(run_jobs(make_verifier, todo, workers=workers)) as results,
         ):
             for task, verdict in results:
-                problem = "the engine died" if isinstance(verdict, Lost) else verdict.problem
+                problem = "the engine died" if isinstance(verdict, LostJob) else verdict.problem
                 solved += not problem
                 progress.episode(not problem)
                 if problem:
-                    detail = "" if isinstance(verdict, Lost) else f": {verdict.detail}"
+                    detail = "" if isinstance(verdict, LostJob) else f": {verdict.detail}"
                     echo(f"{suite.name}: {task.id}: {problem}{detail}")
         every = len(todo) + len(aside)
         failed += every - solved

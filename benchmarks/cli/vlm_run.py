@@ -12,10 +12,10 @@ from agents.vlm.clients.budget import Budget
 from agents.vlm.factory import AgentFactory, consequential, load_settings
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import AgentSettings
-from er_gym.rollout.events import Emit
-from er_gym.rollout.executor import Size
+from er_gym.rollout.events import EventListener
+from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.runner import Outcome, run
+from er_gym.rollout.runner import RunSummary, run
 from er_gym.tasks.task import Task
 
 _CONCURRENCY = 8
@@ -83,9 +83,9 @@ class VLMRun:
         directory: RunDirectory,
         tasks: Sequence[Task],
         workers: int,
-        listeners: Iterable[Emit] = (),
+        listeners: Iterable[EventListener] = (),
         say: Callable[[object], None] | None = None,
-    ) -> Outcome:
+    ) -> RunSummary:
         """Play the tasks that the run directory has no finished episode of.
 
         ``say`` is called with what a user should hear of the server, from any thread; without it,
@@ -98,7 +98,7 @@ class VLMRun:
             tasks,
             lambda task, seed: factory.agent(seed),
             executor="threads",
-            size=Size(workers, self.concurrency),
+            parallelism=Parallelism(workers, self.concurrency),
             listeners=listeners,
             cost=lambda: factory.cost,
         )

@@ -35,8 +35,8 @@ from benchmarks.scoring.curves import draw_curves
 from benchmarks.scoring.metrics import Score, score_episode, wilson
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym import __version__
-from er_gym.rollout.executor import Size
-from er_gym.rollout.run_directory import Manifest, RunDirectory, claimed
+from er_gym.rollout.executor import Parallelism
+from er_gym.rollout.run_directory import Manifest, RunDirectory, locked_run_directory
 from er_gym.rollout.runner import finished, run
 from er_gym.tasks import jsonl_format, load_suite
 from er_gym.tasks.task import Task
@@ -126,21 +126,26 @@ class Evaluator:
             seed=_SEED,
             er_gym=__version__,
         )
-        with claimed(self._work / f"{file_stem(name)}-{where}", manifest) as store:
-            return self._play(store, tasks, where, name)
+        with locked_run_directory(
+            self._work / f"{file_stem(name)}-{where}", manifest
+        ) as run_directory:
+            return self._play(run_directory, tasks, where, name)
 
     def _play(
-        self, store: RunDirectory, tasks: Sequence[Task], where: str, name: str
+        self, run_directory: RunDirectory, tasks: Sequence[Task], where: str, name: str
     ) -> list[Score]:
-        before = finished(store, tasks)
+        before = finished(run_directory, tasks)
         progress = Progress(self._console, f"{where}, {name}", len(tasks), len(before), 0)
         with progress:
-            make, size = NamedAgent(store.manifest.agent, trust=self._trust), Size(self._workers)
-            run(store, tasks, make, size=size, listeners=[progress])
+            make, parallelism = (
+                NamedAgent(run_directory.manifest.agent, trust=self._trust),
+                Parallelism(self._workers),
+            )
+            run(run_directory, tasks, make, parallelism=parallelism, listeners=[progress])
         wanted = {task.id for task in tasks}
         return [
             score_episode(episode, CORRECTED)
-            for episode in store.episodes()
+            for episode in run_directory.episodes()
             if episode.task_id in wanted
         ]
 
@@ -314,16 +319,6 @@ def _page(parts: Sequence[str], pictures: Sequence[Path]) -> str:
     tables = "\n".join(parts)
     return f"""# Baselines
 
-<<<<<<< HEAD
-What policies learn on the embedded engine, beside agents that do not learn. This page is made by
-`python -m benchmarks.pages.baselines` from run directories. Everything is under
-`instances="explore"`, where a type name says nothing of the task's objects, and with the corrected
-scorer. A trained policy plays what it thinks best; it is the one at the end of training, none is
-chosen by how it did in an evaluation. Success in %: the mean over seeds with the least and the most;
-where there is one run only, Wilson's 95 % interval. The rooms of the unseen tasks (`er-1k`) are the paper's twelve
-test rooms, none of them in training; some of their tasks are about types of things that training
-has never named. Training tasks are a sample of those that were trained on.
-=======
 This page shows what policies learn on the embedded engine, beside agents that do not learn.
 `python -m benchmarks.pages.baselines` makes it from run directories. All episodes use
 `instances="explore"`, where the environment does not look at the task to choose which object a type
@@ -333,7 +328,6 @@ the lowest and the highest; for a single run, Wilson's 95 % interval. The rooms 
 (`er-1k`) are the paper's twelve test rooms, and training uses none of them. Some of their tasks are
 about object types that training never names. Training tasks are a sample of those that the policy
 was trained on.
->>>>>>> p4
 
 Times are from the start of training to its end, evaluations included, on {machine()}.
 `er-gym tasks generate --suite train` makes the suite `train` once, in about 3 minutes.

@@ -140,15 +140,15 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
             suite=suite.name, suite_digest=suite.digest, suite_size=len(suite.tasks),
             agent=vlm_run.name, env=env, seed=0, er_gym=__version__,
         )  # fmt: skip
-        store = RunDirectory.create(Path(place), manifest)
+        run_directory = RunDirectory.create(Path(place), manifest)
         began = time.perf_counter()
 
         def note(event: Event) -> None:
             if isinstance(event, EpisodeEnded):
                 ended.append((time.perf_counter(), event.steps))
 
-        with closing(vlm_run.factory(store.path)) as factory:
-            outcome = vlm_run.play(factory, store, tasks, workers, [note])
+        with closing(vlm_run.factory(run_directory.path)) as factory:
+            outcome = vlm_run.play(factory, run_directory, tasks, workers, [note])
     ours.close()
     process.join(5)
     whole = ended[-1][0] - began

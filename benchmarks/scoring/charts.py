@@ -48,7 +48,7 @@ def draw_charts(tasks: Sequence[Task], out: Path, title: str, *, force: bool = T
     Raises:
         ImportError: matplotlib is not installed.
         ValueError: there are no tasks.
-        NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
+        ForeignFile, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     try:
         import matplotlib.figure  # noqa: F401

@@ -122,14 +122,14 @@ def load_run(path: Path) -> RunReport:
     Raises:
         RunDirectoryError: there is no run.
     """
-    store = RunDirectory.open(path)
-    found = store.read()
+    run_directory = RunDirectory.open(path)
+    found = run_directory.read()
     scores = {
         name: tuple(score_episode(episode, scorer) for episode in found.episodes)
         for name, scorer in SCORERS.items()
     }
     unusable = tuple(map(str, found.unusable))
-    return RunReport(path, store.manifest, found.episodes, scores, unusable)
+    return RunReport(path, run_directory.manifest, found.episodes, scores, unusable)
 
 
 def _miss(episode: EpisodeRecord, scored: Score) -> Miss:

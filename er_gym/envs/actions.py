@@ -1,4 +1,4 @@
-"""The action space: a verb, alone or with an object type, the same in every scene."""
+"""The action space: verbs, alone or with an object type; the same in every scene."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.arguments import shown
+from er_gym.envs.arguments import short_repr
 from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
 
@@ -33,14 +33,14 @@ class Action:
 
 
 AnyAction: TypeAlias = Action | str | int | np.integer[Any] | NDArray[np.integer[Any]]
-"""What an environment takes: an action, its text, or its index in :data:`ACTIONS`; the index may be
-an array of one element, shape () or (1,), as learners' ``predict`` returns it."""
+"""What ``step`` accepts: an action, its text, or its index in :data:`ACTIONS`. The index may be an
+array of one element, shape () or (1,), as learners' ``predict`` returns it."""
 NO_ACTION = "(no action) "
-"""A text that begins with this names no action, whatever follows."""
+"""A text that begins with this names no action."""
 
 
 def applies(verb: str, object_type: str) -> bool:
-    """Whether a verb makes sense for a type at all, in some scene and some state."""
+    """Whether a verb can apply to an object type in any scene and state."""
     return verbs.verb_named(verb).takes(object_type)
 
 
@@ -58,7 +58,7 @@ INDICES: dict[str, NDArray[np.intp]] = {
     verb: np.array([INDEX.get(Action(verb, name), -1) for name in OBJECT_TYPES])
     for verb in verbs.OBJECT_VERBS
 }
-"""The same by verb: (T,) an index for each type, -1 where the verb makes no sense in any scene."""
+"""Verb to (T,) the index of its action with each object type; -1 if the verb does not apply."""
 _BY_TEXT = {str(action).lower(): action for action in ACTIONS}
 _VERBS_LONGEST_FIRST = sorted(
     {*verbs.OBJECT_VERBS, *verbs.ALIASES}, key=len, reverse=True
@@ -66,7 +66,7 @@ _VERBS_LONGEST_FIRST = sorted(
 
 
 def parse(text: str) -> Action | None:
-    """The action that a text names, None if it names none. Case and spacing do not matter."""
+    """The action that a text names, None if it names none. Case and spacing are ignored."""
     words = " ".join(text.lower().split())
     alone = _BY_TEXT.get(words) or _BY_TEXT.get(verbs.canonical_verb(words))
     if alone is not None:
@@ -78,7 +78,7 @@ def parse(text: str) -> Action | None:
 
 
 def understand(action: AnyAction) -> tuple[Action | None, str]:
-    """The action meant, None if a text names none; and the text.
+    """The action that is meant (None if a text names none), and its text.
 
     Raises:
         gymnasium.error.InvalidAction: see :func:`text_of`.
@@ -90,10 +90,10 @@ def understand(action: AnyAction) -> tuple[Action | None, str]:
 
 
 def text_of(action: AnyAction) -> str:
-    """An action's text.
+    """The text of an action.
 
     Raises:
-        gymnasium.error.InvalidAction: it is neither text nor an action nor its index.
+        gymnasium.error.InvalidAction: the value is no text, no action and no index of an action.
     """
     if isinstance(action, str | Action):
         return str(action)
@@ -101,13 +101,13 @@ def text_of(action: AnyAction) -> str:
     if 0 <= index < len(ACTIONS):
         return str(ACTIONS[index])
     raise gymnasium.error.InvalidAction(
-        f"{shown(action)} is no action: give an index from 0 to {len(ACTIONS) - 1} (an int, or an "
-        "array with one integer), an Action, or text such as 'navigate to Fridge'"
+        f"{short_repr(action)} is no action: give an index from 0 to {len(ACTIONS) - 1} (an int or "
+        "an array with one integer), an Action, or text such as 'navigate to Fridge'"
     )
 
 
 def _index_of(action: object) -> int:
-    """The index that a number stands for; -1 for what stands for none."""
+    """The index that a value stands for, -1 if it stands for none."""
     if isinstance(action, int | np.integer) and not isinstance(action, bool):
         return int(action)
     if isinstance(action, np.ndarray) and action.shape in ((), (1,)) and action.dtype.kind in "iu":

@@ -1,4 +1,4 @@
-"""Names written into pictures: a box and a type for each thing, as set-of-marks prompting does."""
+"""Annotates pictures with a box and a type for each object, as set-of-marks prompting does."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _LEAST = 40
-"""What covers fewer pixels of its box than this is not named."""
+"""Objects whose box has fewer pixels are not named."""
 _COLOURS = (
     (230, 60, 60), (60, 120, 230), (30, 150, 70), (200, 120, 0), (150, 60, 190),
     (0, 150, 160), (190, 40, 120), (110, 110, 20),
@@ -19,11 +19,11 @@ _SKIPPED = frozenset({"Floor", "Wall", "Ceiling"})
 def annotated(
     frame: NDArray[np.uint8], boxes: Mapping[str, tuple[int, int, int, int]]
 ) -> NDArray[np.uint8]:
-    """A picture with things named in it.
+    """A copy of a picture with object types written into it.
 
     Args:
         frame: (H, W, 3) uint8.
-        boxes: object id to left, upper, right and lower end of what is seen of it, pixels; as
+        boxes: object id to the box of its visible part, pixels (left, upper, right, lower), as in
             ``event.instance_detections2D``.
 
     Returns:
@@ -36,7 +36,7 @@ def annotated(
     named = [
         (name.split("|")[0], tuple(map(int, box))) for name, box in boxes.items() if "|" in name
     ]
-    # Large things first, so that the names of small ones are on top.
+    # Large objects first, so that the names of small objects are on top.
     named.sort(key=lambda item: (_area(item[1]), item), reverse=True)
     for kind, box in named:
         if kind in _SKIPPED or _area(box) < _LEAST:

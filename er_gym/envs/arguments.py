@@ -1,7 +1,7 @@
-"""Checks of what an environment or a wrapper is made with.
+"""Checks of the arguments of environments and wrappers.
 
-Each returns the value as the type that it stands for, so that a NumPy number becomes Python's, and
-raises ``ValueError`` with one line: what was given, and what is allowed.
+Each check returns the value as a plain Python value, also for a NumPy number. It raises
+``ValueError`` with one line that says what was given and what is allowed.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ import numpy as np
 _LONGEST = 80
 
 
-def shown(value: object) -> str:
-    """A value for a message: on one line, cut short."""
+def short_repr(value: object) -> str:
+    """A value as text for a message: one line, cut short."""
     try:
         text = " ".join(reprlib.repr(value).split())
-    except Exception:  # anybody's class may come here, and its __repr__ may fail
+    except Exception:  # a user's class may have a __repr__ that fails
         text = f"a {type(value).__name__}"
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
-def whole(name: str, value: Any, least: int, most: int | None = None) -> int:
-    """A whole number, ``least`` to ``most``; Booleans are none."""
+def whole_number(name: str, value: Any, least: int, most: int | None = None) -> int:
+    """Check a whole number from ``least`` to ``most``; a Boolean is not one."""
     fits = not isinstance(value, bool) and isinstance(value, Integral)
     if not fits or value < least or (most is not None and value > most):
-        raise ValueError(f"{name} is {shown(value)}; give a whole number {_span(least, most)}")
+        raise ValueError(f"{name} is {short_repr(value)}; give a whole number {_span(least, most)}")
     return int(value)
 
 
@@ -43,10 +43,11 @@ def number(
     above: bool = False,
     allowed: str = "",
 ) -> float:
-    """A finite number, ``least`` to ``most``; Booleans are none.
+    """Check a finite number from ``least`` to ``most``; a Boolean is not one.
 
-    ``above``: whether both ends are left out. ``allowed``: what to give, in other words than
-    "a number" and the range.
+    Args:
+        above: whether the range excludes both ends.
+        allowed: what to give, for the message; by default "a number" and the range.
     """
     fits = not isinstance(value, bool) and isinstance(value, Real) and _finite(value)
     if fits:
@@ -54,21 +55,21 @@ def number(
         fits = low and (most is None or (value < most if above else value <= most))
     if not fits:
         allowed = allowed or f"a number {_span(least, most, above)}"
-        raise ValueError(f"{name} is {shown(value)}; give {allowed}")
+        raise ValueError(f"{name} is {short_repr(value)}; give {allowed}")
     return float(value)
 
 
 def flag(name: str, value: Any) -> bool:
-    """True or False."""
+    """Check a Boolean."""
     if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{name} is {shown(value)}; give True or False")
+        raise ValueError(f"{name} is {short_repr(value)}; give True or False")
     return bool(value)
 
 
 def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
-    """One of some names."""
+    """Check one of the allowed names."""
     if not isinstance(value, str) or value not in allowed:
-        raise ValueError(f"unknown {name} {shown(value)}; choose one of: {', '.join(allowed)}")
+        raise ValueError(f"unknown {name} {short_repr(value)}; choose one of: {', '.join(allowed)}")
     return value
 
 

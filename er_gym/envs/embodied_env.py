@@ -1,4 +1,4 @@
-"""The environment: it owns the loop, and nothing but the loop."""
+"""The environment: Gymnasium's interface, the controller, and where tasks come from."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pickle
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -14,57 +14,36 @@ from gymnasium import spaces
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from er_gym.envs import object_selection as which
-from er_gym.envs import skills
-from er_gym.envs.actions import ACTIONS, Action, AnyAction
-from er_gym.envs.arguments import flag, number, one_of, shown, whole
-from er_gym.envs.conduct import Setting
+from er_gym.envs import object_selection
+from er_gym.envs.actions import ACTIONS, AnyAction
+from er_gym.envs.arguments import flag, number, one_of, short_repr, whole_number
+from er_gym.envs.episode import Episode, EpisodeSettings, ResetResult, StepResult
 from er_gym.envs.errors import ResetNeeded
-from er_gym.envs.info import Info, LegalActions
-from er_gym.envs.legality import Known
-from er_gym.envs.observations import (
-    MAX_REPEATS,
-    Memory,
-    Situation,
-    goal_row,
-    parse_obs_mode,
-    sensors_of,
-)
-from er_gym.envs.perception import SENSORS, Percept
+from er_gym.envs.observations import parse_obs_mode, sensors_of
+from er_gym.envs.perception import SENSORS
 from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
-from er_gym.tasks import verbs
-from er_gym.tasks.arrangement import set_up_scene
-from er_gym.tasks.goal import Condition, unmet_conditions
-from er_gym.tasks.judge import Criteria, Progress
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import TaskType
 from er_gym.tasks.types import task_type as look_up_type
 from er_gym.thor import BACKENDS, RENDER_DEVICES, check_size, make_controller
-from er_gym.thor.objects import ENTRY_KEYS
 
-MAX_UNKNOWN = 3
-"""So many replies in a row that name no known action end the episode."""
-_CUT_OFF = frozenset({"step limit", "no known action"})
-"""Why an episode ends that the agent does not end."""
 _NOT_BEGUN, _CLOSED = "no episode has begun", "the environment is closed"
 _BROKEN_OFF = "the last reset or step was broken off by an error"
-"""Why there is no episode to ask about."""
+"""The reasons why no episode is under way."""
 _LARGEST_SIDE = 4096
-"""Of a picture, pixels."""
+"""The longest side of a picture, pixels."""
 _SMALLEST_GRID, _LARGEST_GRID = 0.01, 5.0
 """Metres. AI2-THOR allows less, but working out where the agent can stand then takes minutes."""
-_LONGEST_QUOTE = 200
-"""An answer quotes no more characters than this of what it does not understand."""
 
 
 class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     """A household task in an AI2-THOR room, played with high-level actions.
 
     ## Description
-    The agent stands in a corner of a room and is told what to do: find a thing, pick one up, switch
-    one on, carry one somewhere. It walks, opens, takes and puts by naming object types, as in the
-    paper *Embodied-Reasoner* (arXiv 2503.21696), and is judged by the task's key actions.
+    The agent stands in a corner of a room and gets an instruction: find an object, pick it up,
+    switch it on, carry it somewhere. It walks, opens, picks up and puts by naming object types, as
+    in the paper *Embodied-Reasoner* (arXiv 2503.21696). The task's key actions decide its success.
 
     ## Action Space
     ``Discrete`` over :data:`er_gym.envs.actions.ACTIONS`, the same in every scene: ``observe``,
@@ -74,72 +53,72 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     array of one integer, as learners' ``predict`` returns it.
     ``info["action_mask"]`` and :meth:`action_masks` say which are legal now.
 
-    - ``navigate to`` goes to where the object can be handled. Legal for what is, or was once in
-      this episode, plain to see (:func:`er_gym.envs.legality.navigable_within`), and for the task's
-      own ``navigable_objects``.
-    - ``pickup``, ``put in``, ``open``, ``close``, ``toggle``, ``slice`` need the object to be plain
-      to see now, or visible and of a type that lies in the receptacle last navigated to; ``slice``,
-      which the paper does not have, needs a knife in the hand. A stove burner can be toggled, too,
-      where what stands on it and hides it is in reach.
+    - ``navigate to`` goes to where the agent can handle the object. It is legal for types that have
+      been clearly visible in this episode (:func:`er_gym.envs.legality.navigable_within`), and for
+      the task's ``navigable_objects``.
+    - ``pickup``, ``put in``, ``open``, ``close``, ``toggle``, ``slice`` are legal if the object is
+      clearly visible now, or if it is visible and of a type that lies in the receptacle last
+      navigated to. ``slice``, which the paper does not have, needs a knife in the hand. A stove
+      burner can also be toggled if the object that stands on it is in reach.
     - ``observe`` looks right, behind and left; ``info["views"]`` has the pictures.
     - ``end`` says that the task is done.
 
-    An illegal action costs a step, changes nothing and is answered in words.
+    An illegal action costs a step and changes nothing; ``info["feedback"]`` says why.
 
     ## Observation Space
     ``Dict`` of what ``obs_mode`` asks for, joined with ``+``:
 
     - ``rgb``: the agent's view, ``(height, width, 3)`` uint8.
-    - ``depth``: ``(height, width)`` float32, how far what is seen at each pixel is from the camera,
+    - ``depth``: ``(height, width)`` float32, the distance of each pixel's surface from the camera
       along its axis, metres; :data:`er_gym.envs.observations.FAR`, 40, where there is nothing.
     - ``instance``: ``(height, width)`` int32, the number of the object at each pixel, 0 for the
       room. ``info["instance_ids"][number]`` is its object id. The numbers are those of this step:
       they can change when something is sliced.
     - ``state``: ``(D,)`` float32 in [-1, 1], see :data:`er_gym.envs.observations.STATE_LAYOUT`.
-    - ``text``: the task, what is seen, held and possible, and feedback, in words.
-    - the name of another package's, or ``package.module:ROW`` (docs/extending.md).
+    - ``text``: the task, what the agent sees, holds and can do, and feedback, in words.
+    - an observation of another package, by name or as ``package.module:ROW`` (docs/extending.md).
 
     ## Info
     ``reset`` and ``step`` return an :class:`er_gym.envs.info.Info`: what is ``visible``, ``held``,
-    ``navigable``, ``interactable`` and ``legal`` now, what came of the action, the steps taken and
-    allowed, and how far the task has come.
+    ``navigable``, ``interactable`` and ``legal`` now, the result of the action, the steps taken and
+    allowed, and the key actions done and left.
 
     ## Rewards
     Each key action of the task is worth its reward (1) once, in any order unless the type of task
-    is ordered; which instance of a type it is done to does not matter, unless the task singles one
-    out. ``end`` is worth its own only when all others but navigation are done, the task's goal
-    holds (``info["goal_unmet"]`` says what of it does not), and, for a search, when the target can
-    be interacted with. :mod:`er_gym.tasks.judge` states the rules in full. ``step_penalty`` and
+    is ordered. Any instance of its object type counts, unless the task names one. ``end`` earns its
+    reward only if all key actions but navigation are done, the task's goal holds
+    (``info["goal_unmet"]`` lists what does not), and, in a search, the agent can interact with the
+    target. :mod:`er_gym.tasks.judge` states the rules in full. ``step_penalty`` and
     ``illegal_penalty`` are subtracted for each counted step and each illegal action.
 
     ## Starting State
     The agent stands at the reachable position nearest to a corner of the scene's bounds and looks
     diagonally into the room, which is as recorded or rearranged as the task says. ``reset(seed=…)``
-    draws a task from ``episode_source``, of ``task_type`` if that is given. ``options`` pins it:
+    draws a task from ``episode_source``, of ``task_type`` if given. ``options`` pins the task:
     ``{"task": task}`` (a :class:`~er_gym.tasks.task.Task`, or its id), ``{"scene": "FloorPlan1"}``,
-    ``{"suite": name or file}`` to draw from that one this time, or any of them together.
+    ``{"suite": name or file}`` to draw from that suite this time, or any of them together.
 
     ## Episode End
-    Terminates on ``end``; on the fourth same action in a row; on the third reply in a row that
-    names no known action (such a reply costs no step). Truncates at ``max_steps``, placing the
-    agent counting as the first step. ``info["end_reason"]`` says which, and ``info["max_steps"]``
-    how many steps this episode has.
+    The episode terminates on ``end``, on the fourth same action in a row, and on the third reply in
+    a row that names no known action (such a reply costs no step). It truncates at ``max_steps``;
+    placing the agent counts as the first step. ``info["end_reason"]`` names the reason, and
+    ``info["max_steps"]`` the step limit.
 
     ## Copies and Threads
-    ``copy.deepcopy`` and ``pickle`` keep the episode: the copy plays the same task and the same
-    actions again when it is made, and goes on with equal observations. On ``backend="unity"``,
-    which does not repeat itself exactly, only an environment without an episode can be copied.
-    Threads that share an environment wait for each other.
+    ``copy.deepcopy`` and ``pickle`` keep the episode: a new copy replays the task's actions and
+    continues with equal observations. ``backend="unity"`` does not repeat itself exactly, so there
+    only an environment without an episode can be copied. Threads that share an environment wait for
+    each other.
 
     ## Arguments
-    - ``episode_source``: what episodes are drawn from: a list of tasks; the name of a suite
-      (default ``"mini"``); the path of a task file; ``"generate"``: the generator, live, an endless
-      stream of verified tasks in the training rooms; or an
+    - ``episode_source``: where tasks are drawn from: a list of tasks; the name of a suite (default
+      ``"mini"``); the path of a task file; ``"generate"``, an endless stream of tasks in the
+      training rooms, each generated and verified when it is drawn; or an
       :class:`~er_gym.envs.sources.EpisodeSource`.
     - ``task_type``: draw tasks of this type only.
     - ``backend``: ``"embedded"`` or ``"unity"`` (:func:`er_gym.thor.make_controller`).
-    - ``width``, ``height`` pixels, such as 4096 by 4096 at most; ``field_of_view`` degrees,
-      vertical; ``grid_size`` and ``visibility_distance`` metres.
+    - ``width``, ``height``: pixels, at most 4096 each; ``field_of_view``: degrees,
+      vertical; ``grid_size`` and ``visibility_distance``: metres.
     - ``instances``: ``"target"``: a type name stands for the task's object of that type first, as
       in the paper; ``"explore"``: for the nearest not yet visited (navigation) or the nearest
       (interaction), whatever the task.
@@ -147,12 +126,12 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
       program (:mod:`er_gym.envs.protocol`).
     - ``max_steps``: 1 or more; default: the task type's own.
     - ``step_penalty``, ``illegal_penalty``: 0 or more, see Rewards.
-    - ``render_device``: what the embedded engine draws with, one for all environments of a process:
-      ``"cpu"``, or ``"gpu"`` where there is one with EGL.
-    - ``annotate``: write the types of things into the pictures, as set-of-marks prompting does.
+    - ``render_device``: the device that the embedded engine draws with, the same for all
+      environments of a process: ``"cpu"``, or ``"gpu"`` on a machine that has one with EGL.
+    - ``annotate``: write the object types into the pictures, as set-of-marks prompting does.
 
     ## Version History
-    - v0: first.
+    - v0: the first version.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012  (Gymnasium's own)
@@ -169,7 +148,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         field_of_view: float = 90.0,
         grid_size: float = 0.1,
         visibility_distance: float = 20.0,
-        instances: str = which.TARGET,
+        instances: str = object_selection.TARGET,
         protocol: str = DEFAULT.name,
         max_steps: int | None = None,
         step_penalty: float = 0.0,
@@ -185,40 +164,48 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             max_steps=max_steps, step_penalty=step_penalty, illegal_penalty=illegal_penalty,
             annotate=annotate, render_device=render_device, render_mode=render_mode,
         )  # fmt: skip
-        # Everything is looked at before anything is started.
-        one_of("instances", instances, which.POLICIES)
-        self._protocol = protocol_named(protocol)
-        if self._protocol.chooses_instances and instances != which.TARGET:
+        # Check every argument before anything is started.
+        one_of("instances", instances, object_selection.POLICIES)
+        rules = protocol_named(protocol)
+        if rules.chooses_instances and instances != object_selection.TARGET:
             raise ValueError(
-                f"the {protocol} protocol decides itself what a type name stands for; "
+                f"the {protocol} protocol decides which object a type name stands for; "
                 f"leave out instances={instances!r}"
             )
         if render_mode is not None:
             one_of("render_mode", render_mode, self.metadata["render_modes"])
-        width = whole("width", width, 1, _LARGEST_SIDE)
-        height = whole("height", height, 1, _LARGEST_SIDE)
+        width = whole_number("width", width, 1, _LARGEST_SIDE)
+        height = whole_number("height", height, 1, _LARGEST_SIDE)
         check_size(width, height)
         annotate = flag("annotate", annotate)
         self._backend = one_of("backend", backend, BACKENDS)
-        self._grid_size = number("grid_size", grid_size, _SMALLEST_GRID, _LARGEST_GRID)
-        self._step_penalty = number("step_penalty", step_penalty, 0)
-        self._illegal_penalty = number("illegal_penalty", illegal_penalty, 0)
-        self._max_steps = None if max_steps is None else whole("max_steps", max_steps, 1)
+        grid_size = number("grid_size", grid_size, _SMALLEST_GRID, _LARGEST_GRID)
+        step_penalty = number("step_penalty", step_penalty, 0)
+        illegal_penalty = number("illegal_penalty", illegal_penalty, 0)
+        max_steps = None if max_steps is None else whole_number("max_steps", max_steps, 1)
         self._task_type: TaskType | None = None
         if task_type is not None:
             self._task_type = look_up_type(task_type)
         self._obs = parse_obs_mode(obs_mode)
-        self._annotate = annotate
         sensors = sensors_of(self._obs.values())
         if annotate and sensors:
             sensors |= {"instances"}
-        self._instances = instances
+        self._settings = EpisodeSettings(
+            protocol=rules,
+            observations=self._obs,
+            instances=instances,
+            grid_size=grid_size,
+            max_steps=max_steps,
+            step_penalty=step_penalty,
+            illegal_penalty=illegal_penalty,
+            annotate=annotate,
+        )
         self.render_mode = render_mode
         self._controller_arguments: dict[str, Any] = {
             "width": width,
             "height": height,
             "fieldOfView": number("field_of_view", field_of_view, 0, 180, above=True),
-            "gridSize": self._grid_size,
+            "gridSize": grid_size,
             "visibilityDistance": number("visibility_distance", visibility_distance, 0, above=True),
             "snapToGrid": False,
             "headless": not sensors,
@@ -227,15 +214,14 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         one_of("render_device", render_device, RENDER_DEVICES)
         if sensors and backend == "embedded":
             self._controller_arguments["render_device"] = render_device
-        self._live: EpisodeSource | None = None
+        self._generator: EpisodeSource | None = None
         self._generates = isinstance(episode_source, str) and episode_source == GENERATE
-        self._source = self._from(episode_source)
+        self._source = self._resolve_source(episode_source)
         self._controller: Any = None
-        self._percept: Percept  # what was taken in last; nothing before the first reset
-        self._alone = threading.RLock()
-        self._missing = _NOT_BEGUN  # why there is no episode, "" if there is one
-        self._end_reason = ""
-        self._done: list[AnyAction] = []  # in this episode, so that a copy can do it again
+        self._episode: Episode | None = None
+        self._lock = threading.RLock()
+        self._no_episode = _NOT_BEGUN  # why no episode is under way; "" if one is
+        self._actions_taken: list[AnyAction] = []  # in this episode, for copies to replay
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = spaces.Dict(
             {name: kind.space(width, height) for name, kind in self._obs.items()}
@@ -245,210 +231,156 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
+    ) -> ResetResult:
         """Begin an episode; ``options`` may pin its ``task``, ``scene`` or ``suite``.
 
         Raises:
-            ValueError: an option does not fit, or there is no such task; what was under way goes
+            ValueError: an option does not fit, or there is no such task. The episode under way goes
                 on.
             gymnasium.error.Error: the seed is no whole number from 0.
         """
         checked = _checked({} if options is None else options)
-        with self._alone:
+        with self._lock:
             super().reset(seed=seed)
             return self._begin(self._choose(**checked))
 
-    def step(self, action: AnyAction) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: AnyAction) -> StepResult:
         """Do an action: an index, an :class:`~er_gym.envs.actions.Action` or its text.
 
         Raises:
             ResetNeeded: there is no episode, or it is over.
-            gymnasium.error.InvalidAction: an index that is out of range, or something else that is
-                no action at all; the episode goes on. (Text that names no known action is answered,
-                not raised, numbers included: models write them.)
+            gymnasium.error.InvalidAction: the index is out of range, or the value is no action at
+                all. The episode goes on. (Text that names no known action, such as a number, raises
+                nothing: models write it, and the feedback answers it.)
         """
-        with self._alone:
-            self._need_episode("step()")
-            if self._end_reason:
+        with self._lock:
+            episode = self._current("step()")
+            if episode.end_reason:
                 raise ResetNeeded(
-                    f"the episode is over ({self._end_reason}): call reset() before step()"
+                    f"the episode is over ({episode.end_reason}): call reset() before step()"
                 )
-            return self._do(action)
+            return self._do(episode, action)
 
     def action_masks(self) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
-        with self._alone:
-            self._need_episode("action_masks()")
-            return self._conduct.legal(self._around, self._known)
+        with self._lock:
+            return self._current("action_masks()").action_mask()
 
     @property
     def task(self) -> Task:
         """The task of the episode."""
-        self._need_episode("asking for the task")
-        return self._task
+        return self._current("asking for the task").task
 
     @property
     def agent_pose(self) -> AgentPose:
         """Where the agent is now."""
-        self._need_episode("asking for the agent's pose")
-        return self._percept.pose
+        return self._current("asking for the agent's pose").perception.pose
 
     @property
     def objects(self) -> Sequence[Mapping[str, Any]]:
-        """AI2-THOR's metadata of all objects, as they are now; a copy of the caller's own."""
-        with self._alone:
-            self._need_episode("asking for the objects")
-            # Nine times as quick as deepcopy, and metadata are plain.
-            return pickle.loads(pickle.dumps(self._all_objects()))  # type: ignore[no-any-return]
+        """AI2-THOR's metadata of all objects now, as a copy that the caller may change."""
+        with self._lock:
+            objects = self._current("asking for the objects").all_objects()
+            # Pickling is nine times as quick as deepcopy, and metadata are plain data.
+            return pickle.loads(pickle.dumps(objects))  # type: ignore[no-any-return]
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``; the array
-        is the caller's own."""
-        with self._alone:
-            self._need_episode("render()")
+        """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``.
+
+        The array is a copy that the caller may change.
+        """
+        with self._lock:
+            episode = self._current("render()")
             if self.render_mode is None:
                 gymnasium.logger.warn(
                     "render() draws nothing, since the environment was made without a render_mode; "
                     "make it with render_mode='rgb_array'"
                 )
                 return None
-            if self._percept.frame is None:
+            if episode.perception.frame is None:
                 headless, self._controller.headless = self._controller.headless, False
                 frame = self._controller.step(action="Pass").frame
                 self._controller.headless = headless
-                self._percept = replace(self._percept, frame=frame)
-            return np.array(self._picture(self._percept))
+                episode.perception = replace(episode.perception, frame=frame)
+            return np.array(episode.picture(episode.perception))
 
     def close(self) -> None:
         """Stop the controller, and the generator if there is one; ``reset`` opens them again."""
-        with self._alone:
+        with self._lock:
             if self._controller is not None:
                 self._controller.stop()
                 self._controller = None
-            self._missing = _CLOSED
-            live, self._live = self._live, None
+            self._no_episode = _CLOSED
+            live, self._generator = self._generator, None
             getattr(live, "close", lambda: None)()
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy is made of: the arguments, the task, and what has been done so far.
+        """The state of a copy: the arguments, the task, and the actions taken so far.
 
         Raises:
-            gymnasium.error.Error: there is an episode, and it is Unity's.
+            gymnasium.error.Error: an episode is under way on ``backend="unity"``.
         """
-        with self._alone:
-            if not self._missing and self._backend != "embedded":
+        with self._lock:
+            if not self._no_episode and self._backend != "embedded":
                 raise gymnasium.error.Error(
                     f"an episode on backend {self._backend!r} cannot be copied, since it does not "
                     "repeat itself exactly: copy the environment before reset(), or reset another "
                     "with options={'task': env.unwrapped.task} and do the same actions there"
                 )
+            episode = None if self._no_episode else self._current("copying")
             return {
                 **EzPickle.__getstate__(self),
                 "random": (self._np_random, self._np_random_seed, self.action_space),
-                "missing": self._missing,
-                "episode": None if self._missing else (self._task, self._done, self._standing),
+                "no_episode": self._no_episode,
+                "episode": episode and (episode.task, self._actions_taken, episode.fingerprint),
             }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Make the environment anew, and do again what has been done.
+        """Make the environment anew, and replay the actions taken.
 
         Raises:
-            gymnasium.error.Error: that has led elsewhere, as in a changed version of er-gym.
+            gymnasium.error.Error: the replay led elsewhere, as in another version of er-gym.
         """
         EzPickle.__setstate__(self, state)
         if state["episode"] is not None:
-            task, done, standing = state["episode"]
+            task, actions, fingerprint = state["episode"]
             self._begin(task)
-            for action in done:
-                self._do(action)
-            if self._standing != standing:
+            episode = self._current("copying")
+            for action in actions:
+                self._do(episode, action)
+            if episode.fingerprint != fingerprint:
                 self.close()
                 raise gymnasium.error.Error(
                     f"the episode of task {task.id} did not come out the same when it was played "
                     "again; reset a new environment instead"
                 )
-        self._missing = state["missing"]
+        self._no_episode = state["no_episode"]
         self._np_random, self._np_random_seed, self.action_space = state["random"]
 
     # -- the loop's parts ------------------------------------------------------------------------
 
-    def _need_episode(self, before: str) -> None:
-        if self._missing:
-            raise ResetNeeded(f"{self._missing}: call reset() before {before}")
+    def _current(self, before: str) -> Episode:
+        """The episode that is under way; ResetNeeded if there is none."""
+        if self._no_episode or self._episode is None:
+            raise ResetNeeded(f"{self._no_episode}: call reset() before {before}")
+        return self._episode
 
-    @property
-    def _standing(self) -> tuple[Any, ...]:
-        """What tells two courses of an episode apart."""
-        return self._percept.pose, self._steps, self._end_reason, self._known.names
-
-    def _begin(self, task: Task) -> tuple[dict[str, Any], dict[str, Any]]:
-        self._missing = _BROKEN_OFF  # until all of it is done
-        self._task = task
-        self._done = []
+    def _begin(self, task: Task) -> ResetResult:
+        self._no_episode = _BROKEN_OFF  # until this has succeeded
+        self._actions_taken = []
         controller = self._started_controller(task.scene)
-        bounds = set_up_scene(controller, task.scene, task.arrangement).metadata["sceneBounds"]
-        floor = skills.reachable(controller, (self._backend, task.scene, self._grid_size))
-        pose = self._protocol.start(bounds, floor)
-        self._memory = Memory(pose, goal_row(task.instruction))
-        self._progress = Progress.start(Criteria.of(task))
-        self._known = Known(task.navigable_objects)
-        self._conduct = self._protocol.conduct(
-            Setting(task, controller, floor, pose, self._grid_size, self._instances)
-        )
-        self._steps = 1
-        self._limit = self._max_steps or task.max_steps
-        self._unknown = 0
-        self._end_reason = ""
-        self._goal_unmet: tuple[Condition, ...] = ()
-        placed = skills.place(controller, pose)
-        self._take_in(placed)
-        feedback = "You look around the room."
-        info = self._info(None, "", placed.success, "", feedback)
-        answer = self._observation(feedback, True, info), cast(dict[str, Any], info)
-        self._missing = ""
+        self._episode = Episode(self._settings, task, controller, self._backend)
+        answer = self._episode.begin()
+        self._no_episode = ""
         return answer
 
-    def _do(self, action: AnyAction) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        understood, text = self._protocol.understand(action, self._percept.objects)
-        self._missing = _BROKEN_OFF  # until all of it is done
-        self._done.append(int(action.item()) if isinstance(action, np.ndarray) else action)
-        answer = self._answer(understood, text)
-        self._missing = ""
+    def _do(self, episode: Episode, action: AnyAction) -> StepResult:
+        understood, text = episode.understand(action)
+        self._no_episode = _BROKEN_OFF  # until this has succeeded
+        self._actions_taken.append(int(action.item()) if isinstance(action, np.ndarray) else action)
+        answer = episode.step(understood, text)
+        self._no_episode = ""
         return answer
-
-    def _answer(
-        self, understood: Action | None, text: str
-    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        if understood is None:
-            return self._not_understood(text)
-        self._unknown = 0
-        if understood == self._memory.last and self._memory.repeats >= MAX_REPEATS:
-            self._end_reason = "repeated action"
-            times = self._memory.repeats + 1
-            feedback = f"You have tried to {understood} {times} times in a row; that is it."
-            said = self._protocol.repeated or understood
-            return self._reply(said, text, False, "", feedback, 0.0)
-        self._steps += understood.verb != verbs.END or self._protocol.end_is_step
-        refused = self._conduct.objection(understood, self._around, self._known)
-        if refused:
-            object_id, outcome = "", skills.Outcome(None, False, refused)
-        else:
-            object_id, outcome = self._conduct.do(
-                understood, self._percept, self._around, self._progress.left
-            )
-        self._memory.act(understood, outcome.success)
-        self._take_in(outcome)
-        reward = self._judge(understood, outcome, object_id) - self._step_penalty
-        if refused:
-            reward -= self._illegal_penalty
-        if understood.verb == verbs.END:
-            self._end_reason = "end"
-        elif self._steps >= self._limit:
-            self._end_reason = "step limit"
-        feedback = refused or _feedback(understood, outcome)
-        return self._reply(
-            understood, text, outcome.success, object_id, feedback, reward, outcome.views
-        )
 
     def _started_controller(self, scene: str) -> Any:
         if self._controller is None:
@@ -457,13 +389,13 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             )
         return self._controller
 
-    def _from(self, source: Source) -> EpisodeSource:
-        """Where to draw from; the generator is made once for an environment, which closes it."""
+    def _resolve_source(self, source: Source) -> EpisodeSource:
+        """The source to draw from. An environment makes one generator and closes it."""
         if not isinstance(source, str) or source != GENERATE:
             return make_source(source, verification_env)
-        if self._live is None:
-            self._live = make_source(GENERATE, verification_env)
-        return self._live
+        if self._generator is None:
+            self._generator = make_source(GENERATE, verification_env)
+        return self._generator
 
     def _choose(
         self,
@@ -473,9 +405,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     ) -> Task:
         source = self._source
         if suite is not None:
-            source = self._from(suite)
-        elif self._generates and self._live is None:  # closed, and begun again
-            source = self._source = self._from(GENERATE)
+            source = self._resolve_source(suite)
+        elif self._generates and self._generator is None:  # close() has closed it
+            source = self._source = self._resolve_source(GENERATE)
         if task is None:
             return source.draw(self.np_random, self._task_type, scene)
         wanted = source.find(task) if isinstance(task, str) else task
@@ -483,166 +415,25 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             raise ValueError(f"task {wanted.id} plays in {wanted.scene}, not in {scene}")
         return wanted
 
-    def _take_in(self, outcome: skills.Outcome) -> None:
-        """Remember what can be seen after a step, and in the views of an "observe"."""
-        for percept in (*outcome.views.values(), outcome.percept):
-            if percept is not None:
-                self._percept = percept
-                self._around = self._conduct.around(percept)
-                self._known.add(percept.objects.kinds[self._around.navigable])
-                self._memory.look(percept, self._at_kind)
-
-    @property
-    def _at_kind(self) -> int | None:
-        """The type of what was last navigated to, if that is still there."""
-        objects = self._percept.objects
-        row = objects.row.get(self._conduct.at)
-        return None if row is None else int(objects.kinds[row])
-
-    def _judge(self, action: Action, outcome: skills.Outcome, object_id: str) -> float:
-        """The reward that an action earned, by the rules of :mod:`er_gym.tasks.judge`."""
-        if not outcome.success:
-            return 0.0
-        if action.verb == verbs.END and self._task.goal:
-            self._goal_unmet = unmet_conditions(
-                self._task.goal, self._objects_of_goal(), self._around.in_reach
-            )
-        self._progress, reward = self._progress.after(
-            action.verb,
-            action.object_type,
-            object_id,
-            in_reach=self._around.in_reach,
-            goal_holds=not self._goal_unmet,
-        )
-        return reward
-
-    def _objects_of_goal(self) -> Sequence[Mapping[str, Any]]:
-        """Metadata of the objects that the goal is about; of all, where it asks for more than is
-        at hand, since that takes longer than the rest of a step."""
-        goal = self._task.goal
-        if all(name in ENTRY_KEYS for condition in goal for name, _ in condition.state):
-            return self._percept.objects.entries({condition.object_type for condition in goal})
-        return self._all_objects()
-
-    def _all_objects(self) -> Sequence[Mapping[str, Any]]:
-        return self._controller.last_event.metadata["objects"]  # type: ignore[no-any-return]
-
-    def _not_understood(
-        self, text: str
-    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        self._unknown += 1
-        if self._protocol.unknown_breaks_runs:
-            self._memory.forget_last()
-        if self._unknown >= MAX_UNKNOWN:
-            self._end_reason = "no known action"
-        quoted = text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
-        feedback = (
-            f"{quoted!r} names no action. Say one of: {', '.join(verbs.BARE_VERBS)}; or one of "
-            f"{', '.join(verbs.OBJECT_VERBS)} with an object type, such as 'navigate to Fridge'."
-        )
-        return self._reply(None, text, False, "", feedback, 0.0)
-
-    # -- what is handed out ----------------------------------------------------------------------
-
-    def _reply(
-        self,
-        action: Action | None,
-        text: str,
-        success: bool,
-        object_id: str,
-        feedback: str,
-        reward: float,
-        views: Mapping[str, Percept] | None = None,
-    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        truncated = self._end_reason == "step limit"
-        terminated = bool(self._end_reason) and not truncated
-        appended = self._protocol.appends_end and self._end_reason in _CUT_OFF
-        if appended:
-            reward += self._judge(Action(verbs.END), skills.Outcome(None, True), "")
-        info = self._info(action, text, success, object_id, feedback)
-        info["end_appended"] = appended
-        if views:
-            # Copies: a view's frame may be what the next observation is made of.
-            info["views"] = {
-                name: None if view.frame is None else np.array(self._picture(view))
-                for name, view in views.items()
-            }
-        obs = self._observation(feedback, success, info)
-        return obs, reward, terminated, truncated, cast(dict[str, Any], info)
-
-    def _picture(self, percept: Percept) -> NDArray[np.uint8] | None:
-        return percept.annotated if self._annotate else percept.frame
-
-    def _observation(self, feedback: str, success: bool, info: Info) -> dict[str, Any]:
-        """The observation; what explains it is added to ``info``."""
-        situation = Situation(
-            percept=self._percept,
-            around=self._around,
-            memory=self._memory,
-            known=self._known,
-            instruction=self._task.instruction,
-            feedback=feedback,
-            at=self._at_kind,
-            success=success,
-            steps=self._steps,
-            max_steps=self._limit,
-            annotate=self._annotate,
-        )
-        for kind in self._obs.values():
-            cast(dict[str, Any], info).update(kind.info(situation))
-        return {name: kind.build(situation) for name, kind in self._obs.items()}
-
-    def _info(
-        self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
-    ) -> Info:
-        mask = self._conduct.legal(self._around, self._known)
-        return {
-            "task": self._task,
-            "action": action,
-            "action_text": text,
-            "action_success": success,
-            "object_id": object_id,
-            "feedback": feedback,
-            "success": self._progress.success,
-            "goal_unmet": self._goal_unmet,
-            "key_actions_done": self._progress.done,
-            "key_actions_left": self._progress.left,
-            "visible": self._percept.visible_names,
-            "held": self._percept.held_name,
-            "navigable": self._known.names,
-            "interactable": self._around.in_reach,
-            "legal": LegalActions(mask),
-            "action_mask": mask,
-            "steps": self._steps,
-            "max_steps": self._limit,
-            "end_reason": self._end_reason,
-        }
-
 
 def _checked(options: Mapping[str, Any]) -> Mapping[str, Any]:
     if not isinstance(options, Mapping):
         raise ValueError(
-            f"options at reset are {shown(options)}; give a dictionary such as "
+            f"options at reset are {short_repr(options)}; give a dictionary such as "
             "{'scene': 'FloorPlan1'}"
         )
-    unknown = sorted(shown(name) for name in options if name not in ("task", "scene", "suite"))
+    unknown = sorted(short_repr(name) for name in options if name not in ("task", "scene", "suite"))
     if unknown:
         raise ValueError(f"unknown option {unknown[0]} at reset; there are: task, scene, suite")
     for name, kinds in (("task", Task | str), ("scene", str)):
         if not isinstance(options.get(name), kinds | None) or options.get(name) == "":
             raise ValueError(
-                f"option {name!r} at reset is {shown(options[name])}; give a "
+                f"option {name!r} at reset is {short_repr(options[name])}; give a "
                 f"{'Task or its id' if name == 'task' else 'scene such as FloorPlan1'}"
             )
     return options
 
 
-def _feedback(action: Action, outcome: skills.Outcome) -> str:
-    if outcome.success:
-        return f"Done: {action}."
-    return f"You could not {action}: {outcome.problem}"
-
-
 def verification_env() -> EmbodiedEnv:
-    """An environment in which a verifier plays generated tasks; nothing is drawn in it."""
+    """An environment in which a verifier plays generated tasks; it draws no pictures."""
     return EmbodiedEnv((), obs_mode="state")

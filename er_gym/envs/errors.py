@@ -1,4 +1,4 @@
-"""What environments raise that Gymnasium has no name for."""
+"""Exceptions of environments, beyond those of Gymnasium."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ import gymnasium
 
 
 class ResetNeeded(gymnasium.error.ResetNeeded):
-    """Something was asked of an episode, and no episode is under way; the message says why."""
+    """A call needs an episode, and no episode is under way; the message says why."""

@@ -1,4 +1,4 @@
-"""An endless stream of tasks: rooms rearranged, tasks generated, each played before it is used."""
+"""An endless source of tasks: it rearranges rooms, generates tasks and verifies each by playing."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from er_gym.envs.arguments import shown
-from er_gym.envs.verify import PlayableEnv, Verifier, unwanted, with_difficulty
+from er_gym.envs.arguments import short_repr
+from er_gym.envs.verify import PlayableEnv, Verifier, rejection_reason, with_difficulty
 from er_gym.tasks.generate import Generator, generated_types, generator_for
 from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import Task
@@ -16,24 +16,24 @@ from er_gym.tasks.types import BY_NAME, TaskType
 from er_gym.thor import SCENE_NAMES, make_controller
 
 TRAINING = SuiteSpec(total=1, scenes="training", layouts=1000, unseen_objects=False)
-"""Tasks in the training rooms, none about things that are kept for evaluation."""
+"""Tasks in the training rooms, without the object types kept for evaluation."""
 _ROOMS = 40
-"""How many rooms are looked at for a task."""
+"""The number of arranged rooms tried for one task."""
 _CANDIDATES = 4
-"""How many tasks of one room are played before another is looked at."""
+"""The number of tasks of one room that are played before the next room is tried."""
 _KEPT = 32
-"""How many arranged rooms are remembered."""
+"""The number of arranged rooms in the cache."""
 
 
 class GeneratedSource:
-    """Makes tasks as they are asked for; needs no files and never runs out.
+    """Generates tasks on demand; it needs no files and never runs out.
 
     A draw takes a room, an arrangement of it and a task at random, and plays the task on an
-    embedded engine of its own; what cannot be done is passed over. It depends on the state of the
-    random generator alone, not on earlier draws.
+    embedded engine of its own. Tasks that cannot be done are skipped. A draw depends only on the
+    state of the random generator, not on earlier draws.
 
     Args:
-        env: in which tasks are tried; it is closed with the source.
+        env: the environment in which tasks are verified; the source closes it.
         spec: in which rooms, of which types, how many arrangements of a room there are to draw
             beside the recorded one, how difficult; its ``total`` and ``per_layout`` mean nothing
             here.
@@ -52,9 +52,9 @@ class GeneratedSource:
         return GeneratedSource, (self._env, self._spec)
 
     def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
-        """A task that the solver has just done."""
+        """Draw a task that the solver has just solved."""
         if scene and scene not in SCENE_NAMES:
-            raise ValueError(f"unknown scene {shown(scene)}; give a name such as FloorPlan1")
+            raise ValueError(f"unknown scene {short_repr(scene)}; give a name such as FloorPlan1")
         kinds = [task_type] if task_type else self._kinds
         rooms = (scene,) if scene else self._spec.rooms
         for _ in range(_ROOMS):
@@ -64,7 +64,7 @@ class GeneratedSource:
             tasks = [
                 task
                 for task in room.tasks([kind.name])
-                if not unwanted(task, room, self._spec, self._verify)
+                if not rejection_reason(task, room, self._spec, self._verify)
             ]
             order: list[int] = rng.permutation(len(tasks)).tolist()
             for task in (tasks[number] for number in order[:_CANDIDATES]):
@@ -78,13 +78,13 @@ class GeneratedSource:
         )
 
     def find(self, task_id: str) -> Task:
-        """There are no tasks to be found by their ids."""
+        """Raise ValueError: generated tasks cannot be found by id."""
         raise ValueError(
-            f"no task {shown(task_id)}: tasks that are generated live cannot be asked for by id; "
-            "pass the Task itself"
+            f"no task {short_repr(task_id)}: tasks that are generated live cannot be asked for "
+            "by id; pass the Task itself"
         )
 
     def close(self) -> None:
-        """Stop its engines."""
+        """Stop both engines."""
         self._controller.stop()
         self._verify.close()

@@ -16,9 +16,8 @@ from er_gym.tasks.task import KeyAction, Task
 class LegalActions(Sequence[Action]):
     """The actions that a mask allows, in the order of :data:`er_gym.envs.actions.ACTIONS`.
 
-    They are worked out when they are asked for, which a step need not wait for.
-    ``"open Fridge" in legal``, or the same as an :class:`~er_gym.envs.actions.Action`, looks at
-    one place of the mask only.
+    The list is made on demand, so that a step does not wait for it. ``"open Fridge" in legal``, or
+    the same with an :class:`~er_gym.envs.actions.Action`, reads one entry of the mask.
 
     Args:
         mask: (len(ACTIONS),) int8: 1 for each action that is legal.
@@ -60,33 +59,32 @@ class _Always(TypedDict):
     """What every ``info`` has."""
 
     task: Task
-    """What is asked. It holds the key actions, which an agent should not look at."""
+    """The task. It holds the key actions, which an agent should not read."""
     action: Action | None
-    """What was done; None after ``reset`` and after a reply that names no known action."""
+    """The action; None after ``reset`` and after a reply that names no known action."""
     action_text: str
     """The action as it was given to ``step``; ``""`` after ``reset``."""
     action_success: bool
-    """Whether it was legal and the simulator did it; after ``reset``, whether the agent could be
-    placed."""
+    """Whether the action was legal and the simulator did it; after ``reset``, whether the simulator
+    placed the agent."""
     object_id: str
     """The object that the action was done to, ``""`` for none."""
     feedback: str
-    """What the agent is told about the action, a sentence or two."""
+    """What the environment tells the agent about the action, a sentence or two."""
     visible: tuple[str, ...]
-    """Types of which the agent sees an object now, in alphabetical order."""
+    """The object types that the agent sees now, in alphabetical order."""
     held: str
     """The type of the object in the agent's hand, ``""`` for none."""
     navigable: tuple[str, ...]
-    """Types that may be gone to: what was plain to see since ``reset``, and what the task lists."""
+    """Types that the agent may navigate to: clearly visible before, or listed by the task."""
     interactable: tuple[str, ...]
-    """Types of which an object is in reach now, in alphabetical order. Which verbs it takes,
-    ``legal`` says."""
+    """Types with an object in reach now, in alphabetical order. ``legal`` has the verbs."""
     legal: LegalActions
     """The actions that are legal now."""
     action_mask: NDArray[np.int8]
-    """The same by index, for learners: (len(ACTIONS),) int8, 1 for each that is legal."""
+    """The legal actions by index, for learners: (len(ACTIONS),) int8, 1 for each."""
     steps: int
-    """How many steps were taken; placing the agent is the first."""
+    """The number of steps taken; placing the agent is the first."""
     max_steps: int
     """The step limit of this episode, the placing included."""
     key_actions_done: tuple[KeyAction, ...]
@@ -94,16 +92,16 @@ class _Always(TypedDict):
     key_actions_left: tuple[KeyAction, ...]
     """In the order of the task."""
     success: bool
-    """Whether the task is done: decided at ``end``, False before."""
+    """Whether the task is done; decided at ``end``, False before."""
     goal_unmet: tuple[Condition, ...]
-    """What of the task's goal did not hold at ``end``; empty before."""
+    """The conditions of the task's goal that did not hold at ``end``; empty before."""
     end_reason: str
     """Why the episode is over, ``""`` while it is not: ``"end"``, ``"step limit"``,
     ``"repeated action"`` or ``"no known action"``."""
 
 
 class Info(_Always, total=False):
-    """What ``reset`` and ``step`` tell beside the observation."""
+    """What ``reset`` and ``step`` return beside the observation."""
 
     end_appended: bool
     """After ``step``: whether the paper's protocol appended an ``end`` to the episode."""

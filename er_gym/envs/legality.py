@@ -1,7 +1,7 @@
-"""What may be navigated to and interacted with now: the paper's rules.
+"""Which objects the agent may navigate to and interact with now: the paper's rules.
 
-Whole columns of objects are judged at once (:class:`~er_gym.thor.objects.ObjectTable`); objects are
-given by their rows there. Positions are metres in AI2-THOR's world frame.
+The functions judge all objects of an :class:`~er_gym.thor.objects.ObjectTable` at once. They name
+an object by its row there. Positions are metres in AI2-THOR's world frame.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs.actions import ACTIONS, INDEX, INDICES, Action, applies
-from er_gym.envs.perception import Percept, marked, names
+from er_gym.envs.perception import Perception, type_mask, type_names
 from er_gym.tasks import verbs
 from er_gym.tasks.verbs import Verb
 from er_gym.thor.objects import KIND_OF, PROPERTY_OF_STATE, TYPES, ObjectTable
@@ -25,16 +25,16 @@ _VOLUME_PER_METRE = 0.02
 
 
 def navigable_within(volume: NDArray[np.float64], face: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N,) how near the agent must be to visible objects, metres, to walk to them: nearer than so.
+    """(N,) the distance below which the agent may go to a visible object, metres.
 
-    The paper's rule: an object is plain enough to see if d < 1, or S > 0.5 and d < 10, or S > 0.15
-    and d < 4, or S > 0.08 and d < 2.5, or V > 0.005 and d < 2, or V > 0.001 and d < 1.5, or
-    V / d > 0.02 (with V at least 0.01; less than that has d < 1 anyhow).
+    The paper's rule: a visible object is clearly visible if d < 1, or S > 0.5 and d < 10, or
+    S > 0.15 and d < 4, or S > 0.08 and d < 2.5, or V > 0.005 and d < 2, or V > 0.001 and d < 1.5,
+    or V / d > 0.02 (with V at least 0.01; for a smaller V this means d < 0.5).
 
     Args:
-        volume: (N,) V, of each one's axis-aligned box, m³.
-        face: (N,) S, of the box's largest face, m². And d is the horizontal distance from the agent
-            to the box's centre, m.
+        volume: (N,) V, the volume of each object's axis-aligned box, m³.
+        face: (N,) S, the area of the box's largest face, m². In the rule, d is the horizontal
+            distance from the agent to the box's centre, m.
     """
     # searchsorted counts the bounds that are less than a value.
     within = np.maximum(
@@ -45,7 +45,7 @@ def navigable_within(volume: NDArray[np.float64], face: NDArray[np.float64]) -> 
 
 
 def _of_type(object_types: Iterable[str]) -> NDArray[np.bool_]:
-    return marked(np.array([KIND_OF[name] for name in object_types], np.intp))
+    return type_mask(np.array([KIND_OF[name] for name in object_types], np.intp))
 
 
 _INTERACTIONS = tuple(map(verbs.verb_named, verbs.INTERACTIONS))
@@ -64,7 +64,7 @@ _NO_GOAL = _of_type(verbs.NOWHERE)
 
 
 def _possible(verb: Verb, table: ObjectTable) -> NDArray[np.bool_]:
-    """(N,) which objects a verb can be done to in their present state, whatever the hand does."""
+    """(N,) bool: the objects that a verb can apply to in their present state, for any hand."""
     if verb.object_property:
         able = table.has[verb.object_property] | _ALSO[verb.name][table.kinds]
     else:
@@ -76,7 +76,7 @@ def _possible(verb: Verb, table: ObjectTable) -> NDArray[np.bool_]:
 
 
 def _hand_fits(verb: Verb, table: ObjectTable) -> bool:
-    """Whether the hand is as a verb needs it."""
+    """Whether the hand holds what a verb needs."""
     if verb.hand == verbs.ANY:
         return True
     if verb.hand in (verbs.EMPTY, verbs.FULL):
@@ -84,8 +84,8 @@ def _hand_fits(verb: Verb, table: ObjectTable) -> bool:
     return table.held >= 0 and table.type_of(table.held) in verb.hand
 
 
-def _hand_objection(action: Action, verb: Verb, table: ObjectTable) -> str:
-    """What is wrong with the hand, in words for the agent."""
+def _hand_problem(action: Action, verb: Verb, table: ObjectTable) -> str:
+    """Why the hand does not fit a verb, in words for the agent."""
     if verb.hand == verbs.EMPTY:
         return f"You hold {table.type_of(table.held)} already; put it down first."
     if verb.hand == verbs.FULL:
@@ -99,16 +99,16 @@ def _hand_objection(action: Action, verb: Verb, table: ObjectTable) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Affordances:
-    """What could be done with the N objects of a table, wherever the agent is.
+    """What the agent could do with the N objects of a table from anywhere.
 
     Attributes:
-        within: (N,) how near one must be to walk there, metres, see :func:`navigable_within`; 0 for
-            what is in the hand, and for the floor.
-        actions: (N, len(INTERACTIONS)) index of the action that does each verb to each object; -1
-            where it cannot be done in the object's present state, and that of the hand.
-        on_burners: (2, C) rows of what stands on a stove burner, and of the burner under each.
-        alike: row of a receptacle to (N,) bool, which objects are of types that lie in it; less the
-            floor and what is in the hand. Filled as it is asked for.
+        within: (N,) metres, see :func:`navigable_within`; 0 for the held object and the floor.
+        actions: (N, len(INTERACTIONS)) the index of the action that applies each verb to each
+            object; -1 if the state of the object or of the hand does not allow it.
+        on_burners: (2, C) the rows of the objects on stove burners, and the row of each one's
+            burner.
+        alike: row of a receptacle to (N,) bool: the objects of the types that lie in it, without
+            the floor and the held object. Computed on demand.
     """
 
     within: NDArray[np.float64]
@@ -118,7 +118,7 @@ class Affordances:
 
     @staticmethod
     def of(table: ObjectTable) -> Affordances:
-        """Work them out."""
+        """Compute the affordances of a table."""
         within = navigable_within(table.volume, table.face)
         within[_NO_GOAL[table.kinds]] = 0.0
         possible = np.zeros((len(table), len(_INTERACTIONS)), dtype=bool)
@@ -141,7 +141,7 @@ def _on_burners(table: ObjectTable) -> NDArray[np.intp]:
 
 
 def affordances(table: ObjectTable) -> Affordances:
-    """What could be done with a table's objects: worked out once, and kept with the table."""
+    """The affordances of a table's objects, computed once and stored with the table."""
     found = table.derived.get("affordances")
     if not isinstance(found, Affordances):
         found = table.derived["affordances"] = Affordances.of(table)
@@ -149,15 +149,15 @@ def affordances(table: ObjectTable) -> Affordances:
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
-    """What the agent can do things to, now.
+class AvailableObjects:
+    """The objects that the agent can act on now.
 
     Attributes:
-        objects: all of the scene.
-        navigable: rows of objects that are plain enough to see to be walked to.
-        interactable: rows of objects that may be interacted with; the navigable are among them.
-        covered: rows of the stove burners that are under one of these. Whether a pan hides its
-            burner or not, the knob of that burner can be turned.
+        objects: all objects of the scene.
+        navigable: rows of the objects that the agent sees clearly enough to navigate to them.
+        interactable: rows of the objects that the agent may interact with, the navigable included.
+        covered: rows of the stove burners under an interactable object. The agent can turn the knob
+            of such a burner even if a pan hides the burner.
     """
 
     objects: ObjectTable
@@ -167,37 +167,40 @@ class Surroundings:
 
     @cached_property
     def interactable_types(self) -> NDArray[np.bool_]:
-        """(T,) bool: the types of the interactable objects."""
-        return marked(self.objects.kinds[self.interactable])
+        """(T,) bool: True for the types of the interactable objects."""
+        return type_mask(self.objects.kinds[self.interactable])
 
     @cached_property
     def in_reach(self) -> tuple[str, ...]:
-        """The names of the same types, in alphabetical order."""
-        return names(self.interactable_types)
+        """The names of these types, in alphabetical order."""
+        return type_names(self.interactable_types)
 
 
-def surroundings(percept: Percept, at: str = "") -> Surroundings:
-    """Judge what is perceived.
+def available_objects(perception: Perception, navigated_to: str = "") -> AvailableObjects:
+    """The objects that the agent can navigate to and interact with.
 
     Args:
-        at: id of the receptacle last navigated to. Things of the types that lie in it can be
-            interacted with wherever they are visible.
+        perception: what the agent perceives now.
+        navigated_to: id of the receptacle last navigated to. Objects of the types that lie in it
+            can be interacted with wherever they are visible.
     """
-    table, visible = percept.objects, percept.visible
+    table, visible = perception.objects, perception.visible
     can = affordances(table)
-    distance = np.hypot(table.centre[:, 0] - percept.pose.x, table.centre[:, 2] - percept.pose.z)
+    distance = np.hypot(
+        table.centre[:, 0] - perception.pose.x, table.centre[:, 2] - perception.pose.z
+    )
     plain = visible & (distance < can.within)
     reach = plain
-    row = table.row.get(at)
+    row = table.row.get(navigated_to)
     if row is not None and table.contents[row]:
         alike = can.alike.get(row)
         if alike is None:
-            kinds = marked(table.kinds[list(table.contents[row])])
+            kinds = type_mask(table.kinds[list(table.contents[row])])
             alike = can.alike[row] = kinds[table.kinds] & (can.within > 0)
         reach = plain | (visible & alike)
     navigable = plain.nonzero()[0]
     standing, burners = can.on_burners
-    return Surroundings(
+    return AvailableObjects(
         objects=table,
         navigable=navigable,
         interactable=navigable if reach is plain else reach.nonzero()[0],
@@ -205,29 +208,29 @@ def surroundings(percept: Percept, at: str = "") -> Surroundings:
     )
 
 
-class Known:
-    """The types that may be navigated to: what was plain to see once in an episode stays so.
+class KnownTypes:
+    """The types that the agent may navigate to: all that were clearly visible in the episode.
 
     Attributes:
-        names: theirs, in alphabetical order.
-        types: (T,) bool, the same.
-        legal: (len(ACTIONS),) int8, 1 for each action that is legal whatever is in reach: to go to
-            one of these types, and those that name none.
+        names: the names of the types, in alphabetical order.
+        types: (T,) bool: True for each of these types.
+        legal: (len(ACTIONS),) int8: 1 for each action that is legal whatever is in reach: going to
+            one of these types, and the actions that name no type.
     """
 
     def __init__(self, object_types: Iterable[str]) -> None:
-        self._told = {*object_types} - verbs.NOWHERE  # tasks name types that no scene has, too
-        self.types = marked(np.array([KIND_OF[t] for t in self._told & KIND_OF.keys()], np.intp))
+        self._told = {*object_types} - verbs.NOWHERE  # tasks also name types that no scene has
+        self.types = type_mask(np.array([KIND_OF[t] for t in self._told & KIND_OF.keys()], np.intp))
         self._update()
 
     def add(self, kinds: NDArray[np.intp]) -> None:
-        """Some objects are plain to see now, of these kinds."""
+        """Add the types of objects that are clearly visible now, by index into ``TYPES``."""
         if not self.types[kinds].all():
             self.types[kinds] = True
             self._update()
 
     def _update(self) -> None:
-        self._names = self._told.union(names(self.types))
+        self._names = self._told.union(type_names(self.types))
         self.names = tuple(sorted(self._names))
         self.legal = np.zeros(len(ACTIONS), dtype=np.int8)
         self.legal[_BARE] = self.legal[INDICES[verbs.NAVIGATE][self.types]] = 1
@@ -236,14 +239,14 @@ class Known:
         return object_type in self._names
 
 
-def suited(action: Action, around: Surroundings) -> list[int]:
-    """Rows of the objects that an interaction can be done to as things are now."""
-    rows, held = around.interactable, around.objects.held
-    if action.verb == verbs.TOGGLE and len(around.covered):
-        rows = np.union1d(rows, around.covered)
+def candidate_rows(action: Action, available: AvailableObjects) -> list[int]:
+    """The rows of the objects that an interaction can be done to now."""
+    rows, held = available.interactable, available.objects.held
+    if action.verb == verbs.TOGGLE and len(available.covered):
+        rows = np.union1d(rows, available.covered)
     if held >= 0 and verbs.verb_named(action.verb).in_hand:
         rows = np.union1d(rows, [held])
-    actions = affordances(around.objects).actions[rows, _NUMBER[action.verb]]
+    actions = affordances(available.objects).actions[rows, _NUMBER[action.verb]]
     index = INDEX.get(action)
     return [
         row
@@ -252,12 +255,12 @@ def suited(action: Action, around: Surroundings) -> list[int]:
     ]
 
 
-def objection(action: Action, around: Surroundings, known: Known) -> str:
-    """Why an action is illegal now, in words for the agent; "" when it is legal."""
-    name, objects = action.object_type, around.objects
+def illegal_reason(action: Action, available: AvailableObjects, known: KnownTypes) -> str:
+    """Why an action is illegal now, in words for the agent; ``""`` if it is legal."""
+    name, objects = action.object_type, available.objects
     verb = verbs.verb_named(action.verb)
     if verb.alone:
-        return "" if _hand_fits(verb, objects) else _hand_objection(action, verb, objects)
+        return "" if _hand_fits(verb, objects) else _hand_problem(action, verb, objects)
     if action.verb == verbs.NAVIGATE:
         if name in known:
             return ""
@@ -265,27 +268,27 @@ def objection(action: Action, around: Surroundings, known: Known) -> str:
             f"You cannot navigate to {name}: none has been close enough to see clearly. "
             f"You could go to: {_listing(known.names)}."
         )
-    if suited(action, around):
+    if candidate_rows(action, available):
         return ""
     if applies(action.verb, name):
         if not _hand_fits(verb, objects):
-            return _hand_objection(action, verb, objects)
+            return _hand_problem(action, verb, objects)
         in_hand = verb.in_hand and objects.held >= 0 and objects.type_of(objects.held) == name
-        if not around.interactable_types[KIND_OF[name]] and not in_hand:
+        if not available.interactable_types[KIND_OF[name]] and not in_hand:
             return (
                 f"You cannot {action}: none is within reach and in view. "
-                f"There is: {_listing(around.in_reach)}."
+                f"There is: {_listing(available.in_reach)}."
             )
     return f"You cannot {action}. {verb.otherwise or 'It is not in the state for that.'}"
 
 
-def legal_actions(around: Surroundings, known: Known) -> NDArray[np.int8]:
-    """(len(ACTIONS),) int8: 1 for each action to which :func:`objection` has none."""
-    legal, objects = known.legal.copy(), around.objects
+def legal_actions(available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
+    """(len(ACTIONS),) int8: 1 for each action without an :func:`illegal_reason`."""
+    legal, objects = known.legal.copy(), available.objects
     possible = affordances(objects).actions
-    interactions = possible[around.interactable]
+    interactions = possible[available.interactable]
     legal[interactions[interactions >= 0]] = 1
-    if len(around.covered):
+    if len(available.covered):
         legal[_TOGGLE_BURNER] = 1
     if _IN_HAND and objects.held >= 0:
         with_held = possible[objects.held, _IN_HAND]

@@ -1,4 +1,4 @@
-"""Which object a type name stands for. Objects are given by their rows in a table."""
+"""Selects the object that a type name stands for. Objects are rows of an ``ObjectTable``."""
 
 from __future__ import annotations
 
@@ -10,29 +10,34 @@ from er_gym.thor import ObjectTable
 
 TARGET, EXPLORE = "target", "explore"
 POLICIES = (TARGET, EXPLORE)
-"""``target`` looks at the task, as the paper does; ``explore`` never does."""
+"""``target`` prefers the task's objects, as the paper does; ``explore`` ignores the task."""
 
 
-def by_task(
+def select_for_task(
     task: Task,
     pending: Sequence[KeyAction],
     verb: str,
     candidates: Sequence[int],
     objects: ObjectTable,
 ) -> int:
-    """The candidate that the task is about, else the first in scene order.
+    """The candidate that matters most to the task, else the first in scene order.
 
-    Objects of key actions still to be done with this verb come first, then those of any key action
-    to come, then the task's other objects.
+    Objects of pending key actions with this verb come first, then objects of other pending key
+    actions, then the task's other objects.
+
+    Args:
+        pending: the key actions not done yet.
+        verb: what the agent does to the object.
+        candidates: rows of objects, in scene order, at least one.
     """
     allowed = {objects.ids[row]: row for row in candidates}
-    for object_id in _of_interest(task, pending, verb):
+    for object_id in _by_relevance(task, pending, verb):
         if object_id in allowed:
             return allowed[object_id]
     return candidates[0]
 
 
-def _of_interest(task: Task, pending: Sequence[KeyAction], verb: str) -> Iterable[str]:
+def _by_relevance(task: Task, pending: Sequence[KeyAction], verb: str) -> Iterable[str]:
     yield from (action.object_id for action in pending if action.verb == verb)
     yield from (action.object_id for action in pending)
     for action in pending:
@@ -42,16 +47,18 @@ def _of_interest(task: Task, pending: Sequence[KeyAction], verb: str) -> Iterabl
     yield from task.related_objects
 
 
-def nearest(
+def select_nearest(
     candidates: Sequence[int],
     objects: ObjectTable,
     agent: AgentPose,
     visited: Collection[str] = (),
 ) -> int:
-    """The nearest candidate that has not been visited, the nearest of all when all have been.
+    """The nearest candidate not visited yet, or the nearest of all if all have been visited.
 
     Args:
-        visited: ids of objects.
+        candidates: rows of objects, at least one.
+        agent: the agent's pose.
+        visited: ids of the objects visited.
     """
     fresh = [row for row in candidates if objects.ids[row] not in visited] or candidates
     return min(fresh, key=lambda row: distance(objects, row, agent))
@@ -63,11 +70,11 @@ def distance(objects: ObjectTable, row: int, agent: AgentPose) -> float:
     return hypot(x - agent.x, z - agent.z)
 
 
-def redirected(task: Task, goal: int, objects: ObjectTable) -> int:
-    """Where going to an object leads.
+def navigation_target(task: Task, goal: int, objects: ObjectTable) -> int:
+    """The row of the object that the agent goes to when it navigates to ``goal``.
 
-    Going to a receptacle that does not open and holds one of the task's related objects means going
-    to that object.
+    If ``goal`` is a receptacle that does not open and holds one of the task's related objects, the
+    agent goes to that object.
     """
     if objects.has["receptacle"][goal] and not objects.has["openable"][goal]:
         for object_id in task.related_objects:
@@ -77,8 +84,8 @@ def redirected(task: Task, goal: int, objects: ObjectTable) -> int:
     return goal
 
 
-def container_in_the_way(goal: int, objects: ObjectTable) -> int | None:
-    """The outermost closed receptacle that an object is in, None if it is in none."""
+def closed_container_of(goal: int, objects: ObjectTable) -> int | None:
+    """The row of the outermost closed receptacle around an object, None if there is none."""
     shut = [
         parent
         for parent in objects.parents[goal]

@@ -19,9 +19,9 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from er_gym.envs.actions import Action
-from er_gym.envs.arguments import shown
-from er_gym.envs.legality import Known, Surroundings
-from er_gym.envs.perception import SENSORS, Percept
+from er_gym.envs.arguments import short_repr
+from er_gym.envs.legality import AvailableObjects, KnownTypes
+from er_gym.envs.perception import SENSORS, Perception
 from er_gym.plugins import PluginError, Registry, is_dotted
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
@@ -122,17 +122,17 @@ class Memory:
     last: Action | None = None
     repeats: int = 0
 
-    def look(self, percept: Percept, at: int | None = None) -> None:
+    def look(self, perception: Perception, at: int | None = None) -> None:
         """Take in what is visible now; ``at``: the type of what was last navigated to."""
-        objects, visible = percept.objects, percept.visible
-        self.seen |= percept.visible_types
-        out_of_sight = ~percept.visible_types
+        objects, visible = perception.objects, perception.visible
+        self.seen |= perception.visible_types
+        out_of_sight = ~perception.visible_types
         is_open, is_on = objects.has["isOpen"], objects.has["isToggled"]
         for remembered, now in ((self.is_open, is_open), (self.is_on, is_on)):
             remembered &= out_of_sight
             remembered[objects.kinds[visible & now]] = True
         if at is not None:
-            weights = self.wanted * percept.visible_types
+            weights = self.wanted * perception.visible_types
             weights[at] = 0.0
             if objects.held >= 0:
                 weights[objects.kinds[objects.held]] = 0.0
@@ -160,10 +160,10 @@ class Situation:
         annotate: whether the types of things are written into pictures.
     """
 
-    percept: Percept
-    around: Surroundings
+    perception: Perception
+    available: AvailableObjects
     memory: Memory
-    known: Known
+    known: KnownTypes
     instruction: str
     feedback: str
     at: int | None
@@ -176,7 +176,7 @@ class Situation:
     def picture(self) -> NDArray[np.uint8] | None:
         """The agent's view as an observation shows it, (height, width, 3) uint8; None where nothing
         is drawn. Read-only."""
-        return self.percept.annotated if self.annotate else self.percept.frame
+        return self.perception.annotated if self.annotate else self.perception.frame
 
 
 @lru_cache(maxsize=4096)
@@ -216,7 +216,7 @@ def goal_row(instruction: str) -> NDArray[np.float32]:
 
 def _relative_pose(situation: Situation) -> tuple[float, ...]:
     """The agent's pose in the frame of where it began."""
-    pose, start = situation.percept.pose, situation.memory.start
+    pose, start = situation.perception.pose, situation.memory.start
     dx, dz = pose.x - start.x, pose.z - start.z
     heading = radians(start.rotation)
     turned = radians(pose.rotation) - heading
@@ -233,7 +233,7 @@ def _relative_pose(situation: Situation) -> tuple[float, ...]:
 
 
 def _state(situation: Situation) -> NDArray[np.float32]:
-    memory, objects = situation.memory, situation.percept.objects
+    memory, objects = situation.memory, situation.perception.objects
     last = memory.last
     scalars = (
         *_relative_pose(situation),
@@ -249,10 +249,10 @@ def _state(situation: Situation) -> NDArray[np.float32]:
     if last is not None and last.verb in _LAST:  # the paper's protocol has other verbs and types
         vector[_LAST[last.verb]] = 1.0
     table = vector[len(SCALARS) :].reshape(len(FEATURES), len(TYPES))
-    table[_ROW["visible"]] = situation.percept.visible_types
+    table[_ROW["visible"]] = situation.perception.visible_types
     table[_ROW["seen"]] = memory.seen
     table[_ROW["navigable"]] = situation.known.types
-    table[_ROW["interactable"]] = situation.around.interactable_types
+    table[_ROW["interactable"]] = situation.available.interactable_types
     table[_ROW["open"]] = memory.is_open
     table[_ROW["on"]] = memory.is_on
     table[_ROW["goal"]] = memory.wanted
@@ -283,37 +283,37 @@ def _plain(text: str) -> str:
 
 
 def _text(situation: Situation) -> str:
-    percept = situation.percept
+    perception = situation.perception
     lines = (
         f"Task: {situation.instruction}",
         f"Step {situation.steps} of {situation.max_steps}. {situation.feedback}",
-        f"You see: {', '.join(percept.visible_names) or 'nothing'}.",
-        f"You hold: {percept.held_name or 'nothing'}.",
+        f"You see: {', '.join(perception.visible_names) or 'nothing'}.",
+        f"You hold: {perception.held_name or 'nothing'}.",
         f"You can navigate to: {', '.join(situation.known.names) or 'nothing'}.",
-        f"Within reach: {', '.join(situation.around.in_reach) or 'nothing'}.",
+        f"Within reach: {', '.join(situation.available.in_reach) or 'nothing'}.",
     )
     return _plain("\n".join(lines))
 
 
 FAR = 40.0
 """The greatest ``depth``, metres: what is farther, and where there is nothing, has this value. The
-embedded engine draws as far as this."""
+embedded ``situation.perception`` draws as far as this."""
 
 
 def _depth(situation: Situation) -> NDArray[np.float32]:
-    return np.clip(situation.percept.depth, 0.0, FAR, dtype=np.float32)  # a copy
+    return np.clip(situation.perception.depth, 0.0, FAR, dtype=np.float32)  # a copy
 
 
 def _instance(situation: Situation) -> NDArray[np.int32]:
-    return np.array(situation.percept.instances)
+    return np.array(situation.perception.instances)
 
 
 def _instance_ids(situation: Situation) -> dict[str, Any]:
-    percept = situation.percept
-    ids = [""] * (len(percept.objects) + 1)
-    for number in np.unique(percept.instances).tolist():
+    perception = situation.perception
+    ids = [""] * (len(perception.objects) + 1)
+    for number in np.unique(perception.instances).tolist():
         if number:
-            ids[number] = percept.objects.ids[number - 1]
+            ids[number] = perception.objects.ids[number - 1]
     return {"instance_ids": tuple(ids)}
 
 
@@ -330,7 +330,7 @@ class Observation:
         build: makes it; the array must be its own, because images are shared.
         needs: the sensors that it reads, keys of :data:`er_gym.envs.perception.SENSORS`:
             ``"frame"`` (``situation.picture``), ``"depth"``, ``"instances"``, ``"classes"`` (each
-            an attribute of ``situation.percept``). Without them nothing is drawn.
+            an attribute of ``situation.perception``). Without them nothing is drawn.
         info: what it adds to ``info``, such as what its numbers mean.
 
     Raises:
@@ -348,7 +348,7 @@ class Observation:
         )
         if not known:
             raise ValueError(
-                f"an observation needs {shown(self.needs)}; give a tuple of sensors, of "
+                f"an observation needs {short_repr(self.needs)}; give a tuple of sensors, of "
                 f"{', '.join(SENSORS)}"
             )
 
@@ -364,8 +364,8 @@ OBSERVATIONS: Registry[Observation] = Registry(
     own={
         "rgb": Observation(
             lambda width, height: spaces.Box(0, 255, (height, width, 3), np.uint8),
-            # A copy: after an illegal action the percept is that of the step before.
-            lambda situation: np.array(situation.picture),
+            # A copy: after an illegal action the perception is that of the step before.
+            lambda situation: np.array(situation.perception.picture),
             needs=("frame",),
         ),
         "depth": Observation(
@@ -413,6 +413,6 @@ def parse_obs_mode(obs_mode: str) -> dict[str, Observation]:
 
 def _unknown_mode(obs_mode: object) -> str:
     return (
-        f"unknown obs_mode {shown(obs_mode)}; join any of {', '.join(OBSERVATIONS.names())} and "
-        "package.module:ROW with '+', such as 'rgb+text'"
+        f"unknown obs_mode {short_repr(obs_mode)}; join any of {', '.join(OBSERVATIONS.names())} "
+        "and package.module:ROW with '+', such as 'rgb+text'"
     )

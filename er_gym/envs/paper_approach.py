@@ -17,7 +17,7 @@ import numpy as np
 from er_gym.envs.perception import perceive
 from er_gym.envs.skills import Outcome, Reachable
 from er_gym.tasks.task import AgentPose
-from er_gym.thor.objects import is_there
+from er_gym.thor.objects import is_present
 
 _FARTHEST, _NEAR = 1.5, 1.0
 """How far from an object the agent may stand, and may if the object is large; metres."""
@@ -31,7 +31,7 @@ _HEADINGS = (0, 45, 90, 135, 180, 225, 270, 315, 360)
 _UP, _DOWN = 30, -60
 """How far the head tilts, degrees upwards."""
 _BELOW = 0.44
-"""The agent crouches for an object whose top is lower than its own centre by more, metres."""
+"""The agent crouches if the object's top is this far below the agent's centre, metres."""
 _HORIZON = 60.0
 
 _CORNERS = ((2, 225.0), (3, 315.0), (6, 135.0), (7, 45.0))
@@ -43,8 +43,8 @@ Pose = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Thing:
-    """An object as the paper's agent knows it, now or as it was when the episode began.
+class ObjectSnapshot:
+    """An object as the paper's agent knows it: now, or when the episode began.
 
     Attributes:
         object_id, object_type: AI2-THOR's.
@@ -67,10 +67,10 @@ class Thing:
     contents: tuple[str, ...]
 
 
-def thing_of(entry: Mapping[str, Any]) -> Thing:
+def snapshot_of(entry: Mapping[str, Any]) -> ObjectSnapshot:
     """Read an entry of the metadata's ``objects``."""
     box = entry["axisAlignedBoundingBox"]
-    return Thing(
+    return ObjectSnapshot(
         object_id=entry["objectId"],
         object_type=entry["objectType"],
         x=entry["position"]["x"],
@@ -85,27 +85,27 @@ def thing_of(entry: Mapping[str, Any]) -> Thing:
     )
 
 
-def current(controller: Any, object_id: str) -> Thing | None:
+def current_snapshot(controller: Any, object_id: str) -> ObjectSnapshot | None:
     """An object as it is now, None if there is none of that id."""
     entry = _entry(controller, object_id)
-    return None if entry is None else thing_of(entry)
+    return None if entry is None else snapshot_of(entry)
 
 
 def _entry(controller: Any, object_id: str) -> Mapping[str, Any] | None:
     objects = controller.last_event.metadata["objects"]
     entry = next((entry for entry in objects if entry["objectId"] == object_id), None)
-    return entry if entry is not None and is_there(entry) else None
+    return entry if entry is not None and is_present(entry) else None
 
 
-def unseen(controller: Any, action: str, **arguments: Any) -> bool:
-    """Make a call whose picture nobody wants; whether AI2-THOR reports no error."""
+def step_undrawn(controller: Any, action: str, **arguments: Any) -> bool:
+    """Make a call without drawing; return whether AI2-THOR reports no error."""
     event = controller.step(action=action, renderImage=False, **arguments)
     return not event.metadata["errorMessage"]
 
 
-def stand_at(controller: Any, pose: AgentPose) -> bool:
-    """Teleport; the agent stands or crouches as it did, whatever the pose says."""
-    return unseen(
+def teleport(controller: Any, pose: AgentPose) -> bool:
+    """Teleport; the agent keeps standing or crouching as before, whatever the pose says."""
+    return step_undrawn(
         controller,
         "Teleport",
         position={"x": pose.x, "y": pose.y, "z": pose.z},
@@ -115,9 +115,9 @@ def stand_at(controller: Any, pose: AgentPose) -> bool:
 
 
 def start_in_corner(bounds: Mapping[str, Any], floor: Reachable) -> AgentPose:
-    """Where episodes begin: the reachable position nearest to a corner of the scene's bounds.
+    """The start pose: the reachable position nearest to a corner of the scene's bounds.
 
-    It is that of :func:`er_gym.envs.skills.start_pose`, but where two corners are as near.
+    It equals :func:`er_gym.envs.skills.start_pose` unless two corners are equally near.
 
     Args:
         bounds: ``sceneBounds`` of an event's metadata.
@@ -134,24 +134,24 @@ def start_in_corner(bounds: Mapping[str, Any], floor: Reachable) -> AgentPose:
     return pose
 
 
-def approach(controller: Any, thing: Thing, stated: AgentPose | None) -> Outcome:
+def approach(controller: Any, target: ObjectSnapshot, stated: AgentPose | None) -> Outcome:
     """Go to an object and look at it.
 
     Args:
         stated: the pose that a pose file states for the object; the agent stays in it as it is.
     """
     refused: list[Pose] = []
-    pose = stated or _choose(controller, thing, refused)
+    pose = stated or _choose(controller, target, refused)
     if pose is None:
-        return Outcome(None, False, f"no way was found to {thing.object_type}")
-    while not stand_at(controller, pose):
+        return Outcome(None, False, f"no way was found to {target.object_type}")
+    while not teleport(controller, pose):
         refused.append({"x": pose.x, "y": pose.y, "z": pose.z})
-        pose = _choose(controller, thing, refused)
+        pose = _choose(controller, target, refused)
         if pose is None:
-            return Outcome(None, False, f"no way was found to {thing.object_type}")
+            return Outcome(None, False, f"no way was found to {target.object_type}")
     if stated is None:
-        _adjust_height(controller, thing)
-        _look_at(controller, thing)
+        _adjust_height(controller, target)
+        _look_at(controller, target)
     if not controller.headless:
         controller.step(action="Pass")  # for the one picture that is wanted
     return Outcome(perceive(controller.last_event), True)
@@ -189,35 +189,35 @@ _FACING = {
 """By the direction that the object faces; 0 has its own rule, :func:`_for_facing_north`."""
 
 
-def _choose(controller: Any, thing: Thing, refused: Sequence[Pose]) -> AgentPose | None:
+def _choose(controller: Any, target: ObjectSnapshot, refused: Sequence[Pose]) -> AgentPose | None:
     """The pose from which to reach an object; None where there is none within reach.
 
     Args:
-        refused: positions that turned out to be impossible.
+        refused: positions to which AI2-THOR refused to teleport the agent.
     """
     event = controller.step(
-        action="GetInteractablePoses", objectId=thing.object_id, renderImage=False
+        action="GetInteractablePoses", objectId=target.object_id, renderImage=False
     )
     poses = [
         pose
         for pose in event.metadata["actionReturn"] or ()
-        if _away(pose, thing) <= _FARTHEST
+        if _away(pose, target) <= _FARTHEST
         and not any(all(pose[axis] == place[axis] for axis in "xyz") for place in refused)
     ]
     if not poses:
         return None
-    entry = _entry(controller, thing.object_id)
+    entry = _entry(controller, target.object_id)
     assert entry is not None
     size = [entry["axisAlignedBoundingBox"]["size"][axis] for axis in "xyz"]
     volume = round(size[0] * size[1] * size[2], 4)
     face = round(max(size[0] * size[1], size[0] * size[2], size[1] * size[2]), 4)
     found, rotation = None, 0.0
     if not (volume <= _SMALL[0] and face <= _SMALL[1]):
-        facing = _heading(thing.rotation)
+        facing = _heading(target.rotation)
         choose = _for_facing_north if facing == 0 else _by_sides
-        found, rotation = choose(thing, poses, _FACING.get(facing), (volume, face))
+        found, rotation = choose(target, poses, _FACING.get(facing), (volume, face))
     if found is None:
-        found = min(poses, key=lambda pose: _away(pose, thing))
+        found = min(poses, key=lambda pose: _away(pose, target))
         rotation = found["rotation"]
     return AgentPose(found["x"], found["y"], found["z"], rotation, _HORIZON)
 
@@ -227,41 +227,45 @@ def _heading(degrees: float) -> int:
     return min(_HEADINGS, key=lambda heading: abs(heading - round(degrees))) % 360
 
 
-def _away(pose: Pose, thing: Thing) -> float:
-    return sqrt((pose["x"] - thing.x) ** 2 + (pose["z"] - thing.z) ** 2)
+def _away(pose: Pose, target: ObjectSnapshot) -> float:
+    return sqrt((pose["x"] - target.x) ** 2 + (pose["z"] - target.z) ** 2)
 
 
 _Found = tuple[Pose | None, float]
 _Size = tuple[float, float]
 
 
-def _by_sides(thing: Thing, poses: Sequence[Pose], ways: _Sides | None, size: _Size) -> _Found:
+def _by_sides(
+    target: ObjectSnapshot, poses: Sequence[Pose], ways: _Sides | None, size: _Size
+) -> _Found:
     assert ways is not None
     for x, z, rotation in ways.sides:
-        there = _on_side(thing, _in_line(thing, poses, ways.axis), x, z)
-        found = _straight_ahead(thing, there, size)
+        there = _on_side(target, _in_line(target, poses, ways.axis), x, z)
+        found = _straight_ahead(target, there, size)
         if found is not None or (ways.skips and there):
             return found, rotation
     return None, 0.0
 
 
-def _for_facing_north(thing: Thing, poses: Sequence[Pose], _: object, size: _Size) -> _Found:
+def _for_facing_north(
+    target: ObjectSnapshot, poses: Sequence[Pose], _: object, size: _Size
+) -> _Found:
     """Of the best places on both sides, the nearer. The agent looks north wherever there is a
     place behind the object, even if it then stands in front of it."""
-    line = _in_line(thing, poses, "z")
-    front, back = _on_side(thing, line, 0, 1), _on_side(thing, line, 0, -1)
-    best = [_straight_ahead(thing, there, size) for there in (back, front)]
+    line = _in_line(target, poses, "z")
+    front, back = _on_side(target, line, 0, 1), _on_side(target, line, 0, -1)
+    best = [_straight_ahead(target, there, size) for there in (back, front)]
     there_is = [pose for pose in best if pose is not None]
     # Where both are as near, the place behind is taken: min returns the first.
-    found = min(there_is, key=lambda pose: _away(pose, thing)) if there_is else None
+    found = min(there_is, key=lambda pose: _away(pose, target)) if there_is else None
     return found, 0.0 if back else 180.0
 
 
-def _in_line(thing: Thing, poses: Sequence[Pose], axis: str) -> Sequence[Pose]:
+def _in_line(target: ObjectSnapshot, poses: Sequence[Pose], axis: str) -> Sequence[Pose]:
     """The poses whose offset along an axis is least, to within a tolerance that grows."""
     if not axis:
         return poses
-    origin = {"x": thing.x, "z": thing.z}[axis]
+    origin = {"x": target.x, "z": target.z}[axis]
     for tolerance in _TOLERANCES:
         found = [pose for pose in poses if abs(pose[axis] - origin) <= tolerance]
         if found:
@@ -269,21 +273,21 @@ def _in_line(thing: Thing, poses: Sequence[Pose], axis: str) -> Sequence[Pose]:
     return []
 
 
-def _on_side(thing: Thing, poses: Sequence[Pose], x: int, z: int) -> list[Pose]:
+def _on_side(target: ObjectSnapshot, poses: Sequence[Pose], x: int, z: int) -> list[Pose]:
     return [
         pose
         for pose in poses
-        if (not x or (pose["x"] - thing.x) * x > 0) and (not z or (pose["z"] - thing.z) * z > 0)
+        if (not x or (pose["x"] - target.x) * x > 0) and (not z or (pose["z"] - target.z) * z > 0)
     ]
 
 
-def _straight_ahead(thing: Thing, poses: Sequence[Pose], size: _Size) -> Pose | None:
+def _straight_ahead(target: ObjectSnapshot, poses: Sequence[Pose], size: _Size) -> Pose | None:
     """Of the poses close to the line in which an object faces, one as far off as its size asks.
 
     The paper's equation of the line has x and z the wrong way round; so has this.
     """
-    slope = -tan(radians(thing.rotation))
-    offset = -thing.x - slope * thing.z
+    slope = -tan(radians(target.rotation))
+    offset = -target.x - slope * target.z
     least, close = float("inf"), []
     for pose in poses:
         aside = abs(pose["z"] + slope * pose["x"] + offset) / sqrt(1 + slope**2)
@@ -293,32 +297,32 @@ def _straight_ahead(thing: Thing, poses: Sequence[Pose], size: _Size) -> Pose | 
     if not close:
         return None
     if size[0] <= _LITTLE[0] and size[1] <= _LITTLE[1]:
-        return min(close, key=lambda pose: _away(pose, thing))
-    near = [pose for pose in close if _away(pose, thing) <= _NEAR]
+        return min(close, key=lambda pose: _away(pose, target))
+    near = [pose for pose in close if _away(pose, target) <= _NEAR]
     if not near:
         return None
     if size[0] <= _MIDDLING[0] and size[1] <= _MIDDLING[1]:
-        return sorted(near, key=lambda pose: _away(pose, thing))[len(near) // 2]
-    return max(near, key=lambda pose: _away(pose, thing))
+        return sorted(near, key=lambda pose: _away(pose, target))[len(near) // 2]
+    return max(near, key=lambda pose: _away(pose, target))
 
 
 # -- how to look -----------------------------------------------------------------------------------
 
 
-def _adjust_height(controller: Any, thing: Thing) -> None:
-    """Crouch for what is low, and stand up again if it is then out of sight."""
-    low = controller.last_event.metadata["agent"]["position"]["y"] > thing.top + _BELOW
-    unseen(controller, "Crouch" if low else "Stand")
-    entry = _entry(controller, thing.object_id)
+def _adjust_height(controller: Any, target: ObjectSnapshot) -> None:
+    """Crouch for a low object, and stand up again if the object is then out of sight."""
+    low = controller.last_event.metadata["agent"]["position"]["y"] > target.top + _BELOW
+    step_undrawn(controller, "Crouch" if low else "Stand")
+    entry = _entry(controller, target.object_id)
     if entry is None or not entry["visible"]:
-        unseen(controller, "Stand")
+        step_undrawn(controller, "Stand")
 
 
-def _look_at(controller: Any, thing: Thing) -> None:
+def _look_at(controller: Any, target: ObjectSnapshot) -> None:
     """Tilt the head to the object's middle, and turn to the nearest of eight directions to it."""
     metadata = controller.last_event.metadata
     camera = metadata["cameraPosition"]
-    offset = np.array([thing.centre[k] - camera[axis] for k, axis in enumerate("xyz")])
+    offset = np.array([target.centre[k] - camera[axis] for k, axis in enumerate("xyz")])
     length = np.linalg.norm(offset)
     direction = offset / length if length else offset
     yaw = float(np.degrees(np.arctan2(direction[0], direction[2])))
@@ -326,7 +330,7 @@ def _look_at(controller: Any, thing: Thing) -> None:
     wanted = min(_UP, pitch) if pitch > 0 else max(_DOWN, pitch)
     up = wanted + round(metadata["agent"]["cameraHorizon"])
     if up:
-        unseen(controller, "LookUp" if up > 0 else "LookDown", degrees=abs(up))
+        step_undrawn(controller, "LookUp" if up > 0 else "LookDown", degrees=abs(up))
     heading = _heading(360 + yaw if int(yaw) < 0 else yaw)
     turn = controller.last_event.metadata["agent"]["rotation"]["y"] - heading
-    unseen(controller, "RotateLeft", degrees=turn)
+    step_undrawn(controller, "RotateLeft", degrees=turn)

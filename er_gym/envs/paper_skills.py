@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from math import hypot
 from typing import Any
 
-from er_gym.envs.paper_approach import Thing, stand_at, unseen
-from er_gym.envs.perception import Percept, perceive
+from er_gym.envs.paper_approach import ObjectSnapshot, step_undrawn, teleport
+from er_gym.envs.perception import Perception, perceive
 from er_gym.envs.skills import FORWARD_STEP, VIEWS, Outcome
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
@@ -19,27 +19,27 @@ from er_gym.tasks.task import AgentPose
 _LEFT, _RIGHT = "Left", "Right"
 
 
-def seen(controller: Any) -> Outcome:
-    """What is perceived after the calls of a skill, and what the last one's error was."""
+def outcome_after(controller: Any) -> Outcome:
+    """The outcome of a skill after its calls: the perception, and the error of the last call."""
     problem = controller.last_event.metadata["errorMessage"]
     if not controller.headless:
-        controller.step(action="Pass")  # for the one picture that is wanted
+        controller.step(action="Pass")  # to draw the one picture needed
     return Outcome(perceive(controller.last_event), not problem, problem)
 
 
 def start_again(controller: Any, start: AgentPose) -> Outcome:
     """Go back to where the episode began."""
-    stand_at(controller, start)
-    return seen(controller)
+    teleport(controller, start)
+    return outcome_after(controller)
 
 
 def observe(controller: Any) -> Outcome:
-    """Look left, behind and right, and turn back to where one looked before.
+    """Look left, behind and right, and turn back.
 
-    The views are handed over in the order in which agents are told of them.
+    The views are returned in the order of :data:`er_gym.envs.skills.VIEWS`.
     """
 
-    def turned() -> Percept:
+    def turned() -> Perception:
         return perceive(controller.step(action="RotateLeft", degrees=90))
 
     left, behind, right, last = turned(), turned(), turned(), turned()
@@ -48,25 +48,25 @@ def observe(controller: Any) -> Outcome:
     return Outcome(last, not problem, problem, views)
 
 
-def _call(verb_to_action: str, **fixed: Any) -> Callable[[Any, Thing], Any]:
-    return lambda controller, thing: controller.step(
-        action=verb_to_action, objectId=thing.object_id, forceAction=False, **fixed
+def _call(verb_to_action: str, **fixed: Any) -> Callable[[Any, ObjectSnapshot], Any]:
+    return lambda controller, target: controller.step(
+        action=verb_to_action, objectId=target.object_id, forceAction=False, **fixed
     )
 
 
 _TOGGLE = {False: _call("ToggleObjectOn"), True: _call("ToggleObjectOff")}
-_INTERACTIONS: dict[str, Callable[[Any, Thing], Any]] = {
+_INTERACTIONS: dict[str, Callable[[Any, ObjectSnapshot], Any]] = {
     verbs.PICKUP: _call("PickupObject", manualInteract=False),
     verbs.PUT: _call("PutObject", placeStationary=True),
     verbs.OPEN: _call("OpenObject", openness=1),
     verbs.CLOSE: _call("CloseObject"),
-    verbs.TOGGLE: lambda controller, thing: _TOGGLE[thing.is_toggled](controller, thing),
+    verbs.TOGGLE: lambda controller, target: _TOGGLE[target.is_toggled](controller, target),
 }
 
 
-def interact(controller: Any, verb: str, thing: Thing) -> Outcome:
+def interact(controller: Any, verb: str, target: ObjectSnapshot) -> Outcome:
     """Pick up, put into, open, close or toggle an object, as far as AI2-THOR allows."""
-    event = _INTERACTIONS[verb](controller, thing)
+    event = _INTERACTIONS[verb](controller, target)
     problem = event.metadata["errorMessage"]
     return Outcome(perceive(event), not problem, problem)
 
@@ -86,7 +86,7 @@ def move_forward(controller: Any, related: Sequence[str]) -> Outcome:
     """
     if not _walk(controller, "MoveAhead"):
         _go_round(controller, related)
-    return seen(controller)
+    return outcome_after(controller)
 
 
 def _go_round(controller: Any, related: Sequence[str]) -> None:
@@ -127,21 +127,21 @@ def _nearest(place: tuple[float, float], goals: Sequence[tuple[float, float]]) -
 
 
 def _side_step(controller: Any, side: str) -> bool:
-    unseen(controller, f"Rotate{side}", degrees=90)
+    step_undrawn(controller, f"Rotate{side}", degrees=90)
     _walk(controller, "MoveAhead")
-    return unseen(controller, f"Rotate{_LEFT if side == _RIGHT else _RIGHT}", degrees=90)
+    return step_undrawn(controller, f"Rotate{_LEFT if side == _RIGHT else _RIGHT}", degrees=90)
 
 
 def _back_off(controller: Any) -> None:
     """Walk back; where that is blocked too, turn right and walk, or left and walk."""
     if _walk(controller, "MoveBack"):
         return
-    turned = unseen(controller, "RotateRight", degrees=90)
+    turned = step_undrawn(controller, "RotateRight", degrees=90)
     if not _walk(controller, "MoveAhead"):
         if turned:
-            unseen(controller, "RotateLeft", degrees=180)
+            step_undrawn(controller, "RotateLeft", degrees=180)
         _walk(controller, "MoveAhead")
 
 
 def _walk(controller: Any, action: str) -> bool:
-    return unseen(controller, action, moveMagnitude=FORWARD_STEP)
+    return step_undrawn(controller, action, moveMagnitude=FORWARD_STEP)

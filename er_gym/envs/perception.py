@@ -1,7 +1,8 @@
-"""What the agent perceives, taken out of an event at once.
+"""What the agent perceives, read from an AI2-THOR event.
 
-The event can then be let go. One that somebody keeps has to have all its metadata worked out before
-the world changes, which costs the embedded engine more than the action itself.
+Nothing keeps the event. The embedded engine makes an event's metadata lazily, and must complete the
+metadata of an event that is still referenced before the world changes. That takes longer than the
+action itself.
 """
 
 from __future__ import annotations
@@ -24,27 +25,28 @@ SENSORS: Mapping[str, Mapping[str, bool]] = {
     "instances": {"renderInstanceSegmentation": True},
     "classes": {"renderSemanticSegmentation": True},
 }
-"""The sensors by the attribute of :class:`Percept` that holds their image, each with the arguments
-of the AI2-THOR controller that switch it on. A frame is there whenever anything is drawn."""
+"""The sensors by the attribute of :class:`Perception` that holds their image, each with the
+arguments of the AI2-THOR controller that switch it on. A frame is there whenever anything is
+drawn."""
 
 _WITHOUT_ALPHA = 0xFFFFFF
 
 
 @dataclass(frozen=True, eq=False)
-class Percept:
-    """What an event tells the agent.
+class Perception:
+    """What the agent perceives in one state of the world.
 
     Attributes:
-        objects: the N objects of the scene, as they are then.
-        visible, interactable: (N,) bool, as the simulator has them.
-        pose: the agent's.
-        frame: its view, (height, width, 3) uint8; None when none was drawn.
-        depth: (height, width) float32 metres along the view axis; None unless that was asked for.
-        masks: AI2-THOR's instance masks by object id; None unless these were asked for.
-        classes: (height, width, 3) uint8, a colour for each object type; None unless that was
-            asked for.
-        boxes: object id to what is seen of it, in pixels (left, upper, right, lower); None without
-            instance masks.
+        objects: the N objects of the scene.
+        visible, interactable: (N,) bool, AI2-THOR's ``visible`` and ``isInteractable``.
+        pose: the agent's pose, metres and degrees in the world frame.
+        frame: the agent's view, (height, width, 3) uint8; None if it was not drawn.
+        depth: (height, width) float32 metres along the view axis; None if it was not asked for.
+        masks: AI2-THOR's instance masks by object id; None if they were not asked for.
+        classes: (height, width, 3) uint8, a colour for each object type; None if it was not asked
+            for.
+        boxes: object id to the box of its visible part, pixels (left, upper, right, lower); None
+            without instance masks.
     """
 
     objects: ObjectTable
@@ -59,7 +61,7 @@ class Percept:
 
     @cached_property
     def annotated(self) -> NDArray[np.uint8] | None:
-        """The frame with the types of things written into it; the plain frame without masks."""
+        """The frame annotated with object types; the plain frame without instance masks."""
         if self.frame is None or self.boxes is None:
             return self.frame
         return annotated(self.frame, self.boxes)
@@ -76,23 +78,23 @@ class Percept:
 
     @cached_property
     def visible_names(self) -> tuple[str, ...]:
-        """The names of the types of which something is visible, in alphabetical order."""
-        return names(self.visible_types)
+        """The names of the visible object types, in alphabetical order."""
+        return type_names(self.visible_types)
 
     @property
     def held_name(self) -> str:
-        """The type of what is in the hand, ``""`` when that is empty."""
+        """The type of the object in the agent's hand, ``""`` if the hand is empty."""
         held = self.objects.held
         return "" if held < 0 else self.objects.type_of(held)
 
     @cached_property
     def visible_types(self) -> NDArray[np.bool_]:
-        """(T,) bool: the types of which something is visible."""
-        return marked(self.objects.kinds[self.visible])
+        """(T,) bool: True for each visible object type."""
+        return type_mask(self.objects.kinds[self.visible])
 
 
-def perceive(event: Any) -> Percept:
-    """What an AI2-THOR event tells the agent."""
+def perceive(event: Any) -> Perception:
+    """Read what the agent perceives from an AI2-THOR event."""
     objects, visible, interactable = objects_of(event)
     agent = event.metadata["agent"]
     position = agent["position"]
@@ -105,7 +107,7 @@ def perceive(event: Any) -> Percept:
         agent["isStanding"],
     )
     boxes, depth = event.instance_detections2D, event.depth_frame
-    return Percept(
+    return Perception(
         objects=objects,
         visible=visible,
         interactable=interactable,
@@ -139,13 +141,13 @@ def _rows_of_pixels(masks: Any, row: Mapping[str, int]) -> NDArray[np.int32]:
     return found
 
 
-def marked(kinds: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """(T,) bool: True for the types that occur among some kinds, indices into ``TYPES``."""
+def type_mask(kinds: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """(T,) bool: True for the types at the given indices into ``TYPES``."""
     mark = np.zeros(len(TYPES), dtype=bool)
     mark[kinds] = True
     return mark
 
 
-def names(mark: NDArray[np.bool_]) -> tuple[str, ...]:
-    """The names of the types that are marked in (T,) bool, in alphabetical order."""
+def type_names(mark: NDArray[np.bool_]) -> tuple[str, ...]:
+    """The names of the types that are True in a (T,) bool mask, in alphabetical order."""
     return tuple([TYPES[kind] for kind in mark.nonzero()[0].tolist()])

@@ -1,8 +1,8 @@
-"""Protocols: by which rules an episode is played. Each is a row of :data:`PROTOCOLS`.
+"""Protocols: the rules of an episode. Each protocol is a row of :data:`PROTOCOLS`.
 
-``default`` is this suite's own. ``paper`` is that of the evaluation program of Embodied-Reasoner
-(arXiv 2503.21696), rule by rule, so that numbers stand beside the paper's table; docs/agents.md
-lists what differs.
+``default`` is er-gym's own. ``paper`` follows the evaluation program of Embodied-Reasoner (arXiv
+2503.21696) rule by rule, so that its numbers compare with the paper's table. docs/agents.md lists
+the differences.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from er_gym.envs.action_handler import ActionHandler, DefaultActionHandler, EpisodeSetup
 from er_gym.envs.actions import Action, AnyAction, understand
 from er_gym.envs.arguments import one_of
-from er_gym.envs.conduct import Conduct, DefaultConduct, Setting
+from er_gym.envs.paper_action_handler import PaperActionHandler, understand_as_paper
 from er_gym.envs.paper_approach import start_in_corner
-from er_gym.envs.paper_conduct import PaperConduct, understand_as_paper
 from er_gym.envs.skills import Reachable, start_pose
 from er_gym.tasks.task import AgentPose
 from er_gym.tasks.verbs import END
@@ -28,20 +28,20 @@ class EpisodeProtocol:
 
     Attributes:
         name: as ``--protocol`` and ``EmbodiedEnv(protocol=…)`` take it.
-        understand: the action that is meant, None if none is; and its text.
-        conduct: how actions are judged and carried out in an episode.
-        start: where an episode begins, given the scene's bounds and where the agent can stand.
-        chooses_instances: whether it decides itself which object a type name stands for.
-        unknown_breaks_runs: whether a reply that names no action comes between two same actions.
-        repeated: what the fourth same action in a row is recorded as; None for itself.
+        understand: returns the action that a reply means (None if it means none), and its text.
+        action_handler: makes the handler that judges and carries out an episode's actions.
+        start: returns the start pose, given ``sceneBounds`` and the reachable positions.
+        chooses_instances: whether the protocol decides which object a type name stands for.
+        unknown_breaks_runs: whether a reply that names no action interrupts a row of same actions.
+        repeated: how the fourth same action in a row is recorded; None for the action itself.
         end_is_step: whether ``end`` counts towards the step limit.
-        appends_end: whether an episode that is cut off, by the step limit or by three replies that
-            name no action, is ended by a successful ``end``.
+        appends_end: whether a successful ``end`` is appended to an episode that the step limit, or
+            the third reply that names no action, has cut off.
     """
 
     name: str
     understand: Callable[[AnyAction, ObjectTable], tuple[Action | None, str]]
-    conduct: Callable[[Setting], Conduct]
+    action_handler: Callable[[EpisodeSetup], ActionHandler]
     start: Callable[[Mapping[str, Any], Reachable], AgentPose]
     chooses_instances: bool = False
     unknown_breaks_runs: bool = False
@@ -53,13 +53,13 @@ class EpisodeProtocol:
 DEFAULT = EpisodeProtocol(
     name="default",
     understand=lambda action, _: understand(action),
-    conduct=DefaultConduct,
+    action_handler=DefaultActionHandler,
     start=start_pose,
 )
 PAPER = EpisodeProtocol(
     name="paper",
     understand=understand_as_paper,
-    conduct=PaperConduct,
+    action_handler=PaperActionHandler,
     start=start_in_corner,
     chooses_instances=True,
     unknown_breaks_runs=True,
@@ -71,9 +71,9 @@ PROTOCOLS = {protocol.name: protocol for protocol in (DEFAULT, PAPER)}
 
 
 def protocol_named(name: str) -> EpisodeProtocol:
-    """Look a protocol up.
+    """The protocol of a name.
 
     Raises:
-        ValueError: there is none of that name; the message lists those there are.
+        ValueError: the name is unknown; the message lists the known names.
     """
     return PROTOCOLS[one_of("protocol", name, PROTOCOLS)]

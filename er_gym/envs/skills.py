@@ -1,8 +1,8 @@
-"""High-level verbs turned into calls of the AI2-THOR controller.
+"""Skills: high-level verbs as calls of the AI2-THOR controller.
 
-A skill takes the controller and an object's row in a table and returns an :class:`Outcome`; whether
-it may be used now is not its business (see :mod:`er_gym.envs.legality`). No skill keeps an event
-while it calls the controller: see :mod:`er_gym.envs.perception`.
+A skill takes the controller and an object's row in a table, and returns an :class:`Outcome`. It
+does not check whether it is legal now; :mod:`er_gym.envs.legality` does. No skill keeps an event
+while it calls the controller; :mod:`er_gym.envs.perception` says why.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.perception import Percept, perceive
+from er_gym.envs.perception import Perception, perceive
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.tasks.task import AgentPose
@@ -26,15 +26,15 @@ from er_gym.thor import ObjectTable
 from er_gym.thor.floor import floor_of
 
 FORWARD_STEP = 0.5
-"""How far "move forward" goes when nothing is in the way, metres."""
+"""The length of a ``move forward`` without obstacles, metres."""
 _COMFORTABLE = 0.7
-"""How far from an object's middle one likes to stand, metres."""
+"""The preferred distance from an object's centre, metres."""
 _POSITIONS_AT_ONCE = 12
 _ROTATIONS = (0, 90, 180, 270)
 _HORIZONS = (-30, 0, 30, 60)
 _DIRECTIONS = np.array([(r, h) for r in _ROTATIONS for h in _HORIZONS])
 VIEWS = ("right", "behind", "left")
-"""What an "observe" shows, in this order."""
+"""The directions that ``observe`` shows, in this order."""
 _xyz = itemgetter(*"xyz")
 
 Position = Sequence[float]
@@ -43,7 +43,11 @@ Angle = TypeVar("Angle", float, NDArray[Any])
 
 
 class Reachable:
-    """Where the agent can stand in a scene: the ``actionReturn`` of GetReachablePositions."""
+    """The positions where the agent can stand in a scene.
+
+    Args:
+        positions: the ``actionReturn`` of GetReachablePositions, metres.
+    """
 
     def __init__(self, positions: Sequence[Mapping[str, float]]) -> None:
         flat = chain.from_iterable(map(_xyz, positions))
@@ -52,11 +56,11 @@ class Reachable:
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """(N, 3) x, y and z of each position, in the order of x, then z."""
+        """(N, 3) x, y and z of each position, metres; sorted by x, then z."""
         return self._xyz
 
     def nearest_to(self, x: float, z: float) -> Iterator[list[Position]]:
-        """The positions in batches, those nearest to a point first."""
+        """The positions in batches, nearest to the point (x, z) first."""
         distance = np.hypot(self._xyz[:, 0] - x, self._xyz[:, 2] - z).round(6)
         nearest_first = self._xyz[np.argsort(distance, kind="stable")]
         for first in range(0, len(nearest_first), _POSITIONS_AT_ONCE):
@@ -67,10 +71,10 @@ _reachable: dict[Hashable, Reachable] = {}
 
 
 def reachable(controller: Any, scene: Hashable) -> Reachable:
-    """Where the agent can stand: asked for once in a process, since it does not change.
+    """The positions where the agent can stand. A process asks the controller once for each key.
 
     Args:
-        scene: the scene, and whatever else the answer depends on.
+        scene: a key: the scene, and whatever else the positions depend on.
     """
     if scene not in _reachable:
         event = controller.step(action="GetReachablePositions", renderImage=False)
@@ -80,19 +84,19 @@ def reachable(controller: Any, scene: Hashable) -> Reachable:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a skill.
+    """The outcome of a skill.
 
     Attributes:
-        percept: what the agent perceives after it; None when it perceives what it did before.
-        success: whether it was done.
-        problem: if not, why not.
-        views: for "observe", direction to what is perceived there.
+        perception: what the agent perceives afterwards; None if that has not changed.
+        success: whether the skill succeeded.
+        problem: why it failed, ``""`` if it succeeded.
+        views: after ``observe``, direction to what the agent perceives there.
     """
 
-    percept: Percept | None
+    perception: Perception | None
     success: bool
     problem: str = ""
-    views: Mapping[str, Percept] = field(default_factory=dict)
+    views: Mapping[str, Perception] = field(default_factory=dict)
 
 
 def _outcome(event: Any) -> Outcome:
@@ -101,7 +105,7 @@ def _outcome(event: Any) -> Outcome:
 
 
 def place(controller: Any, pose: AgentPose, *, force: bool = False) -> Outcome:
-    """Put the agent at a pose; ``force``: whether there is room for it or not."""
+    """Teleport the agent to a pose; ``force`` skips AI2-THOR's check for room."""
     return _outcome(
         controller.step(
             action="TeleportFull",
@@ -115,9 +119,9 @@ def place(controller: Any, pose: AgentPose, *, force: bool = False) -> Outcome:
 
 
 def start_pose(bounds: Mapping[str, Any], floor: Reachable) -> AgentPose:
-    """Where episodes begin: the reachable position nearest to a corner of the scene's bounds.
+    """The start pose: the reachable position nearest to a corner of the scene's bounds.
 
-    The agent looks diagonally into the room from there: 45, 135, 225 or 315 degrees.
+    The agent looks diagonally into the room, at 45, 135, 225 or 315 degrees.
 
     Args:
         bounds: ``sceneBounds`` of an event's metadata.
@@ -141,20 +145,20 @@ def _start_pose(
     return AgentPose(x, y, z, rotation)
 
 
-def navigate(controller: Any, percept: Percept, goal: int, floor: Reachable) -> Outcome:
-    """Go to where an object can best be seen and handled, facing it.
+def navigate(controller: Any, perception: Perception, goal: int, floor: Reachable) -> Outcome:
+    """Go to the pose from which the agent sees and handles an object best.
 
-    Positions are tried from the nearest to the object's middle outwards; among the first from which
-    it can be interacted with, the one that is at a comfortable distance and has it in the middle of
-    the picture is taken.
+    The search runs from the position nearest to the object's centre outwards, in batches. The first
+    batch with poses from which the object is interactable decides: the agent takes the pose at the
+    most comfortable distance that has the object in the middle of the picture.
     """
-    objects = percept.objects
+    objects = perception.objects
     object_id, centre = objects.ids[goal], tuple(objects.centre[goal].tolist())
-    # The pose that one would choose were nothing in the way is mostly possible, and whether it is,
-    # one sees from there. What is in the hand one sees from everywhere.
+    # Try the best pose of an empty room first: it mostly works, and its event says whether it does.
+    # A held object is visible from everywhere.
     if goal != objects.held:
         there = place(controller, _best_view(floor, *centre))
-        if there.success and _can_handle(there.percept, object_id):
+        if there.success and _can_handle(there.perception, object_id):
             return there
 
     def discomfort(pose: AgentPose) -> float:
@@ -166,12 +170,12 @@ def navigate(controller: Any, percept: Percept, goal: int, floor: Reachable) -> 
         if found:
             return place(controller, min(found, key=discomfort))
     problem = f"no way was found to where {objects.type_of(goal)} can be seen"
-    return replace(place(controller, percept.pose), success=False, problem=problem)
+    return replace(place(controller, perception.pose), success=False, problem=problem)
 
 
-def _can_handle(percept: Percept | None, object_id: str) -> bool:
-    row = None if percept is None else percept.objects.row.get(object_id)
-    return percept is not None and row is not None and bool(percept.interactable[row])
+def _can_handle(perception: Perception | None, object_id: str) -> bool:
+    row = None if perception is None else perception.objects.row.get(object_id)
+    return perception is not None and row is not None and bool(perception.interactable[row])
 
 
 def _interactable_poses(
@@ -197,7 +201,7 @@ def _interactable_poses(
 
 
 def _view(position: Position, centre: Position) -> tuple[float, float, float]:
-    """How a point is seen from a position: metres away, degrees clockwise from +z and down."""
+    """A point seen from a position: distance in metres, degrees clockwise from +z, degrees down."""
     dx, dz = centre[0] - position[0], centre[2] - position[2]
     distance = hypot(dx, dz)
     eye = position[1] + 0.675
@@ -211,11 +215,11 @@ def _view(position: Position, centre: Position) -> tuple[float, float, float]:
 def _discomfort(
     distance: Angle, bearing: Angle, below: Angle, rotation: Angle, horizon: Angle
 ) -> Angle:
-    """How badly one sees who looks in a direction: 1 for every 45 degrees or metre amiss.
+    """How uncomfortable a view is: 1 for every 45 degrees off, and for every metre off.
 
     Args:
         distance, bearing, below: see :func:`_view`.
-        rotation, horizon: where one looks, degrees.
+        rotation, horizon: the direction in which the agent looks, degrees.
     """
     aside = abs((bearing - rotation + 180) % 360 - 180)
     amiss: Angle = aside / 45 + abs(below - horizon) / 45 + abs(distance - _COMFORTABLE)
@@ -224,12 +228,12 @@ def _discomfort(
 
 @lru_cache(maxsize=16384)
 def _best_view(floor: Reachable, x: float, y: float, z: float) -> AgentPose:
-    """The pose near a point from which to look at it most comfortably, were nothing in the way.
+    """The most comfortable pose near a point if nothing were in the way.
 
-    It is the one that :func:`navigate` would choose, were it among those to choose from.
+    :func:`navigate` would choose this pose if it were among the interactable ones.
     """
     positions = next(floor.nearest_to(x, z))
-    # math's functions, not NumPy's, whose last digits differ from machine to machine.
+    # math's functions, since the last digits of NumPy's differ between machines.
     views = np.array([_view(position, (x, y, z)) for position in positions])
     amiss = _discomfort(*views.T[..., None], *_DIRECTIONS.T)
     position, direction = divmod(int(amiss.argmin()), len(_DIRECTIONS))
@@ -239,9 +243,9 @@ def _best_view(floor: Reachable, x: float, y: float, z: float) -> AgentPose:
 
 
 def observe(controller: Any) -> Outcome:
-    """Look right, behind and left, and turn back to where one looked before."""
+    """Look right, behind and left, and turn back."""
 
-    def turned() -> Percept:
+    def turned() -> Perception:
         return perceive(controller.step(action="RotateRight", degrees=90))
 
     views = {view: turned() for view in VIEWS}
@@ -259,12 +263,12 @@ def move_forward(controller: Any, grid_size: float) -> Outcome:
         taken += step
     problem = "" if taken else controller.last_event.metadata["errorMessage"]
     if not controller.headless:
-        controller.step(action="Pass")  # for the one picture that is wanted
+        controller.step(action="Pass")  # to draw the one picture needed
     return replace(_outcome(controller.last_event), success=taken > 0, problem=problem)
 
 
 def _part_to_put_into(objects: ObjectTable, row: int) -> str:
-    """The id of the receptacle proper: a Sink's basin rather than the Sink."""
+    """The id of the part that takes objects: a Sink's basin rather than the Sink."""
     part = f"{objects.ids[row]}|{BASIN_OF.get(objects.type_of(row), '')}"
     return part if part in objects.row else objects.ids[row]
 
@@ -278,12 +282,12 @@ def _put(controller: Any, objects: ObjectTable, row: int) -> Any:
 def _toggle(controller: Any, objects: ObjectTable, row: int) -> Any:
     switch = row
     if objects.type_of(row) == "StoveBurner":
-        # AI2-THOR's burners have no switch; the knob that names one in controlledObjects is it.
+        # AI2-THOR's burners have no switch; the knob whose controlledObjects name one is it.
         for other, controlled in enumerate(objects.controlled):
             if row in controlled:
                 switch = other
     action = "ToggleObjectOff" if objects.has["isToggled"][switch] else "ToggleObjectOn"
-    # The agent sees the burner; whether its knob is in the picture is no matter.
+    # The agent must see the burner, not its knob.
     return controller.step(action=action, objectId=objects.ids[switch], forceAction=switch != row)
 
 
@@ -291,7 +295,7 @@ _OTHERWISE: Mapping[str, Callable[[Any, ObjectTable, int], Any]] = {
     verbs.PUT: _put,
     verbs.TOGGLE: _toggle,
 }
-"""Verbs that take more than a call of their AI2-THOR action with the object's id."""
+"""Verbs that need more than one call of their AI2-THOR action with the object's id."""
 
 
 def interact(controller: Any, name: str, objects: ObjectTable, row: int) -> Outcome:
@@ -304,7 +308,7 @@ def interact(controller: Any, name: str, objects: ObjectTable, row: int) -> Outc
     )
 
 
-def do_alone(controller: Any, name: str) -> Outcome:
-    """Do a verb that goes with no object, by its AI2-THOR action."""
+def act_without_object(controller: Any, name: str) -> Outcome:
+    """Do a verb that takes no object, by its AI2-THOR action."""
     verb = verbs.verb_named(name)
     return _outcome(controller.step(action=verb.thor_action, **verb.parameters))

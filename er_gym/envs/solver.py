@@ -1,4 +1,4 @@
-"""The ceiling: a player that knows the key actions, and plays them as a careful agent would."""
+"""The solver: it knows the key actions, and plays them as a careful agent would."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from er_gym.tasks.task import KeyAction, type_of_id
 
 
 class Solver:
-    """Does a task's key actions in their order, and what it takes to be able to.
+    """Does a task's key actions in order, and the actions that each of them needs first.
 
-    It goes where a key action leads; if the place is not in sight it looks round, then walks to one
-    thing after another that is, until the place is too. What it cannot reach it walks to, then to
-    what that lies in, then a step nearer. It opens what is closed before it puts something in. What
-    it knows beforehand are the key actions; all else it reads from ``info`` as any agent may. One
-    solver plays one episode.
+    It navigates to the object of a key action. If that is not in sight, it looks round, then goes
+    from object to object until it is. If an object is out of reach, the solver goes to it, then to
+    the receptacle that it lies in, then a step forward. It opens a closed receptacle before it puts
+    an object in. It knows only the key actions beforehand and reads the rest from ``info``, as any
+    agent may. One solver plays one episode.
     """
 
     def __init__(self) -> None:
@@ -28,7 +28,7 @@ class Solver:
         self._current: KeyAction | None = None
 
     def next(self, info: Mapping[str, Any]) -> tuple[Action, KeyAction | None]:
-        """The next action, and the key action that it is for; None when all are done.
+        """The next action, and the key action that it serves (None if all are done).
 
         Args:
             info: what the last ``env.reset`` or ``env.step`` returned.
@@ -63,7 +63,7 @@ class Solver:
         return nearer[tried] if tried < len(nearer) else self._explore(info)
 
     def _explore(self, info: Mapping[str, Any]) -> Action:
-        """Look round once, then go from thing to thing, those not visited yet first."""
+        """Look round once, then go from object to object, unvisited types first."""
         if not self._looked:
             self._looked = True
             return Action(verbs.OBSERVE)
@@ -75,10 +75,10 @@ class Solver:
 
 
 def _nearer(key: KeyAction, name: str, info: Mapping[str, Any]) -> Iterator[Action]:
-    """What may bring something of a type within reach: what can be tried, in this order.
+    """The actions that may bring an object of a type within reach, in the order to try them.
 
-    Small things can be out of reach from where one sees them best. Then it helps to go to the
-    receptacle, for what lies in that may be handled wherever it is visible.
+    A small object can be out of reach from where the agent sees it best. Then it helps to go to its
+    receptacle: objects of the types in it are interactable wherever they are visible.
     """
     if name in info["navigable"]:
         yield Action(verbs.NAVIGATE, name)
@@ -91,7 +91,7 @@ def _nearer(key: KeyAction, name: str, info: Mapping[str, Any]) -> Iterator[Acti
 
 
 def _holders(key: KeyAction, done: Sequence[KeyAction]) -> Iterator[str]:
-    """The types of what an object lies in, as far as it has been put there, innermost first."""
+    """The types of the receptacles into which the agent has put an object, innermost first."""
     lies_in: dict[str, str] = {}
     held = ""
     for earlier in done:
@@ -106,7 +106,7 @@ def _holders(key: KeyAction, done: Sequence[KeyAction]) -> Iterator[str]:
 
 
 def _name_in(wanted: str, *lists: Sequence[str]) -> str:
-    """The spelling under which a type is at hand: a SinkBasin may be there as its Sink."""
+    """The name under which a type is listed: a SinkBasin may be listed as its Sink."""
     for names in lists:
         if wanted in names:
             return wanted

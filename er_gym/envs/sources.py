@@ -1,4 +1,4 @@
-"""Where episodes come from: a list of tasks, a suite, a file, or the generator, live."""
+"""Sources of episodes: a list of tasks, a suite, a task file, or the generator."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from er_gym.envs.arguments import shown
+from er_gym.envs.arguments import short_repr
 from er_gym.tasks.errors import TaskFileError, describe_substitutions, summarise_set_aside
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite, suite_file, suite_from_file, suite_names
@@ -29,25 +29,26 @@ GENERATE = "generate"
 
 @runtime_checkable
 class EpisodeSource(Protocol):
-    """Something that tasks are drawn from."""
+    """A source that tasks are drawn from."""
 
     def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
-        """A task, the same for a generator in the same state.
+        """Draw a task. Random generators in the same state draw the same task.
 
         Args:
-            task_type: of what type, any for None.
-            scene: in which scene, any for None.
+            rng: the random generator.
+            task_type: the type of the task, None for any.
+            scene: the scene of the task, None for any.
 
         Raises:
-            ValueError: there is none.
+            ValueError: the source has no such task.
         """
         ...
 
     def find(self, task_id: str) -> Task:
-        """The task of an id.
+        """The task with an id.
 
         Raises:
-            ValueError: there is none.
+            ValueError: the source has no such task.
         """
         ...
 
@@ -84,11 +85,10 @@ class TaskList:
 
     @lru_cache(maxsize=64)  # noqa: B019  (few lists, and they are kept anyhow)
     def share(self, index: int, count: int) -> TaskList:
-        """Every ``count``-th scene's tasks, from the ``index``-th on; all of them, if that would
-        leave a share without a type that the list has.
+        """The tasks of every ``count``-th scene, from the ``index``-th on.
 
-        What an engine remembers of a room serves its own process alone, so that processes are
-        quicker when each plays in rooms of its own.
+        An engine's caches of a room serve its own process only, so processes are faster if each
+        plays in rooms of its own. If a share lacked a task type, all tasks are returned.
         """
         scenes = sorted({task.scene for task in self.tasks})
         share_of = {scene: place % count for place, scene in enumerate(scenes)}
@@ -99,23 +99,25 @@ class TaskList:
         return TaskList(mine, self._name)
 
     def find(self, task_id: str) -> Task:
-        """The task of that id."""
+        """The task with that id."""
         for task in self.tasks:
             if task.id == task_id:
                 return task
-        raise ValueError(f"no task {shown(task_id)} among the {len(self.tasks)} of {self._name}")
+        raise ValueError(
+            f"no task {short_repr(task_id)} among the {len(self.tasks)} of {self._name}"
+        )
 
 
 def make_source(source: Source, make_env: Callable[[], PlayableEnv]) -> EpisodeSource:
-    """What :class:`~er_gym.envs.embodied_env.EmbodiedEnv` draws from.
+    """The source that :class:`~er_gym.envs.embodied_env.EmbodiedEnv` draws tasks from.
 
-    Of a file, tasks that cannot be used, or that do not fit their scenes, are not drawn; a warning
-    names them.
+    Tasks of a file that cannot be used, or do not fit their scenes, are not drawn. A warning names
+    them.
 
     Args:
         source: a list of tasks, the name of a suite, the path of a task file (``.json``, ``.jsonl``
             or ``.jsonl.gz``), ``"generate"``, or an :class:`EpisodeSource`.
-        make_env: makes the environment in which generated tasks are tried.
+        make_env: makes the environment in which generated tasks are verified.
 
     Raises:
         ValueError: there is no such suite, or the file cannot be used.
@@ -142,14 +144,14 @@ def make_source(source: Source, make_env: Callable[[], PlayableEnv]) -> EpisodeS
         if len(tasks) == len(source):
             return TaskList(tasks)
     raise ValueError(
-        f"{shown(source)} is no source of episodes; give a suite's name, a task file, "
+        f"{short_repr(source)} is no source of episodes; give a suite's name, a task file, "
         f"{GENERATE!r}, a list of tasks, or an EpisodeSource"
     )
 
 
 @lru_cache(maxsize=16)
 def _read(name: str, is_file: bool, changed: int) -> tuple[TaskList, str]:
-    """The tasks of a suite or file, read once as long as it does not change, and what is odd."""
+    """The tasks of a suite or file, cached until it changes; and remarks for a warning."""
     suite = suite_from_file(name) if is_file else load_suite(name)
     if not is_file:
         return TaskList(suite.tasks, f"the suite {suite.name}"), ""

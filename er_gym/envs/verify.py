@@ -1,4 +1,4 @@
-"""Whether a task can be done: the solver plays it on the embedded engine."""
+"""Verifies that a task can be done: the solver plays it on the embedded engine."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ REASONS = (
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of playing a task.
+    """The result of playing a task.
 
     Attributes:
         problem: one of :data:`REASONS`, ``""`` for a task that can be done.
-        detail: the last thing that the agent was told.
-        steps: how many it took, the placing of the agent among them.
-        start: x and z of where the agent began, metres.
+        detail: the last feedback.
+        steps: the number of steps, the placing of the agent included.
+        start: x and z of the agent's start position, metres.
     """
 
     problem: str
@@ -51,11 +51,11 @@ class Verdict:
 
 
 class PlayableEnv(Protocol):
-    """What a verifier asks of the environment that it is handed: an ``EmbodiedEnv`` has it."""
+    """What a verifier needs of its environment; an ``EmbodiedEnv`` has it."""
 
     @property
     def agent_pose(self) -> AgentPose:
-        """Where the agent is."""
+        """The agent's pose now."""
 
     @property
     def objects(self) -> Sequence[Mapping[str, Any]]:
@@ -74,13 +74,13 @@ class PlayableEnv(Protocol):
 
 
 class Verifier:
-    """Plays tasks, one after another, in an environment that it owns; close it in the end.
+    """Plays tasks, one after another, in an environment that it owns; :meth:`close` it at the end.
 
-    A task passes if the solver succeeds within the step limit, earns all of the reward, and has
-    something to do: the goal must not hold from the start.
+    A task passes if the solver succeeds within the step limit and earns the whole reward, and if
+    the goal does not hold from the start.
 
     Args:
-        env: of any tasks and any ``obs_mode``; ``"state"`` is the quickest.
+        env: any environment; ``obs_mode="state"`` is the fastest.
     """
 
     def __init__(self, env: PlayableEnv) -> None:
@@ -88,7 +88,7 @@ class Verifier:
         self._starts: dict[str, tuple[float, float]] = {}
 
     def start_of(self, scene: str) -> tuple[float, float]:
-        """x and z of where episodes in a scene begin, however it is arranged; metres."""
+        """x and z of the start position in a scene, the same for every arrangement; metres."""
         if scene not in self._starts:
             nothing = Task("nothing", TASK_TYPES[0], scene, "", ())
             self._env.reset(options={"task": nothing})
@@ -97,7 +97,7 @@ class Verifier:
         return self._starts[scene]
 
     def __call__(self, task: Task) -> Verdict:
-        """Play a task from its own start."""
+        """Play a task."""
         _, info = self._env.reset(seed=0, options={"task": task})
         pose = self._env.agent_pose
         where = (pose.x, pose.z)
@@ -123,8 +123,8 @@ class Verifier:
         self._env.close()
 
 
-def unwanted(task: Task, room: Generator, spec: SuiteSpec, verify: Verifier) -> str:
-    """Why a generated task is not one that is wanted, ``""`` if it is; nothing is played."""
+def rejection_reason(task: Task, room: Generator, spec: SuiteSpec, verify: Verifier) -> str:
+    """Why a generated task does not fit the suite, ``""`` if it fits; nothing is played."""
     if not spec.unseen_objects and UNSEEN_TYPES & subject_types(task):
         return "it is about things that training never sees"
     if spec.allows_any_difficulty:
@@ -134,7 +134,7 @@ def unwanted(task: Task, room: Generator, spec: SuiteSpec, verify: Verifier) -> 
 
 
 def with_difficulty(task: Task, room: Generator, verdict: Verdict) -> Task:
-    """The task, which says in ``extra["difficulty"]`` how hard it is and how many steps it took."""
+    """The task with its difficulty and the solver's number of steps in ``extra["difficulty"]``."""
     figures = difficulty(task, room.objects, verdict.start)
     told = {**asdict(figures), "distance": round(figures.distance, 2), "steps": verdict.steps}
     return replace(task, extra={**task.extra, "difficulty": told})

@@ -1,9 +1,10 @@
-"""The protocol that every agent follows, whatever is inside it."""
+"""The protocol that every agent follows."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import PurePosixPath
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 from er_gym.envs.actions import Action
@@ -13,14 +14,14 @@ from er_gym.tasks.task import Task
 
 @dataclass(frozen=True)
 class ModelReply:
-    """What a model's reply took.
+    """What a model's reply cost.
 
     Attributes:
         model: the model's name, as its server gives it.
         seconds: how long the reply took.
-        prompt_tokens, completion_tokens: as counted, or upper bounds.
-        cost: in US dollars, 0 where no price is known.
-        cached: whether an earlier request paid for it.
+        prompt_tokens, completion_tokens: as the server counted them, or upper bounds.
+        cost: US dollars; 0 if no price is known.
+        cached: whether the reply came from the cache, so that an earlier request paid for it.
     """
 
     model: str = ""
@@ -38,8 +39,8 @@ class Decision:
     Attributes:
         action: anything that ``EmbodiedEnv.step`` takes: an :class:`~er_gym.envs.actions.Action`,
             its text, or its index.
-        thought: what the agent said to itself; kept in the episode's record, never read by the env.
-        reply: of an agent that asks a model, what its reply took.
+        thought: the agent's reasoning; it goes into the episode's record, not to the environment.
+        reply: the cost of the model's reply, if the agent asks a model.
     """
 
     action: Action | str | int
@@ -48,9 +49,9 @@ class Decision:
 
 
 class CannotGoOn(Exception):
-    """No further episode can be played, this one included: a budget is spent, a key is refused.
+    """The agent can play no further episode, nor finish this one: a budget is spent, a key refused.
 
-    The run stops and shows the message. What has been played is kept.
+    The run stops and shows the message. The episodes played before stay in the run directory.
     """
 
 
@@ -58,17 +59,17 @@ class Agent(Protocol):
     """Plays episodes: ``reset`` once for each, then ``act`` until the episode is over."""
 
     obs_mode: str
-    """The observations it needs, as ``EmbodiedEnv(obs_mode=…)`` names them."""
+    """The observations that the agent needs, as ``EmbodiedEnv(obs_mode=…)`` names them."""
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Begin an episode; ``obs`` and ``info`` are what ``env.reset`` returned."""
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """Decide, given what the last ``env.reset`` or ``env.step`` returned."""
+        """Choose an action; ``obs`` and ``info`` are what the last reset or step returned."""
 
 
 class MakeAgent(Protocol):
-    """Makes the agent of one episode. To play in other processes it has to be picklable."""
+    """Makes the agent of one episode. It must be picklable to play in worker processes."""
 
     def __call__(self, task: Task, seed: int) -> Agent:
         """Make an agent, given the task and the seed of the episode."""
@@ -83,13 +84,45 @@ class LeavesAttachments(Protocol):
     """An agent that leaves files of its own, such as its conversation and the pictures it saw."""
 
     attachment_folders: Sequence[str]
-    """Folders of the run directory that its files go to. In each, the files of an episode are
-    ``STEM.*`` or in the folder ``STEM/``."""
+    """Folders of the run directory that its files go to: plain names, none of them er-gym's own.
+    In each folder, the files of an episode are ``STEM.SUFFIX``, or lie in the folder ``STEM/``."""
 
     def attachments(self, episode: EpisodeRecord, stem: str) -> Attachments:
-        """The files of the episode that is over or has crashed.
+        """The files of an episode that is over or has crashed.
 
         Args:
             episode: its record.
             stem: what the names of its files begin with (:func:`.run_directory.file_stem`).
         """
+
+
+_RESERVED = frozenset({"episodes", "run.json", "run.lock", "events.jsonl"})
+"""Names in a run directory that no attachment may use."""
+
+
+def check_attachments(files: Attachments, folders: Sequence[str], stem: str) -> None:
+    """Check where an agent wants its files.
+
+    Raises:
+        ValueError: a folder is no plain name or one of er-gym's own, or a path is not
+            ``FOLDER/STEM.SUFFIX`` or within ``FOLDER/STEM/``.
+        TypeError: a file's content is not bytes.
+    """
+    for folder in folders:
+        if folder in ("", ".", "..") or "/" in folder or folder in _RESERVED:
+            raise ValueError(
+                f"attachment folder {folder!r} is not allowed; give a plain name that is none of: "
+                f"{', '.join(sorted(_RESERVED))}"
+            )
+    for path, data in files.items():
+        folder, *inner = path.split("/")
+        # With one suffix only, a file of task "a" is never taken for one of task "a.b".
+        beside = len(inner) == 1 and PurePosixPath(inner[0]).stem == stem and "." in inner[0]
+        within = len(inner) > 1 and inner[0] == stem and not {"", ".", ".."}.intersection(inner)
+        if folder not in folders or not (beside or within):
+            raise ValueError(
+                f"attachment {path!r} is not allowed; give FOLDER/{stem}.SUFFIX or "
+                f"FOLDER/{stem}/NAME, with FOLDER one of: {', '.join(folders) or '(none declared)'}"
+            )
+        if not isinstance(data, bytes):
+            raise TypeError(f"attachment {path!r} is {type(data).__name__}; give bytes")

@@ -1,6 +1,7 @@
-"""Environments in worker processes, for threads of this process: a pipe each, several per process.
+"""A pool of environments in worker processes, for agents in threads of this process.
 
-:mod:`er_gym.rollout.worker_pool` plays whole episodes in other processes. Here the agent stays in
+Each environment has a pipe of its own, and a process holds several environments. Unlike
+:mod:`er_gym.rollout.worker_pool`, which plays whole episodes in other processes, the agent stays in
 this process, because it mostly waits for a server's reply. Only the engine, which needs a core and
 memory, runs elsewhere.
 """
@@ -23,19 +24,19 @@ from er_gym.rollout.processes import CONTEXT, end_processes, start_process
 from er_gym.rollout.worker_pool import WorkerSetupError
 
 _PROTOCOL = 5
-"""Pickle's: takes half as long for pictures as what ``Connection.send`` uses."""
-_NOBODY = -1
-DEADLINE = 600.0
-"""Seconds after which an environment that has not answered is taken for stuck."""
+"""Pickle's protocol. For pictures it is twice as fast as that of ``Connection.send``."""
+_NO_SLOT = -1
+DEADLINE_SECONDS = 600.0
+"""Seconds after which an environment that has not answered counts as stuck."""
 
 
 class EnvLost(Exception):
-    """The process that an environment was in is gone; :meth:`EnvPool.env` gives another.
+    """The worker process of an environment is gone; :meth:`EnvPool.env` gives another environment.
 
     Attributes:
-        exitcode: of the process; minus the signal's number if a signal ended it.
-        at_fault: whether it died while it was at work on this environment, or on none at all: a
-            neighbour of one that kills its process is not to blame.
+        exitcode: the exit code of the process; minus the signal's number if a signal ended it.
+        at_fault: whether this environment may have killed the process: the process died while it
+            worked on this environment, or on none. It is False for the neighbours of the culprit.
     """
 
     def __init__(self, exitcode: int | None, at_fault: bool) -> None:
@@ -47,28 +48,32 @@ class EnvLost(Exception):
 class EnvPool:
     """``slots`` environments in ``workers`` spawned processes; use it in a ``with`` statement.
 
-    Slot ``i`` is in process ``i % workers``. A process that dies is started anew when one of its
-    slots is next asked for. Processes ignore Ctrl-C, and end when this process does, however it
-    ends.
+    Slot ``i`` is in process ``i % workers``. A process that has died is started again when one of
+    its slots is next used. Processes ignore Ctrl-C. They end when this process ends, in any way.
 
     Args:
-        workers: how many processes, at least 1; no more are started than there are slots.
-        slots: how many environments.
+        workers: the number of processes, at least 1; at most one for each slot is started.
+        slots: the number of environments.
         env: the keyword arguments of :class:`~er_gym.envs.embodied_env.EmbodiedEnv`.
-        deadline: seconds; a process that leaves a question unanswered for so long is killed.
+        deadline: seconds; a process that leaves a request unanswered for longer is killed.
 
     Attributes:
-        closed: whether it has been left, and the processes have ended or are about to.
+        closed: whether the ``with`` statement has ended, so that the processes end or have ended.
     """
 
     def __init__(
-        self, workers: int, slots: int, env: Mapping[str, Any], *, deadline: float = DEADLINE
+        self,
+        workers: int,
+        slots: int,
+        env: Mapping[str, Any],
+        *,
+        deadline: float = DEADLINE_SECONDS,
     ) -> None:
         self.deadline = deadline
         self.closed = False
         self._workers, self._slots = min(workers, slots), slots
         self._kwargs = dict(env)
-        self._lock = threading.Lock()  # starting and burying processes
+        self._lock = threading.Lock()  # guards starting and ending processes
         self._team: list[_Worker] = []
 
     def __enter__(self) -> EnvPool:
@@ -89,11 +94,11 @@ class EnvPool:
         self._close()
 
     def env(self, slot: int) -> RemoteEnv:
-        """The environment of a slot, to be used by one thread; made if it is not there.
+        """The environment of a slot, for one thread; it is made if the slot has none.
 
         Raises:
-            WorkerSetupError: it cannot be made.
-            EnvLost: the process died of making it, or all has been closed.
+            WorkerSetupError: the environment cannot be made.
+            EnvLost: the process died while making it, or the pool is closed.
         """
         place = slot % self._workers
         with self._lock:
@@ -113,13 +118,13 @@ class EnvPool:
     def _start(self, place: int) -> _Worker:
         return _Worker(range(place, self._slots, self._workers), self._kwargs)
 
-    def _bury(self, worker: _Worker, slot: int, stuck: bool) -> EnvLost:
-        """End a process that is of no use any more, and say what its end was."""
+    def _end(self, worker: _Worker, slot: int, stuck: bool) -> EnvLost:
+        """End a dead or stuck process, and return the exception for its environment."""
         with self._lock:
             if stuck:
                 worker.process.kill()
             end_processes([worker.process])
-        at_fault = worker.serving.value in (slot, _NOBODY)
+        at_fault = worker.serving.value in (slot, _NO_SLOT)
         return EnvLost(worker.process.exitcode, at_fault)
 
     def _close(self) -> None:
@@ -132,27 +137,27 @@ class EnvPool:
 
 
 class RemoteEnv:
-    """What is needed of an environment to play an episode; the environment is elsewhere.
+    """An environment in a worker process, with the methods that an episode needs.
 
-    What it raises is raised here too, as from there.
+    An exception in the worker process is raised here again, with its file and line.
 
     Attributes:
-        lost: what ended it, None while it can be used.
+        lost: the exception that ended the environment, None while it can be used.
 
     Raises:
-        EnvLost: its process died or got stuck; at any method but ``close``.
+        EnvLost: the process died or got stuck; from any method but ``close``.
     """
 
-    def __init__(self, engines: EnvPool, worker: _Worker, slot: int) -> None:
+    def __init__(self, pool: EnvPool, worker: _Worker, slot: int) -> None:
         self.lost: EnvLost | None = None
-        self._engines, self._worker, self._slot = engines, worker, slot
+        self._pool, self._worker, self._slot = pool, worker, slot
         self._pipe = worker.pipes[slot]
         self._task: Any = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin the episode that ``options["task"]`` states."""
+        """Begin an episode of ``options["task"]``."""
         if options is None:
             raise ValueError("no task is given; state one: options={'task': TASK}")
         self._task = options["task"]
@@ -172,17 +177,17 @@ class RemoteEnv:
             self._ask("close")
 
     def _ask(self, method: str, *args: Any) -> Any:
-        question = pickle.dumps((method, args), _PROTOCOL)
-        stuck, told = False, b""
+        request = pickle.dumps((method, args), _PROTOCOL)
+        stuck, answer_bytes = False, b""
         with contextlib.suppress(EOFError, OSError):  # the process is gone
-            self._pipe.send_bytes(question)
-            stuck = not self._pipe.poll(self._engines.deadline)
+            self._pipe.send_bytes(request)
+            stuck = not self._pipe.poll(self._pool.deadline)
             if not stuck:
-                told = self._pipe.recv_bytes()
-        if not told:
-            self.lost = self._engines._bury(self._worker, self._slot, stuck)
+                answer_bytes = self._pipe.recv_bytes()
+        if not answer_bytes:
+            self.lost = self._pool._end(self._worker, self._slot, stuck)
             raise self.lost
-        answer = pickle.loads(told)
+        answer = pickle.loads(answer_bytes)
         if isinstance(answer, _Raised):
             answer.again()
         return answer
@@ -192,15 +197,15 @@ class _Worker:
     """A process, and the pipes to it.
 
     Attributes:
-        pipes: by slot.
-        serving: the slot that the process is at work on now, :data:`_NOBODY` for none; in memory
-            that outlives it.
+        pipes: the pipes by slot.
+        serving: the slot that the process works on now, :data:`_NO_SLOT` for none. It is in shared
+            memory, which outlives the process.
     """
 
     def __init__(self, slots: Sequence[int], env: Mapping[str, Any]) -> None:
         pairs = {slot: CONTEXT.Pipe() for slot in slots}
         self.pipes = {slot: ours for slot, (ours, _) in pairs.items()}
-        self.serving = CONTEXT.RawValue("i", _NOBODY)
+        self.serving = CONTEXT.RawValue("i", _NO_SLOT)
         theirs = {slot: pipe for slot, (_, pipe) in pairs.items()}
         self.process = start_process(_serve, theirs, env, self.serving)
         # With our copies closed, the pipes end when the process does.
@@ -213,7 +218,7 @@ class _Worker:
 
 @dataclass(frozen=True)
 class _Raised:
-    """What was raised over there, and where."""
+    """An exception of the worker process, with the file and line that raised it."""
 
     error: Exception
     file: str
@@ -224,18 +229,18 @@ class _Raised:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         try:
             pickle.loads(pickle.dumps(error, _PROTOCOL))
-        except Exception:  # anything may be in an exception, and its class may take any arguments
+        except Exception:  # an exception may hold anything, and its class may take any arguments
             error = RuntimeError(f"{type(error).__name__}: {error}")
         return cls(error, frame.filename, frame.lineno or 1)
 
     def again(self) -> None:
-        """Raise it here, with a traceback that ends where it was raised."""
+        """Raise the exception here, with a traceback that ends at its origin."""
         there = compile("\n" * (self.line - 1) + "raise error", self.file, "exec")
         exec(there, {"error": self.error})
 
 
-class _Seat:
-    """A slot's environment, if there is one."""
+class _SlotEnv:
+    """The environment of a slot, if it has been made."""
 
     def __init__(self, env: Mapping[str, Any]) -> None:
         self._kwargs = env
@@ -265,36 +270,36 @@ class _Seat:
 
 
 def _without_task(info: dict[str, Any]) -> dict[str, Any]:
-    """The caller has it."""
+    """``info`` without its task, which the caller has already."""
     return {name: value for name, value in info.items() if name != "task"}
 
 
 def _serve(pipes: Mapping[int, Connection], env: Mapping[str, Any], serving: Any) -> None:
-    """The worker process: one question after the other, until no pipe has another end."""
-    seats = {slot: _Seat(env) for slot in pipes}
-    there = dict(pipes)
+    """Run the worker process: answer requests until the other ends of all pipes are closed."""
+    slot_envs = {slot: _SlotEnv(env) for slot in pipes}
+    open_pipes = dict(pipes)
     try:
-        while there:
-            ready = wait(list(there.values()))
-            for slot, pipe in list(there.items()):
+        while open_pipes:
+            ready = wait(list(open_pipes.values()))
+            for slot, pipe in list(open_pipes.items()):
                 if pipe not in ready:
                     continue
                 try:
-                    question = pipe.recv_bytes()
+                    request = pipe.recv_bytes()
                     serving.value = slot
-                    pipe.send_bytes(_answer(seats[slot], question))
+                    pipe.send_bytes(_answer(slot_envs[slot], request))
                 except (EOFError, OSError):
-                    del there[slot]
-                serving.value = _NOBODY
+                    del open_pipes[slot]
+                serving.value = _NO_SLOT
     finally:
-        for seat in seats.values():
+        for slot_env in slot_envs.values():
             with contextlib.suppress(Exception):
-                seat.close()
+                slot_env.close()
 
 
-def _answer(seat: _Seat, question: bytes) -> bytes:
+def _answer(slot_env: _SlotEnv, request: bytes) -> bytes:
     try:
-        method, args = pickle.loads(question)
-        return pickle.dumps(getattr(seat, method)(*args), _PROTOCOL)
-    except Exception as error:  # whatever it is, the one who asked must hear of it
+        method, args = pickle.loads(request)
+        return pickle.dumps(getattr(slot_env, method)(*args), _PROTOCOL)
+    except Exception as error:  # the caller raises it
         return pickle.dumps(_Raised.caught(error), _PROTOCOL)

@@ -1,9 +1,12 @@
-"""The event stream of a run: what happens, as it happens, one JSON line each.
+"""The event stream of a run: one JSON line for each event, in the order of writing.
 
-``events.jsonl`` in a run directory only grows. Every process that plays appends to it, a line per
-write, so lines never mix and a killed process leaves at most one broken line, which readers skip.
-Progress bars, trainers and viewers read it; results are read from the episodes' records, never from
-here. Times are seconds since the epoch (UTC).
+``events.jsonl`` in a run directory only grows. Every process that plays appends whole lines to it,
+so the lines of processes do not mix. A killed process leaves at most one broken line, which readers
+skip. Progress bars, trainers and viewers read the stream. Results come from the episodes' records,
+never from the stream. Times are seconds since the epoch (UTC).
+
+The events of an episode name its task. If a worker process dies, its episode begins again: a second
+``episode_begun`` of a task makes the events of its first course void.
 
 A change that an older reader would misread takes a new ``format`` in ``run_begun``.
 """
@@ -11,6 +14,7 @@ A change that an older reader would misread takes a new ``format`` in ``run_begu
 from __future__ import annotations
 
 import contextlib
+import json
 import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -22,6 +26,7 @@ from er_gym.rollout.json_lines import JsonLines
 
 EVENTS = "events.jsonl"
 """The file's name in a run directory."""
+_FORMAT = b"er-gym/events/1"
 
 
 class _Event(BaseModel):
@@ -34,8 +39,11 @@ class RunBegun(_Event):
     """A run starts or continues.
 
     Attributes:
-        tasks: how many episodes it is to have in all.
-        done: how many of them were there before.
+        format: the version of the stream's layout.
+        suite: the suite's name.
+        agent: the agent's spec.
+        tasks: the number of episodes that the run is to have.
+        done: the number of these that an earlier start finished.
     """
 
     kind: Literal["run_begun"] = "run_begun"
@@ -47,7 +55,11 @@ class RunBegun(_Event):
 
 
 class EpisodeBegun(_Event):
-    """An agent has been placed in a scene and told its task."""
+    """The agent has been placed in a scene and told its task.
+
+    Attributes:
+        max_steps: the step limit; placing the agent counts as the first step.
+    """
 
     kind: Literal["episode_begun"] = "episode_begun"
     task_id: str
@@ -61,10 +73,11 @@ class Reply(_Event):
     """A model has answered.
 
     Attributes:
-        step: number of the step that the reply decided, counting from 1.
-        seconds: how long the answer took.
-        cost: in US dollars; 0 where no price is known.
-        cached: whether an earlier request paid for it.
+        step: the number of the step that the reply decided, from 1.
+        seconds: how long the reply took.
+        prompt_tokens, completion_tokens: as the server counted them, or upper bounds.
+        cost: US dollars; 0 if no price is known.
+        cached: whether the reply came from the cache, so that an earlier request paid for it.
     """
 
     kind: Literal["reply"] = "reply"
@@ -79,11 +92,15 @@ class Reply(_Event):
 
 
 class StepDone(_Event):
-    """A step has been taken.
+    """The agent has taken a step.
 
     Attributes:
-        step: its number, counting from 1; placing the agent is 0 and no event.
-        verb: canonical; ``error`` for a reply that named no known action.
+        step: the number of the step, from 1. Placing the agent is step 0 and has no event.
+        verb: the canonical verb; ``error`` for a reply that named no known action.
+        object_type: the object type that the agent named.
+        success: whether the action was legal and the simulator did it.
+        reward: what the step earned.
+        thought: the agent's reasoning.
     """
 
     kind: Literal["step"] = "step"
@@ -100,9 +117,12 @@ class EpisodeEnded(_Event):
     """An episode is over and its record is in the run directory.
 
     Attributes:
-        success: what the environment said; scores are computed from the record.
-        steps: how many were taken.
-        error: what it crashed with, in one line; ``""`` if it did not.
+        success: the environment's verdict; scores are computed from the record.
+        end_reason: why the episode ended, in the environment's words; ``""`` if it crashed.
+        total_reward: the sum over the steps.
+        steps: the number of steps that the agent took.
+        seconds: wall-clock time.
+        error: the error it crashed with, in one line; ``""`` if it did not crash.
     """
 
     kind: Literal["episode_ended"] = "episode_ended"
@@ -120,7 +140,9 @@ class Cost(_Event):
     """What the run has cost so far, continued runs included.
 
     Attributes:
-        cost: in US dollars.
+        requests: the number of replies.
+        tokens: the sum of prompt and completion tokens.
+        cost: US dollars.
         estimated: whether some of it is an upper bound.
     """
 
@@ -137,11 +159,11 @@ class Cost(_Event):
 
 
 class RunEnded(_Event):
-    """A run has played all it was asked to, or stopped; a killed run has no such event.
+    """A run has played all its tasks, or has stopped. A killed run has no such event.
 
     Attributes:
-        played, crashed: episodes of this start of the run.
-        stopped: why it stopped early; ``""`` if it did not.
+        played, crashed: the number of episodes since this ``run_begun``.
+        stopped: why the run stopped early; ``""`` if it did not.
     """
 
     kind: Literal["run_ended"] = "run_ended"
@@ -151,35 +173,35 @@ class RunEnded(_Event):
 
 
 Event: TypeAlias = RunBegun | EpisodeBegun | Reply | StepDone | EpisodeEnded | Cost | RunEnded
-Emit: TypeAlias = Callable[[Event], None]
-"""Whoever wants to hear of events."""
+EventListener: TypeAlias = Callable[[Event], None]
+"""Is called with each event."""
 _ANY: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="kind")])
 
 
-def nobody(event: Event) -> None:
-    """Listen to nothing."""
+def ignore_event(event: Event) -> None:
+    """The listener that does nothing."""
 
 
 class EventLog:
-    """Appends events to the stream of a run directory, and tells listeners in this process.
+    """Appends events to the stream of a run directory, and calls listeners.
 
     Args:
-        directory: of the run.
-        listeners: called with each event that this object is given, in its thread.
+        directory: the run directory.
+        listeners: called with each event that this log is given, in the thread that gives it.
 
     Raises:
         ValueError: the file is a link or no regular file.
-        OSError: it cannot be written.
+        OSError: the file cannot be opened.
     """
 
-    def __init__(self, directory: Path, listeners: Iterable[Emit] = ()) -> None:
+    def __init__(self, directory: Path, listeners: Iterable[EventListener] = ()) -> None:
         self._lines = JsonLines(directory / EVENTS)
         self._listeners = tuple(listeners)
 
     def __call__(self, event: Event) -> None:
-        """Append an event, and tell the listeners.
+        """Append an event, and call the listeners.
 
-        A full disk ends a run where a result is lost by it, not here.
+        A failure to write the event is ignored: only a lost result may end a run.
         """
         with contextlib.suppress(OSError):
             self._lines.add(event.model_dump_json())
@@ -192,7 +214,7 @@ class EventLog:
 
 
 def read_events(directory: Path) -> Iterator[Event]:
-    """All events of a run so far, oldest first; lines that are no event are skipped."""
+    """All events of a run so far, oldest first; see :func:`parse_events`."""
     try:
         data = (directory / EVENTS).read_bytes()
     except FileNotFoundError:
@@ -201,12 +223,33 @@ def read_events(directory: Path) -> Iterator[Event]:
 
 
 def parse_events(lines: Iterable[bytes]) -> Iterator[Event]:
-    """Events from the lines of a stream; those that are no event are skipped.
+    """The events in the lines of a stream.
 
-    A killed process leaves half a line, and a later version may write kinds unknown here.
+    Lines that are no event are skipped: a killed process leaves half a line, and a later version
+    may write kinds of events unknown here.
+
+    Raises:
+        ValueError: a run has begun in another format, so its events might be misread.
     """
     for line in lines:
         try:
-            yield _ANY.validate_json(line)
+            event = _ANY.validate_json(line)
         except ValidationError:
+            if _FORMAT not in line and (other := _other_format(line)):
+                raise ValueError(
+                    f"the event stream has the format {other!r}, not {_FORMAT.decode()!r}; read it "
+                    "with the version of er-gym that wrote it"
+                ) from None
             continue
+        yield event
+
+
+def _other_format(line: bytes) -> str:
+    """The format that a ``run_begun`` of another version states, ``""`` for any other line."""
+    try:
+        event = json.loads(line)
+    except ValueError:
+        return ""
+    if not isinstance(event, dict) or event.get("kind") != "run_begun":
+        return ""
+    return str(event.get("format", ""))

@@ -1,4 +1,4 @@
-"""What every way of executing a run shares: a played episode, and who takes it."""
+"""What all executors share: the played episode, who takes it, and how much runs at once."""
 
 from __future__ import annotations
 
@@ -6,23 +6,30 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from er_gym.rollout.agent import Agent, Attachments, LeavesAttachments, MakeAgent
-from er_gym.rollout.play import episode_seed
+from er_gym.rollout.agent import (
+    Agent,
+    Attachments,
+    CannotGoOn,
+    LeavesAttachments,
+    MakeAgent,
+    check_attachments,
+)
+from er_gym.rollout.play import episode_seed, one_line
 from er_gym.rollout.records import EpisodeRecord, record_episode
 from er_gym.rollout.run_directory import Manifest, RunDirectory
-from er_gym.rollout.worker_pool import Lost
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.task import Task
 from er_gym.writing import file_stem
 
 
 @dataclass(frozen=True)
-class Played:
+class PlayedEpisode:
     """An episode that is over or has crashed.
 
     Attributes:
-        record: of it.
-        attachments: the files that its agent leaves.
-        folders: the folders of the run directory that these go to.
+        record: the episode's record.
+        attachments: the files that the agent leaves, bytes by path in the run directory.
+        folders: the folders of the run directory that the files go to.
     """
 
     record: EpisodeRecord
@@ -30,38 +37,67 @@ class Played:
     folders: Sequence[str] = ()
 
     @classmethod
-    def by(cls, agent: Agent | None, record: EpisodeRecord) -> Played:
-        """An episode with the files that its agent leaves; None if it could not be made."""
+    def by(cls, agent: Agent | None, record: EpisodeRecord) -> PlayedEpisode:
+        """The episode with the files that its agent leaves.
+
+        If the agent fails to hand over its files, or names a path outside its folders, the episode
+        counts as crashed: its record says so, and the next run plays it again.
+
+        Args:
+            agent: None if it could not be made.
+            record: the episode's record.
+        """
         if not isinstance(agent, LeavesAttachments):
             return cls(record)
-        files = agent.attachments(record, file_stem(record.task_id))
-        return cls(record, files, agent.attachment_folders)
+        stem = file_stem(record.task_id)
+        try:
+            folders = tuple(agent.attachment_folders)
+            files = dict(agent.attachments(record, stem))
+            check_attachments(files, folders, stem)
+        except CannotGoOn:
+            raise
+        except Exception as error:  # agents are anybody's code; one must not end the run
+            problem = record.error or one_line(error)
+            crashed = {"success": False, "end_reason": "", "error": problem}
+            return cls(record.model_copy(update=crashed))
+        return cls(record, files, folders)
 
 
-class Sink(Protocol):
-    """Takes episodes, in the thread that called the executor."""
+class EpisodeSink(Protocol):
+    """Takes episodes. The executor calls it in the thread that called the executor."""
 
-    def save(self, played: Played) -> None:
-        """Put an episode into the run directory; doing it twice does no harm."""
+    def save(self, played: PlayedEpisode) -> None:
+        """Write an episode into the run directory. Saving it twice does no harm."""
 
-    def ended(self, played: Played) -> None:
-        """Count an episode that has been saved, and tell whoever listens."""
+    def ended(self, played: PlayedEpisode) -> None:
+        """Count an episode that has been saved, and tell the listeners."""
 
 
 @dataclass(frozen=True)
-class Size:
-    """How much is done at once.
+class Parallelism:
+    """How much runs at once.
 
     Attributes:
-        workers: how many processes.
-        concurrency: how many episodes at once, for executors that play several in a process.
-        deadline: seconds that a step of an environment in another process may take, with the wait
-            for others in that process; the process is killed then.
+        workers: the number of worker processes, at least 1.
+        concurrency: the number of episodes at once, at least 1, for executors that play several
+            episodes in one process.
+        deadline: seconds within which an environment in another process must answer. The time
+            includes the wait for its neighbours in that process. The process is killed after it.
+
+    Raises:
+        ValueError: a number is out of its range.
     """
 
     workers: int = 1
     concurrency: int = 8
     deadline: float = 600.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("workers", self.workers), ("concurrency", self.concurrency)):
+            if value < 1:
+                raise ValueError(f"{name} is {value}; give a whole number from 1")
+        if not self.deadline > 0:
+            raise ValueError(f"deadline is {self.deadline}; give seconds above 0")
 
 
 class Executor(Protocol):
@@ -72,19 +108,21 @@ class Executor(Protocol):
         directory: RunDirectory,
         tasks: Sequence[Task],
         make_agent: MakeAgent,
-        sink: Sink,
-        size: Size,
+        sink: EpisodeSink,
+        parallelism: Parallelism,
     ) -> None:
-        """Play every task and hand each episode to ``sink``, saved before the next is looked at.
+        """Play every task, and hand each episode to ``sink`` before looking at the next.
 
         Raises:
             CannotGoOn: an agent said that no further episode can be played.
             WorkerSetupError: the environment cannot be made.
-            KeyboardInterrupt: Ctrl-C; what is over has been saved, and no process is left.
+            ValueError: the executor cannot use ``make_agent``.
+            KeyboardInterrupt: Ctrl-C. The episodes handed over so far are saved, and no process is
+                left.
         """
 
 
-def unbegun_episode(task: Task, manifest: Manifest, error: str) -> EpisodeRecord:
+def unbegun_episode(task: Task, manifest: LostJob, error: str) -> EpisodeRecord:
     """The record of an episode that crashed before its environment could tell the step limit."""
     return record_episode(
         task,
@@ -95,7 +133,7 @@ def unbegun_episode(task: Task, manifest: Manifest, error: str) -> EpisodeRecord
     )
 
 
-def lost_episode(task: Task, lost: Lost, manifest: Manifest) -> EpisodeRecord:
+def lost_episode(task: Task, lost: LostJob, manifest: Manifest) -> EpisodeRecord:
     """The record of an episode whose worker died every time."""
     error = f"the worker process died {lost.tries} times, last with exit code {lost.exitcode}"
     return unbegun_episode(task, manifest, error)

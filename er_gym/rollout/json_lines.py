@@ -1,4 +1,4 @@
-"""Files of JSON lines that only grow, written to by several threads and processes."""
+"""Append-only files of JSON lines, which several threads and processes write at once."""
 
 from __future__ import annotations
 
@@ -12,20 +12,22 @@ _CLOSED = -1
 
 
 class JsonLines:
-    """A file of lines; it and its directory are made.
+    """An append-only file of lines. The file and its directory are made if they are missing.
 
     Args:
-        path: of the file.
+        path: the file.
 
     Raises:
-        ValueError: it is a link, or no regular file: what it leads to is not ours to write to.
-        OSError: it cannot be written.
+        ValueError: the path is a link, or no regular file. er-gym does not write to what may be
+            somebody else's.
+        OSError: the file cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._lock = threading.Lock()
         self._read_to = 0
+        self._half_written = False
         path.parent.mkdir(parents=True, exist_ok=True)
         flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
         try:
@@ -39,18 +41,24 @@ class JsonLines:
             os.close(self._file)
             raise _not_ours(path)
         if state.st_size and os.pread(self._file, 1, state.st_size - 1) != b"\n":
-            os.write(self._file, b"\n")  # ends what a killed process left half-written
+            os.write(self._file, b"\n")  # end the line that a killed process left half-written
 
     def add(self, line: str) -> None:
-        """Write a line; OSError if it cannot be written, or the file is closed."""
-        # One write of a whole line to the end of the file: lines of processes do not mix.
+        """Append a line.
+
+        Raises:
+            OSError: the line cannot be written, or the file is closed.
+        """
+        # One write appends a whole line, so lines of different processes do not mix.
         with self._lock:
-            data = line.encode() + b"\n"
-            if os.write(self._file, data) != len(data):
+            data = b"\n" * self._half_written + line.encode() + b"\n"
+            written = os.write(self._file, data)
+            self._half_written = written != len(data)
+            if self._half_written:  # the disk is full; the next line begins on a line of its own
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
 
     def new(self) -> list[bytes]:
-        """The lines that have been added since the last call, whoever added them."""
+        """The whole lines that any process has added since the last call; all at the first."""
         with self._lock:
             if self._file == _CLOSED:
                 return []

@@ -1,4 +1,4 @@
-"""The one loop in which an agent acts in an environment."""
+"""The loop in which an agent acts in an environment."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from er_gym.rollout.agent import Agent, Decision
 
 
 class Steppable(Protocol):
-    """What the loop asks of an environment."""
+    """What the loop needs of an environment."""
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Do an action, as ``gymnasium.Env.step``."""
@@ -48,11 +48,11 @@ def transitions(
     """Let an agent act until the episode is over.
 
     Args:
-        env: has been reset.
-        agent: has been reset.
+        env: an environment that has been reset.
+        agent: an agent that has been reset.
         obs, info: what ``env.reset`` returned.
-        seen: the key of ``info`` that holds the agent's observation, where that is not the
-            environment's: a scripted teacher reads text while a learner's arrays are recorded.
+        seen: a key of ``info``; the agent gets ``info[seen]`` in place of the observation. A
+            scripted teacher thus reads text while the learner's arrays are recorded.
     """
     over = False
     while not over:

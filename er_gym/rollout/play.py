@@ -1,4 +1,4 @@
-"""Play one episode and write down what happened."""
+"""Play one episode and record what happened."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 from er_gym.rollout.agent import Agent, CannotGoOn, Decision
-from er_gym.rollout.events import Emit, EpisodeBegun, Reply, StepDone, nobody
+from er_gym.rollout.events import EpisodeBegun, EventListener, Reply, StepDone, ignore_event
 from er_gym.rollout.loop import transitions
 from er_gym.rollout.records import ERROR, EpisodeRecord, StepRecord, record_episode
 from er_gym.tasks.task import Task
@@ -17,7 +17,7 @@ from er_gym.tasks.verbs import END, INIT
 
 
 class Playable(Protocol):
-    """What is asked of an environment: an ``EmbodiedEnv``, here or in another process."""
+    """What :func:`play_episode` needs; an ``EmbodiedEnv`` has it, and so has a ``RemoteEnv``."""
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -31,7 +31,7 @@ class Playable(Protocol):
 def episode_seed(seed: int, task_id: str) -> int:
     """The seed of one episode, in [0, 2**31), from the run's seed and the task's id.
 
-    The same in every process and on every machine, and whatever else the run plays.
+    The seed is the same in every process and on every machine, whatever else the run plays.
     """
     return int.from_bytes(hashlib.sha256(f"{seed}/{task_id}".encode()).digest()[:4], "big") >> 1
 
@@ -44,27 +44,27 @@ def play_episode(
     *,
     agent_name: str = "",
     max_steps: int | None = None,
-    emit: Emit = nobody,
+    emit: EventListener = ignore_event,
 ) -> EpisodeRecord:
     """Play ``task`` from ``reset`` to its end.
 
-    An exception in the agent or the environment does not leave this function: the record holds the
-    steps until then and, in ``error``, what happened where. The environment should not be used
-    again after that.
+    An exception in the agent or the environment does not leave this function. The record then holds
+    the steps before it, and its ``error`` says what was raised and where. Do not use the
+    environment again after that.
 
     Args:
-        env: any scene and task; it is reset to this one.
-        agent: it is reset too.
+        env: an environment in any state; it is reset to the task.
+        agent: an agent in any state; it is reset to the task.
         task: what to play.
         seed: passed to ``env.reset``.
         agent_name: how the record names the agent; its class name by default.
-        max_steps: the step limit for the record of an episode whose ``reset`` crashes; the task's
-            own by default. Of an episode that begins, ``info["max_steps"]`` is recorded.
+        max_steps: the step limit for the record of an episode that crashes in ``env.reset``; the
+            task's own by default. An episode that begins records ``info["max_steps"]``.
         emit: called with the beginning of the episode, each reply of a model, and each step.
 
     Raises:
-        CannotGoOn: the agent says that no further episode can be played; there is no record of
-            this one.
+        CannotGoOn: the agent says that no further episode can be played. This episode has no
+            record.
     """
     steps: list[StepRecord] = []
     info: Mapping[str, Any] = {}
@@ -100,10 +100,15 @@ def play_episode(
 
 
 def one_line(error: BaseException) -> str:
-    """What was raised, its message and where it was raised, in one line."""
-    text = " ".join(traceback.format_exception_only(error)[-1].split())
+    """The type of an exception, its message, and the file and line that raised it, in one line."""
+    text = _encodable(" ".join(traceback.format_exception_only(error)[-1].split()))
     frames = traceback.extract_tb(error.__traceback__)
     return f"{text} ({frames[-1].filename}:{frames[-1].lineno})" if frames else text
+
+
+def _encodable(text: str) -> str:
+    """The text with lone surrogates escaped: models write them, and no UTF-8 file holds them."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _begun(task: Task, max_steps: int) -> EpisodeBegun:
@@ -116,7 +121,9 @@ def _begun(task: Task, max_steps: int) -> EpisodeBegun:
     )
 
 
-def _emit_step(emit: Emit, task_id: str, number: int, decision: Decision, step: StepRecord) -> None:
+def _emit_step(
+    emit: EventListener, task_id: str, number: int, decision: Decision, step: StepRecord
+) -> None:
     if decision.reply is not None:
         emit(Reply(task_id=task_id, step=number, **vars(decision.reply)))
     emit(
@@ -143,7 +150,7 @@ def _placed(info: Mapping[str, Any]) -> StepRecord:
 
 
 def _appended(last: StepRecord) -> StepRecord:
-    """The ``end`` that the protocol appends; what it earned is in the last step's reward."""
+    """The ``end`` that the protocol appends. The last step's reward includes what it earned."""
     return StepRecord(
         verb=END,
         success=True,
@@ -160,10 +167,10 @@ def _stepped(info: Mapping[str, Any], reward: float, thought: str) -> StepRecord
         object_type="" if action is None else action.object_type,
         object_id=info["object_id"],
         success=bool(info["action_success"]) and action is not None,
-        feedback=info["feedback"],
+        feedback=_encodable(info["feedback"]),
         navigable=list(info["navigable"]),
         interactable=list(info["interactable"]),
         reward=reward,
-        thought=thought,
-        text=info["action_text"],
+        thought=_encodable(thought),
+        text=_encodable(info["action_text"]),
     )

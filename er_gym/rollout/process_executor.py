@@ -1,7 +1,8 @@
-"""Play whole episodes in worker processes: for agents that compute."""
+"""The executor for agents that compute: whole episodes in worker processes."""
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -11,10 +12,16 @@ from pathlib import Path
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
 from er_gym.rollout.events import EventLog
-from er_gym.rollout.executor import Played, Sink, Size, lost_episode, unbegun_episode
+from er_gym.rollout.executor import (
+    EpisodeSink,
+    Parallelism,
+    PlayedEpisode,
+    lost_episode,
+    unbegun_episode,
+)
 from er_gym.rollout.play import episode_seed, one_line, play_episode
 from er_gym.rollout.run_directory import Manifest, RunDirectory
-from er_gym.rollout.worker_pool import Lost, do_jobs
+from er_gym.rollout.worker_pool import LostJob, run_jobs
 from er_gym.tasks.task import Task
 
 
@@ -22,39 +29,51 @@ def play_in_processes(
     directory: RunDirectory,
     tasks: Sequence[Task],
     make_agent: MakeAgent,
-    sink: Sink,
-    size: Size,
+    sink: EpisodeSink,
+    parallelism: Parallelism,
 ) -> None:
-    """Play each task in one of ``size.workers`` processes; see :class:`.executor.Executor`."""
+    """Play each task in one of ``parallelism.workers`` processes. See :class:`.Executor`."""
     manifest = directory.manifest
+    _check_picklable(make_agent)
     worker = partial(EpisodeWorker, make_agent, manifest, directory.path)
-    with closing(do_jobs(worker, tasks, workers=size.workers)) as results:
+    with closing(run_jobs(worker, tasks, workers=parallelism.workers)) as results:
         for task, result in results:
             if isinstance(result, _Stop):
                 raise CannotGoOn(result.message)
-            lost = isinstance(result, Lost)
-            played = Played(lost_episode(task, result, manifest)) if lost else result
+            lost = isinstance(result, LostJob)
+            played = PlayedEpisode(lost_episode(task, result, manifest)) if lost else result
             sink.save(played)
             sink.ended(played)
 
 
+def _check_picklable(make_agent: MakeAgent) -> None:
+    """Raise ValueError if worker processes cannot be sent what makes agents."""
+    try:
+        pickle.dumps(make_agent)
+    except Exception as error:  # pickle raises PicklingError, AttributeError, TypeError and others
+        raise ValueError(
+            f"make_agent cannot be sent to worker processes ({type(error).__name__}: {error}); "
+            "give a function or a frozen dataclass at the top of a module, or executor='threads'"
+        ) from error
+
+
 @dataclass(frozen=True)
 class _Stop:
-    """In place of an episode: its agent cannot go on."""
+    """A worker returns it in place of an episode whose agent raised CannotGoOn."""
 
     message: str
 
 
 class EpisodeWorker:
-    """Plays one episode after another in one environment, made anew only after a crash.
+    """Plays one episode after another in one environment, which it makes anew after a crash.
 
-    The agent is made for each episode, from the episode's seed, so that an episode's outcome does
+    It makes a new agent for each episode from the episode's seed. An episode's outcome thus does
     not depend on what this worker played before.
 
     Args:
-        make_agent: makes it.
+        make_agent: makes the agent of an episode.
         manifest: the run's.
-        directory: the run's, whose event stream is written to.
+        directory: the run directory; events are appended to its stream.
     """
 
     def __init__(self, make_agent: MakeAgent, manifest: Manifest, directory: Path) -> None:
@@ -66,7 +85,7 @@ class EpisodeWorker:
     def _make_env(self) -> EmbodiedEnv:
         return EmbodiedEnv((), **self._manifest.env)
 
-    def __call__(self, task: Task) -> Played | _Stop:
+    def __call__(self, task: Task) -> PlayedEpisode | _Stop:
         seed = episode_seed(self._manifest.seed, task.id)
         try:
             if self._env is None:
@@ -75,7 +94,7 @@ class EpisodeWorker:
         except CannotGoOn as stop:
             return _Stop(str(stop))
         except Exception as error:  # as in play_episode, one must not end the run
-            return Played(unbegun_episode(task, self._manifest, one_line(error)))
+            return PlayedEpisode(unbegun_episode(task, self._manifest, one_line(error)))
         try:
             record = play_episode(
                 self._env,
@@ -90,10 +109,10 @@ class EpisodeWorker:
             return _Stop(str(stop))
         if record.error:
             self._close_env()
-        return Played.by(agent, record)
+        return PlayedEpisode.by(agent, record)
 
     def _close_env(self) -> None:
-        """The next episode makes another."""
+        """Close the environment; the next episode makes another."""
         env, self._env = self._env, None
         if env is not None:
             env.close()

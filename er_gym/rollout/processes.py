@@ -1,6 +1,6 @@
-"""Worker processes: how they start, that they ignore Ctrl-C, and that none is left behind.
+"""Starts and ends worker processes: they ignore Ctrl-C, and none is left behind.
 
-Everything in er-gym that works in other processes starts them here: whole episodes
+All of er-gym starts its worker processes here: whole episodes
 (:mod:`er_gym.rollout.worker_pool`), environments for the threads of this process
 (:mod:`er_gym.rollout.env_pool`), and batches of environments for a learner
 (:mod:`agents.rl.vec_env`).
@@ -20,16 +20,16 @@ from multiprocessing.context import SpawnProcess
 from typing import Any, NoReturn
 
 CONTEXT = multiprocessing.get_context("spawn")
-"""Processes are spawned, not forked: a forked renderer or torch does not work."""
-GRACE = 5.0
-"""Seconds that a process has to end by itself before it is killed."""
+"""Processes are spawned, since a renderer or torch does not work in a forked process."""
+GRACE_SECONDS = 5.0
+"""Seconds within which a process must end by itself; then it is killed."""
 
 
 def start_process(target: Callable[..., None], *args: Any) -> SpawnProcess:
-    """Start a process that calls ``target(*args)``; both have to be picklable.
+    """Start a process that calls ``target(*args)``; both must be picklable.
 
     The process ignores Ctrl-C from its first instruction, exits cleanly on SIGTERM, and ends when
-    this process does, however this process ends.
+    this process ends, in any way.
     """
     process = CONTEXT.Process(target=_run, args=(target, args), daemon=True)
     with _interrupts_blocked():
@@ -37,8 +37,8 @@ def start_process(target: Callable[..., None], *args: Any) -> SpawnProcess:
     return process
 
 
-def end_processes(processes: Iterable[SpawnProcess], grace: float = GRACE) -> None:
-    """Wait for processes that have been told to end; kill those that have not after ``grace`` s."""
+def end_processes(processes: Iterable[SpawnProcess], grace: float = GRACE_SECONDS) -> None:
+    """Wait for processes that were told to end; kill those still alive after ``grace`` seconds."""
     deadline = time.monotonic() + grace
     for process in processes:
         process.join(max(0.0, deadline - time.monotonic()))
@@ -49,7 +49,7 @@ def end_processes(processes: Iterable[SpawnProcess], grace: float = GRACE) -> No
 
 @contextlib.contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Keep Ctrl-C from this thread and from a process that it starts meanwhile."""
+    """Block Ctrl-C in this thread and in the processes that it starts meanwhile."""
     is_main = threading.current_thread() is threading.main_thread()
     # Only the main thread may set handlers. Another thread blocks the signal instead; the process
     # it starts inherits the blocking, and ignores the signal before it unblocks anything.
@@ -77,10 +77,10 @@ def _exit_cleanly(signum: int, frame: object) -> NoReturn:
 
 
 def _follow_parent() -> None:
-    """End this process once its parent has ended: first cleanly, after the grace at once."""
+    """End this process once its parent has ended: cleanly, or by force after the grace period."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()
     os.kill(os.getpid(), signal.SIGTERM)
-    time.sleep(GRACE)
+    time.sleep(GRACE_SECONDS)
     os._exit(1)

@@ -1,7 +1,7 @@
-"""What is kept of an episode: enough to score it again later, without the environment.
+"""Records of episodes, which hold all that scoring needs without the environment.
 
-These are wire formats: one :class:`EpisodeRecord` is one JSON file. A change that an older reader
-would misread takes a new ``format``.
+The records are wire formats: one :class:`EpisodeRecord` is one JSON file. A change that an older
+reader would misread takes a new ``format``.
 """
 
 from __future__ import annotations
@@ -45,18 +45,18 @@ class KeyActionRecord(_Record):
 
 
 class StepRecord(_Record):
-    """One step, and what was possible after it.
+    """One step, and the types that were legal targets after it.
 
     Attributes:
         verb: canonical; ``init`` for the first step, in which the agent is placed; :data:`ERROR`
             for a reply that named no known action.
         object_type: as the agent named it.
-        object_id: the object that the name stood for, ``""`` if none.
+        object_id: the object that the name stood for, ``""`` for none.
         success: whether the action was legal and the simulator did it.
-        feedback: what the agent was told.
+        feedback: what the environment told the agent.
         navigable, interactable: object types that were legal targets after the step.
         reward: what the step earned.
-        thought: what the agent said to itself.
+        thought: the agent's reasoning.
         text: the action as the agent gave it.
         appended: whether the protocol took the step and not the agent: the ``end`` that the
             paper's runner appends (:data:`er_gym.envs.protocol.PAPER`).
@@ -82,20 +82,20 @@ class EpisodeRecord(_Record):
         format: the version of this layout.
         task_id, task_type, scene, instruction, name, key_actions: the task's; ``task_type`` is the
             paper's name for it and ``name`` the instruction before paraphrase.
-        max_steps: the episode's step limit, the first step being the placing of the agent.
+        max_steps: the episode's step limit; placing the agent counts as the first step.
         agent: the agent's spec.
         seed: the seed of this episode (not of the run).
         steps: from ``init`` to the last.
-        success: what the environment said at the end; scores are computed from the steps.
-        goal_unmet: what of the task's goal did not hold at ``end``, in words.
+        success: the environment's verdict; scores are computed from the steps.
+        goal_unmet: the conditions of the task's goal that did not hold at ``end``, in words.
         search_targets: the types that the task searches for, empty if it is no search; None in a
             record that was written before records had this field.
         end_reason: why it ended, in the environment's words; ``""`` if it crashed.
         total_reward: the sum over the steps.
         seconds: wall-clock time.
-        error: what it crashed with, in one line; ``""`` if it did not.
-        run: in a run directory, the digest of the manifest of its run; ``""`` elsewhere, and in
-            what was written before episodes told.
+        error: the error it crashed with, in one line; ``""`` if it did not crash.
+        run: in a run directory, the digest of the run's manifest; ``""`` elsewhere, and in records
+            written before this field existed.
     """
 
     format: Literal["er-gym/episode/1"] = "er-gym/episode/1"
@@ -142,7 +142,7 @@ def record_episode(
     seconds: float = 0.0,
     error: str = "",
 ) -> EpisodeRecord:
-    """Put a task and what happened in it into one record.
+    """The record of an episode of a task.
 
     ``max_steps=None`` stands for the task's own limit.
     """

@@ -8,11 +8,10 @@
     runs/x/conversations/<task id>.json  with a vision-language agent: what was said,
     runs/x/pictures/<task id>/           and the pictures that were shown
 
-An agent may leave other files beside the records: :class:`.agent.LeavesAttachments`. A file is
-written to a temporary file and moved to its name, so a file under its name is whole; what a killed
-run left half-written has another name and is never read. The same run continues where it was:
-:meth:`RunDirectory.read` tells what is there. One process at a time plays in a directory:
-:func:`claimed`.
+An agent may leave other files beside the records (:class:`.agent.LeavesAttachments`). A file is
+written under a temporary name and then moved, so each file is whole. Readers ignore the temporary
+files of a killed run. The same run continues where it stopped: :meth:`RunDirectory.read` returns
+the episodes it has. One process at a time plays in a directory (:func:`locked_run_directory`).
 """
 
 from __future__ import annotations
@@ -29,14 +28,14 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from er_gym.envs.protocol import DEFAULT
-from er_gym.locking import sole_user
+from er_gym.locking import exclusive_use
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.events import EVENTS
 from er_gym.rollout.play import episode_seed
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.errors import SetAsideTask, Substitution, TaskFileError
 from er_gym.tasks.reading import read_bytes, read_text
-from er_gym.writing import file_stem, make_folder, write_whole
+from er_gym.writing import file_stem, make_folder, write_atomic
 
 MANIFEST = "run.json"
 EPISODES = "episodes"
@@ -46,11 +45,11 @@ SPENDING = "spending.jsonl"
 REPLIES = "replies"
 SERVER_EVENTS = "server-events.jsonl"
 _KEPT = (EPISODES, CONVERSATIONS, PICTURES, SPENDING, SERVER_EVENTS, REPLIES, EVENTS)
-"""What a run directory holds beside its manifest."""
+"""The files and folders of a run directory beside its manifest."""
 
 
 class RunDirectoryError(ValueError):
-    """A directory that cannot be used as this run's; the message says why and what to do."""
+    """The directory cannot be used for this run; the message says why and what to do."""
 
 
 class Manifest(BaseModel):
@@ -98,12 +97,12 @@ class Manifest(BaseModel):
 
 
 @dataclass(frozen=True)
-class Unusable:
-    """A file among a run's episodes that is none of them.
+class UnusableFile:
+    """A file in the folder of episodes that is no episode of this run.
 
     Attributes:
-        path: of the file.
-        reason: what is wrong with it.
+        path: the file.
+        reason: why it is not usable.
     """
 
     path: Path
@@ -115,16 +114,16 @@ class Unusable:
 
 
 @dataclass(frozen=True)
-class Found:
-    """What is in a run directory.
+class RunContents:
+    """The contents of a run directory.
 
     Attributes:
-        episodes: by file name.
-        unusable: the other files among them.
+        episodes: the episodes, sorted by file name.
+        unusable: the other files in their folder.
     """
 
     episodes: tuple[EpisodeRecord, ...]
-    unusable: tuple[Unusable, ...]
+    unusable: tuple[UnusableFile, ...]
 
 
 class RunDirectory:
@@ -170,7 +169,7 @@ class RunDirectory:
             )
         else:
             make_folder(path / EPISODES)
-            write_whole(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
+            write_atomic(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
         return cls(path, manifest)
 
     @classmethod
@@ -195,43 +194,48 @@ class RunDirectory:
             ) from error
 
     def write(self, episode: EpisodeRecord) -> Path:
-        """Keep an episode, in place of an earlier one of the same task."""
+        """Write an episode; it replaces an earlier one of the same task."""
         path = self._file(episode.task_id)
         make_folder(path.parent)
         told = episode.model_copy(update={"run": self.manifest.digest})
-        write_whole(path, told.model_dump_json(indent=1) + "\n")
+        write_atomic(path, told.model_dump_json(indent=1) + "\n")
         return path
 
     def attach(
         self, task_id: str, attachments: Mapping[str, bytes], folders: Sequence[str]
     ) -> None:
-        """Keep the files that an agent leaves, in place of earlier ones of the same task.
+        """Write the files that an agent leaves; they replace earlier ones of the same task.
 
         Args:
             task_id: of the episode.
-            attachments: bytes by path from the run directory on; the last is written last.
-            folders: the folders that such files go to; what they hold of the task is removed.
+            attachments: bytes by path in the run directory, written in this order.
+            folders: the folders that such files go to. The task's earlier files there are removed.
         """
         stem = file_stem(task_id)
+        played_before = self._file(task_id).exists()
         for folder in folders:
             shutil.rmtree(self.path / folder / stem, ignore_errors=True)
+            if played_before:
+                for old in (self.path / folder).glob("*.*"):
+                    if old.stem == stem and f"{folder}/{old.name}" not in attachments:
+                        old.unlink()
         for name, data in attachments.items():
             place = self.path / name
             make_folder(place.parent)
-            write_whole(place, data)
+            write_atomic(place, data)
 
-    def read(self) -> Found:
-        """Every episode there is, and what else is among them: broken, copied and foreign files."""
+    def read(self) -> RunContents:
+        """All episodes, and the unusable files among them: broken, copied or foreign."""
         episodes, unusable = [], []
         for path in sorted((self.path / EPISODES).glob("*.json")):
             try:
                 episodes.append(self._episode(path))
             except ValueError as error:
-                unusable.append(Unusable(path, str(error)))
-        return Found(tuple(episodes), tuple(unusable))
+                unusable.append(UnusableFile(path, str(error)))
+        return RunContents(tuple(episodes), tuple(unusable))
 
     def episodes(self) -> Iterator[EpisodeRecord]:
-        """Every episode there is, by file name; files that hold none of this run's are left out."""
+        """All episodes of this run, sorted by file name."""
         yield from self.read().episodes
 
     def move_aside(self, task_ids: Iterable[str]) -> list[str]:
@@ -290,34 +294,33 @@ class RunDirectory:
 
 
 @contextlib.contextmanager
-def claimed(path: Path, manifest: Manifest) -> Iterator[RunDirectory]:
-    """A run directory to play in, which nobody else plays in meanwhile.
+def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirectory]:
+    """A run directory to play in, locked against other processes.
 
-    Where it ends with an exception before anything is there that could be lost (an episode that did
-    not crash, a reply that was paid for), a run that was begun here is removed, so that a
-    mistyped command leaves nothing in the way of the right one. A run that was killed so early
-    gives way, too.
+    If the block raises before there is anything to lose (an episode that did not crash, a reply
+    that was paid for), a run that was begun here is removed. A mistyped command thus leaves nothing
+    in the way of the right one. A run that was killed that early is replaced, too.
 
     Raises:
         Locked: another process plays in it.
         RunDirectoryError: another run's results are there; nothing is changed.
         OSError: the directory cannot be made or written to.
     """
-    with sole_user(path):
+    with exclusive_use(path):
         if (path / MANIFEST).exists():
             begun = RunDirectory.open(path)
             if not any(_holds_something(path / name) for name in (EPISODES, SPENDING, REPLIES)):
                 begun._withdraw()
         new = not (path / MANIFEST).exists()
-        store = RunDirectory.create(path, manifest)
+        run_directory = RunDirectory.create(path, manifest)
         try:
-            yield store
+            yield run_directory
         except BaseException as error:  # Ctrl-C too
             paid = _holds_something(path / SPENDING)
             # What crashed since nobody answered says no more than the error does.
             refused = isinstance(error, CannotGoOn)
-            if new and not paid and all(one.error and refused for one in store.episodes()):
-                store._withdraw()
+            if new and not paid and all(one.error and refused for one in run_directory.episodes()):
+                run_directory._withdraw()
             raise
 
 

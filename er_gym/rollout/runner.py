@@ -11,8 +11,8 @@ from contextlib import closing
 from dataclasses import dataclass, field
 
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
-from er_gym.rollout.events import Cost, Emit, EpisodeEnded, EventLog, RunBegun, RunEnded
-from er_gym.rollout.executor import Executor, Played, Size
+from er_gym.rollout.events import Cost, EpisodeEnded, EventListener, EventLog, RunBegun, RunEnded
+from er_gym.rollout.executor import Executor, Parallelism, PlayedEpisode
 from er_gym.rollout.process_executor import play_in_processes
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import RunDirectory
@@ -27,31 +27,31 @@ EXECUTORS: dict[str, Executor] = {
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunSummary:
     """What :func:`run` did.
 
     Attributes:
-        played: how many episodes it played.
-        kept: how many it found done.
-        crashed: of those played, the episodes that crashed or whose worker died again and again.
-            They are in the run directory, count as failures, and are played again by the next run.
+        played: the number of episodes played.
+        already_done: how many were finished before it started.
+        crashed: of those played, the episodes that crashed or whose worker died three times. They
+            are in the run directory and count as failures. The next run plays them again.
     """
 
     played: int
-    kept: int
+    already_done: int
     crashed: tuple[EpisodeRecord, ...]
 
 
 class Stopped(CannotGoOn):
-    """An agent could not go on, so the run has stopped; ``outcome`` says what it did till then."""
+    """An agent could not go on, so the run has stopped; ``outcome`` says what was played before."""
 
-    def __init__(self, message: str, outcome: Outcome) -> None:
+    def __init__(self, message: str, outcome: RunSummary) -> None:
         super().__init__(message)
         self.outcome = outcome
 
 
 def finished(directory: RunDirectory, tasks: Iterable[Task]) -> list[EpisodeRecord]:
-    """The episodes of these tasks that need not be played again: those that did not crash."""
+    """The recorded episodes of these tasks that did not crash; they are not played again."""
     ids = {task.id for task in tasks}
     return [each for each in directory.episodes() if each.task_id in ids and not each.error]
 
@@ -62,32 +62,34 @@ def run(
     make_agent: MakeAgent,
     *,
     executor: str = "processes",
-    size: Size = Size(),  # noqa: B008 (frozen)
-    listeners: Iterable[Emit] = (),
+    parallelism: Parallelism = Parallelism(),  # noqa: B008 (frozen)
+    listeners: Iterable[EventListener] = (),
     cost: Callable[[], Cost | None] = lambda: None,
-) -> Outcome:
+) -> RunSummary:
     """Play the tasks that the run directory has no finished episode of.
 
-    Each episode is in the run directory before the next result is looked at, so a run that is
-    interrupted or killed loses no more than the episodes being played. An episode whose process
-    died is played again with a new agent; one whose process died three times is recorded as lost.
+    Each episode is written before the next result is looked at. A run that is interrupted or killed
+    thus loses no more than the episodes under way. If a worker process dies, its episode is played
+    again with a new agent. After the third death the episode is recorded as crashed.
 
     Args:
-        directory: where to, and, in its manifest, with which environment and seed; the manifest's
-            agent is how records name the agent.
+        directory: the run directory. Its manifest states the environment, the seed, and how records
+            name the agent.
         tasks: what to play.
-        make_agent: makes the agent of an episode, given its task and seed.
-        executor: one of :data:`EXECUTORS`.
-        size: how much at once.
-        listeners: called in this process with the run's events: those of episodes that end, and,
-            where the agents act in this process, of every step.
-        cost: what the run has cost so far, asked after each episode.
+        make_agent: makes the agent of an episode from the episode's task and seed. For
+            ``"processes"`` it must be picklable.
+        executor: a name in :data:`EXECUTORS`.
+        parallelism: how much runs at once.
+        listeners: called in this thread with the events of the run and of each episode that ends.
+            Steps and replies are in the run directory's event stream
+            (:func:`er_gym.rollout.events.read_events`).
+        cost: returns what the run has cost so far; called after each episode.
 
     Raises:
         Stopped: an agent raised :class:`~er_gym.rollout.agent.CannotGoOn`.
         WorkerSetupError: the environment cannot be made.
-        KeyboardInterrupt: Ctrl-C; what was over is in the run directory, no process is left.
-        ValueError: there is no such executor.
+        KeyboardInterrupt: Ctrl-C. The episodes that were over are saved, and no process is left.
+        ValueError: there is no such executor, or it cannot use ``make_agent``.
         OSError: the run directory cannot be written.
     """
     if executor not in EXECUTORS:
@@ -101,21 +103,21 @@ def run(
         stopped = ""
         try:
             if todo:
-                EXECUTORS[executor](directory, todo, make_agent, sink, size)
+                EXECUTORS[executor](directory, todo, make_agent, sink, parallelism)
         except CannotGoOn as stop:
             stopped = str(stop)
-            raise Stopped(stopped, sink.outcome(len(done))) from stop
+            raise Stopped(stopped, sink.summary(len(done))) from stop
         except BaseException as error:  # Ctrl-C too
             stopped = f"{type(error).__name__}: {error}"
             raise
         finally:
             emit(RunEnded(played=sink.played, crashed=len(sink.crashed), stopped=stopped))
-    return sink.outcome(len(done))
+    return sink.summary(len(done))
 
 
 @dataclass
 class _Sink:
-    """Writes episodes into the run directory, and tells of them."""
+    """Writes episodes into the run directory, and emits their events."""
 
     directory: RunDirectory
     emit: EventLog
@@ -123,11 +125,11 @@ class _Sink:
     played: int = 0
     crashed: list[EpisodeRecord] = field(default_factory=list)
 
-    def save(self, played: Played) -> None:
+    def save(self, played: PlayedEpisode) -> None:
         self.directory.attach(played.record.task_id, played.attachments, played.folders)
         self.directory.write(played.record)
 
-    def ended(self, played: Played) -> None:
+    def ended(self, played: PlayedEpisode) -> None:
         record = played.record
         self.played += 1
         if record.error:
@@ -139,7 +141,7 @@ class _Sink:
                 success=record.success,
                 end_reason=record.end_reason,
                 total_reward=record.total_reward,
-                steps=max(0, len(record.steps) - 1),
+                steps=sum(not step.appended for step in record.steps[1:]),
                 seconds=record.seconds,
                 error=record.error,
             )
@@ -148,5 +150,5 @@ class _Sink:
         if total is not None:
             self.emit(total)
 
-    def outcome(self, kept: int) -> Outcome:
-        return Outcome(self.played, kept, tuple(self.crashed))
+    def summary(self, already_done: int) -> RunSummary:
+        return RunSummary(self.played, already_done, tuple(self.crashed))

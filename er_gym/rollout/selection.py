@@ -1,4 +1,4 @@
-"""Which of a suite's tasks a run plays."""
+"""Selects the tasks of a suite that a run plays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from er_gym.tasks.task import Task
 
 @dataclass(frozen=True)
 class Shard:
-    """One of ``count`` parts of a suite, ``index`` counting from 1."""
+    """Part ``index`` of ``count`` parts of a suite, counted from 1."""
 
     index: int
     count: int
@@ -22,7 +22,7 @@ class Shard:
         """Read ``"2/8"``.
 
         Raises:
-            ValueError: it is not of that form, or there is no such part.
+            ValueError: the text is not ``i/n``, or i is not in 1..n.
         """
         index, slash, count = text.partition("/")
         if slash and index.isdecimal() and count.isdecimal() and 1 <= int(index) <= int(count):
@@ -30,7 +30,7 @@ class Shard:
         raise ValueError(f"{text!r} is no shard: give i/n with 1 <= i <= n, such as 2/8")
 
     def __contains__(self, task_id: str) -> bool:
-        """Whether a task belongs to it: by a hash of its id, the same everywhere and for good."""
+        """Whether a task is in the shard. A hash of its id decides, the same on every machine."""
         digest = hashlib.sha256(task_id.encode()).digest()
         return int.from_bytes(digest[:8], "big") % self.count == self.index - 1
 
@@ -43,8 +43,10 @@ def select(
     limit: int | None = None,
     set_aside: Iterable[SetAsideTask] = (),
 ) -> list[Task]:
-    """The tasks to play, in the suite's order: those named, of these the shard's, of these the
-    first ``limit``. Of tasks that were set aside none is played, named or not.
+    """The tasks to play, in the suite's order.
+
+    Of the named tasks (all if none is named), the shard's are chosen, and of these the first
+    ``limit``. Tasks that were set aside are never played.
 
     Raises:
         ValueError: the suite has no task of a given id, or all that were named are set aside.

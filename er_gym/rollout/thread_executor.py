@@ -1,7 +1,7 @@
-"""Play many episodes at once whose agents mostly wait: a thread each, engines in other processes.
+"""The executor for agents that mostly wait: a thread for each episode, engines in other processes.
 
-For agents that ask a server, or a model that this process holds: while one waits for its reply, the
-others' engines work.
+It suits agents that ask a server, or a model in this process. While one agent waits for its reply,
+the engines of the others work.
 """
 
 from __future__ import annotations
@@ -9,51 +9,60 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any
 
 from er_gym.rollout.agent import Agent, CannotGoOn, Decision, MakeAgent
 from er_gym.rollout.env_pool import EnvLost, EnvPool, RemoteEnv
 from er_gym.rollout.events import EventLog
-from er_gym.rollout.executor import Played, Sink, Size, lost_episode, unbegun_episode
+from er_gym.rollout.executor import (
+    EpisodeSink,
+    Parallelism,
+    PlayedEpisode,
+    lost_episode,
+    unbegun_episode,
+)
 from er_gym.rollout.play import episode_seed, one_line, play_episode
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.worker_pool import Lost
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.task import Task
 
 _TRIES = 3
-"""How often an episode is tried whose process dies."""
+"""The number of tries at an episode whose process dies."""
 
 
 def play_in_threads(
     directory: RunDirectory,
     tasks: Sequence[Task],
     make_agent: MakeAgent,
-    sink: Sink,
-    size: Size,
+    sink: EpisodeSink,
+    parallelism: Parallelism,
 ) -> None:
-    """Play ``size.concurrency`` tasks at once; see :class:`.executor.Executor`.
+    """Play ``parallelism.concurrency`` tasks at once; see :class:`.executor.Executor`.
 
-    Agents are made, and asked, in the thread of their episode. When one cannot go on, the others'
-    next replies are waited for; episodes that are not over with these leave no record. At Ctrl-C
-    nothing is waited for.
+    Each agent is made, and acts, in the thread of its episode. If an agent cannot go on, the run
+    waits for the replies under way. Episodes that these replies do not finish leave no record. At
+    Ctrl-C the run waits for nothing.
     """
     todo = deque(tasks)
-    slots = talking = min(size.concurrency, len(todo))
+    slots = talking = min(parallelism.concurrency, len(todo))
     stopped: CannotGoOn | None = None
     env = directory.manifest.env
-    with EnvPool(size.workers, slots, env, deadline=size.deadline) as pool:
-        events = EventLog(directory.path)
-        threads = _Threads(directory, pool, make_agent, events, todo)
+    with (
+        EnvPool(parallelism.workers, slots, env, deadline=parallelism.deadline) as pool,
+        closing(EventLog(directory.path)) as events,
+    ):
+        threads = _ThreadedRun(directory, pool, make_agent, events, todo)
         try:
             for slot in range(slots):
-                # Daemons: one that waits for a reply must not keep the process from ending.
+                # Daemon threads: one that waits for a reply must not keep the process from ending.
                 threading.Thread(target=threads.play_all, args=(slot,), daemon=True).start()
             while talking:
-                threads.told.acquire()
+                threads.unhandled.acquire()
                 result = threads.results[0]
-                if isinstance(result, Played):
+                if isinstance(result, PlayedEpisode):
                     sink.save(result)
                     sink.ended(result)
                 elif result is None:
@@ -65,28 +74,28 @@ def play_in_threads(
                 threads.results.popleft()
         finally:
             threads.stopping.set()
-            # What is over is saved, also the episode whose saving Ctrl-C interrupted.
+            # Save what is over, also the episode whose saving Ctrl-C interrupted.
             for result in tuple(threads.results):
-                if isinstance(result, Played):
+                if isinstance(result, PlayedEpisode):
                     sink.save(result)
-            events.close()
     if stopped is not None:
         raise stopped
 
 
 class _Stopping(CannotGoOn):
-    """The run stops; not to be recorded, nor told."""
+    """Ends an episode because the run stops; the episode has no record."""
 
 
 @dataclass(frozen=True)
-class _Threads:
+class _ThreadedRun:
     """What the threads of a run share.
 
     Attributes:
-        results: what they tell: an episode; what ends the run; None from a thread that has ended.
-            The main thread removes what it has dealt with.
-        told: counts the results that the main thread has not looked at.
-        stopping: set when no agent is to act any more.
+        results: the queue from the threads to the main thread: an episode, an exception that ends
+            the run, or None from a thread that has ended. The main thread removes a result once it
+            has handled it.
+        unhandled: counts the results that the main thread has not taken up.
+        stopping: set when no agent may act any more.
     """
 
     directory: RunDirectory
@@ -94,32 +103,32 @@ class _Threads:
     make_agent: MakeAgent
     events: EventLog
     todo: deque[Task]
-    results: deque[Played | BaseException | None] = field(default_factory=deque)
-    told: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
+    results: deque[PlayedEpisode | BaseException | None] = field(default_factory=deque)
+    unhandled: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
     stopping: threading.Event = field(default_factory=threading.Event)
 
     def play_all(self, slot: int) -> None:
-        """A thread: one episode after the other in the environment of a slot."""
+        """Run a thread: play one episode after another in the environment of a slot."""
         try:
             while not self.stopping.is_set():
                 try:
                     task = self.todo.popleft()
                 except IndexError:
                     break
-                self._tell(self._episode(slot, task))
+                self._put(self._episode(slot, task))
         except _Stopping:
             pass
-        except BaseException as error:  # whatever it is, the main thread must hear of it
-            self._tell(error)
+        except BaseException as error:  # the main thread raises it
+            self._put(error)
             self.stopping.set()
         finally:
-            self._tell(None)
+            self._put(None)
 
-    def _tell(self, result: Played | BaseException | None) -> None:
+    def _put(self, result: PlayedEpisode | BaseException | None) -> None:
         self.results.append(result)
-        self.told.release()
+        self.unhandled.release()
 
-    def _episode(self, slot: int, task: Task) -> Played:
+    def _episode(self, slot: int, task: Task) -> PlayedEpisode:
         """Play a task, again with a new agent if its process dies."""
         seed = episode_seed(self.directory.manifest.seed, task.id)
         tries = 0
@@ -143,8 +152,8 @@ class _Threads:
                     if self.stopping.is_set():
                         raise _Stopping
                     continue
-                record = lost_episode(task, Lost(tries, lost.exitcode), self.directory.manifest)
-            return Played.by(agent, record)
+                record = lost_episode(task, LostJob(tries, lost.exitcode), self.directory.manifest)
+            return PlayedEpisode.by(agent, record)
 
     def _play(self, env: RemoteEnv, task: Task, seed: int) -> tuple[Agent | None, EpisodeRecord]:
         manifest = self.directory.manifest
@@ -168,7 +177,7 @@ class _Threads:
 
 
 class _Stoppable:
-    """An agent that does not act any more once the run stops."""
+    """An agent that stops acting when the run stops."""
 
     def __init__(self, agent: Agent, stopping: threading.Event) -> None:
         self.obs_mode = agent.obs_mode

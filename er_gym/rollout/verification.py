@@ -1,4 +1,4 @@
-"""A verifier with the environment that it plays in, for worker processes."""
+"""Makes a verifier with an environment of its own, for worker processes."""
 
 from __future__ import annotations
 

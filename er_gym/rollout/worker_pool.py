@@ -1,8 +1,8 @@
-"""Jobs in worker processes, where a process that dies costs one try at one job.
+"""A pool of worker processes in which a dying process costs one try at one job.
 
-``concurrent.futures`` loses every running job when one process is killed and does not say which of
-them was at fault. Here each worker has a pipe of its own and holds one job at a time, so the job is
-known, is tried again, and the others are not disturbed.
+In ``concurrent.futures``, a killed process loses all running jobs, and nothing says which job was
+at fault. Here each worker has a pipe of its own and holds one job at a time. The pool thus knows
+the job, tries it again, and leaves the other jobs alone.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
-class Lost:
-    """What is returned for a job whose worker died every time.
+class LostJob:
+    """The result of a job whose worker died at every try.
 
     Attributes:
-        tries: how often it was tried.
-        exitcode: of the last worker; minus the signal's number if a signal ended it.
+        tries: the number of tries.
+        exitcode: the exit code of the last worker; minus the signal's number if a signal ended it.
     """
 
     tries: int
@@ -59,55 +59,59 @@ class _Worker(Generic[Job, Result]):
         theirs.close()
 
     def give(self, attempt: _Try[Job]) -> None:
-        """Hand it a job. If the process is gone, :meth:`take` will say so."""
+        """Send the worker a job. If the process is gone, :meth:`take` raises."""
         self.holds = attempt
         with contextlib.suppress(OSError):
             self.connection.send(attempt.job)
 
     def take(self) -> Result | _SetupFailed:
-        """What it did with its job; raises EOFError or OSError if the process is gone."""
+        """The result of the worker's job; EOFError or OSError if the process is gone."""
         self.holds = None
         result: Result | _SetupFailed = self.connection.recv()
         return result
 
     def dismiss(self) -> None:
-        """Tell the process to end: at once if it is at work."""
+        """Tell the process to end, at once if it is working."""
         self.connection.close()
         if self.holds is not None:
             self.process.terminate()
 
     def stop(self) -> int | None:
-        """End the process, killing it if it does not end by itself, and return its exit code."""
+        """End the process, by force if it does not end itself, and return its exit code."""
         self.dismiss()
         end_processes([self.process])
         return self.process.exitcode
 
 
-def do_jobs(
+def run_jobs(
     make: Callable[[], Callable[[Job], Result]],
     jobs: Iterable[Job],
     *,
     workers: int,
     tries: int = 3,
-) -> Generator[tuple[Job, Result | Lost], None, None]:
-    """Do every job in one of ``workers`` spawned processes; yield each when it is done.
+) -> Generator[tuple[Job, Result | LostJob], None, None]:
+    """Do every job in one of ``workers`` spawned processes; yield each result when it is done.
 
     Leaving the iterator early (an exception, Ctrl-C, ``close()``) ends the processes. They ignore
-    Ctrl-C themselves, and end when this process does, however it ends.
+    Ctrl-C themselves. They end when this process ends, in any way.
 
     Args:
-        make: called once in each process, it returns what does the jobs; if that has a ``close``
-            method, it is called before the process ends. Picklable, as are jobs and results.
-        jobs: what to do.
-        workers: how many processes at most.
-        tries: how often a job is tried when the process that does it dies.
+        make: called once in each process; it returns the function that does the jobs. If that has a
+            ``close`` method, the process calls it before it ends. ``make``, the jobs and the
+            results must be picklable.
+        jobs: the jobs.
+        workers: the largest number of processes, at least 1.
+        tries: the number of tries at a job whose process dies.
 
     Yields:
-        The job, and its result or :class:`Lost`.
+        The job, and its result or :class:`LostJob`.
 
     Raises:
-        WorkerSetupError: ``make`` raised.
+        WorkerSetupError: ``make`` raised an exception.
+        ValueError: ``workers`` is less than 1.
     """
+    if workers < 1:
+        raise ValueError(f"workers is {workers}; give a whole number from 1")
     waiting = deque(_Try(job) for job in jobs)
     team: list[_Worker[Job, Result]] = []
     try:
@@ -130,7 +134,7 @@ def do_jobs(
                     if attempt.number < tries:
                         waiting.append(_Try(attempt.job, attempt.number + 1))
                     else:
-                        yield attempt.job, Lost(attempt.number, exitcode)
+                        yield attempt.job, LostJob(attempt.number, exitcode)
                     continue
                 if isinstance(result, _SetupFailed):
                     raise WorkerSetupError(result.message)
@@ -143,10 +147,10 @@ def do_jobs(
 
 
 def _serve(connection: Connection, make: Callable[[], Callable[[Job], Result]]) -> None:
-    """The worker process: do what comes through the pipe until it is closed."""
+    """Run the worker process: do the jobs from the pipe until it is closed."""
     try:
         do = make()
-    except Exception as error:  # whatever it is, the parent must hear of it
+    except Exception as error:  # the parent raises it
         connection.send(_SetupFailed(f"{type(error).__name__}: {error}"))
         return
     try:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from er_gym.tasks.equivalence import BASIN_OF, is_among
-from er_gym.thor.objects import is_there
+from er_gym.thor.objects import is_present
 
 _CUT_UP = frozenset({"isSliced", "isBroken"})
 
@@ -103,7 +103,7 @@ def unmet_conditions(
 def _holds(condition: Condition, entry: Mapping[str, Any], kind_of: Mapping[str, str]) -> bool:
     if entry["objectType"] != condition.object_type:
         return False
-    if not is_there(entry) and _CUT_UP.isdisjoint(name for name, _ in condition.state):
+    if not is_present(entry) and _CUT_UP.isdisjoint(name for name, _ in condition.state):
         return False  # the object was cut into parts, and the condition is not about that
     if condition.object_id and entry["objectId"] != condition.object_id:
         return False

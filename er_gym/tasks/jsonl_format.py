@@ -173,7 +173,7 @@ def write_tasks(
     Raises:
         ValueError: two tasks have different arrangements with the same name, or a text holds a
             lone surrogate.
-        NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
+        ForeignFile, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     path, tasks = Path(path), list(tasks)
     header = json.dumps({"format": FORMAT, "tasks": len(tasks), **made}, ensure_ascii=False)

@@ -132,7 +132,7 @@ def write_tasks(path: str | Path, tasks: Iterable[Task], *, force: bool = True) 
 
     Raises:
         TaskFileError: a task's ``extra`` holds fields with which the task could not be read again.
-        NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
+        ForeignFile, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     path, tasks = Path(path), list(tasks)
     records = [

@@ -96,7 +96,7 @@ def write_generator_tasks(
 
     Raises:
         TaskFileError: a task's ``extra`` holds fields with which the task could not be read again.
-        NotOurs, CannotWrite: see :func:`~er_gym.writing.write_output`.
+        ForeignFile, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     groups: dict[Path, list[Task]] = {}
     for task in tasks:

@@ -1,4 +1,4 @@
-"""The boundary: everything above speaks the AI2-THOR 5 Controller API and asks for one here."""
+"""The boundary: makes AI2-THOR 5 controllers on either engine, for all layers above."""
 
 from er_gym.sim.placement_restrictions import accepts, placement_table
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError

@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
 
 class BackendError(RuntimeError):
-    """An engine cannot be started on this machine; the message says what would mend it."""
+    """An engine cannot be started on this machine; the message says what to do."""
 
 
 RENDER_DEVICES = ("cpu", "gpu")
-"""What the embedded engine can draw with. As in the engine, which is too heavy to import for this;
-a test compares."""
+"""The devices that the embedded engine can draw with. The engine, which is too heavy to import
+here, has the same list; a test compares them."""
 
 
 def _embedded(arguments: dict[str, Any]) -> Controller:
@@ -67,17 +67,17 @@ BACKENDS: dict[str, Callable[[dict[str, Any]], Controller]] = {
 
 
 def make_controller(backend: str = "embedded", **arguments: Any) -> Controller:
-    """A started AI2-THOR controller.
+    """Start an AI2-THOR controller.
 
     Args:
         backend: "embedded" (our engine, in this process) or "unity" (the real simulator;
             CloudRendering when there is no display).
-        **arguments: those of ``ai2thor.controller.Controller``; and, for the embedded engine,
-            ``render_device``: "cpu" or "gpu", one for the whole process.
+        **arguments: the arguments of ``ai2thor.controller.Controller``. The embedded engine also
+            takes ``render_device``: "cpu" or "gpu", the same for the whole process.
 
     Raises:
-        ValueError: there is no such backend.
-        BackendError: it cannot be started here.
+        ValueError: the backend is unknown.
+        BackendError: the engine cannot be started on this machine.
     """
     start = BACKENDS.get(backend)
     if start is None:

@@ -1,10 +1,10 @@
-"""Lets AI2-THOR's client start er-gym's player where no X server and no Vulkan library is.
+"""Lets AI2-THOR's client start er-gym's player on machines without X server and Vulkan.
 
-The client tests the machine for what Unity needs before it starts a build. Where er-gym's player is
-installed in a build's place there is nothing to test, and these tests pass; a real build is tested
-as ever. ``er-gym player install`` copies this file into the site-packages of its Python, where a
-``.pth`` file calls :func:`activate` as Python starts; so it needs nothing but the standard library
-and imports next to nothing.
+The client tests the machine for what Unity needs before it starts a build. If er-gym's player is
+installed in place of the build, this hook makes the tests pass. A real build is tested as usual.
+``er-gym player install`` copies this file into the site-packages of its Python, where a ``.pth``
+file calls :func:`activate` when Python starts. The file thus needs only the standard library and
+imports as little as possible.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
     from typing import Any
 
 MARKER = "installed-by-er-gym.json"
-"""A file in a release folder that says: er-gym has put its player here."""
+"""The file in a release folder that marks er-gym's player."""
 PLATFORMS = ("Linux64", "CloudRendering")
-"""Those of the client's platforms that er-gym's player takes the place of."""
+"""The client's platforms whose builds er-gym's player replaces."""
 _TARGET = "ai2thor.platform"
 
 
 def activate() -> None:
-    """Adapt the client's module of platforms whenever it comes to be imported."""
+    """Adapt the client's module of platforms when it is imported."""
     if _Finder not in sys.meta_path:
         sys.meta_path.insert(0, _Finder)
 
 
 class _Finder:
-    """Finds that one module as Python does, and adapts it once it is loaded."""
+    """Finds the module of platforms as Python does, and adapts it after it is loaded."""
 
     @classmethod
     def find_spec(cls, name: str, path: Any = None, target: Any = None) -> Any:

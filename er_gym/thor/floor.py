@@ -1,4 +1,4 @@
-"""All of the floor of a scene, wherever the agent stands on it."""
+"""The positions where the agent can stand, on all of a scene's floor."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from er_gym.sim.world import World
 
 
 def floor_of(event: Any) -> Sequence[Mapping[str, float]]:
-    """Where one can stand, in metres, by an event of GetReachablePositions.
+    """The positions where the agent can stand, metres, from an event of GetReachablePositions.
 
-    AI2-THOR lists the piece of floor that the agent is on. The embedded engine knows the others as
-    well: an episode may begin on any of them, and what is asked once must hold for all episodes.
+    AI2-THOR lists only the piece of floor that the agent is on. The embedded engine also knows the
+    other pieces. They are included, since an episode may begin on any piece and the positions are
+    asked for only once.
     """
     metadata = event.metadata
     if isinstance(metadata, LazyMetadata) and isinstance(metadata.source, World):

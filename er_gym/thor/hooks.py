@@ -1,4 +1,4 @@
-"""Puts :mod:`er_gym.thor.client_hook` where a Python reads it as it starts; removes it again."""
+"""Installs :mod:`er_gym.thor.client_hook` where a Python loads it at its start, and removes it."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pathlib import Path
 
 from er_gym.thor import client_hook
 from er_gym.thor.places import PlayerError, client_home
-from er_gym.writing import write_whole
+from er_gym.writing import write_atomic
 
 _HOOK = "er_gym_player_hook"
-"""What the module is called where it is copied to."""
+"""The name of the copied module."""
 _FOR_ALL = 0o644
-"""A hook that a user of this Python may not read would be complained of whenever Python starts."""
+"""Readable by all: Python prints an error at each start if its user may not read a hook."""
 _ASK_PYTHON = """
 import json, site, sysconfig
 from ai2thor._builds import COMMIT_ID
@@ -27,10 +27,10 @@ print(json.dumps({"commit": COMMIT_ID, "folders": [sysconfig.get_path("purelib")
 
 
 def hook_folders(python: str) -> list[Path]:
-    """The folders whose ``.pth`` files a Python reads as it starts, the preferred one first.
+    """The folders whose ``.pth`` files a Python reads at its start, the preferred one first.
 
     Raises:
-        PlayerError: it does not have the version of AI2-THOR's client that this Python has.
+        PlayerError: that Python lacks the version of AI2-THOR's client that this Python has.
     """
     from ai2thor._builds import COMMIT_ID
 
@@ -53,30 +53,30 @@ def hook_folders(python: str) -> list[Path]:
 
 
 def write_hook(folders: Sequence[Path]) -> Path | None:
-    """See to it that there is a hook in one of the folders; where, or None."""
+    """Make sure that one of the folders has the hook; return its path, None if none can."""
     for folder in folders:
-        if all(_says(folder / name, text) for name, text in _hook_files().items()):
-            return folder / f"{_HOOK}.pth"  # it is whose it is: only its owner removes it
+        if all(_has_text(folder / name, text) for name, text in _hook_files().items()):
+            return folder / f"{_HOOK}.pth"  # another user may own it; only the owner removes it
     for folder in folders:
         with contextlib.suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
             if os.access(folder, os.W_OK):
-                # First it is written down, so that uninstall finds what a kill leaves behind.
+                # Record the folder first, so that uninstall finds what a kill leaves behind.
                 hooks = sorted({*_hooks(), str(folder)})
-                write_whole(_record(), json.dumps({"hooks": hooks}) + "\n", mode=_FOR_ALL)
+                write_atomic(_record(), json.dumps({"hooks": hooks}) + "\n", mode=_FOR_ALL)
                 for name, text in _hook_files().items():
-                    write_whole(folder / name, text, mode=_FOR_ALL)
+                    write_atomic(folder / name, text, mode=_FOR_ALL)
                 return folder / f"{_HOOK}.pth"
     return None
 
 
 def _hook_files() -> dict[str, str]:
-    # In this order: a .pth file that names no module is complained of whenever Python starts.
+    # In this order: Python prints an error at each start if a .pth file names a missing module.
     module = Path(client_hook.__file__).read_text(encoding="utf-8")
     return {f"{_HOOK}.py": module, f"{_HOOK}.pth": f"import {_HOOK}; {_HOOK}.activate()\n"}
 
 
-def _says(path: Path, text: str) -> bool:
+def _has_text(path: Path, text: str) -> bool:
     try:
         return path.read_text(encoding="utf-8") == text
     except (OSError, ValueError):
@@ -84,7 +84,7 @@ def _says(path: Path, text: str) -> bool:
 
 
 def _record() -> Path:
-    """The file that says in which folders er-gym has put hooks for this user."""
+    """The file that lists the folders with this user's hooks."""
     return client_home() / "hooks-by-er-gym.json"
 
 
@@ -97,7 +97,7 @@ def _hooks() -> list[str]:
 
 
 def remove_hooks() -> bool:
-    """Remove this user's hooks and the record of them; whether there was a record."""
+    """Remove this user's hooks and their record; return whether there was a record."""
     for folder in map(Path, _hooks()):
         (folder / f"{_HOOK}.pth").unlink(missing_ok=True)  # before the module that it names
         for path in (*folder.glob(f"{_HOOK}.*"), *folder.glob(f"__pycache__/{_HOOK}.*")):

@@ -1,4 +1,4 @@
-"""The program that starts the player, and that AI2-THOR's client is given to launch."""
+"""The program that AI2-THOR's client launches to start the player."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ import sys
 from hashlib import sha256
 from pathlib import Path
 
-from er_gym.writing import write_whole
+from er_gym.writing import write_atomic
 
 EXECUTABLE = 0o755
 _START = Path(__file__).with_name("start_player.py")
 
 
 def thor_executable() -> str:
-    """What ``Controller(local_executable_path=…, x_display=":0")`` launches to get our engine.
+    """The executable for ``Controller(local_executable_path=…, x_display=":0")``.
 
-    It is the path of a launcher for this Python and this er-gym, which is written to the user's
-    cache (``$XDG_CACHE_HOME`` or ``~/.cache``) when it is not there yet. The client splits it as a
-    shell would, so that a path with spaces comes quoted. Where nothing can be written it is the
-    command that the launcher would run.
+    Returns:
+        The path of a launcher for this Python and this er-gym. The launcher is written to the
+        user's cache (``$XDG_CACHE_HOME`` or ``~/.cache``) if it is missing. The client splits the
+        path as a shell would, so a path with spaces is quoted. If the cache cannot be written, it
+        is the command that the launcher would run.
     """
     text = launcher()
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "er-gym"
@@ -28,7 +29,7 @@ def thor_executable() -> str:
     try:
         if not (os.access(path, os.X_OK) and path.read_text() == text):
             cache.mkdir(parents=True, exist_ok=True)
-            write_whole(path, text, mode=EXECUTABLE)
+            write_atomic(path, text, mode=EXECUTABLE)
     except OSError:
         return shlex.join(_command())
     return shlex.quote(str(path))
@@ -40,8 +41,8 @@ def _command() -> list[str]:
 
 def launcher() -> str:
     """The text of a program that starts the player with this Python and this er-gym."""
-    # A shell script: a `#!` line takes neither spaces nor more than some hundred characters. The
-    # shell is there at once, to see whose child it is; Python may come after the parent's death.
+    # A shell script, since a `#!` line allows neither spaces nor long paths. The shell starts at
+    # once and knows its parent; Python may start after the parent's death.
     return (
         "#!/bin/sh\n"
         "# er-gym's player, which AI2-THOR's client starts in place of Unity's.\n"

@@ -1,4 +1,4 @@
-"""Every object type of the iTHOR scenes, and what things of that type can do."""
+"""Every object type of the iTHOR scenes, with its properties."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from er_gym.sim.initial_state import USED_UP
 
 @dataclass(frozen=True)
 class ObjectType:
-    """A kind of object.
+    """An object type.
 
     Attributes:
         name: AI2-THOR's ``objectType``.
@@ -36,4 +36,4 @@ def _load() -> dict[str, ObjectType]:
 
 
 OBJECT_TYPES: Mapping[str, ObjectType] = MappingProxyType(_load())
-"""By name, in alphabetical order; the parts that slicing makes are among them."""
+"""Object types by name, in alphabetical order, with the parts that slicing makes."""

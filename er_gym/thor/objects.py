@@ -1,8 +1,8 @@
-"""The objects of an AI2-THOR event as columns.
+"""The objects of an AI2-THOR event as arrays.
 
-What asks about all objects at every step (what may be navigated to, what is seen) asks arrays, not
-a dictionary for each object. Events of the embedded engine hand over the engine's own arrays, and
-their metadata need not be made at all; those of Unity are read entry by entry.
+The environment judges all objects at every step, which is faster with arrays than with a dictionary
+for each object. An event of the embedded engine hands over the engine's own arrays, so its metadata
+need not be made. An event of Unity is read entry by entry.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class ObjectTable:
 
     The engine hands out the same table as long as nothing but the agent has changed. Arrays are
     read-only by agreement. Objects of types that are not in :data:`OBJECT_TYPES` are left out, and
-    wholes of which there are only parts (:func:`is_there`).
+    wholes of which there are only parts (:func:`is_present`).
 
     Attributes:
         ids: ``objectId`` of each. row: the row of each id.
@@ -123,7 +123,7 @@ class ObjectTable:
         return np.asarray(np.maximum(np.maximum(x * y, y * z), x * z))
 
 
-def is_there(entry: Mapping[str, Any]) -> bool:
+def is_present(entry: Mapping[str, Any]) -> bool:
     """Whether an object of the metadata can be found in the scene.
 
     AI2-THOR goes on listing a whole that was sliced, or an egg that was broken; its parts are
@@ -153,7 +153,7 @@ def objects_of(event: Any) -> _Seen:
 
 
 def _of_entries(metadata: Mapping[str, Any]) -> _Seen:
-    entries = [e for e in metadata["objects"] if e["objectType"] in KIND_OF and is_there(e)]
+    entries = [e for e in metadata["objects"] if e["objectType"] in KIND_OF and is_present(e)]
     ids = tuple(e["objectId"] for e in entries)
     row = {object_id: k for k, object_id in enumerate(ids)}
 

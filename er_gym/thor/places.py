@@ -1,7 +1,7 @@
 """The places in the client's folder that ``er-gym player install`` fills.
 
-Each holds nothing, what er-gym put there, or what is somebody else's. What is somebody else's is
-moved aside by a single rename and comes back by one, so that no kill in between loses it.
+A place is empty, or holds a file or folder of er-gym or of somebody else. A foreign file is moved
+aside by one rename and restored by one rename, so that a kill in between loses nothing.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from typing import Any
 
 from er_gym.thor.client_hook import MARKER
 from er_gym.thor.launcher import EXECUTABLE, launcher
-from er_gym.writing import write_whole
+from er_gym.writing import write_atomic
 
 _GPUS = 256
-"""As many device numbers as the mapping knows; no machine has more."""
+"""The number of devices in the mapping; no machine has more."""
 _OURS = {"-1": "installed by er-gym"}
 """An entry of the mapping that the client never looks up: device numbers begin at 0."""
 
@@ -32,7 +32,7 @@ class PlayerError(RuntimeError):
 
 
 def client_home() -> Path:
-    """The folder of all that the client keeps."""
+    """The folder in which the client keeps its files."""
     return Path("~/.ai2thor").expanduser()
 
 
@@ -47,24 +47,24 @@ class Place(ABC):
     @property
     @abstractmethod
     def is_ours(self) -> bool:
-        """Whether er-gym has put there what is there."""
+        """Whether the place holds er-gym's file."""
 
     @abstractmethod
     def write(self, path: Path) -> None:
-        """Write what er-gym puts there, to some other path."""
+        """Write er-gym's file to another path."""
 
     @property
     def is_foreign(self) -> bool:
-        """Whether something else is there."""
+        """Whether the place holds a file that is not er-gym's."""
         return os.path.lexists(self.path) and not self.is_ours
 
     @property
     def set_aside(self) -> Path:
-        """Where something else waits; the client prunes only what is in ``releases``."""
+        """Where a foreign file waits; the client prunes only the folder ``releases``."""
         return client_home() / "set-aside-by-er-gym" / self.path.name
 
     def put(self) -> None:
-        """Fill the place; what is foreign there is set aside."""
+        """Fill the place, and move a foreign file aside."""
         with _drafts() as drafts:
             self.write(drafts / "new")
             if self.is_foreign:
@@ -76,7 +76,7 @@ class Place(ABC):
             (drafts / "new").rename(self.path)
 
     def clear(self) -> bool:
-        """Remove what er-gym has put there and bring back what waits; whether there was either."""
+        """Remove er-gym's file and restore a foreign one; return whether there was either."""
         ours = self.is_ours
         if ours:
             with _drafts() as drafts:
@@ -102,7 +102,7 @@ def _drafts() -> Iterator[Path]:
 
 
 def sweep() -> bool:
-    """Remove drafts, also those that a kill has left; whether there were any."""
+    """Remove drafts, also those that a kill has left; return whether there were any."""
     folder = _drafts_folder()
     left = folder.exists()
     shutil.rmtree(folder, ignore_errors=True)
@@ -121,7 +121,7 @@ class Release(Place):
 
     @property
     def name(self) -> str:
-        """What the client calls the build, its folder and the program in it."""
+        """The client's name for the build, its folder and its program."""
         from ai2thor._builds import COMMIT_ID
 
         return f"thor-{self.platform}-{COMMIT_ID}"
@@ -141,12 +141,12 @@ class Release(Place):
 
     @property
     def is_unity(self) -> bool:
-        """Whether a real build is there."""
+        """Whether the place holds a real build."""
         return self.is_foreign and self.path.is_dir()
 
     def write(self, path: Path) -> None:
         path.mkdir()
-        write_whole(path / self.name, launcher(), mode=EXECUTABLE)
+        write_atomic(path / self.name, launcher(), mode=EXECUTABLE)
         # How the build can be spoken to; without this file the client goes to the network for it.
         (path / "metadata.json").write_text(json.dumps({"server_types": ["FIFO", "WSGI"]}) + "\n")
         (path / MARKER).write_text(json.dumps({"python": sys.executable}) + "\n")
@@ -178,7 +178,7 @@ class GpuMapping(Place):
 
 
 def _devices(path: Path) -> dict[str, Any]:
-    """What a mapping file says; nothing where there is none, or it is damaged."""
+    """The content of a mapping file; empty if the file is missing or damaged."""
     try:
         devices = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -21,7 +21,7 @@ _PLACES: tuple[Place, ...] = (*RELEASES, GpuMapping())
 
 @dataclass(frozen=True)
 class Installed:
-    """What :func:`install` has done.
+    """The result of :func:`install`.
 
     Attributes:
         releases: the builds whose place the player has taken.
@@ -38,11 +38,11 @@ class Installed:
 def install(*, force: bool = False, python: str = sys.executable) -> Installed:
     """Put the player where ``Controller(…)`` finds it as its own build, without a download.
 
-    A second time is harmless, and mends an installation whose Python has moved.
+    Installing again is harmless, and repairs an installation whose Python has moved.
 
     Args:
-        force: set real builds aside that are there; :func:`uninstall` brings them back.
-        python: the interpreter whose programs the hook serves, if that is another.
+        force: set real builds aside; :func:`uninstall` restores them.
+        python: the interpreter whose programs the hook serves, if it is not this one.
 
     Raises:
         PlayerError: a real build is there, the client could not start the player from there, or
@@ -51,11 +51,11 @@ def install(*, force: bool = False, python: str = sys.executable) -> Installed:
     for release in RELEASES:
         _check_path(release)
     folders = hook_folders(python)
-    with _alone():
+    with _installation_lock():
         for release in RELEASES:
             _check_build(release, force)
         if GpuMapping().is_foreign and os.path.lexists(GpuMapping().set_aside):
-            raise _two_of(GpuMapping())
+            raise _both_occupied(GpuMapping())
         for place in _PLACES:
             place.put()
         return Installed(RELEASES, write_hook(folders), tuple(_soon_pruned()))
@@ -78,10 +78,10 @@ def _check_build(release: Release, force: bool) -> None:
                 "aside, and uninstall brings it back"
             )
         if os.path.lexists(release.set_aside):
-            raise _two_of(release)
+            raise _both_occupied(release)
 
 
-def _two_of(place: Place) -> PlayerError:
+def _both_occupied(place: Place) -> PlayerError:
     return PlayerError(
         f"{place.path} is not er-gym's, and neither is {place.set_aside}, which is set aside "
         "already; move one of the two away"
@@ -89,20 +89,20 @@ def _two_of(place: Place) -> PlayerError:
 
 
 def uninstall() -> tuple[Release, ...]:
-    """Remove what :func:`install` has put there, and bring back what it had set aside.
+    """Remove what :func:`install` has installed, and restore what it had set aside.
 
     Returns:
-        The builds of Unity's that are there now.
+        The Unity builds that are installed now.
 
     Raises:
-        PlayerError: nothing of er-gym's is there.
+        PlayerError: er-gym has installed nothing.
     """
     unity = [str(release.path) for release in RELEASES if release.is_unity]
     others = f", but builds that er-gym did not put there: {', '.join(unity)}" if unity else ""
     nothing = PlayerError(f"nothing of er-gym's is in {client_home()}{others}")
     if not client_home().is_dir():
         raise nothing
-    with _alone():
+    with _installation_lock():
         removed = [sweep(), *(place.clear() for place in _PLACES), remove_hooks()]
     if not any(removed):
         raise nothing
@@ -113,13 +113,13 @@ def uninstall() -> tuple[Release, ...]:
 
 
 def still_aside() -> list[Path]:
-    """What :func:`install` had set aside and could not come back, for its place is taken."""
+    """What :func:`install` set aside and could not be restored, since its place is taken."""
     return [place.set_aside for place in _PLACES if os.path.lexists(place.set_aside)]
 
 
 @contextlib.contextmanager
-def _alone() -> Iterator[None]:
-    """Keep out another er-gym that does the same, and say in one line what the disk refuses."""
+def _installation_lock() -> Iterator[None]:
+    """Lock out another er-gym that installs, and turn errors of the disk into a PlayerError."""
     try:
         client_home().mkdir(parents=True, exist_ok=True)
         folder = os.open(client_home(), os.O_RDONLY)
@@ -136,7 +136,7 @@ def _alone() -> Iterator[None]:
 
 
 def _soon_pruned() -> list[Path]:
-    """Others' builds that the client deletes as it next starts: it keeps the newest three."""
+    """Others' builds that the client, which keeps the newest three, deletes at its next start."""
     folders = [path for path in RELEASES[0].path.parent.iterdir() if path.is_dir()]
     newest_last = sorted(folders, key=lambda path: path.stat().st_mtime)
     return [path for path in newest_last[:-3] if not (path / client_hook.MARKER).is_file()]

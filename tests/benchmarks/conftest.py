@@ -4,7 +4,7 @@ from episodes_by_hand import (  # noqa: F401
     episode,
     manifest,
     paper_tasks,
+    run_directory,
     step,
-    store,
     tasks_file,
 )

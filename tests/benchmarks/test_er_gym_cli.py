@@ -17,11 +17,11 @@ import pytest
 from benchmarks.cli import main as cli
 from er_gym.rollout import runner
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.runner import Outcome
+from er_gym.rollout.runner import RunSummary
 from er_gym.tasks.types import TASK_TYPES
 
 COUNTER = "CounterTop|-00.08|+01.15|00.00"
-NOTHING = Outcome(0, 0, ())
+NOTHING = RunSummary(0, 0, ())
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "benchmarks.cli"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
@@ -157,15 +157,15 @@ def test_a_bad_command(er_gym, arguments, words):
     assert all(word in one_line(err) for word in words)
 
 
-def test_the_directory_of_another_run_is_left_alone(er_gym, tasks_file, store, episode):
-    store.write(episode(("end",), ("end",)))
-    before = {path: path.read_bytes() for path in store.path.rglob("*.json")}
+def test_the_directory_of_another_run_is_left_alone(er_gym, tasks_file, run_directory, episode):
+    run_directory.write(episode(("end",), ("end",)))
+    before = {path: path.read_bytes() for path in run_directory.path.rglob("*.json")}
     code, shown, err = er_gym(
-        *("bench", "--tasks-file", tasks_file, "--agent", "oracle", "--out", store.path)
+        *("bench", "--tasks-file", tasks_file, "--agent", "oracle", "--out", run_directory.path)
     )
     assert (code, shown) == (2, "")
     assert "its suite is 'hand-made', this one's 'tasks'; choose another --out" in one_line(err)
-    assert {path: path.read_bytes() for path in store.path.rglob("*.json")} == before
+    assert {path: path.read_bytes() for path in run_directory.path.rglob("*.json")} == before
 
 
 def test_a_directory_that_cannot_be_made(er_gym, tasks_file, tmp_path):
@@ -296,7 +296,7 @@ def test_a_run_is_played_and_continued_under_one_protocol(
 
     played = []
     monkeypatch.setattr(
-        runner, "run", lambda store, tasks, make_agent, **_: played.extend(tasks) or NOTHING
+        runner, "run", lambda run_directory, tasks, make_agent, **_: played.extend(tasks) or NOTHING
     )
     for protocol, states in (("paper", True), ("default", False)):
         code, _, err = er_gym(
@@ -355,9 +355,9 @@ def test_an_ended_run_continues(tasks_file, tmp_path, signum):
 def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, episode):
     crashed = episode(("end",), (), task_id="paper-2", error="ValueError: no")
 
-    def run(store, tasks, make_agent, **how):
-        store.write(crashed)
-        return Outcome(played=7, kept=0, crashed=(crashed,))
+    def run(run_directory, tasks, make_agent, **how):
+        run_directory.write(crashed)
+        return RunSummary(played=7, already_done=0, crashed=(crashed,))
 
     monkeypatch.setattr(runner, "run", run)
     out = tmp_path / "run"
@@ -373,7 +373,7 @@ def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, epi
 
 
 def test_a_full_disk_is_told_in_one_line(tasks_file, tmp_path, er_gym, monkeypatch):
-    def run(store, tasks, make_agent, **how):
+    def run(run_directory, tasks, make_agent, **how):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(runner, "run", run)

@@ -71,7 +71,7 @@ def test_put_in_bathtub_is_put_in_its_basin_to_both(text_env: EmbodiedEnv) -> No
 
 @pytest.mark.parametrize("player", ["oracle", "random"])
 def test_a_search_whose_old_record_does_not_say_for_what(
-    text_env: EmbodiedEnv, store: RunDirectory, player: str
+    text_env: EmbodiedEnv, run_directory: RunDirectory, player: str
 ) -> None:
     """What was found follows from what the environment said; a report says so in a line."""
     searches = [task for task in ER_1K if task.type.search][:4]
@@ -82,6 +82,8 @@ def test_a_search_whose_old_record_does_not_say_for_what(
         score_episode(r, CORRECTED) for r in records
     ]
     for record in old:
-        store.write(record)
-    (overview,) = tables([load_run(store.path)])
-    assert f"{store.path}: 4 of 4 episodes are searches whose old records" in str(overview.notes)
+        run_directory.write(record)
+    (overview,) = tables([load_run(run_directory.path)])
+    assert f"{run_directory.path}: 4 of 4 episodes are searches whose old records" in str(
+        overview.notes
+    )

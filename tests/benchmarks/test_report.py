@@ -20,19 +20,19 @@ LONG_RANGE = "long-range tasks with dependency relationships"
 
 
 @pytest.fixture
-def run(store, episode):
+def run(run_directory, episode):
     """One success, and one that only the corrected scorer sees: 2 of a suite of 2."""
-    store.write(episode(KEYS, KEYS))
+    run_directory.write(episode(KEYS, KEYS))
     played = ("pickup Egg", "put in Plate", "end")
-    store.write(episode(UNTYPED, played, task_id="task-2", task_type=LONG_RANGE))
-    return load_run(store.path)
+    run_directory.write(episode(UNTYPED, played, task_id="task-2", task_type=LONG_RANGE))
+    return load_run(run_directory.path)
 
 
 @pytest.fixture
-def failing_run(store, episode):
+def failing_run(run_directory, episode):
     """One success, one given up, one crashed, out of a suite that says it has 2."""
-    store.write(episode(KEYS, KEYS))
-    store.write(
+    run_directory.write(episode(KEYS, KEYS))
+    run_directory.write(
         episode(
             KEYS,
             ("!pickup Egg", "!pickup | Egg"),
@@ -40,8 +40,10 @@ def failing_run(store, episode):
             end_reason="step limit",
         )
     )
-    store.write(episode(KEYS, (), task_id="task-3", end_reason="", error="ValueError: no\nmore"))
-    return load_run(store.path)
+    run_directory.write(
+        episode(KEYS, (), task_id="task-3", end_reason="", error="ValueError: no\nmore")
+    )
+    return load_run(run_directory.path)
 
 
 def test_where_the_scorers_differ_there_are_two_rows_and_a_note(run):
@@ -62,9 +64,9 @@ def test_where_the_scorers_differ_there_are_two_rows_and_a_note(run):
     assert overview.notes == (f"{run.path}: the scorers differ in 1 of 2 episodes: task-2",)
 
 
-def test_where_they_agree_there_is_one(store, episode):
-    store.write(episode(KEYS, KEYS))
-    overview = tables([load_run(store.path)])[0]
+def test_where_they_agree_there_is_one(run_directory, episode):
+    run_directory.write(episode(KEYS, KEYS))
+    overview = tables([load_run(run_directory.path)])[0]
     assert overview.title == "Results, suite hand-made, scorer both, in %"
     assert [row[:3] for row in overview.rows] == [("oracle", "1/2", "100.00")]
 
@@ -88,8 +90,8 @@ def test_the_columns_are_the_papers(run):
     )
 
 
-def test_a_run_without_episodes_is_a_row_of_dashes(store):
-    loaded = load_run(store.path)
+def test_a_run_without_episodes_is_a_row_of_dashes(run_directory):
+    loaded = load_run(run_directory.path)
     (row,) = tables([loaded], with_types=True, with_misses=True)[0].rows
     assert row[1:] == ("0/2", *["-"] * 8)
     assert json.loads(report.as_json([loaded]))["runs"][0]["episodes"] == 0

@@ -129,7 +129,7 @@ def test_a_copy_goes_on_with_the_episode_and_into_the_next(
 def test_an_episode_of_unity_says_that_it_cannot_be_copied() -> None:
     env = EmbodiedEnv(obs_mode="text", backend="unity")
     copy.deepcopy(env)  # nothing has begun
-    env._missing = ""  # as if one had; there is no Unity here
+    env._no_episode = ""  # as if one had; there is no Unity here
     with pytest.raises(gymnasium.error.Error, match=r"'unity' cannot be copied.*before reset\(\)"):
         copy.deepcopy(env)
 

@@ -16,7 +16,7 @@ from benchmarks.scoring.scorers import CORRECTED, PAPER
 from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS, INDEX, NO_ACTION, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.paper_conduct import NO_OBJECT, understand_as_paper
+from er_gym.envs.paper_action_handler import NO_OBJECT, understand_as_paper
 from er_gym.envs.paper_skills import observe
 from er_gym.envs.protocol import PROTOCOLS
 from er_gym.rollout.agent import Decision
@@ -186,7 +186,7 @@ def test_texts_are_read_as_the_papers_runner_reads_them(
     env: EmbodiedEnv, text: str, meant: str | None
 ) -> None:
     env.reset(options={"task": TAKE_APPLE})
-    action, said = understand_as_paper(text, env._percept.objects)
+    action, said = understand_as_paper(text, env._episode.perception.objects)
     assert said == text
     assert (None if action is None else str(action)) == meant
 
@@ -215,9 +215,12 @@ def test_init_begins_where_the_episode_began(env: EmbodiedEnv, play: Play) -> No
 
 def test_the_mask_allows_what_would_be_tried(env: EmbodiedEnv, play: Play) -> None:
     play(TAKE_APPLE, "navigate to CounterTop", "pickup Apple")
-    around, known = env._around, env._known
+    available, known = env._episode._available, env._episode._known
     assert env.action_masks().tolist() == [
-        int(action.verb != "slice" and not env._conduct.objection(action, around, known))
+        int(
+            action.verb != "slice"
+            and not env._episode._handler.illegal_reason(action, available, known)
+        )
         for action in ACTIONS
     ]
 
@@ -241,9 +244,9 @@ def test_things_of_the_types_that_lay_in_the_receptacle_are_within_reach_when_se
     """Their types are those of when the agent went there, in this case before it took the Apple."""
     task = replace(TAKE_APPLE, target_objects=(APPLE,), navigable_objects=("CounterTop",))
     play(task, "navigate to CounterTop", "pickup Apple")
-    inside = env._conduct._inside  # type: ignore[attr-defined]
+    inside = env._episode._handler._inside  # type: ignore[attr-defined]
     play(task, "navigate to CounterTop", "pickup Apple", "navigate to Window")
-    assert (env._conduct._inside == inside).all()  # type: ignore[attr-defined]  # no receptacle
+    assert (env._episode._handler._inside == inside).all()  # type: ignore[attr-defined]  # no receptacle
     assert inside.any()
 
 

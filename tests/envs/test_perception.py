@@ -14,9 +14,9 @@ import pytest
 from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.envs.legality import Known, legal_actions, navigable_within, surroundings
+from er_gym.envs.legality import KnownTypes, available_objects, legal_actions, navigable_within
 from er_gym.envs.observations import Memory
-from er_gym.envs.perception import Percept, names, perceive
+from er_gym.envs.perception import Perception, perceive, type_names
 from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import AgentPose
@@ -50,7 +50,7 @@ def make_entry(
     }
 
 
-def percept_of(*entries: Entry) -> Percept:
+def perception_of(*entries: Entry) -> Perception:
     """What an agent in the origin perceives of some objects."""
     metadata = {
         "objects": list(entries),
@@ -99,8 +99,8 @@ def box(x: float, y: float, z: float, distance: float, **fields: Any) -> Entry:
     ],
 )
 def test_navigable_rule(entry: Entry, expected: bool) -> None:
-    around = surroundings(percept_of(entry))
-    assert around.navigable.tolist() == around.interactable.tolist() == [0] * expected
+    available = available_objects(perception_of(entry))
+    assert available.navigable.tolist() == available.interactable.tolist() == [0] * expected
 
 
 def rule(volume: float, face: float, distance: float) -> bool:
@@ -128,7 +128,7 @@ def test_how_near_one_must_be_is_the_papers_rule() -> None:
 
 
 def test_what_is_like_the_contents_of_where_one_is_can_be_handled_wherever_it_is_seen() -> None:
-    percept = percept_of(
+    perception = perception_of(
         make_entry("Bowl|1", centre=FAR, receptacle=True, receptacleObjectIds=["Egg|1"]),
         make_entry("Egg|1", centre=FAR, visible=False, parentReceptacles=["Bowl|1"]),
         make_entry("Egg|2", centre=FAR),
@@ -136,12 +136,12 @@ def test_what_is_like_the_contents_of_where_one_is_can_be_handled_wherever_it_is
         make_entry("Apple|1", centre=FAR),
         make_entry("Egg|4"),
     )
-    around = surroundings(percept, "Bowl|1")
-    assert [percept.objects.ids[k] for k in around.navigable] == ["Egg|4"]
-    assert [percept.objects.ids[k] for k in around.interactable] == ["Egg|2", "Egg|4"]
+    available = available_objects(perception, "Bowl|1")
+    assert [perception.objects.ids[k] for k in available.navigable] == ["Egg|4"]
+    assert [perception.objects.ids[k] for k in available.interactable] == ["Egg|2", "Egg|4"]
     for elsewhere in ("", "Egg|4", "Bowl|2"):
-        found = surroundings(percept, elsewhere).interactable
-        assert [percept.objects.ids[k] for k in found] == ["Egg|4"]
+        found = available_objects(perception, elsewhere).interactable
+        assert [perception.objects.ids[k] for k in found] == ["Egg|4"]
 
 
 def told(mask: np.ndarray) -> list[str]:
@@ -152,12 +152,14 @@ def test_the_hand_decides_between_picking_up_and_putting() -> None:
     near = (make_entry("Apple|1", pickupable=True), make_entry("Bowl|1", receptacle=True))
     held = make_entry("Egg|1", pickupable=True, isPickedUp=True)
     for entries, legal in ((near, "pickup Apple"), ((*near, held), "put in Bowl")):
-        mask = legal_actions(surroundings(percept_of(*entries)), Known(["Narnia", "Floor"]))
+        mask = legal_actions(
+            available_objects(perception_of(*entries)), KnownTypes(["Narnia", "Floor"])
+        )
         assert set(told(mask)) == {"observe", "move forward", "end", legal}
 
 
 def test_known_types_grow_and_are_told_in_order() -> None:
-    known = Known(["Mug", "Narnia", "Floor"])
+    known = KnownTypes(["Mug", "Narnia", "Floor"])
     assert known.names == ("Mug", "Narnia")
     known.add(np.array([KIND_OF["Apple"], KIND_OF["Mug"], KIND_OF["Apple"]]))
     assert known.names == ("Apple", "Mug", "Narnia")
@@ -176,9 +178,9 @@ def test_memory_is_of_what_was_seen_last() -> None:
         ((unseen, make_entry("Apple|1")), True),
         ((shut, unseen), False),
     ):
-        memory.look(percept_of(*entries))
-        assert names(memory.is_open) == names(memory.is_on) == ("Cabinet",) * remembered
-    assert names(memory.seen) == ("Apple", "Cabinet")
+        memory.look(perception_of(*entries))
+        assert type_names(memory.is_open) == type_names(memory.is_on) == ("Cabinet",) * remembered
+    assert type_names(memory.seen) == ("Apple", "Cabinet")
 
 
 # -- random play -----------------------------------------------------------------------------------
@@ -212,7 +214,7 @@ class Twin:
     held: int = 0
     events: int = 0
 
-    def perceive(self, event: Any) -> Percept:
+    def perceive(self, event: Any) -> Perception:
         metadata = dict(event.metadata)
         ours, plain = (
             perceive(event),
@@ -221,15 +223,15 @@ class Twin:
         assert ours.pose == plain.pose
         assert np.allclose(ours.objects.centre, plain.objects.centre)  # what is carried moves
         assert (ours.visible_types == plain.visible_types).all()
-        known = Known([])
+        known = KnownTypes([])
         for at in ("", *ours.objects.ids):
-            one, other = surroundings(ours, at), surroundings(plain, at)
+            one, other = available_objects(ours, at), available_objects(plain, at)
             assert [ours.objects.ids[k] for k in one.navigable] == navigable_ids(metadata)
             assert one.interactable.tolist() == other.interactable.tolist()
             assert one.in_reach == other.in_reach
             assert told(legal_actions(one, known)) == told(legal_actions(other, known))
-        for memory, percept in zip(self.memories, (ours, plain), strict=True):
-            memory.look(percept)
+        for memory, perception in zip(self.memories, (ours, plain), strict=True):
+            memory.look(perception)
         for field in ("seen", "is_open", "is_on"):
             one_mark, other_mark = (getattr(memory, field) for memory in self.memories)
             assert (one_mark == other_mark).all()

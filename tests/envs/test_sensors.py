@@ -176,7 +176,7 @@ def test_vector_environments_stack_them() -> None:
 def test_an_observation_of_another_package_reads_classes() -> None:
     seen = Observation(
         space=lambda width, height: spaces.Box(0, 255, (height, width, 3), np.uint8),
-        build=lambda situation: np.array(situation.percept.classes),
+        build=lambda situation: np.array(situation.perception.classes),
         needs=("classes",),
     )
     assert set(SENSORS) >= set(seen.needs)

@@ -54,7 +54,7 @@ ECHO = ModelClient(
 )
 HANDS = Observation(
     space=lambda width, height: spaces.Box(0, 1, (1,), np.float32),
-    build=lambda situation: np.array([situation.percept.objects.held >= 0], np.float32),
+    build=lambda situation: np.array([situation.perception.objects.held >= 0], np.float32),
 )
 
 

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from er_gym.locking import Locked
 from er_gym.rollout.records import EpisodeRecord
-from er_gym.rollout.run_directory import RunDirectory, RunDirectoryError, claimed
+from er_gym.rollout.run_directory import RunDirectory, RunDirectoryError, locked_run_directory
 from er_gym.writing import file_stem
 
 GOLDEN = """
@@ -53,33 +53,33 @@ def test_what_was_written_before_goals_and_search_targets_is_read_still() -> Non
     assert not read.key_actions[0].exact
 
 
-def test_write_and_read(store, episode):
+def test_write_and_read(run_directory, episode):
     first, second = episode(("end",), ("end",)), episode(("end",), (), task_id="task-2")
     for each in (second, first):
-        store.write(each)
-    again = RunDirectory.open(store.path)
-    assert again.manifest == store.manifest
+        run_directory.write(each)
+    again = RunDirectory.open(run_directory.path)
+    assert again.manifest == run_directory.manifest
     assert list(again.episodes()) == [first, second]
 
 
-def test_writing_again_replaces(store, episode):
-    store.write(episode(("end",), (), error="ValueError: no"))
-    store.write(episode(("end",), ("end",)))
-    assert [each.error for each in store.episodes()] == [""]
+def test_writing_again_replaces(run_directory, episode):
+    run_directory.write(episode(("end",), (), error="ValueError: no"))
+    run_directory.write(episode(("end",), ("end",)))
+    assert [each.error for each in run_directory.episodes()] == [""]
 
 
-def test_leftovers_are_passed_over(store, episode):
-    path = store.write(episode(("end",), ("end",)))
+def test_leftovers_are_passed_over(run_directory, episode):
+    path = run_directory.write(episode(("end",), ("end",)))
     whole = path.read_text()
     (path.parent / ".task-2.abc.tmp").write_text(whole)
     (path.parent / "task-3.json").write_text(whole[: len(whole) // 2])
     (path.parent / "task-4.json").write_bytes(b"\xff\xfe\x00")
     (path.parent / "task-5.json").touch()
-    assert [each.task_id for each in store.episodes()] == ["task-1"]
+    assert [each.task_id for each in run_directory.episodes()] == ["task-1"]
 
 
-def test_a_write_that_fails_leaves_the_old_file(store, episode, monkeypatch):
-    path = store.write(episode(("end",), ("end",)))
+def test_a_write_that_fails_leaves_the_old_file(run_directory, episode, monkeypatch):
+    path = run_directory.write(episode(("end",), ("end",)))
     before = path.read_bytes()
 
     def full(handle):
@@ -87,17 +87,17 @@ def test_a_write_that_fails_leaves_the_old_file(store, episode, monkeypatch):
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space"):
-        store.write(episode(("end",), ()))
+        run_directory.write(episode(("end",), ()))
     assert path.read_bytes() == before
     assert os.listdir(path.parent) == [path.name]
 
 
-def test_results_can_be_read_by_others(store, episode):
-    assert store.write(episode(("end",), ("end",))).stat().st_mode & 0o044 == 0o044
+def test_results_can_be_read_by_others(run_directory, episode):
+    assert run_directory.write(episode(("end",), ("end",))).stat().st_mode & 0o044 == 0o044
 
 
-def test_the_same_run_continues(store, manifest):
-    assert RunDirectory.create(store.path, manifest).manifest == manifest
+def test_the_same_run_continues(run_directory, manifest):
+    assert RunDirectory.create(run_directory.path, manifest).manifest == manifest
 
 
 def test_tuples_do_not_make_another_run(tmp_path, manifest):
@@ -117,30 +117,30 @@ def test_tuples_do_not_make_another_run(tmp_path, manifest):
         ("er_gym", "0.2.0"),
     ],
 )
-def test_another_run_is_refused_by_the_field_that_differs(store, manifest, field, value):
-    before = (store.path / "run.json").read_bytes()
+def test_another_run_is_refused_by_the_field_that_differs(run_directory, manifest, field, value):
+    before = (run_directory.path / "run.json").read_bytes()
     with pytest.raises(RunDirectoryError, match=rf"its {field} is .*another --out") as caught:
-        RunDirectory.create(store.path, manifest.model_copy(update={field: value}))
+        RunDirectory.create(run_directory.path, manifest.model_copy(update={field: value}))
     assert repr(value) in str(caught.value)
-    assert (store.path / "run.json").read_bytes() == before
+    assert (run_directory.path / "run.json").read_bytes() == before
 
 
-def test_episodes_of_unknown_origin_are_refused(store, manifest, episode):
-    store.write(episode(("end",), ("end",)))
-    (store.path / "run.json").unlink()
+def test_episodes_of_unknown_origin_are_refused(run_directory, manifest, episode):
+    run_directory.write(episode(("end",), ("end",)))
+    (run_directory.path / "run.json").unlink()
     with pytest.raises(RunDirectoryError, match=r"holds episodes but no run\.json"):
-        RunDirectory.create(store.path, manifest)
+        RunDirectory.create(run_directory.path, manifest)
 
 
-def test_what_is_no_run(tmp_path, store):
+def test_what_is_no_run(tmp_path, run_directory):
     with pytest.raises(RunDirectoryError, match="is no run directory"):
         RunDirectory.open(tmp_path / "nowhere")
-    (store.path / "run.json").write_text('{"format": "er-gym/run/1"}')
+    (run_directory.path / "run.json").write_text('{"format": "er-gym/run/1"}')
     with pytest.raises(RunDirectoryError, match="is no run manifest: suite: Field required"):
-        RunDirectory.open(store.path)
-    (store.path / "run.json").write_text("{")
+        RunDirectory.open(run_directory.path)
+    (run_directory.path / "run.json").write_text("{")
     with pytest.raises(RunDirectoryError, match="is no run manifest: the file: Invalid JSON"):
-        RunDirectory.open(store.path)
+        RunDirectory.open(run_directory.path)
 
 
 def test_fit_ids_are_their_own_file_names():
@@ -165,9 +165,9 @@ def test_file_names_stay_apart_and_short():
 
 
 @pytest.fixture
-def odd_files(store, manifest, episode, tmp_path):
+def odd_files(run_directory, manifest, episode, tmp_path):
     """A run with one good episode, task-1, and files that are none; what is said of each."""
-    good = store.write(episode(("end",), ("end",)))
+    good = run_directory.write(episode(("end",), ("end",)))
     folder, whole = good.parent, good.read_text()
     (folder / "task-1 (copy).json").write_text(whole)
     (folder / "task-2.json").write_text(whole)
@@ -195,8 +195,8 @@ def odd_files(store, manifest, episode, tmp_path):
     }
 
 
-def test_what_is_no_episode_of_the_run_is_named(store, odd_files):
-    found = store.read()
+def test_what_is_no_episode_of_the_run_is_named(run_directory, odd_files):
+    found = run_directory.read()
     assert [each.task_id for each in found.episodes] == ["task-1"]
     said = dict(str(each).removeprefix("episodes/").split(": ", 1) for each in found.unusable)
     assert said.keys() == odd_files.keys()
@@ -205,57 +205,63 @@ def test_what_is_no_episode_of_the_run_is_named(store, odd_files):
         assert said[name].isprintable()
 
 
-def test_it_is_moved_out_of_the_way_and_not_lost(store, odd_files, episode):
-    kept = {path.name: path.read_bytes() for path in (store.path / "episodes").glob("task-[23]*")}
-    told = store.move_aside(["task-1", "task-2", "task-3"])
+def test_it_is_moved_out_of_the_way_and_not_lost(run_directory, odd_files, episode):
+    kept = {
+        path.name: path.read_bytes()
+        for path in (run_directory.path / "episodes").glob("task-[23]*")
+    }
+    told = run_directory.move_aside(["task-1", "task-2", "task-3"])
     assert len(told) == len(odd_files)
     assert sum("and the task is played anew" in line for line in told) == 2
     for name, content in kept.items():
-        assert (store.path / "episodes" / f"{name}.aside-1").read_bytes() == content
-    store.write(episode(("end",), (), task_id="task-3"))
-    assert [each.task_id for each in store.episodes()] == ["task-1", "task-3"]
-    assert len(store.move_aside(["task-1", "task-2", "task-3"])) == len(odd_files) - 2
+        assert (run_directory.path / "episodes" / f"{name}.aside-1").read_bytes() == content
+    run_directory.write(episode(("end",), (), task_id="task-3"))
+    assert [each.task_id for each in run_directory.episodes()] == ["task-1", "task-3"]
+    assert len(run_directory.move_aside(["task-1", "task-2", "task-3"])) == len(odd_files) - 2
 
 
 # -- who plays has the directory -------------------------------------------------------------------
 
 
 def test_a_start_that_is_refused_claims_nothing(tmp_path, manifest):
-    with pytest.raises(ValueError, match="no such model"), claimed(tmp_path / "a" / "x", manifest):
+    with (
+        pytest.raises(ValueError, match="no such model"),
+        locked_run_directory(tmp_path / "a" / "x", manifest),
+    ):
         raise ValueError("no such model")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_was_there_before_stays(tmp_path, store, manifest, episode):
+def test_what_was_there_before_stays(tmp_path, run_directory, manifest, episode):
     (tmp_path / "run" / "notes.md").write_text("mine")
-    with pytest.raises(KeyboardInterrupt), claimed(store.path, manifest):
+    with pytest.raises(KeyboardInterrupt), locked_run_directory(run_directory.path, manifest):
         raise KeyboardInterrupt
-    assert [path.name for path in store.path.iterdir()] == ["notes.md"]
+    assert [path.name for path in run_directory.path.iterdir()] == ["notes.md"]
     for error in ("", "ValueError: no"):
-        with claimed(store.path, manifest) as mine:
+        with locked_run_directory(run_directory.path, manifest) as mine:
             mine.write(episode(("end",), (), error=error))
-        with pytest.raises(KeyboardInterrupt), claimed(store.path, manifest):
+        with pytest.raises(KeyboardInterrupt), locked_run_directory(run_directory.path, manifest):
             raise KeyboardInterrupt
-        assert len(list(RunDirectory.open(store.path).episodes())) == 1
+        assert len(list(RunDirectory.open(run_directory.path).episodes())) == 1
 
 
-def test_a_run_killed_before_it_had_anything_gives_way(store, manifest):
+def test_a_run_killed_before_it_had_anything_gives_way(run_directory, manifest):
     other = manifest.model_copy(update={"agent": "random"})
-    with claimed(store.path, other):
+    with locked_run_directory(run_directory.path, other):
         pass
-    assert RunDirectory.open(store.path).manifest == other
+    assert RunDirectory.open(run_directory.path).manifest == other
 
 
-def test_what_was_paid_for_stays(store, manifest):
-    (store.path / "spending.jsonl").write_text("{}\n")
+def test_what_was_paid_for_stays(run_directory, manifest):
+    (run_directory.path / "spending.jsonl").write_text("{}\n")
     with (
         pytest.raises(RunDirectoryError, match="its agent is"),
-        claimed(store.path, manifest.model_copy(update={"agent": "random"})),
+        locked_run_directory(run_directory.path, manifest.model_copy(update={"agent": "random"})),
     ):
         pass
-    with pytest.raises(KeyboardInterrupt), claimed(store.path, manifest):
+    with pytest.raises(KeyboardInterrupt), locked_run_directory(run_directory.path, manifest):
         raise KeyboardInterrupt
-    assert (store.path / "run.json").exists()
+    assert (run_directory.path / "run.json").exists()
 
 
 @pytest.mark.parametrize("name", ["spending.jsonl", "conversations/x.json", "replies/cache.db"])
@@ -268,10 +274,10 @@ def test_files_of_unknown_origin_are_refused(tmp_path, manifest, name):
     assert path.read_text() == "mine"
 
 
-def test_two_do_not_play_in_one_directory(store, manifest):
+def test_two_do_not_play_in_one_directory(run_directory, manifest):
     with (
-        claimed(store.path, manifest),
+        locked_run_directory(run_directory.path, manifest),
         pytest.raises(Locked, match=f"in use by process {os.getpid()};"),
-        claimed(store.path, manifest),
+        locked_run_directory(run_directory.path, manifest),
     ):
         pass

@@ -17,13 +17,13 @@ from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout import process_executor, runner
 from er_gym.rollout.events import EpisodeEnded
-from er_gym.rollout.executor import Size
+from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.runner import Outcome
+from er_gym.rollout.runner import RunSummary
 from er_gym.rollout.selection import Shard, select
-from er_gym.rollout.worker_pool import Lost
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.paper_format import read_tasks
 
 
@@ -47,8 +47,8 @@ def short_env():
 
 
 @pytest.fixture
-def new_store(tmp_path, manifest):
-    """Makes a store for a run of an agent, in short episodes."""
+def new_run_directory(tmp_path, manifest):
+    """Makes a run_directory for a run of an agent, in short episodes."""
 
     def make(agent: str, name: str = "run") -> RunDirectory:
         env = {"obs_mode": "text", "max_steps": 8}
@@ -58,19 +58,25 @@ def new_store(tmp_path, manifest):
     return make
 
 
-def run(store: RunDirectory, tasks, *, workers=1, on_episode=lambda event: None) -> Outcome:
+def run(
+    run_directory: RunDirectory, tasks, *, workers=1, on_episode=lambda event: None
+) -> RunSummary:
     """Play with the agent that the manifest names; hear of episodes that end."""
 
     def listen(event):
         if isinstance(event, EpisodeEnded):
             on_episode(event)
 
-    agent = NamedAgent(store.manifest.agent)
-    return runner.run(store, tasks, agent, size=Size(workers), listeners=[listen])
+    agent = NamedAgent(run_directory.manifest.agent)
+    return runner.run(
+        run_directory, tasks, agent, parallelism=Parallelism(workers), listeners=[listen]
+    )
 
 
-def modified(store: RunDirectory) -> dict[str, int]:
-    return {path.name: path.stat().st_mtime_ns for path in (store.path / "episodes").iterdir()}
+def modified(run_directory: RunDirectory) -> dict[str, int]:
+    return {
+        path.name: path.stat().st_mtime_ns for path in (run_directory.path / "episodes").iterdir()
+    }
 
 
 def timeless(episode: EpisodeRecord) -> EpisodeRecord:
@@ -195,7 +201,7 @@ def test_a_crash_is_written_down_with_what_was_before(env, tasks):
 # -- a run ---------------------------------------------------------------------------------------
 
 
-def test_workers_play_what_is_played_here(new_store, tasks, short_env):
+def test_workers_play_what_is_played_here(new_run_directory, tasks, short_env):
     """The random agent, because it would show if anything but the task's seed mattered."""
     here = []
     for task in tasks:
@@ -206,43 +212,43 @@ def test_workers_play_what_is_played_here(new_store, tasks, short_env):
     assert len({tuple(step.text for step in each.steps) for each in here}) == 7
 
     seen = []
-    one, two = new_store("random", "one"), new_store("random", "two")
-    assert run(one, tasks, workers=1, on_episode=seen.append) == Outcome(7, 0, ())
-    assert run(two, tasks[::-1], workers=2) == Outcome(7, 0, ())
+    one, two = new_run_directory("random", "one"), new_run_directory("random", "two")
+    assert run(one, tasks, workers=1, on_episode=seen.append) == RunSummary(7, 0, ())
+    assert run(two, tasks[::-1], workers=2) == RunSummary(7, 0, ())
     assert [timeless(each) for each in one.episodes()] == here
     assert [timeless(each) for each in two.episodes()] == here
     assert sorted(each.task_id for each in seen) == [task.id for task in tasks]
 
 
-def test_running_again_plays_nothing_again(new_store, tasks):
-    store = new_store("oracle")
-    run(store, tasks[:4], workers=2)
-    before = modified(store)
+def test_running_again_plays_nothing_again(new_run_directory, tasks):
+    run_directory = new_run_directory("oracle")
+    run(run_directory, tasks[:4], workers=2)
+    before = modified(run_directory)
     assert len(before) == 4
-    assert run(store, tasks, workers=2) == Outcome(3, 4, ())
-    after = modified(store)
+    assert run(run_directory, tasks, workers=2) == RunSummary(3, 4, ())
+    after = modified(run_directory)
     assert len(after) == 7
     assert {name: after[name] for name in before} == before
     started = time.monotonic()
-    assert run(store, tasks, workers=2) == Outcome(0, 7, ())
+    assert run(run_directory, tasks, workers=2) == RunSummary(0, 7, ())
     assert time.monotonic() - started < 0.5  # no process was started
-    assert modified(store) == after
+    assert modified(run_directory) == after
 
 
-def test_a_crashed_episode_is_played_again(new_store, tasks, episode):
-    store = new_store("oracle")
-    run(store, tasks, workers=1)
-    (first, *_) = store.episodes()
-    store.write(first.model_copy(update={"error": "ValueError: no"}))
-    before = modified(store)
-    assert run(store, tasks, workers=1) == Outcome(1, 6, ())
-    assert not any(each.error for each in store.episodes())
-    changed = {name for name, when in modified(store).items() if when != before[name]}
+def test_a_crashed_episode_is_played_again(new_run_directory, tasks, episode):
+    run_directory = new_run_directory("oracle")
+    run(run_directory, tasks, workers=1)
+    (first, *_) = run_directory.episodes()
+    run_directory.write(first.model_copy(update={"error": "ValueError: no"}))
+    before = modified(run_directory)
+    assert run(run_directory, tasks, workers=1) == RunSummary(1, 6, ())
+    assert not any(each.error for each in run_directory.episodes())
+    changed = {name for name, when in modified(run_directory).items() if when != before[name]}
     assert changed == {"paper-0.json"}
 
 
-def test_killed_workers_are_replaced(new_store, tasks):
-    store = new_store("random")
+def test_killed_workers_are_replaced(new_run_directory, tasks):
+    run_directory = new_run_directory("random")
     victims = []
 
     def kill_all_once(episode):
@@ -251,44 +257,44 @@ def test_killed_workers_are_replaced(new_store, tasks):
                 victims.append(child.pid)
                 os.kill(child.pid, signal.SIGKILL)
 
-    assert run(store, tasks, workers=2, on_episode=kill_all_once) == Outcome(7, 0, ())
+    assert run(run_directory, tasks, workers=2, on_episode=kill_all_once) == RunSummary(7, 0, ())
     assert len(victims) == 2
-    assert len(modified(store)) == 7
+    assert len(modified(run_directory)) == 7
 
 
-def test_a_task_that_kills_its_worker_is_reported(new_store, tasks, monkeypatch):
-    store = new_store("oracle")
+def test_a_task_that_kills_its_worker_is_reported(new_run_directory, tasks, monkeypatch):
+    run_directory = new_run_directory("oracle")
 
     def give_up(make, jobs, workers):
         for job in jobs:
-            yield job, Lost(tries=3, exitcode=-9)
+            yield job, LostJob(tries=3, exitcode=-9)
 
-    monkeypatch.setattr(process_executor, "do_jobs", give_up)
-    outcome = run(store, tasks[:1])
+    monkeypatch.setattr(process_executor, "run_jobs", give_up)
+    outcome = run(run_directory, tasks[:1])
     (record,) = outcome.crashed
     assert record.error == "the worker process died 3 times, last with exit code -9"
-    assert list(store.episodes()) == [record]
+    assert list(run_directory.episodes()) == [record]
     monkeypatch.undo()
-    assert run(store, tasks[:1]) == Outcome(1, 0, ())
+    assert run(run_directory, tasks[:1]) == RunSummary(1, 0, ())
 
 
-def test_crashes_do_not_end_a_run(new_store, tasks):
+def test_crashes_do_not_end_a_run(new_run_directory, tasks):
     bad = replace(tasks[1], scene="FloorPlan999")
-    outcome = run(new_store("oracle"), [tasks[0], bad, tasks[2]], workers=1)
+    outcome = run(new_run_directory("oracle"), [tasks[0], bad, tasks[2]], workers=1)
     assert outcome.played == 3
     (crashed,) = outcome.crashed
     assert crashed.task_id == "paper-1"
     assert "FloorPlan999" in crashed.error
 
 
-def test_ctrl_c_keeps_what_is_done(new_store, tasks):
-    store = new_store("random")
+def test_ctrl_c_keeps_what_is_done(new_run_directory, tasks):
+    run_directory = new_run_directory("random")
 
     def interrupt(episode):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(store, tasks, workers=2, on_episode=interrupt)
+        run(run_directory, tasks, workers=2, on_episode=interrupt)
     assert multiprocessing.active_children() == []
-    assert len(modified(store)) == 1
-    assert run(store, tasks, workers=2) == Outcome(6, 1, ())
+    assert len(modified(run_directory)) == 1
+    assert run(run_directory, tasks, workers=2) == RunSummary(6, 1, ())

@@ -20,10 +20,10 @@ from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout import thread_executor
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.events import EpisodeEnded
-from er_gym.rollout.executor import Size
+from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.runner import Outcome, Stopped, run
+from er_gym.rollout.runner import RunSummary, Stopped, run
 from er_gym.rollout.worker_pool import WorkerSetupError
 from er_gym.tasks.paper_format import read_tasks
 
@@ -44,8 +44,8 @@ def many(tasks):
 
 
 @pytest.fixture
-def new_store(tmp_path, manifest):
-    """Makes a store for a run in short episodes."""
+def new_run_directory(tmp_path, manifest):
+    """Makes a run_directory for a run in short episodes."""
 
     def make(**env) -> RunDirectory:
         changed = {"agent": "random", "env": {"obs_mode": "text", "max_steps": 4, **env}}
@@ -55,8 +55,8 @@ def new_store(tmp_path, manifest):
 
 
 @pytest.fixture
-def store(new_store):
-    return new_store()
+def run_directory(new_run_directory):
+    return new_run_directory()
 
 
 class Agent:
@@ -104,8 +104,15 @@ class Leaving:
 
 
 def run_threaded(
-    store, tasks, make, *, workers=1, concurrency=8, on_episode=lambda event: None, keep=None
-) -> Outcome:
+    run_directory,
+    tasks,
+    make,
+    *,
+    workers=1,
+    concurrency=8,
+    on_episode=lambda event: None,
+    keep=None,
+) -> RunSummary:
     """Play in threads; hear of episodes that end, and of what agents are asked to leave."""
 
     def listen(event):
@@ -116,12 +123,19 @@ def run_threaded(
         agent = make(task, seed)
         return agent if keep is None else Leaving(agent, keep)
 
-    size = Size(workers, concurrency)
-    return run(store, tasks, make_leaving, executor="threads", size=size, listeners=[listen])
+    parallelism = Parallelism(workers, concurrency)
+    return run(
+        run_directory,
+        tasks,
+        make_leaving,
+        executor="threads",
+        parallelism=parallelism,
+        listeners=[listen],
+    )
 
 
-def kept(store: RunDirectory) -> list[str]:
-    return sorted(each.task_id for each in store.episodes())
+def kept(run_directory: RunDirectory) -> list[str]:
+    return sorted(each.task_id for each in run_directory.episodes())
 
 
 def ids(tasks) -> list[str]:
@@ -142,9 +156,9 @@ def wait_for(condition) -> None:
 # -- what is played ------------------------------------------------------------------------------
 
 
-def test_what_is_played_is_what_is_played_here(store, tasks, monkeypatch):
+def test_what_is_played_is_what_is_played_here(run_directory, tasks, monkeypatch):
     """The random agent, because it would show if anything but the task's seed mattered."""
-    env = EmbodiedEnv((), **store.manifest.env)
+    env = EmbodiedEnv((), **run_directory.manifest.env)
     here = []
     for task in tasks:
         seed = episode_seed(0, task.id)
@@ -156,27 +170,29 @@ def test_what_is_played_is_what_is_played_here(store, tasks, monkeypatch):
     talks, seen = [], []
 
     def keep(episode, agent):
-        known = episode.task_id in kept(store)
+        known = episode.task_id in kept(run_directory)
         talks.append((episode.task_id, known, threading.current_thread()))
 
     def on_episode(episode):
-        seen.append((episode.task_id, episode.task_id in kept(store), threading.current_thread()))
+        seen.append(
+            (episode.task_id, episode.task_id in kept(run_directory), threading.current_thread())
+        )
 
     outcome = run_threaded(
-        store, tasks, at_random, workers=2, concurrency=3, keep=keep, on_episode=on_episode
+        run_directory, tasks, at_random, workers=2, concurrency=3, keep=keep, on_episode=on_episode
     )
-    assert outcome == Outcome(7, 0, ())
-    assert [each.model_copy(update={"seconds": 0.0}) for each in store.episodes()] == here
+    assert outcome == RunSummary(7, 0, ())
+    assert [each.model_copy(update={"seconds": 0.0}) for each in run_directory.episodes()] == here
     assert sorted(each[:2] for each in talks) == [(each, False) for each in ids(tasks)]
     assert sorted(each[:2] for each in seen) == [(each, True) for each in ids(tasks)]
     assert {thread for *_, thread in seen} == {threading.main_thread()}
     assert threading.main_thread() not in {thread for *_, thread in talks}
 
     monkeypatch.setattr(thread_executor, "EnvPool", None)  # no process is started
-    assert run_threaded(store, tasks, at_random) == Outcome(0, 7, ())
+    assert run_threaded(run_directory, tasks, at_random) == RunSummary(0, 7, ())
 
 
-def test_a_slow_reply_stops_nobody(store, many):
+def test_a_slow_reply_stops_nobody(run_directory, many):
     seen = []
     others_are_done = threading.Event()
 
@@ -190,13 +206,13 @@ def test_a_slow_reply_stops_nobody(store, many):
             others_are_done.set()
 
     outcome = run_threaded(
-        store,
+        run_directory,
         many[:31],
         lambda task, seed: Agent(slow) if task.id == "paper-0-0" else Agent(),
         concurrency=3,
         on_episode=on_episode,
     )
-    assert outcome == Outcome(31, 0, ())
+    assert outcome == RunSummary(31, 0, ())
     assert seen[-1] == "paper-0-0"
     assert ids(many[:31]) == sorted(seen)
 
@@ -204,7 +220,7 @@ def test_a_slow_reply_stops_nobody(store, many):
 # -- what goes wrong -----------------------------------------------------------------------------
 
 
-def test_killed_processes_lose_and_repeat_nothing(store, many):
+def test_killed_processes_lose_and_repeat_nothing(run_directory, many):
     """All are killed while episodes are under way, twice: no episode can lose three."""
     made, talks = Counter(), []
 
@@ -220,7 +236,7 @@ def test_killed_processes_lose_and_repeat_nothing(store, many):
 
     seen = []
     outcome = run_threaded(
-        store,
+        run_directory,
         many,
         make,
         workers=2,
@@ -228,13 +244,13 @@ def test_killed_processes_lose_and_repeat_nothing(store, many):
         on_episode=lambda episode: seen.append(episode.task_id),
         keep=lambda episode, agent: talks.append(episode.task_id),
     )
-    assert outcome == Outcome(64, 0, ())
-    assert sorted(seen) == sorted(talks) == kept(store) == ids(many)
+    assert outcome == RunSummary(64, 0, ())
+    assert sorted(seen) == sorted(talks) == kept(run_directory) == ids(many)
     assert made["paper-6-20"] >= 2
     assert made["paper-5-40"] >= 2
 
 
-def test_who_kills_the_process_is_given_up_and_the_others_are_not(store, tasks):
+def test_who_kills_the_process_is_given_up_and_the_others_are_not(run_directory, tasks):
     """Both others are in the middle of an episode in the same process each time it dies."""
     made, talks, under_way = Counter(), [], set()
     given_up = threading.Event()
@@ -255,7 +271,7 @@ def test_who_kills_the_process_is_given_up_and_the_others_are_not(store, tasks):
         return Agent(kill if task.id == "paper-0" else wait)
 
     outcome = run_threaded(
-        store,
+        run_directory,
         tasks[:3],
         make,
         concurrency=3,
@@ -266,10 +282,10 @@ def test_who_kills_the_process_is_given_up_and_the_others_are_not(store, tasks):
     assert (lost.task_id, lost.steps) == ("paper-0", [])
     assert lost.error == "the worker process died 3 times, last with exit code -9"
     assert made == {"paper-0": 3, "paper-1": 4, "paper-2": 4}
-    assert kept(store) == sorted(talks) == ids(tasks[:3])
+    assert kept(run_directory) == sorted(talks) == ids(tasks[:3])
 
 
-def test_crashes_are_recorded_and_do_not_end_a_run(store, tasks):
+def test_crashes_are_recorded_and_do_not_end_a_run(run_directory, tasks):
     def make(task, seed):
         if task.id == "paper-1":
             raise ValueError("no such model")
@@ -278,7 +294,7 @@ def test_crashes_are_recorded_and_do_not_end_a_run(store, tasks):
     bad = replace(tasks[0], scene="FloorPlan999")
     talks = []
     outcome = run_threaded(
-        store,
+        run_directory,
         [bad, *tasks[1:]],
         make,
         concurrency=1,
@@ -292,28 +308,28 @@ def test_crashes_are_recorded_and_do_not_end_a_run(store, tasks):
     assert talks == ["paper-0", *(f"paper-{n}" for n in range(2, 7))]
 
 
-def test_an_environment_that_cannot_be_made_ends_it(new_store, tasks):
+def test_an_environment_that_cannot_be_made_ends_it(new_run_directory, tasks):
     with pytest.raises(WorkerSetupError, match="'smell'"):
-        run_threaded(new_store(obs_mode="smell"), tasks, ending, concurrency=3)
+        run_threaded(new_run_directory(obs_mode="smell"), tasks, ending, concurrency=3)
     assert no_process()
 
 
-def test_what_cannot_be_kept_ends_it(store, tasks):
+def test_what_cannot_be_kept_ends_it(run_directory, tasks):
     def keep(episode, agent):
         raise OSError("disk full")
 
     with pytest.raises(OSError, match="disk full"):
-        run_threaded(store, tasks, ending, keep=keep)
-    assert kept(store) == []
+        run_threaded(run_directory, tasks, ending, keep=keep)
+    assert kept(run_directory) == []
     assert no_process()
 
 
 # -- how it is ended -----------------------------------------------------------------------------
 
 
-def test_an_agent_that_cannot_go_on_stops_the_run(new_store, tasks):
+def test_an_agent_that_cannot_go_on_stops_the_run(new_run_directory, tasks):
     """In flight: one that is over with its reply, one that is not, one that cannot go on."""
-    store = new_store(max_steps=100_000)
+    run_directory = new_run_directory(max_steps=100_000)
     in_flight = threading.Barrier(3)
     spent = threading.Event()
     agents, talks = set(), []
@@ -345,30 +361,30 @@ def test_an_agent_that_cannot_go_on_stops_the_run(new_store, tasks):
 
     with pytest.raises(Stopped, match=r"^the budget is spent$") as stopped:
         run_threaded(
-            store,
+            run_directory,
             tasks,
             make,
             concurrency=3,
             keep=lambda episode, agent: talks.append(episode.task_id),
         )
-    assert stopped.value.outcome == Outcome(2, 0, ())
+    assert stopped.value.outcome == RunSummary(2, 0, ())
     assert talks == ["paper-0", "paper-2"]
-    assert kept(store) == ["paper-0", "paper-2"]
+    assert kept(run_directory) == ["paper-0", "paper-2"]
     assert agents == {"paper-0", "paper-1", "paper-2", "paper-3"}
     assert no_process()
-    assert run_threaded(store, tasks, ending) == Outcome(5, 2, ())
+    assert run_threaded(run_directory, tasks, ending) == RunSummary(5, 2, ())
 
 
-def test_a_refused_key_ends_it_before_anything_is_played(store, tasks):
+def test_a_refused_key_ends_it_before_anything_is_played(run_directory, tasks):
     def make(task, seed):
         raise CannotGoOn("the key is refused")
 
     with pytest.raises(CannotGoOn, match="the key is refused"):
-        run_threaded(store, tasks, make, concurrency=4)
-    assert kept(store) == []
+        run_threaded(run_directory, tasks, make, concurrency=4)
+    assert kept(run_directory) == []
 
 
-def test_an_interrupt_waits_for_no_reply_and_loses_no_episode(store, tasks, monkeypatch):
+def test_an_interrupt_waits_for_no_reply_and_loses_no_episode(run_directory, tasks, monkeypatch):
     """It comes while an episode is being written. What an agent says later is nobody's business."""
     waiting, replied = threading.Event(), threading.Event()
     threads, talks, interrupted = [], [], []
@@ -384,13 +400,13 @@ def test_an_interrupt_waits_for_no_reply_and_loses_no_episode(store, tasks, monk
             interrupted.append(episode.task_id)
             assert waiting.wait(LONG)
             raise KeyboardInterrupt
-        return RunDirectory.write(store, episode)
+        return RunDirectory.write(run_directory, episode)
 
-    monkeypatch.setattr(store, "write", write)
+    monkeypatch.setattr(run_directory, "write", write)
     started = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         run_threaded(
-            store,
+            run_directory,
             tasks,
             lambda task, seed: Agent(slow) if task.id == "paper-0" else Agent(),
             concurrency=2,
@@ -398,13 +414,13 @@ def test_an_interrupt_waits_for_no_reply_and_loses_no_episode(store, tasks, monk
         )
     assert time.monotonic() - started < LONG
     assert no_process()
-    done = kept(store)
+    done = kept(run_directory)
     assert interrupted[0] in done
     assert "paper-0" not in done
     replied.set()
     threads[0].join(LONG)
     assert not threads[0].is_alive()
-    assert (kept(store), "paper-0" in talks) == (done, False)
+    assert (kept(run_directory), "paper-0" in talks) == (done, False)
 
 
 PARENT = """
@@ -412,7 +428,7 @@ import os, socket
 from pathlib import Path
 from agents import Decision
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.executor import Size
+from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.runner import run
 from er_gym.tasks.paper_format import read_tasks
 
@@ -446,24 +462,24 @@ if __name__ == "__main__":
         read_tasks(folder / "tasks.json"),
         lambda task, seed: Agent(task),
         executor="threads",
-        size=Size(workers=2, concurrency=2),
+        parallelism=Parallelism(workers=2, concurrency=2),
     )
 """
 
 
-def test_a_run_that_is_ended_goes_on_where_it_was(store, tasks, tmp_path):
+def test_a_run_that_is_ended_goes_on_where_it_was(run_directory, tasks, tmp_path):
     """The same command, ended by Ctrl-C and then killed; then what is left of it."""
-    stderr = run_until(signal.SIGINT, store, tmp_path)
+    stderr = run_until(signal.SIGINT, run_directory, tmp_path)
     assert stderr.count("Traceback") == 1  # the parent's own
-    done = kept(store)
+    done = kept(run_directory)
     assert done == ["paper-0", "paper-1", "paper-3"]
-    assert run_until(signal.SIGKILL, store, tmp_path) == ""
-    assert kept(store) == done
-    assert run_threaded(store, tasks, ending) == Outcome(4, 3, ())
-    assert kept(store) == ids(tasks)
+    assert run_until(signal.SIGKILL, run_directory, tmp_path) == ""
+    assert kept(run_directory) == done
+    assert run_threaded(run_directory, tasks, ending) == RunSummary(4, 3, ())
+    assert kept(run_directory) == ids(tasks)
 
 
-def run_until(signum: int, store: RunDirectory, folder: Path) -> str:
+def run_until(signum: int, run_directory: RunDirectory, folder: Path) -> str:
     """Run the script until an agent waits in it and an engine is stuck, then end it; its stderr."""
     script = folder / "parent.py"
     script.write_text(PARENT.format(folder=str(folder)))

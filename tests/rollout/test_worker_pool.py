@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from er_gym.rollout.worker_pool import Lost, WorkerSetupError, do_jobs
+from er_gym.rollout.worker_pool import LostJob, WorkerSetupError, run_jobs
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
@@ -28,44 +28,44 @@ def jobs(monkeypatch):
 
 
 def test_every_job_is_done_once(jobs):
-    results = list(do_jobs(jobs.Squarer, range(20), workers=3))
+    results = list(run_jobs(jobs.Squarer, range(20), workers=3))
     assert sorted(results) == [(job, job * job) for job in range(20)]
 
 
 def test_no_jobs_start_no_process(jobs):
-    assert list(do_jobs(jobs.no_such_engine, [], workers=3)) == []
+    assert list(run_jobs(jobs.no_such_engine, [], workers=3)) == []
 
 
 def test_workers_are_other_processes_and_are_closed(jobs, tmp_path):
-    list(do_jobs(partial(jobs.Closing, tmp_path), range(6), workers=2))
+    list(run_jobs(partial(jobs.Closing, tmp_path), range(6), workers=2))
     pids = {int(path.name) for path in tmp_path.iterdir()}
     assert len(pids) == 2
     assert os.getpid() not in pids
 
 
 def test_a_killed_worker_costs_one_try(jobs, tmp_path):
-    results = dict(do_jobs(partial(jobs.Fragile, tmp_path, False), range(8), workers=2))
+    results = dict(run_jobs(partial(jobs.Fragile, tmp_path, False), range(8), workers=2))
     assert results == {job: job for job in range(8)}
     tried = [path.name.split("-")[0] for path in tmp_path.iterdir()]
     assert sorted(tried) == [*"01233", *"4567"]  # no other job was tried again
 
 
 def test_a_job_that_always_kills_is_given_up(jobs, tmp_path):
-    results = dict(do_jobs(partial(jobs.Fragile, tmp_path, True), range(8), workers=2, tries=3))
-    assert results.pop(3) == Lost(tries=3, exitcode=-signal.SIGKILL)
+    results = dict(run_jobs(partial(jobs.Fragile, tmp_path, True), range(8), workers=2, tries=3))
+    assert results.pop(3) == LostJob(tries=3, exitcode=-signal.SIGKILL)
     assert results == {job: job for job in (0, 1, 2, 4, 5, 6, 7)}
     assert len(list(tmp_path.glob("3-*"))) == 3
 
 
 def test_a_worker_that_cannot_be_set_up_ends_it(jobs):
     with pytest.raises(WorkerSetupError, match="OSError: no such engine"):
-        list(do_jobs(jobs.no_such_engine, range(4), workers=2))
+        list(run_jobs(jobs.no_such_engine, range(4), workers=2))
     assert multiprocessing.active_children() == []
 
 
 def test_leaving_early_ends_workers_at_once(jobs, tmp_path):
     started = time.monotonic()
-    results = do_jobs(partial(jobs.Mixed, tmp_path), ["quick", "slow"], workers=2)
+    results = run_jobs(partial(jobs.Mixed, tmp_path), ["quick", "slow"], workers=2)
     assert next(results) == ("quick", "quick")
     wait_for(lambda: list(tmp_path.glob("began-*")))
     results.close()
@@ -78,9 +78,9 @@ PARENT = """
 from functools import partial
 from pathlib import Path
 from pool_jobs import Slow
-from er_gym.rollout.worker_pool import do_jobs
+from er_gym.rollout.worker_pool import run_jobs
 if __name__ == "__main__":
-    list(do_jobs(partial(Slow, Path({folder!r})), [1, 2], workers=2))
+    list(run_jobs(partial(Slow, Path({folder!r})), [1, 2], workers=2))
 """
 
 

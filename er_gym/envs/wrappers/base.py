@@ -1,4 +1,4 @@
-"""What the wrappers have in common."""
+"""The base class and helpers of the wrappers."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class TaskWrapper(gymnasium.Wrapper[Any, Any, Any, Any]):
         return masks
 
 
-def told(info: Mapping[str, Any], key: str) -> Any:
+def info_entry(info: Mapping[str, Any], key: str) -> Any:
     """An entry of ``info``.
 
     Raises:
-        ValueError: there is none, so the environment is none of er-gym's.
+        ValueError: the entry is missing, so the environment is not one of er-gym's.
     """
     if key not in info:
         raise ValueError(

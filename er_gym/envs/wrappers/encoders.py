@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.arguments import shown
+from er_gym.envs.arguments import short_repr
 
 HASHED = "hashed"
 MODEL = "sentence-transformers:"
@@ -75,7 +75,7 @@ def make_encoder(name: str = HASHED) -> Encoder:
     # A configuration may hold anything.
     is_model = isinstance(name, str) and name.startswith(MODEL) and name != MODEL
     if name != HASHED and not is_model:
-        raise ValueError(f"unknown encoder {shown(name)}; give {_ALLOWED}")
+        raise ValueError(f"unknown encoder {short_repr(name)}; give {_ALLOWED}")
     return _made(name)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
-from er_gym.envs.wrappers.base import TaskWrapper, told
+from er_gym.envs.wrappers.base import TaskWrapper, info_entry
 from er_gym.envs.wrappers.encoders import HASHED, make_encoder
 
 KEY = "instruction"
@@ -58,7 +58,7 @@ class InstructionEmbedding(TaskWrapper, RecordConstructorArgs):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Begin an episode, and encode what its task says."""
         obs, info = self.env.reset(seed=seed, options=options)
-        self._embedding = make_encoder(self._encoder)(told(info, "task").instruction)
+        self._embedding = make_encoder(self._encoder)(info_entry(info, "task").instruction)
         return self._with_instruction(obs), info
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
@@ -67,7 +67,7 @@ class InstructionEmbedding(TaskWrapper, RecordConstructorArgs):
         return self._with_instruction(obs), float(reward), terminated, truncated, info
 
     def _with_instruction(self, obs: dict[str, Any]) -> dict[str, Any]:
-        # A copy: whoever writes into one observation must not change the next.
+        # A copy, so that writing into one observation does not change the next.
         return {**obs, KEY: self._embedding.copy()}
 
 

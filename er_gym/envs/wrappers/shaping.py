@@ -9,7 +9,7 @@ import gymnasium
 from gymnasium.utils import RecordConstructorArgs
 
 from er_gym.envs.arguments import number
-from er_gym.envs.wrappers.base import TaskWrapper, told
+from er_gym.envs.wrappers.base import TaskWrapper, info_entry
 
 
 def potential(info: Mapping[str, Any]) -> float:
@@ -18,7 +18,7 @@ def potential(info: Mapping[str, Any]) -> float:
     Raises:
         ValueError: ``info`` is none of an er-gym environment.
     """
-    left, done = (len(told(info, f"key_actions_{state}")) for state in ("left", "done"))
+    left, done = (len(info_entry(info, f"key_actions_{state}")) for state in ("left", "done"))
     return -left / max(left + done, 1)
 
 

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.envs.action_handler import EpisodeSetup, ExecutedAction
 from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
-from er_gym.envs.conduct import Done, Setting
-from er_gym.envs.legality import Known, Surroundings, navigable_within
-from er_gym.envs.paper_approach import Thing, approach, current, thing_of
+from er_gym.envs.legality import AvailableObjects, KnownTypes, navigable_within
+from er_gym.envs.paper_approach import ObjectSnapshot, approach, current_snapshot, snapshot_of
 from er_gym.envs.paper_skills import interact, move_forward, observe, start_again
-from er_gym.envs.perception import Percept, marked
+from er_gym.envs.perception import Perception, type_mask
 from er_gym.envs.skills import Outcome
 from er_gym.tasks import verbs
 from er_gym.tasks.task import KeyAction
@@ -69,7 +69,7 @@ def understand_as_paper(action: AnyAction, objects: ObjectTable) -> tuple[Action
     return Action(verb, word if word in there else next(alike, NO_OBJECT)), text
 
 
-class PaperConduct:
+class PaperActionHandler:
     """The paper's way to judge and carry out actions.
 
     - A type may be gone to once it has been plain to see, or where the task lists it.
@@ -81,83 +81,89 @@ class PaperConduct:
       switched on, is not heeded.
 
     Args:
-        setting: of the episode; its ``instances`` means nothing here.
+        setup: of the episode; its ``instances`` means nothing here.
     """
 
-    def __init__(self, setting: Setting) -> None:
-        self.at = ""
-        self._setting, task = setting, setting.task
-        self._inside = marked(np.array([], np.intp))  # types that lay in the last receptacle
+    def __init__(self, setup: EpisodeSetup) -> None:
+        self.navigated_to = ""
+        self._setup, task = setup, setup.task
+        self._inside = type_mask(np.array([], np.intp))  # types that lay in the last receptacle
         self._second = str(task.extra.get("identity")) in _SECOND_WHEN_HOLDING
         self._targets: dict[str, list[str]] = {}
         for object_id in task.target_objects:
             self._targets.setdefault(object_id.split("|")[0], []).append(object_id)
-        self._first: dict[str, Thing] = {}
-        for entry in setting.controller.last_event.metadata["objects"]:
+        self._first: dict[str, ObjectSnapshot] = {}
+        for entry in setup.controller.last_event.metadata["objects"]:
             if entry["objectType"] not in self._first:
-                self._first[entry["objectType"]] = thing_of(entry)
+                self._first[entry["objectType"]] = snapshot_of(entry)
 
-    def around(self, percept: Percept) -> Surroundings:
+    def available_objects(self, perception: Perception) -> AvailableObjects:
         """What is plain to see, what is in the hand included; and what lay in the receptacle."""
-        table, visible = percept.objects, percept.visible
-        away = np.hypot(table.centre[:, 0] - percept.pose.x, table.centre[:, 2] - percept.pose.z)
+        table, visible = perception.objects, perception.visible
+        away = np.hypot(
+            table.centre[:, 0] - perception.pose.x, table.centre[:, 2] - perception.pose.z
+        )
         plain = visible & (away < _within(table))
         inside = visible & self._inside[table.kinds]
-        return Surroundings(
+        return AvailableObjects(
             objects=table,
             navigable=plain.nonzero()[0],
             interactable=(plain | inside).nonzero()[0],
             covered=np.array([], np.intp),  # AI2-THOR refuses what a pan hides
         )
 
-    def objection(self, action: Action, around: Surroundings, known: Known) -> str:
+    def illegal_reason(self, action: Action, available: AvailableObjects, known: KnownTypes) -> str:
         """A type must be known to go there, and at hand to do anything else to it."""
         name = action.object_type
         if action.verb in (verbs.INIT, *_BARE):
             return ""
         if action.verb == verbs.NAVIGATE:
             return "" if name in known else f"You cannot navigate to {name or 'nothing'}."
-        if name in around.in_reach:
+        if name in available.in_reach:
             return ""
         return f"You cannot {action.verb} {name or 'nothing'}: it is not available for interaction."
 
-    def legal(self, around: Surroundings, known: Known) -> NDArray[np.int8]:
+    def legal(self, available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: the paper's interactions with what is at hand are legal."""
         legal = known.legal.copy()
         legal[_NOT_BARE] = 0
         for verb in _INTERACTIONS:
-            indices = INDICES[verb][around.interactable_types]
+            indices = INDICES[verb][available.interactable_types]
             legal[indices[indices >= 0]] = 1
         return legal
 
-    def do(
-        self, action: Action, percept: Percept, around: Surroundings, left: Sequence[KeyAction]
-    ) -> Done:
+    def execute(
+        self,
+        action: Action,
+        perception: Perception,
+        available: AvailableObjects,
+        left: Sequence[KeyAction],
+    ) -> ExecutedAction:
         """Carry out a legal action."""
-        setting, controller = self._setting, self._setting.controller
+        setup, controller = self._setup, self._setup.controller
         if action.verb == verbs.OBSERVE:
             return "", observe(controller)
         if action.verb == verbs.MOVE_FORWARD:
-            return "", move_forward(controller, setting.task.related_objects)
+            return "", move_forward(controller, setup.task.related_objects)
         if action.verb == verbs.END:
             return "", Outcome(None, True)
         if action.verb == verbs.INIT:
-            return "", start_again(controller, setting.start)
-        thing = self._choose(action, percept.objects)
-        if thing is None:
+            return "", start_again(controller, setup.start)
+        target = self._choose(action, perception.objects)
+        if target is None:
             return "", Outcome(None, False, f"there is no such {action.object_type}")
         if action.verb != verbs.NAVIGATE:
-            return thing.object_id, interact(controller, action.verb, thing)
-        aim = self._on_it(thing)
-        outcome = approach(controller, aim, setting.task.poses.get(aim.object_id))
+            return target.object_id, interact(controller, action.verb, target)
+        aim = self._on_it(target)
+        outcome = approach(controller, aim, setup.task.poses.get(aim.object_id))
         if outcome.success:
-            self.at = thing.object_id
+            self.navigated_to = target.object_id
             if aim.receptacle:
                 types = (object_id.split("|")[0] for object_id in aim.contents)
-                self._inside = marked(np.array([KIND_OF[t] for t in types if t in KIND_OF], int))
-        return thing.object_id, outcome
+                self._inside = type_mask(np.array([KIND_OF[t] for t in types if t in KIND_OF], int))
+        return target.object_id, outcome
 
-    def _choose(self, action: Action, objects: ObjectTable) -> Thing | None:
+    def _choose(self, action: Action, objects: ObjectTable) -> ObjectSnapshot | None:
         """The object that a type stands for; None if a task names one that the scene lacks."""
         targets = self._targets.get(action.object_type)
         if targets is None:
@@ -165,19 +171,19 @@ class PaperConduct:
         second = self._second and action.verb == verbs.NAVIGATE and objects.held >= 0
         if second and len(targets) < 2:
             return None
-        return current(self._setting.controller, targets[1 if second else 0])
+        return current_snapshot(self._setup.controller, targets[1 if second else 0])
 
-    def _on_it(self, thing: Thing) -> Thing:
+    def _on_it(self, target: ObjectSnapshot) -> ObjectSnapshot:
         """Where going to an object leads: to the first of the task's related objects that lies in
         it, if it is a receptacle that does not open."""
-        if thing.receptacle and not thing.openable:
-            for object_id in self._setting.task.related_objects:
-                if object_id in thing.contents:
-                    return current(self._setting.controller, object_id) or thing
-        return thing
+        if target.receptacle and not target.openable:
+            for object_id in self._setup.task.related_objects:
+                if object_id in target.contents:
+                    return current_snapshot(self._setup.controller, object_id) or target
+        return target
 
 
-_FLOOR = marked(np.array([KIND_OF[name] for name in verbs.NOWHERE]))
+_FLOOR = type_mask(np.array([KIND_OF[name] for name in verbs.NOWHERE]))
 
 
 def _within(table: ObjectTable) -> NDArray[np.float64]:

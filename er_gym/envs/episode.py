@@ -1,0 +1,309 @@
+"""One episode: its state, and what each action does to it.
+
+:class:`~er_gym.envs.embodied_env.EmbodiedEnv` draws the task and owns the controller. An
+:class:`Episode` places the agent, judges and carries out actions, and builds observations, ``info``
+and rewards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.envs import skills
+from er_gym.envs.action_handler import EpisodeSetup
+from er_gym.envs.actions import Action, AnyAction
+from er_gym.envs.info import Info, LegalActions
+from er_gym.envs.legality import KnownTypes
+from er_gym.envs.observations import MAX_REPEATS, Memory, Observation, Situation, goal_row
+from er_gym.envs.perception import Perception
+from er_gym.envs.protocol import EpisodeProtocol
+from er_gym.tasks import verbs
+from er_gym.tasks.arrangement import set_up_scene
+from er_gym.tasks.goal import Condition, unmet_conditions
+from er_gym.tasks.judge import Criteria, Progress
+from er_gym.tasks.task import Task
+from er_gym.thor.objects import ENTRY_KEYS
+
+MAX_UNKNOWN = 3
+"""This many replies in a row that name no known action end the episode."""
+_CUT_OFF = frozenset({"step limit", "no known action"})
+"""The reasons for which an episode ends although the agent did not end it."""
+_LONGEST_QUOTE = 200
+"""An answer quotes at most this many characters of a text that names no action."""
+
+ResetResult: TypeAlias = tuple[dict[str, Any], dict[str, Any]]
+"""Observation and info, as ``gymnasium.Env.reset`` returns them."""
+StepResult: TypeAlias = tuple[dict[str, Any], float, bool, bool, dict[str, Any]]
+"""What ``gymnasium.Env.step`` returns."""
+
+
+@dataclass(frozen=True)
+class EpisodeSettings:
+    """What all episodes of an environment share; the values have been checked.
+
+    Attributes:
+        protocol: the rules.
+        observations: the builders, by name.
+        instances: which object a type name stands for, see :mod:`er_gym.envs.object_selection`.
+        grid_size: metres.
+        max_steps: the step limit; None for each task's own.
+        step_penalty, illegal_penalty: subtracted from the reward for each step, and for each
+            illegal action.
+        annotate: whether pictures have the object types written into them.
+    """
+
+    protocol: EpisodeProtocol
+    observations: Mapping[str, Observation]
+    instances: str
+    grid_size: float
+    max_steps: int | None
+    step_penalty: float
+    illegal_penalty: float
+    annotate: bool
+
+
+class Episode:
+    """An episode of one task; :meth:`begin` it, then :meth:`step` until it has an ``end_reason``.
+
+    Args:
+        settings: of the environment.
+        task: what is asked.
+        controller: in any scene; the episode resets it to the task's.
+        backend: the name of the controller's backend.
+
+    Attributes:
+        task: what is asked.
+        perception: what the agent perceived last.
+        end_reason: why the episode is over, ``""`` while it is not.
+    """
+
+    perception: Perception
+
+    def __init__(
+        self, settings: EpisodeSettings, task: Task, controller: Any, backend: str
+    ) -> None:
+        self.task = task
+        self.end_reason = ""
+        self._settings, self._protocol = settings, settings.protocol
+        self._controller, self._backend = controller, backend
+        self._progress = Progress.start(Criteria.of(task))
+        self._known = KnownTypes(task.navigable_objects)
+        self._steps = 1
+        self._step_limit = settings.max_steps or task.max_steps
+        self._unknown_replies = 0
+        self._goal_unmet: tuple[Condition, ...] = ()
+
+    def begin(self) -> ResetResult:
+        """Arrange the scene and place the agent."""
+        task, settings, controller = self.task, self._settings, self._controller
+        bounds = set_up_scene(controller, task.scene, task.arrangement).metadata["sceneBounds"]
+        floor = skills.reachable(controller, (self._backend, task.scene, settings.grid_size))
+        pose = self._protocol.start(bounds, floor)
+        self._memory = Memory(pose, goal_row(task.instruction))
+        self._handler = self._protocol.action_handler(
+            EpisodeSetup(task, controller, floor, pose, settings.grid_size, settings.instances)
+        )
+        placed = skills.place(controller, pose)
+        self._perceive(placed)
+        feedback = "You look around the room."
+        info = self._info(None, "", placed.success, "", feedback)
+        return self._observation(feedback, True, info), cast(dict[str, Any], info)
+
+    @property
+    def fingerprint(self) -> tuple[Any, ...]:
+        """A value that differs between two courses of an episode."""
+        return self.perception.pose, self._steps, self.end_reason, self._known.names
+
+    def understand(self, action: AnyAction) -> tuple[Action | None, str]:
+        """The action that is meant, None if none is; and its text.
+
+        Raises:
+            gymnasium.error.InvalidAction: it is no action at all; nothing has changed.
+        """
+        return self._protocol.understand(action, self.perception.objects)
+
+    def action_mask(self) -> NDArray[np.int8]:
+        """(len(ACTIONS),) int8: 1 for each action that is legal now."""
+        return self._handler.legal(self._available, self._known)
+
+    def all_objects(self) -> Sequence[Mapping[str, Any]]:
+        """AI2-THOR's metadata of all objects, as they are now."""
+        return self._controller.last_event.metadata["objects"]  # type: ignore[no-any-return]
+
+    def step(self, understood: Action | None, text: str) -> StepResult:
+        """Do an action that :meth:`understand` returned."""
+        if understood is None:
+            return self._not_understood(text)
+        self._unknown_replies = 0
+        if understood == self._memory.last and self._memory.repeats >= MAX_REPEATS:
+            self.end_reason = "repeated action"
+            times = self._memory.repeats + 1
+            feedback = f"You have tried to {understood} {times} times in a row; that is it."
+            said = self._protocol.repeated or understood
+            return self._reply(said, text, False, "", feedback, 0.0)
+        self._steps += understood.verb != verbs.END or self._protocol.end_is_step
+        refused = self._handler.illegal_reason(understood, self._available, self._known)
+        if refused:
+            object_id, outcome = "", skills.Outcome(None, False, refused)
+        else:
+            object_id, outcome = self._handler.execute(
+                understood, self.perception, self._available, self._progress.left
+            )
+        self._memory.act(understood, outcome.success)
+        self._perceive(outcome)
+        reward = self._judge(understood, outcome, object_id) - self._settings.step_penalty
+        if refused:
+            reward -= self._settings.illegal_penalty
+        if understood.verb == verbs.END:
+            self.end_reason = "end"
+        elif self._steps >= self._step_limit:
+            self.end_reason = "step limit"
+        feedback = refused or _feedback(understood, outcome)
+        return self._reply(
+            understood, text, outcome.success, object_id, feedback, reward, outcome.views
+        )
+
+    def _perceive(self, outcome: skills.Outcome) -> None:
+        """Remember what the agent perceives after a step, and in the views of an ``observe``."""
+        for perception in (*outcome.views.values(), outcome.perception):
+            if perception is not None:
+                self.perception = perception
+                self._available = self._handler.available_objects(perception)
+                self._known.add(perception.objects.kinds[self._available.navigable])
+                self._memory.look(perception, self._navigated_to_kind)
+
+    @property
+    def _navigated_to_kind(self) -> int | None:
+        """The type of the object last navigated to, None if that object is gone."""
+        objects = self.perception.objects
+        row = objects.row.get(self._handler.navigated_to)
+        return None if row is None else int(objects.kinds[row])
+
+    def _judge(self, action: Action, outcome: skills.Outcome, object_id: str) -> float:
+        """The reward that an action earned, by the rules of :mod:`er_gym.tasks.judge`."""
+        if not outcome.success:
+            return 0.0
+        if action.verb == verbs.END and self.task.goal:
+            self._goal_unmet = unmet_conditions(
+                self.task.goal, self._objects_of_goal(), self._available.in_reach
+            )
+        self._progress, reward = self._progress.after(
+            action.verb,
+            action.object_type,
+            object_id,
+            in_reach=self._available.in_reach,
+            goal_holds=not self._goal_unmet,
+        )
+        return reward
+
+    def _objects_of_goal(self) -> Sequence[Mapping[str, Any]]:
+        """Metadata of the objects that the goal is about.
+
+        The metadata of all objects takes longer than the rest of a step, so it is made only for a
+        goal that needs more than :data:`~er_gym.thor.objects.ENTRY_KEYS`.
+        """
+        goal = self.task.goal
+        if all(name in ENTRY_KEYS for condition in goal for name, _ in condition.state):
+            return self.perception.objects.entries({condition.object_type for condition in goal})
+        return self.all_objects()
+
+    def _not_understood(self, text: str) -> StepResult:
+        self._unknown_replies += 1
+        if self._protocol.unknown_breaks_runs:
+            self._memory.forget_last()
+        if self._unknown_replies >= MAX_UNKNOWN:
+            self.end_reason = "no known action"
+        quoted = text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
+        feedback = (
+            f"{quoted!r} names no action. Say one of: {', '.join(verbs.BARE_VERBS)}; or one of "
+            f"{', '.join(verbs.OBJECT_VERBS)} with an object type, such as 'navigate to Fridge'."
+        )
+        return self._reply(None, text, False, "", feedback, 0.0)
+
+    # -- observations, info, rewards -------------------------------------------------------------
+
+    def _reply(
+        self,
+        action: Action | None,
+        text: str,
+        success: bool,
+        object_id: str,
+        feedback: str,
+        reward: float,
+        views: Mapping[str, Perception] | None = None,
+    ) -> StepResult:
+        truncated = self.end_reason == "step limit"
+        terminated = bool(self.end_reason) and not truncated
+        appended = self._protocol.appends_end and self.end_reason in _CUT_OFF
+        if appended:
+            reward += self._judge(Action(verbs.END), skills.Outcome(None, True), "")
+        info = self._info(action, text, success, object_id, feedback)
+        info["end_appended"] = appended
+        if views:
+            # Copies, since the next observation may be built from a view's frame.
+            info["views"] = {
+                name: None if view.frame is None else np.array(self.picture(view))
+                for name, view in views.items()
+            }
+        obs = self._observation(feedback, success, info)
+        return obs, reward, terminated, truncated, cast(dict[str, Any], info)
+
+    def picture(self, perception: Perception) -> NDArray[np.uint8] | None:
+        """The frame, annotated with object types if the environment asks for it."""
+        return perception.annotated if self._settings.annotate else perception.frame
+
+    def _observation(self, feedback: str, success: bool, info: Info) -> dict[str, Any]:
+        """The observation; what explains it is added to ``info``."""
+        situation = Situation(
+            perception=self.perception,
+            available=self._available,
+            memory=self._memory,
+            known=self._known,
+            instruction=self.task.instruction,
+            feedback=feedback,
+            at=self._navigated_to_kind,
+            success=success,
+            steps=self._steps,
+            max_steps=self._step_limit,
+            annotate=self._settings.annotate,
+        )
+        for kind in self._settings.observations.values():
+            cast(dict[str, Any], info).update(kind.info(situation))
+        return {name: kind.build(situation) for name, kind in self._settings.observations.items()}
+
+    def _info(
+        self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
+    ) -> Info:
+        mask = self.action_mask()
+        return {
+            "task": self.task,
+            "action": action,
+            "action_text": text,
+            "action_success": success,
+            "object_id": object_id,
+            "feedback": feedback,
+            "success": self._progress.success,
+            "goal_unmet": self._goal_unmet,
+            "key_actions_done": self._progress.done,
+            "key_actions_left": self._progress.left,
+            "visible": self.perception.visible_names,
+            "held": self.perception.held_name,
+            "navigable": self._known.names,
+            "interactable": self._available.in_reach,
+            "legal": LegalActions(mask),
+            "action_mask": mask,
+            "steps": self._steps,
+            "max_steps": self._step_limit,
+            "end_reason": self.end_reason,
+        }
+
+
+def _feedback(action: Action, outcome: skills.Outcome) -> str:
+    if outcome.success:
+        return f"Done: {action}."
+    return f"You could not {action}: {outcome.problem}"
