@@ -69,8 +69,8 @@ def test_a_request_gives_the_task_that_is_made_anyhow() -> None:
 
 
 FAULTS = {
-    "no such type": (["dance"], r"no 'dance' tasks cannot be requested; choose one of: single_se"),
-    "a recipe": ([TASK_TYPES[-1].name], "no 'long-range .* tasks cannot be requested; choose one"),
+    "no such type": (["dance"], r"'dance' tasks cannot be requested; choose one of: single_se"),
+    "a recipe": ([TASK_TYPES[-1].name], "'long-range .* tasks cannot be requested; choose one"),
     "too few": (["pickup_and_put", APPLE["objectId"]], "no 'pickup_and_put' task about 1 objects"),
     "none": (["single_search"], "no 'single_search' task about 0 objects"),
     "too many": (
