@@ -10,7 +10,7 @@ from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture
 from agents.vlm.matching import Matcher
 from agents.vlm.parsing import Parsed, parse
 from agents.vlm.pictures import encode
-from agents.vlm.prompt_set import Did, Now, PromptSet, parts_of
+from agents.vlm.prompt_set import LastAction, PromptSet, TurnContext, parts_of
 from agents.vlm.record import (
     ConversationRecord,
     MessageRecord,
@@ -119,7 +119,7 @@ class VLMAgent:
         """The user's next turn: the task, or what came of the last action."""
         assert self._task is not None
         pictures = self._pictures(obs, info)
-        now = Now(
+        turn = TurnContext(
             task=self._task.instruction,
             decide=self._settings.decide,
             sees=self._settings.sees,
@@ -128,7 +128,7 @@ class VLMAgent:
             max_steps=info["max_steps"],
         )
         if not self._rounds:
-            return Message("user", parts_of(self._prompts.first(now), pictures))
+            return Message("user", parts_of(self._prompts.first(turn), pictures))
         answer = {"feedback": info["feedback"], "success": bool(info["action_success"])}
         if answer["success"]:  # the paper's protocol finds something even in an unusable reply
             answer |= {"action": str(info["action"]), "problem": ""}
@@ -136,13 +136,13 @@ class VLMAgent:
         if last.problem:
             told = self._prompts.feedback(problem=last.problem, decide=self._settings.decide)
             return Message("user", (told,))
-        did = Did(
+        last_action = LastAction(
             action=last.action,
             success=last.success,
             feedback=last.feedback,
             pictures=len(pictures),
         )
-        return Message("user", parts_of(self._prompts.next(now, did), pictures))
+        return Message("user", parts_of(self._prompts.next(turn, last_action), pictures))
 
     def _pictures(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> list[Picture]:
         """What is seen: after an ``observe`` the views to the right, behind and left, as many as

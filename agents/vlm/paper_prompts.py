@@ -20,7 +20,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TextIO
 
-from agents.vlm.prompt_set import IMAGE, MARK, Decide, Did, Now, PromptSet, Sees
+from agents.vlm.prompt_set import IMAGE, MARK, Decide, LastAction, PromptSet, Sees, TurnContext
 from er_gym.envs.actions import parse
 from er_gym.tasks import verbs
 from er_gym.tasks.reading import open_file
@@ -113,17 +113,17 @@ class DerivedPrompts:
             )
         return self.words.system
 
-    def first(self, now: Now) -> str:
+    def first(self, turn: TurnContext) -> str:
         """See :class:`PromptSet`."""
-        return _with_pictures(_filled(self.words.first, {_TASK: now.task}), 1)
+        return _with_pictures(_filled(self.words.first, {_TASK: turn.task}), 1)
 
-    def next(self, now: Now, did: Did) -> str:
+    def next(self, turn: TurnContext, last_action: LastAction) -> str:
         """See :class:`PromptSet`. Where no action of the file fails, feedback stands at the end."""
-        text = self.words.after.get(_verb(did.action), self.words.usual)
-        if not did.success:
+        text = self.words.after.get(_verb(last_action.action), self.words.usual)
+        if not last_action.success:
             text = self.words.failed or f"{text}\n{_FEEDBACK}"
-        values = {_TASK: now.task, _ACTION: did.action, _FEEDBACK: did.feedback}
-        return _with_pictures(_filled(text, values), did.pictures)
+        values = {_TASK: turn.task, _ACTION: last_action.action, _FEEDBACK: last_action.feedback}
+        return _with_pictures(_filled(text, values), last_action.pictures)
 
     def feedback(self, *, problem: str, decide: Decide) -> str:
         """See :class:`PromptSet`. The paper's files have no such turn: er-gym's own words."""

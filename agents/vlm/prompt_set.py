@@ -21,7 +21,7 @@ words of a task is just that."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Now:
+class TurnContext:
     """What a turn is about.
 
     Attributes:
@@ -40,7 +40,7 @@ class Now:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Did:
+class LastAction:
     """What was done last.
 
     Attributes:
@@ -79,10 +79,10 @@ class PromptSet(Protocol):
     def system(self, *, decide: Decide, sees: Sees) -> str:
         """What the model is and how it replies; "" where there is no such message."""
 
-    def first(self, now: Now) -> str:
+    def first(self, turn: TurnContext) -> str:
         """The first turn: the task, and what is seen, in one picture or in words."""
 
-    def next(self, now: Now, did: Did) -> str:
+    def next(self, turn: TurnContext, last_action: LastAction) -> str:
         """The turn after an action."""
 
     def feedback(self, *, problem: str, decide: Decide) -> str:

@@ -13,7 +13,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from agents.vlm.prompt_set import IMAGE, MARK, THOUGHTS, Decide, Did, Now, Sees, unmarked
+from agents.vlm.prompt_set import (
+    IMAGE,
+    MARK,
+    THOUGHTS,
+    Decide,
+    LastAction,
+    Sees,
+    TurnContext,
+    unmarked,
+)
 from er_gym.tasks import verbs
 from er_gym.tasks.reading import parse_yaml, read_text
 from er_gym.tasks.suites import config_directory
@@ -59,13 +68,13 @@ class Templates:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
         return self._render("system.jinja", decide=decide, sees=sees)
 
-    def first(self, now: Now) -> str:
+    def first(self, turn: TurnContext) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
-        return self._render("first.jinja", pictures=int(now.sees == "pictures"), **vars(now))
+        return self._render("first.jinja", pictures=int(turn.sees == "pictures"), **vars(turn))
 
-    def next(self, now: Now, did: Did) -> str:
+    def next(self, turn: TurnContext, last_action: LastAction) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
-        return self._render("next.jinja", **vars(now), **vars(did))
+        return self._render("next.jinja", **vars(turn), **vars(last_action))
 
     def feedback(self, *, problem: str, decide: Decide) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
@@ -217,8 +226,10 @@ def _try_out(templates: Templates) -> None:
         templates.feedback(problem="It names no action.", decide=decide)
         for sees, numbers in shown.items():
             templates.system(decide=decide, sees=sees)
-            now = Now(task="Find a Mug.", decide=decide, sees=sees, max_steps=20)
-            templates.first(now)
+            turn = TurnContext(task="Find a Mug.", decide=decide, sees=sees, max_steps=20)
+            templates.first(turn)
             for pictures, success in itertools.product(numbers, (True, False)):
-                did = Did(action="navigate to Fridge", success=success, pictures=pictures)
-                templates.next(now, did)
+                last_action = LastAction(
+                    action="navigate to Fridge", success=success, pictures=pictures
+                )
+                templates.next(turn, last_action)
