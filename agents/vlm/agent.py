@@ -10,7 +10,7 @@ from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture
 from agents.vlm.matching import Matcher
 from agents.vlm.parsing import Parsed, parse
 from agents.vlm.pictures import encode
-from agents.vlm.prompt_set import LastAction, PromptSet, TurnContext, parts_of
+from agents.vlm.prompt_set import LastAction, PromptSet, TurnContext, interleave_pictures
 from agents.vlm.record import (
     ConversationRecord,
     MessageRecord,
@@ -128,7 +128,7 @@ class VLMAgent:
             max_steps=info["max_steps"],
         )
         if not self._rounds:
-            return Message("user", parts_of(self._prompts.first(turn), pictures))
+            return Message("user", interleave_pictures(self._prompts.first(turn), pictures))
         answer = {"feedback": info["feedback"], "success": bool(info["action_success"])}
         if answer["success"]:  # the paper's protocol finds something even in an unusable reply
             answer |= {"action": str(info["action"]), "problem": ""}
@@ -142,7 +142,7 @@ class VLMAgent:
             feedback=last.feedback,
             pictures=len(pictures),
         )
-        return Message("user", parts_of(self._prompts.next(turn, last_action), pictures))
+        return Message("user", interleave_pictures(self._prompts.next(turn, last_action), pictures))
 
     def _pictures(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> list[Picture]:
         """What is seen: after an ``observe`` the views to the right, behind and left, as many as

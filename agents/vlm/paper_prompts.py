@@ -20,7 +20,15 @@ from itertools import islice
 from pathlib import Path
 from typing import TextIO
 
-from agents.vlm.prompt_set import IMAGE, MARK, Decide, LastAction, PromptSet, Sees, TurnContext
+from agents.vlm.prompt_set import (
+    IMAGE,
+    IMAGE_MARK,
+    Decide,
+    LastAction,
+    PromptSet,
+    Sees,
+    TurnContext,
+)
 from er_gym.envs.actions import parse
 from er_gym.tasks import verbs
 from er_gym.tasks.reading import open_file
@@ -29,8 +37,8 @@ ENOUGH = 500
 """So many conversations show what all of them have in common."""
 
 _TASK, _ACTION, _FEEDBACK = "\ufdd1", "\ufdd2", "\ufdd3"
-"""Where these go in a text: no characters, just as :data:`~agents.vlm.prompt_set.MARK` is none."""
-_RESERVED = re.compile(f"[{MARK}{_TASK}{_ACTION}{_FEEDBACK}]")
+"""Where these go in a text: no characters, just as :data:`~agents.vlm.prompt_set.IMAGE_MARK` is none."""
+_RESERVED = re.compile(f"[{IMAGE_MARK}{_TASK}{_ACTION}{_FEEDBACK}]")
 _STOPS = ".!?。！？"
 _SLOT = re.compile(f"([{_TASK}{_ACTION}{_FEEDBACK}])([{_STOPS}]?)")
 _ROLES = {
@@ -162,7 +170,7 @@ def read_prompts(path: Path, fallback: PromptSet) -> DerivedPrompts:
     words = _words(samples, path)
     odd = len(found) - len(samples)
     digest = hashlib.sha256(f"{words}{fallback.digest}".encode())
-    shown = words.after.get(verbs.OBSERVE, "").count(MARK)
+    shown = words.after.get(verbs.OBSERVE, "").count(IMAGE_MARK)
     return DerivedPrompts(
         name=path.name,
         digest=digest.hexdigest(),
@@ -236,7 +244,7 @@ def _sample(item: object) -> _Sample | None:
     alternating = ("user", "assistant") * len(said)
     if any(role != expected for (role, _), expected in zip(said, alternating, strict=False)):
         return None
-    asked = tuple(_RESERVED.sub("", text).replace(IMAGE, MARK) for _, text in said[::2])
+    asked = tuple(_RESERVED.sub("", text).replace(IMAGE, IMAGE_MARK) for _, text in said[::2])
     decided = tuple(_decision(text) for _, text in said[1::2])
     return _Sample(system, asked, decided) if any(decided) else None
 
@@ -415,11 +423,11 @@ def _filled(text: str, values: Mapping[str, str]) -> str:
 
 def _with_pictures(text: str, pictures: int) -> str:
     """The text with so many marks: too few are followed by more, the last of too many left out."""
-    few = pictures - text.count(MARK)
+    few = pictures - text.count(IMAGE_MARK)
     if few > 0:
-        head, mark, tail = text.rpartition(MARK)
-        return f"{head}{mark}{MARK * few}{tail}"
+        head, mark, tail = text.rpartition(IMAGE_MARK)
+        return f"{head}{mark}{IMAGE_MARK * few}{tail}"
     for _ in range(-few):
-        head, _, tail = text.rpartition(MARK)
+        head, _, tail = text.rpartition(IMAGE_MARK)
         text = head + tail
     return text

@@ -15,7 +15,7 @@ THOUGHTS = ("Observation", "Planning", "Thinking", "Reflection", "Verification")
 """The kinds of thought that the paper's models write, each between tags of its name."""
 IMAGE = "<image>"
 """Where a picture goes, in templates and training files."""
-MARK = "\ufdd0"
+IMAGE_MARK = "\ufdd0"
 """The same in rendered text. It is no character, so that nobody writes it: an ``<image>`` in the
 words of a task is just that."""
 
@@ -56,7 +56,7 @@ class LastAction:
 
 
 class PromptSet(Protocol):
-    """The words of one kind of conversation. Texts have a :data:`MARK` for each picture.
+    """The words of one kind of conversation. Texts have a :data:`IMAGE_MARK` for each picture.
 
     Attributes:
         name: such as ``default/en``.
@@ -93,13 +93,13 @@ class PromptSet(Protocol):
         """
 
 
-def parts_of(text: str, pictures: Sequence[Picture]) -> tuple[Part, ...]:
+def interleave_pictures(text: str, pictures: Sequence[Picture]) -> tuple[Part, ...]:
     """Text with pictures in place of its marks, in order.
 
     Raises:
         ValueError: there are not as many pictures as marks.
     """
-    first, *rest = text.split(MARK)
+    first, *rest = text.split(IMAGE_MARK)
     if len(rest) != len(pictures):
         raise ValueError(f"the text has {len(rest)} places for {len(pictures)} pictures")
     parts: list[Part] = [first]
@@ -108,6 +108,6 @@ def parts_of(text: str, pictures: Sequence[Picture]) -> tuple[Part, ...]:
     return tuple(part for part in parts if part)
 
 
-def unmarked(text: str) -> str:
+def without_marks(text: str) -> str:
     """Words of others, in which nothing can be taken for a mark."""
-    return text.replace(MARK, "")
+    return text.replace(IMAGE_MARK, "")

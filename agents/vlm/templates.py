@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from agents.vlm.prompt_set import (
     IMAGE,
-    MARK,
+    IMAGE_MARK,
     THOUGHTS,
     Decide,
     LastAction,
     Sees,
     TurnContext,
-    unmarked,
+    without_marks,
 )
 from er_gym.tasks import verbs
 from er_gym.tasks.reading import parse_yaml, read_text
@@ -82,7 +82,7 @@ class Templates:
 
     def _render(self, template: str, *, pictures: int = 0, **variables: Any) -> str:
         given = {
-            name: unmarked(value) if isinstance(value, str) else value
+            name: without_marks(value) if isinstance(value, str) else value
             for name, value in variables.items()
         }
         self.environment.begin()
@@ -101,9 +101,9 @@ class Templates:
                 f"{self.files[template]}: makes a turn of {len(text):,} characters; "
                 f"{_LONGEST:,} are allowed"
             )
-        if text.count(MARK) != pictures:
+        if text.count(IMAGE_MARK) != pictures:
             raise ValueError(
-                f"{self.files[template]}: {IMAGE} comes {text.count(MARK)} times, but the "
+                f"{self.files[template]}: {IMAGE} comes {text.count(IMAGE_MARK)} times, but the "
                 f"pictures are {pictures}; write it once for each of {{{{ pictures }}}}"
             )
         return text
@@ -176,7 +176,7 @@ def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> Bound
     def source(name: str) -> tuple[str, str, None] | None:
         if name not in files:
             return None
-        return unmarked(sources[name]).replace(IMAGE, MARK), str(files[name]), None
+        return without_marks(sources[name]).replace(IMAGE, IMAGE_MARK), str(files[name]), None
 
     environment = BoundedEnvironment(
         loader=FunctionLoader(source),
@@ -208,7 +208,9 @@ def _rows(text: str, file: Path, language: str) -> tuple[ActionRow, ...]:
         known = ", ".join((*own, *added))
         raise ValueError(f"{file}: say what each of these means, and no other: {known}")
     return tuple(
-        ActionRow(f"{verb} <object>" if verb in verbs.OBJECT_VERBS else verb, unmarked(str(words)))
+        ActionRow(
+            f"{verb} <object>" if verb in verbs.OBJECT_VERBS else verb, without_marks(str(words))
+        )
         for verb, words in {**meanings, **(added | meanings)}.items()
     )
 

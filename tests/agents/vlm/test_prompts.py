@@ -13,14 +13,14 @@ import pytest
 
 from agents.vlm.chat import Picture
 from agents.vlm.prompt_set import (
-    MARK,
+    IMAGE_MARK,
     THOUGHTS,
     Decide,
     LastAction,
     PromptSet,
     Sees,
     TurnContext,
-    parts_of,
+    interleave_pictures,
 )
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import Prompts
@@ -87,7 +87,7 @@ def said(prompts: PromptSet, decide: Decide, sees: Sees) -> list[str]:
 @pytest.mark.parametrize(("decide", "sees"), WAYS)
 def test_everything_can_be_said(prompts: PromptSet, decide: Decide, sees: Sees) -> None:
     texts = said(prompts, decide, sees)
-    marks = [text.count(MARK) for text in texts]
+    marks = [text.count(IMAGE_MARK) for text in texts]
     assert marks == [0, 1, 1, 1, 1, 1, 4, 4, 4, 4, 0] if sees == "pictures" else not any(marks)
     for text in texts:
         assert text == text.strip()
@@ -194,26 +194,33 @@ def test_the_variables_that_are_documented_exist(mine: Path) -> None:
 
 
 def test_pictures_take_the_places_of_marks() -> None:
-    assert parts_of(f"a {MARK} b {MARK}", [ONE, TWO]) == ("a ", ONE, " b ", TWO)
-    assert parts_of(f"{MARK}{MARK}\nb", [ONE, TWO]) == (ONE, TWO, "\nb")
-    assert parts_of("no picture", []) == ("no picture",)
-    assert parts_of("", []) == ()
+    assert interleave_pictures(f"a {IMAGE_MARK} b {IMAGE_MARK}", [ONE, TWO]) == (
+        "a ",
+        ONE,
+        " b ",
+        TWO,
+    )
+    assert interleave_pictures(f"{IMAGE_MARK}{IMAGE_MARK}\nb", [ONE, TWO]) == (ONE, TWO, "\nb")
+    assert interleave_pictures("no picture", []) == ("no picture",)
+    assert interleave_pictures("", []) == ()
 
 
-@pytest.mark.parametrize(("text", "pictures"), [(MARK, 0), (MARK, 2), ("", 1)])
+@pytest.mark.parametrize(("text", "pictures"), [(IMAGE_MARK, 0), (IMAGE_MARK, 2), ("", 1)])
 def test_marks_without_pictures(text: str, pictures: int) -> None:
     with pytest.raises(ValueError, match=rf"has {len(text)} places for {pictures} pictures"):
-        parts_of(text, [ONE] * pictures)
+        interleave_pictures(text, [ONE] * pictures)
 
 
-@pytest.mark.parametrize("odd", ["<image>", MARK, "{{ task }}", "{% for %}", "<image><image>"])
+@pytest.mark.parametrize(
+    "odd", ["<image>", IMAGE_MARK, "{{ task }}", "{% for %}", "<image><image>"]
+)
 def test_a_task_may_say_anything(prompts: PromptSet, odd: str) -> None:
     task = f"Find the {odd} Mug."
     turn = TurnContext(task=task, decide="tags", sees="pictures")
     for text in (prompts.first(turn), prompts.next(turn, LastAction(action="end", pictures=1))):
-        parts = parts_of(text, [ONE])
+        parts = interleave_pictures(text, [ONE])
         assert parts.count(ONE) == 1
-        assert f"Find the {odd.replace(MARK, '')} Mug." in "".join(
+        assert f"Find the {odd.replace(IMAGE_MARK, '')} Mug." in "".join(
             part for part in parts if isinstance(part, str)
         )
 
