@@ -98,7 +98,7 @@ class VLMAgent:
                 cost=reply.cost,
                 finish=reply.finish,
                 model=reply.model,
-                kept=reply.kept,
+                kept=reply.from_cache,
                 **tokens(reply.usage),
             )
         )
@@ -109,7 +109,7 @@ class VLMAgent:
             prompt_tokens=reply.usage.prompt,
             completion_tokens=reply.usage.completion,
             cost=reply.cost,
-            cached=reply.kept,
+            cached=reply.from_cache,
         )
         return Decision(action or _as_written(parsed, said), thought, took)
 

@@ -94,11 +94,11 @@ class AgentFactory:
             client = kind.open(opened, settings, self._ledger, self.watch)
             self.client: Client = client
             if directory is not None:
-                from agents.vlm.clients.reply_cache import Kept
+                from agents.vlm.clients.reply_cache import ReplyCache
 
                 self._ledger.open(directory / SPENDING)
                 self.watch.keep = self._keep
-                self.client = Kept(client, directory / REPLIES)
+                self.client = ReplyCache(client, directory / REPLIES)
         except ImportError as error:
             raise ValueError(
                 f"agent {name} needs {error.name}, which is not installed: "

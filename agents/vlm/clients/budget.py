@@ -19,7 +19,7 @@ from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.json_lines import JsonLines
 
 if TYPE_CHECKING:
-    from agents.vlm.clients.reply_cache import Identified
+    from agents.vlm.clients.reply_cache import CacheableClient
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class Metered:
         watch: of the run.
     """
 
-    def __init__(self, client: Identified, ledger: Ledger, watch: Watch) -> None:
+    def __init__(self, client: CacheableClient, ledger: Ledger, watch: Watch) -> None:
         self._client, self._ledger, self._watch = client, ledger, watch
 
     @property
@@ -231,7 +231,7 @@ class Metered:
         self._watch.request(seed).left()
         self._ledger.check()
         reply = self._client.reply(messages, seed)
-        if not reply.kept:
+        if not reply.from_cache:
             self._ledger.enter(
                 Entry.of(
                     reply.usage,

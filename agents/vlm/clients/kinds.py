@@ -16,7 +16,7 @@ from er_gym.plugins import PluginError, Registry, is_dotted
 
 if TYPE_CHECKING:
     from agents.vlm.clients.budget import Ledger
-    from agents.vlm.clients.reply_cache import Identified
+    from agents.vlm.clients.reply_cache import CacheableClient
     from agents.vlm.clients.watch import Watch
     from agents.vlm.settings import AgentSettings
 
@@ -36,14 +36,16 @@ class ModelClient:
         keeps_ledger: whether the client checks the budget and writes the ledger itself.
     """
 
-    make: Callable[[str, AgentSettings, Ledger, Watch], Identified]
+    make: Callable[[str, AgentSettings, Ledger, Watch], CacheableClient]
     opens: str
     help: str
     install: str = "er-gym[vlm]"
     priced: bool = False
     keeps_ledger: bool = False
 
-    def open(self, what: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+    def open(
+        self, what: str, settings: AgentSettings, ledger: Ledger, watch: Watch
+    ) -> CacheableClient:
         """The client, whose replies are written into a run's ledger."""
         client = self.make(what, settings, ledger, watch)
         if self.keeps_ledger:
@@ -53,19 +55,19 @@ class ModelClient:
         return Metered(client, ledger, watch)
 
 
-def _openai(model: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+def _openai(model: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> CacheableClient:
     from agents.vlm.clients.openai_server import OpenAIClient
 
     return OpenAIClient(model, settings, ledger, watch)
 
 
-def _local(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+def _local(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> CacheableClient:
     from agents.vlm.clients.local import LocalClient
 
     return LocalClient(path, settings, watch)
 
 
-def _recorded(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+def _recorded(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> CacheableClient:
     from agents.vlm.clients.scripted import RecordedClient
 
     return RecordedClient(Path(path))

@@ -25,7 +25,7 @@ _REPLY = TypeAdapter(Reply)
 T = TypeVar("T")
 
 
-class Identified(Client, Protocol):
+class CacheableClient(Client, Protocol):
     """A client that says what its replies depend on, beside the conversation."""
 
     @property
@@ -33,7 +33,7 @@ class Identified(Client, Protocol):
         """Model, server, parameters: the same text for what replies alike."""
 
 
-class Kept:
+class ReplyCache:
     """Asks another client only what has not been asked before.
 
     Where nothing is kept in the directory yet it is made. Several threads and processes may share
@@ -48,7 +48,7 @@ class Kept:
         ValueError: nothing can be kept in the directory.
     """
 
-    def __init__(self, client: Identified, directory: Path) -> None:
+    def __init__(self, client: CacheableClient, directory: Path) -> None:
         self._client, self._directory = client, directory
         self._lock = threading.Lock()
         try:
@@ -74,7 +74,7 @@ class Kept:
         key = key_of(self.identity, messages, seed)
         found = self._guarded(lambda cache: _read(cache, key))
         if found is not None:
-            return replace(found, kept=True, seconds=time.monotonic() - began)
+            return replace(found, from_cache=True, seconds=time.monotonic() - began)
         reply = self._client.reply(messages, seed)
         text = json.dumps(asdict(reply))
         self._guarded(lambda cache: cache.set(key, text))

@@ -160,7 +160,7 @@ def _replies(kept: ConversationRecord) -> Mapping[str, Reply]:
             cost=each.cost,
             finish=each.finish,
             model=each.model,
-            kept=True,
+            from_cache=True,
         )
         for each in kept.rounds
     }

@@ -72,7 +72,7 @@ def test_replies_are_kept_and_counted_in_the_run_directory(tmp_path: Path) -> No
         for kept in (False, True):
             speaker = AgentFactory("openai:naughty-1", settings, tmp_path, Budget(max_usd=1))
             reply = speaker.client.reply(HELLO, 0)
-            assert (reply.text, reply.kept) == ("Good day.", kept)
+            assert (reply.text, reply.from_cache) == ("Good day.", kept)
             assert "tokens in 1 replies, $" in str(speaker.cost)
             speaker.close()
         assert server.count == 1

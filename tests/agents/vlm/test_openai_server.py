@@ -270,7 +270,7 @@ def test_a_message_becomes_a_reply(
     naughty.then(Raw(completion(message)))
     reply = make(naughty.url).reply(HELLO, seed=0)
     assert (reply.text, reply.reasoning, reply.call) == (text, reasoning, call)
-    assert (reply.finish, reply.model, reply.kept) == ("stop", MODEL, False)
+    assert (reply.finish, reply.model, reply.from_cache) == ("stop", MODEL, False)
     assert reply.seconds > 0
 
 
