@@ -205,7 +205,7 @@ class Ledger:
             self._lines.close()
 
 
-class Metered:
+class MeteredClient:
     """Keeps the ledger for a client that does not: one entry a reply.
 
     Args:

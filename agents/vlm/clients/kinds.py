@@ -50,9 +50,9 @@ class ModelClient:
         client = self.make(what, settings, ledger, watch)
         if self.keeps_ledger:
             return client
-        from agents.vlm.clients.budget import Metered
+        from agents.vlm.clients.budget import MeteredClient
 
-        return Metered(client, ledger, watch)
+        return MeteredClient(client, ledger, watch)
 
 
 def _openai(model: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> CacheableClient:

@@ -19,7 +19,7 @@ import pytest
 from naughty_server import MODEL, NaughtyServer
 
 from agents.vlm.chat import Message, Reply, Usage
-from agents.vlm.clients.budget import Budget, Entry, Ledger, Metered, Spent
+from agents.vlm.clients.budget import Budget, Entry, Ledger, MeteredClient, Spent
 from agents.vlm.clients.watch import Watch
 from agents.vlm.settings import AgentSettings, Prices
 from er_gym.rollout.agent import CannotGoOn
@@ -51,7 +51,7 @@ class Costly:
 class Purse:
     """A client, and the ledger that it is metered by."""
 
-    client: Metered
+    client: MeteredClient
     ledger: Ledger
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
@@ -69,7 +69,7 @@ class Purse:
 def purse(client: Costly, budget: Budget, path: Path) -> Purse:
     ledger = Ledger(budget, client.prices)
     ledger.open(path)
-    return Purse(Metered(client, ledger, Watch(budget.max_minutes)), ledger)
+    return Purse(MeteredClient(client, ledger, Watch(budget.max_minutes)), ledger)
 
 
 Make = Callable[..., Purse]
