@@ -19,7 +19,7 @@ from er_gym.rollout.run_directory import REPLIES, SERVER_EVENTS, SPENDING
 if TYPE_CHECKING:
     from agents.vlm.agent import VLMAgent
     from agents.vlm.clients.budget import Budget
-    from agents.vlm.clients.watch import Notice
+    from agents.vlm.clients.supervisor import ServerEvent
     from er_gym.rollout.json_lines import JsonLines
 
 __all__ = ["AgentFactory", "consequential", "load_settings", "speaks", "ways_to_name"]
@@ -50,7 +50,7 @@ class AgentFactory:
 
     Attributes:
         client: of the model.
-        watch: the run's time and news; ``watch.show`` is called with what a user should hear.
+        watch: the run's time and news; ``supervisor.show`` is called with what a user should hear.
 
     Args:
         name: a model client's name and what it is to open: ``openai:MODEL``
@@ -86,18 +86,18 @@ class AgentFactory:
         self._directory = directory
         try:
             from agents.vlm.clients.budget import Budget, Ledger
-            from agents.vlm.clients.watch import Watch
+            from agents.vlm.clients.supervisor import RequestSupervisor
 
             asked = budget or Budget()
-            self.watch = Watch(asked.max_minutes)
+            self.supervisor = RequestSupervisor(asked.max_minutes)
             self._ledger = Ledger(asked, settings.prices if kind.priced else Prices())
-            client = kind.open(opened, settings, self._ledger, self.watch)
+            client = kind.open(opened, settings, self._ledger, self.supervisor)
             self.client: Client = client
             if directory is not None:
                 from agents.vlm.clients.reply_cache import ReplyCache
 
                 self._ledger.open(directory / SPENDING)
-                self.watch.keep = self._keep
+                self.supervisor.log_event = self._keep
                 self.client = ReplyCache(client, directory / REPLIES)
         except ImportError as error:
             raise ValueError(
@@ -133,7 +133,7 @@ class AgentFactory:
         if self._events is not None:
             self._events.close()
 
-    def _keep(self, notice: Notice) -> None:
+    def _keep(self, server_event: ServerEvent) -> None:
         """Write down what went wrong; the file is made when something does."""
         from er_gym.rollout.json_lines import JsonLines
 
@@ -141,7 +141,7 @@ class AgentFactory:
         # A full disk is told where something is lost by it.
         with contextlib.suppress(OSError, ValueError), self._keeping:
             self._events = self._events or JsonLines(self._directory / SERVER_EVENTS)
-            self._events.add(notice.model_dump_json())
+            self._events.add(server_event.model_dump_json())
 
 
 def consequential(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:

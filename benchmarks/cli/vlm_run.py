@@ -92,7 +92,7 @@ class VLMRun:
         a logger warns.
         """
         if say is not None:
-            factory.watch.show = say
+            factory.supervisor.show = say
         return run(
             directory,
             tasks,

@@ -48,7 +48,7 @@ class Echo:
 
 
 ECHO = ModelClient(
-    make=lambda model, settings, ledger, watch: Echo(model),
+    make=lambda model, settings, ledger, supervisor: Echo(model),
     opens="ACTION",
     help="says one action again and again",
 )

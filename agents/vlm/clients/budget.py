@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from agents.vlm.chat import Message, Reply, Usage
-from agents.vlm.clients.watch import AGAIN, Watch
+from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
 from agents.vlm.settings import Prices
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.json_lines import JsonLines
@@ -214,8 +214,10 @@ class MeteredClient:
         watch: of the run.
     """
 
-    def __init__(self, client: CacheableClient, ledger: Ledger, watch: Watch) -> None:
-        self._client, self._ledger, self._watch = client, ledger, watch
+    def __init__(
+        self, client: CacheableClient, ledger: Ledger, supervisor: RequestSupervisor
+    ) -> None:
+        self._client, self._ledger, self._supervisor = client, ledger, supervisor
 
     @property
     def identity(self) -> str:
@@ -228,7 +230,7 @@ class MeteredClient:
         Raises:
             CannotGoOn: the budget is spent, or the ledger cannot be written.
         """
-        self._watch.request(seed).left()
+        self._supervisor.request(seed).left()
         self._ledger.check()
         reply = self._client.reply(messages, seed)
         if not reply.from_cache:

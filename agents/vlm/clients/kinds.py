@@ -17,7 +17,7 @@ from er_gym.plugins import PluginError, Registry, is_dotted
 if TYPE_CHECKING:
     from agents.vlm.clients.budget import Ledger
     from agents.vlm.clients.reply_cache import CacheableClient
-    from agents.vlm.clients.watch import Watch
+    from agents.vlm.clients.supervisor import RequestSupervisor
     from agents.vlm.settings import AgentSettings
 
 
@@ -36,7 +36,7 @@ class ModelClient:
         keeps_ledger: whether the client checks the budget and writes the ledger itself.
     """
 
-    make: Callable[[str, AgentSettings, Ledger, Watch], CacheableClient]
+    make: Callable[[str, AgentSettings, Ledger, RequestSupervisor], CacheableClient]
     opens: str
     help: str
     install: str = "er-gym[vlm]"
@@ -44,30 +44,36 @@ class ModelClient:
     keeps_ledger: bool = False
 
     def open(
-        self, what: str, settings: AgentSettings, ledger: Ledger, watch: Watch
+        self, what: str, settings: AgentSettings, ledger: Ledger, supervisor: RequestSupervisor
     ) -> CacheableClient:
         """The client, whose replies are written into a run's ledger."""
-        client = self.make(what, settings, ledger, watch)
+        client = self.make(what, settings, ledger, supervisor)
         if self.keeps_ledger:
             return client
         from agents.vlm.clients.budget import MeteredClient
 
-        return MeteredClient(client, ledger, watch)
+        return MeteredClient(client, ledger, supervisor)
 
 
-def _openai(model: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> CacheableClient:
+def _openai(
+    model: str, settings: AgentSettings, ledger: Ledger, supervisor: RequestSupervisor
+) -> CacheableClient:
     from agents.vlm.clients.openai_server import OpenAIClient
 
-    return OpenAIClient(model, settings, ledger, watch)
+    return OpenAIClient(model, settings, ledger, supervisor)
 
 
-def _local(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> CacheableClient:
+def _local(
+    path: str, settings: AgentSettings, ledger: Ledger, supervisor: RequestSupervisor
+) -> CacheableClient:
     from agents.vlm.clients.local import LocalClient
 
-    return LocalClient(path, settings, watch)
+    return LocalClient(path, settings, supervisor)
 
 
-def _recorded(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> CacheableClient:
+def _recorded(
+    path: str, settings: AgentSettings, ledger: Ledger, supervisor: RequestSupervisor
+) -> CacheableClient:
     from agents.vlm.clients.scripted import RecordedClient
 
     return RecordedClient(Path(path))

@@ -25,7 +25,7 @@ from PIL import Image
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients.batching import Batcher
 from agents.vlm.clients.checkpoint import load, one_line
-from agents.vlm.clients.watch import AGAIN, Watch
+from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.agent import CannotGoOn
 
@@ -78,12 +78,18 @@ class LocalClient:
             settings.
     """
 
-    def __init__(self, path: str, settings: AgentSettings, watch: Watch | None = None) -> None:
+    def __init__(
+        self, path: str, settings: AgentSettings, supervisor: RequestSupervisor | None = None
+    ) -> None:
         if settings.decide == "tools":
             raise ValueError(
                 "decide: tools needs a server; a model in this process takes tags or json"
             )
-        self._name, self._settings, self._watch = path, settings, watch or Watch()
+        self._name, self._settings, self._supervisor = (
+            path,
+            settings,
+            supervisor or RequestSupervisor(),
+        )
         loaded = load(path, settings)
         self.identity = loaded.identity
         self._model, self._ends = loaded.model, loaded.ends
@@ -214,7 +220,7 @@ class LocalClient:
             raise _plainer(error, rows) from None
         if self._closing.is_set():
             raise CannotGoOn(_CLOSED)
-        if self._watch.over:
+        if self._supervisor.over:
             raise CannotGoOn(f"the minutes are over; {AGAIN}")
         return [self._reply(row, said) for row, said in zip(rows, spoken, strict=True)]
 
@@ -241,7 +247,7 @@ class LocalClient:
             choices = [_Draw(sampling.temperature, sampling.top_p, [row.seed for row in rows])]
 
         def closing(input_ids: torch.Tensor, scores: Any, **more: Any) -> torch.Tensor:
-            ends = self._closing.is_set() or self._watch.over
+            ends = self._closing.is_set() or self._supervisor.over
             return torch.full((len(rows),), ends, device=input_ids.device)
 
         device = self._model.device

@@ -20,9 +20,9 @@ from agents.vlm.clients.budget import Budget, Entry, Ledger
 from agents.vlm.clients.decision_schema import REQUEST_FIELDS
 from agents.vlm.clients.failures import Failure, failure_of
 from agents.vlm.clients.redaction import DiscreetLogs, Secrets
+from agents.vlm.clients.supervisor import AGAIN, Request, RequestSupervisor, duration
 from agents.vlm.clients.tokens import Asked
 from agents.vlm.clients.transport import Pace, WholeAnswers
-from agents.vlm.clients.watch import AGAIN, Request, Watch, duration
 from agents.vlm.clients.wire import (
     billed,
     cost_of,
@@ -55,7 +55,7 @@ class OpenAIClient:
     What may pass is tried again, ``settings.server.tries`` times in all, each try
     ``settings.server.timeout`` seconds at most from first to last byte: no connection, 408, 409,
     425, 429, 5xx, and answers that are cut off or empty. Between tries it waits as long as the
-    server asks, or half a second, a second, two … Each failed try is told to ``watch``. An answer
+    server asks, or half a second, a second, two … Each failed try is told to ``supervisor``. An answer
     of status 2xx is entered in the ledger before it is judged.
 
     Args:
@@ -79,12 +79,12 @@ class OpenAIClient:
         model: str,
         settings: AgentSettings,
         ledger: Ledger | None = None,
-        watch: Watch | None = None,
+        supervisor: RequestSupervisor | None = None,
     ) -> None:
         self._model, self.prices = model, settings.prices
         self._settings = settings
         self._ledger = ledger or Ledger(Budget(), settings.prices)
-        self._watch = watch or Watch()
+        self._supervisor = supervisor or RequestSupervisor()
         server = settings.server
         url = _address(server)
         # As it may be shown: without user, password and query.
@@ -126,7 +126,7 @@ class OpenAIClient:
         """The next turn, as :class:`agents.vlm.chat.Client` has it."""
         body = self._body(messages, seed)
         asked = Asked.of(body, messages, in_letters(messages), self._fields)
-        request = self._watch.request(seed)
+        request = self._supervisor.request(seed)
         request.of = self._settings.server.tries
         late = 0
         for request.attempt in itertools.count(1):
@@ -138,19 +138,19 @@ class OpenAIClient:
                 return replace(answer, seconds=time.monotonic() - request.began)
             what = self._line(answer)
             if answer.ends:
-                raise self._watch.stop(self._with_tries(what, request))
+                raise self._supervisor.stop(self._with_tries(what, request))
             late += answer.late
             if not answer.passes or request.attempt == request.of or late == _LATE_TRIES:
                 what = self._with_tries(what, request)
                 if answer.unreached:
-                    raise self._watch.stop(f"{what}; {_SEE_TO_IT}, and {AGAIN}")
+                    raise self._supervisor.stop(f"{what}; {_SEE_TO_IT}, and {AGAIN}")
                 raise request.gave_up(what)
             self._pause(answer, what, request)
         raise AssertionError("unreachable")
 
     def close(self) -> None:
         """Close all connections. Whoever still waits gets a ModelError."""
-        self._watch.close()
+        self._supervisor.close()
         self._sdk.close()
         self._logs.close()
 
@@ -169,7 +169,7 @@ class OpenAIClient:
             self._ledger.check()
         except CannotGoOn as error:
             # The others' answers are under way, and paid for; but nobody tries again.
-            self._watch.stop(str(error), waits_for_answers=True)
+            self._supervisor.stop(str(error), waits_for_answers=True)
             raise
 
     def _try(self, body: bytes, asked: Asked, request: Request) -> Reply | Failure:
@@ -249,14 +249,14 @@ class OpenAIClient:
         pause = failure.pause or growing * random.uniform(0.75, 1.0)
         left = request.left()
         if pause > left:
-            raise self._watch.stop(
+            raise self._supervisor.stop(
                 f"{what}; the server asks to wait {duration(pause)}, and {duration(left)} of "
                 f"--max-minutes are left; {AGAIN}"
                 if failure.pause
                 else f"{what}; the minutes of --max-minutes are over; {AGAIN}"
             )
         if pause > _LONGEST_ASKED and math.isinf(left):
-            raise self._watch.stop(
+            raise self._supervisor.stop(
                 f"{what}; the server asks to wait {duration(pause)}: {AGAIN} after that, or give "
                 "--max-minutes of more, and it is waited for"
             )

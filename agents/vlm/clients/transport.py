@@ -20,7 +20,7 @@ import httpcore2
 import httpx2
 from openai import OpenAIError
 
-from agents.vlm.clients.watch import Request
+from agents.vlm.clients.supervisor import Request
 
 LARGEST_ANSWER = 20_000_000
 """Bytes; what is longer is no reply."""
@@ -54,7 +54,7 @@ class Pace:
         self._lock = threading.Lock()
 
     def wait(self, request: Request) -> None:
-        """Wait for one's turn; raises as :meth:`~agents.vlm.clients.watch.Request.wait`."""
+        """Wait for one's turn; raises as :meth:`~agents.vlm.clients.supervisor.Request.wait`."""
         with self._lock:
             turn = max(time.monotonic(), self._next)
             self._next = turn + self._gap

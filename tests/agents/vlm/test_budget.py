@@ -20,7 +20,7 @@ from naughty_server import MODEL, NaughtyServer
 
 from agents.vlm.chat import Message, Reply, Usage
 from agents.vlm.clients.budget import Budget, Entry, Ledger, MeteredClient, Spent
-from agents.vlm.clients.watch import Watch
+from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.settings import AgentSettings, Prices
 from er_gym.rollout.agent import CannotGoOn
 
@@ -69,7 +69,7 @@ class Purse:
 def purse(client: Costly, budget: Budget, path: Path) -> Purse:
     ledger = Ledger(budget, client.prices)
     ledger.open(path)
-    return Purse(MeteredClient(client, ledger, Watch(budget.max_minutes)), ledger)
+    return Purse(MeteredClient(client, ledger, RequestSupervisor(budget.max_minutes)), ledger)
 
 
 Make = Callable[..., Purse]

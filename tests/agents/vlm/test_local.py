@@ -28,7 +28,7 @@ from tiny_qwen import make_tiny_qwen
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply
 from agents.vlm.clients.local import LocalClient, _Draw, _without_thought
-from agents.vlm.clients.watch import Watch
+from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.agent import CannotGoOn
 
@@ -630,7 +630,7 @@ def test_closing_stops_it_in_the_middle_of_a_reply(client: Clients) -> None:
 def test_the_minutes_stop_it_in_the_middle_of_a_reply(client: Clients) -> None:
     model = client(sampling={"max_tokens": 16_000})  # a minute of words
     model._model.generation_config.eos_token_id, model._ends = None, frozenset()
-    model._watch = Watch(max_minutes=0.5 / 60)
+    model._supervisor = RequestSupervisor(max_minutes=0.5 / 60)
     batches = recorded(model)
     with pytest.raises(CannotGoOn, match="the minutes are over; run the same command again"):
         model.reply([user("Hello")], 0)

@@ -27,12 +27,12 @@ pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
 import openai
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
-from agents.vlm.clients import watch, wire
+from agents.vlm.clients import supervisor, wire
 from agents.vlm.clients.budget import Budget, Ledger
 from agents.vlm.clients.openai_server import OpenAIClient
+from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.clients.tokens import Asked, picture_at_most, usage_of
 from agents.vlm.clients.transport import LARGEST_ANSWER, Pace
-from agents.vlm.clients.watch import Watch
 from agents.vlm.settings import AgentSettings, Prices, Server
 from er_gym.rollout.agent import CannotGoOn
 
@@ -602,7 +602,7 @@ def test_requests_are_spread(naughty: NaughtyServer, make: Make) -> None:
 
 
 def test_who_waits_for_a_turn_is_let_go() -> None:
-    pace, run = Pace(1), Watch()
+    pace, run = Pace(1), RequestSupervisor()
     pace.wait(run.request(0))
     raised: list[BaseException] = []
 
@@ -762,7 +762,7 @@ def test_a_server_that_refuses_again_and_again_stops_the_run(
 def test_those_who_wait_are_let_go_when_the_run_stops(
     make: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(watch, "_GRACE", 0.2)
+    monkeypatch.setattr(supervisor, "_GRACE", 0.2)
     with NaughtyServer(script=["429", "stall", "401"], retry_after="60") as server:
         client = make(server.url, timeout=60)
         began = time.monotonic()

@@ -1,6 +1,6 @@
 """How long a run waits for its server, and what it tells meanwhile.
 
-All requests of a run share a :class:`Watch`: its minutes, what happens to its requests, and its end
+All requests of a run share a :class:`RequestSupervisor`: its minutes, what happens to its requests, and its end
 where the server refuses one request after another.
 """
 
@@ -33,7 +33,7 @@ _LONGEST_WAIT = 3600.0  # seconds of one wait; threads cannot wait for an infini
 _log = logging.getLogger(__name__)
 
 
-class Notice(BaseModel):
+class ServerEvent(BaseModel):
     """Something that a user waits for, or that went wrong; a line of ``server-events.jsonl``.
 
     Attributes:
@@ -63,10 +63,10 @@ class Notice(BaseModel):
         return f"{self.what}{place}{then}"
 
 
-Listener = Callable[[Notice], None]
+Listener = Callable[[ServerEvent], None]
 
 
-class Watch:
+class RequestSupervisor:
     """The time of a run, and its news. One serves all threads.
 
     Args:
@@ -80,7 +80,7 @@ class Watch:
 
     def __init__(self, max_minutes: float | None = None) -> None:
         self.show: Listener = _warn
-        self.keep: Listener = lambda notice: None
+        self.log_event: Listener = lambda server_event: None
         self._minutes = max_minutes
         self._ends = math.inf if max_minutes is None else time.monotonic() + 60 * max_minutes
         self._changed = threading.Condition()
@@ -117,7 +117,7 @@ class Watch:
             self._stopped = (time.monotonic(), why, waits_for_answers)
             self._forget_refusals()
             self._changed.notify_all()
-        self.tell("stopped", why)
+        self.emit("stopped", why)
         return CannotGoOn(why)
 
     def close(self) -> None:
@@ -126,7 +126,7 @@ class Watch:
             self._closed = True
             self._changed.notify_all()
 
-    def tell(
+    def emit(
         self,
         event: Literal["retry", "waiting", "failed", "stopped"],
         what: str,
@@ -135,16 +135,16 @@ class Watch:
         of: int = 0,
         wait: float = 0.0,
     ) -> None:
-        """Tell those who listen; for the arguments see :class:`Notice`."""
+        """Tell those who listen; for the arguments see :class:`ServerEvent`."""
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
-        notice = Notice(
+        server_event = ServerEvent(
             time=now, event=event, what=what, seed=seed, attempt=attempt, of=of, wait=wait
         )
         self._last_news = time.monotonic()
-        self.keep(notice)
+        self.log_event(server_event)
         if event != "stopped":  # what is raised says so
             with contextlib.suppress(OSError, ValueError):  # nobody reads what is shown
-                self.show(notice)
+                self.show(server_event)
 
     # -- for requests ------------------------------------------------------------------------------
 
@@ -217,13 +217,13 @@ class Request:
         attempt: which try is under way; ``of``: how many there are at most.
     """
 
-    def __init__(self, watch: Watch, number: int, seed: int) -> None:
+    def __init__(self, supervisor: RequestSupervisor, number: int, seed: int) -> None:
         self.number, self.seed = number, seed
         self.began = time.monotonic()
         self.failing_since = math.inf
         self.answering = False
         self.attempt = self.of = 0
-        self._watch = watch
+        self._supervisor = supervisor
 
     def left(self, *, answering: bool = False) -> float:
         """Seconds until the run's minutes are over.
@@ -235,25 +235,25 @@ class Request:
             CannotGoOn: they are over, or the run has stopped.
             ModelError: the client has been closed.
         """
-        return self._watch._left(self, answering)
+        return self._supervisor._left(self, answering)
 
     def wait(self, seconds: float) -> None:
         """Wait, unless the run ends meanwhile; raises as :meth:`left`."""
-        self._watch._wait(self, seconds)
+        self._supervisor._wait(self, seconds)
 
     def still_waiting(self, what: str, seconds: float) -> None:
         """Say that an answer has not come for so long, if nothing else has been said for long."""
-        if self._watch._is_quiet():
-            self._watch.tell("waiting", what, self.seed, self.attempt, self.of, seconds)
+        if self._supervisor._is_quiet():
+            self._supervisor.emit("waiting", what, self.seed, self.attempt, self.of, seconds)
 
     def retry(self, what: str, wait: float, of: int) -> None:
         """Say that a try failed, and that another of ``of`` follows."""
-        self._watch._failed(self)
-        self._watch.tell("retry", what, self.seed, self.attempt, of, wait)
+        self._supervisor._failed(self)
+        self._supervisor.emit("retry", what, self.seed, self.attempt, of, wait)
 
     def answered(self) -> None:
         """There is a reply."""
-        self._watch._answered(time.monotonic() - self.began)
+        self._supervisor._answered(time.monotonic() - self.began)
 
     def gave_up(self, what: str) -> ModelError | CannotGoOn:
         """What to raise where no further try follows.
@@ -261,18 +261,18 @@ class Request:
         The run stops where the server has refused several different requests in a row; otherwise
         something may be wrong with this one alone.
         """
-        self._watch._failed(self)
+        self._supervisor._failed(self)
         try:
-            refused = self._watch._gave_up(self)
+            refused = self._supervisor._gave_up(self)
         except CannotGoOn as error:
-            self._watch.tell("stopped", what, self.seed)
+            self._supervisor.emit("stopped", what, self.seed)
             return error
         if refused:
-            return self._watch.stop(
+            return self._supervisor.stop(
                 f"the server has refused {refused} requests in a row, the last with: {what}; see "
                 f"to it, and {AGAIN}"
             )
-        self._watch.tell("failed", what, self.seed)
+        self._supervisor.emit("failed", what, self.seed)
         return ModelError(what)
 
 
@@ -285,5 +285,5 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.0f} h"
 
 
-def _warn(notice: Notice) -> None:
-    _log.warning("%s", notice)
+def _warn(server_event: ServerEvent) -> None:
+    _log.warning("%s", server_event)
