@@ -10,7 +10,7 @@ from inspect import signature
 from agents.scripted.oracle import OracleAgent
 from agents.scripted.random import RandomAgent
 from agents.scripted.searcher import SearcherAgent
-from agents.vlm.factory import AgentFactory, speaks, ways_to_name
+from agents.vlm.factory import AgentFactory, agent_name_forms, is_model_agent
 from agents.vlm.settings import AgentSettings
 from er_gym.plugins import PluginError, Registry, reason
 from er_gym.rollout.agent import Agent, Decision
@@ -35,7 +35,7 @@ AGENTS: Registry[Callable[..., Agent]] = Registry(
     own={"oracle": OracleAgent, "random": RandomAgent, "searcher": SearcherAgent},
     expected="an agent's class (er_gym.rollout.agent.Agent), or a function that makes an agent",
     fits=callable,
-    others=f"{RL}RUN with a run directory of er-gym train-rl; {ways_to_name()}",
+    others=f"{RL}RUN with a run directory of er-gym train-rl; {agent_name_forms()}",
 )
 """By name: how to make the agent. It is called with ``seed=`` if it takes that, else without
 arguments."""
@@ -53,7 +53,7 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
     """
     if name.startswith(RL):
         return _trained(name.removeprefix(RL), trust)
-    if speaks(name):
+    if is_model_agent(name):
         return _speaker(name).agent(seed)
     make = AGENTS.get(name)
     if name in AGENTS.own:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from agents import configs
 from agents.vlm.chat import Client
-from agents.vlm.clients.kinds import client_named, speaks, ways_to_name
+from agents.vlm.clients.registry import agent_name_forms, is_model_agent, resolve_client
 from agents.vlm.record import without_secrets
 from agents.vlm.settings import AgentSettings, Prices
 from er_gym.rollout.events import Cost
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from agents.vlm.clients.supervisor import ServerEvent
     from er_gym.rollout.json_lines import JsonLines
 
-__all__ = ["AgentFactory", "consequential", "load_settings", "speaks", "ways_to_name"]
+__all__ = ["AgentFactory", "consequential", "load_settings", "speaks", "agent_name_forms"]
 
 _WHAT = "agent"
 _OF_NO_CONSEQUENCE: Mapping[str, Any] = {
@@ -54,7 +54,7 @@ class AgentFactory:
 
     Args:
         name: a model client's name and what it is to open: ``openai:MODEL``
-            (:data:`agents.vlm.clients.kinds.CLIENTS`).
+            (:data:`agents.vlm.clients.registry.CLIENTS`).
         settings: of the agent.
         directory: where replies are kept, so that none is paid for twice, what has been spent, and
             what went wrong with the server; without it, nothing is kept.
@@ -76,7 +76,7 @@ class AgentFactory:
         from agents.vlm.matching import Matcher
         from agents.vlm.prompts import load_prompts
 
-        kind, opened = client_named(name)
+        kind, opened = resolve_client(name)
         self.name, self.settings = name, settings
         self.prompts = load_prompts(settings.prompts)
         self._matcher = Matcher(settings.matching)

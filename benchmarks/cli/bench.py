@@ -333,10 +333,10 @@ def _env_kwargs(
 
 def _voice(agent: str, spoken: Spoken) -> VLMRun | None:
     """What an agent that speaks is made of; None for others, which take none of these options."""
-    from agents.vlm.factory import speaks
+    from agents.vlm.factory import is_model_agent
     from benchmarks.cli.vlm_run import VLMRun
 
-    if speaks(agent):
+    if is_model_agent(agent):
         return VLMRun.of(agent, **vars(spoken))
     given = [name for name, value in vars(spoken).items() if value not in (None, ())]
     if given:

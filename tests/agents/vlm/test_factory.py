@@ -16,7 +16,7 @@ from agents import configs, make_agent
 from agents.vlm.agent import VLMAgent
 from agents.vlm.chat import Message
 from agents.vlm.clients.budget import Budget
-from agents.vlm.factory import AgentFactory, consequential, load_settings, speaks
+from agents.vlm.factory import AgentFactory, consequential, is_model_agent, load_settings
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.run_directory import REPLIES, SPENDING
 
@@ -54,7 +54,7 @@ def test_a_missing_file_is_told() -> None:
     [("openai:m", True), ("hf:a/b", True), ("openai:", False), ("oracle", False), ("rl:x", False)],
 )
 def test_who_speaks(name: str, answer: bool) -> None:
-    assert speaks(name) is answer
+    assert is_model_agent(name) is answer
 
 
 def test_what_makes_two_runs_differ() -> None:

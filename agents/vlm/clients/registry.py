@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelClient:
+class ModelClientSpec:
     """A way to have a model's replies.
 
     Attributes:
@@ -79,29 +79,29 @@ def _recorded(
     return RecordedClient(Path(path))
 
 
-CLIENTS: Registry[ModelClient] = Registry(
+CLIENTS: Registry[ModelClientSpec] = Registry(
     kind="model client",
     group="er_gym.model_clients",
     own={
-        "openai": ModelClient(
+        "openai": ModelClientSpec(
             opens="MODEL",
             help="a model on an OpenAI-compatible server",
             make=_openai,
             priced=True,
             keeps_ledger=True,
         ),
-        "hf": ModelClient(
+        "hf": ModelClientSpec(
             opens="PATH",
             help="a transformers model in this process",
             make=_local,
             install="er-gym[local]",
         ),
-        "recorded": ModelClient(
+        "recorded": ModelClientSpec(
             opens="RUN", help="what a model said in an earlier run", make=_recorded
         ),
     },
-    expected=f"an {__name__}.ModelClient",
-    fits=lambda row: isinstance(row, ModelClient),
+    expected=f"an {__name__}.ModelClientSpec",
+    fits=lambda row: isinstance(row, ModelClientSpec),
 )
 """By name."""
 
@@ -116,12 +116,12 @@ def _split(name: str) -> tuple[str, str]:
     return (client, opened) if opened and client in CLIENTS.names() else ("", "")
 
 
-def speaks(name: str) -> bool:
+def is_model_agent(name: str) -> bool:
     """Whether an agent of this name gets its replies from a model client: ``openai:MODEL``."""
     return bool(_split(name)[0])
 
 
-def client_named(name: str) -> tuple[ModelClient, str]:
+def resolve_client(name: str) -> tuple[ModelClientSpec, str]:
     """The client of an agent, and what it is to open.
 
     Raises:
@@ -129,11 +129,11 @@ def client_named(name: str) -> tuple[ModelClient, str]:
     """
     client, opened = _split(name)
     if not client:
-        raise PluginError(f"{name!r} is no agent of a model; give {ways_to_name()}")
+        raise PluginError(f"{name!r} is no agent of a model; give {agent_name_forms()}")
     return CLIENTS.get(client), opened
 
 
-def ways_to_name() -> str:
+def agent_name_forms() -> str:
     """How agents of models are named, for messages."""
     *most, last = (f"{name}:{row.opens}" for name, row in CLIENTS.own.items())
     return f"{', '.join(most)} or {last}"
