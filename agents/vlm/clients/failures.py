@@ -13,7 +13,7 @@ from email.utils import parsedate_to_datetime
 import httpx2
 import openai
 
-from agents.vlm.clients.wire import server_words
+from agents.vlm.clients.chat_completions import error_text
 
 _MAY_PASS = frozenset({408, 409, 425, 429})  # and all from 500 on
 _REFUSED: Mapping[int, str] = {
@@ -77,7 +77,7 @@ def failure_of(error: openai.OpenAIError, *, key_from: str, answered: bool) -> F
 
 def _of_status(error: openai.APIStatusError, key_from: str, answered: bool) -> Failure:
     status, headers = error.status_code, error.response.headers
-    said = server_words(error.response.content)
+    said = error_text(error.response.content)
     words = f"{status}, {said}"
     if 300 <= status < 400:
         place = headers.get("location") or "nowhere"

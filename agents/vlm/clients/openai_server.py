@@ -17,21 +17,21 @@ import openai
 
 from agents.vlm.chat import Message, Reply
 from agents.vlm.clients.budget import Budget, Entry, Ledger
+from agents.vlm.clients.chat_completions import (
+    billed_usage,
+    cost_of,
+    picture_bytes,
+    read_billing,
+    read_completion,
+    reply_of,
+    request_body,
+)
 from agents.vlm.clients.decision_schema import REQUEST_FIELDS
 from agents.vlm.clients.failures import Failure, failure_of
 from agents.vlm.clients.redaction import DiscreetLogs, Secrets
 from agents.vlm.clients.supervisor import AGAIN, Request, RequestSupervisor, duration
 from agents.vlm.clients.tokens import Asked
 from agents.vlm.clients.transport import Pace, WholeAnswers
-from agents.vlm.clients.wire import (
-    billed,
-    cost_of,
-    in_letters,
-    read_bill,
-    read_completion,
-    reply_of,
-    request_body,
-)
 from agents.vlm.settings import AgentSettings, Server
 from er_gym.rollout.agent import CannotGoOn
 
@@ -125,7 +125,7 @@ class OpenAIClient:
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
         """The next turn, as :class:`agents.vlm.chat.Client` has it."""
         body = self._body(messages, seed)
-        asked = Asked.of(body, messages, in_letters(messages), self._fields)
+        asked = Asked.of(body, messages, picture_bytes(messages), self._fields)
         request = self._supervisor.request(seed)
         request.of = self._settings.server.tries
         late = 0
@@ -215,7 +215,7 @@ class OpenAIClient:
         began: float,
     ) -> Reply | None:
         """Enter what an answer cost, reply or not; the reply with that, and without secrets."""
-        model, usage = billed(read_bill(body), asked, said)
+        model, usage = billed_usage(read_billing(body), asked, said)
         cost, model = cost_of(usage, self.prices), self._secrets.strike(model)
         self._ledger.enter(
             Entry.of(

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 from pydantic import Field, WrapValidator
 
 from agents.vlm.chat import Message, Picture, Usage
-from agents.vlm.clients.lenient import OrNone, Wire
+from agents.vlm.clients.tolerant_model import OrNone, TolerantModel
 
 _WRONG = -1
 _TEMPLATE = 512
@@ -57,14 +57,14 @@ class Asked:
 
     @staticmethod
     def of(
-        body: bytes, messages: Sequence[Message], in_letters: int, fields: Mapping[str, Any]
+        body: bytes, messages: Sequence[Message], picture_bytes: int, fields: Mapping[str, Any]
     ) -> Asked:
-        """Of a request's body, in which the pictures of ``messages`` take ``in_letters`` bytes."""
+        """Of a request's body, in which the pictures of ``messages`` take ``picture_bytes`` bytes."""
         shown = [part for each in messages for part in each.parts if isinstance(part, Picture)]
         limits = (fields.get("max_tokens"), fields.get("max_completion_tokens"))
         known = [each for each in limits if type(each) is int and each > 0]
         return Asked(
-            text=len(body) - in_letters,
+            text=len(body) - picture_bytes,
             pictures=sum(picture_at_most(each.width, each.height) for each in shown),
             max_tokens=min(known, default=None),
             thinks=fields.get("reasoning_effort", "none") != "none",
@@ -90,12 +90,12 @@ _Whole = Annotated[int, Field(strict=True, ge=0, le=2**53)]
 _Count = Annotated[_Whole | None, WrapValidator(_or_wrong)]
 
 
-class _Details(Wire):
+class _Details(TolerantModel):
     cached_tokens: _Count = None
     reasoning_tokens: _Count = None
 
 
-class Claimed(Wire):
+class Claimed(TolerantModel):
     """A server's count; -1 stands for a value that is no count."""
 
     prompt_tokens: _Count = None

@@ -27,7 +27,7 @@ pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
 import openai
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
-from agents.vlm.clients import supervisor, wire
+from agents.vlm.clients import chat_completions, supervisor
 from agents.vlm.clients.budget import Budget, Ledger
 from agents.vlm.clients.openai_server import OpenAIClient
 from agents.vlm.clients.supervisor import RequestSupervisor
@@ -123,7 +123,7 @@ def test_what_the_sdk_itself_would_send_means_the_same(naughty: NaughtyServer) -
     with openai.OpenAI(base_url=naughty.url, api_key=KEY) as sdk:
         sdk.chat.completions.create(model=MODEL, messages=GOLDEN)
     assert naughty.seen[0].json["messages"] == GOLDEN
-    assert json.loads(wire.request_body({"model": MODEL}, CONVERSATION, False)) == (
+    assert json.loads(chat_completions.request_body({"model": MODEL}, CONVERSATION, False)) == (
         naughty.seen[0].json
     )
 
@@ -138,14 +138,14 @@ def test_a_picture_is_put_into_letters_once_and_forgotten_with_its_conversation(
     picture = Picture(os.urandom(1000), "image/jpeg", 28, 28)
     message = Message("user", (picture,))
     gc.collect()
-    before = len(wire._ENCODED)
-    first = wire.request_body({"model": "m"}, [message, message], False)
-    assert wire.request_body({"model": "m"}, [message, message], False) == first
-    assert len(wire._ENCODED) == before + 1
-    assert wire._part(picture) is wire._part(picture)
+    before = len(chat_completions._ENCODED)
+    first = chat_completions.request_body({"model": "m"}, [message, message], False)
+    assert chat_completions.request_body({"model": "m"}, [message, message], False) == first
+    assert len(chat_completions._ENCODED) == before + 1
+    assert chat_completions._part(picture) is chat_completions._part(picture)
     del picture, message
     gc.collect()
-    assert len(wire._ENCODED) == before
+    assert len(chat_completions._ENCODED) == before
 
 
 @pytest.mark.parametrize(
@@ -352,8 +352,8 @@ def test_an_estimate_is_from_above_in_any_script(text: str) -> None:
     """No tokenizer makes more tokens of a text than it has bytes; so many letters are more."""
     picture = Picture(b"jpeg", "image/jpeg", 784, 420)
     messages = (Message("user", (text, picture)),)
-    body = wire.request_body({"model": "m", "max_tokens": 9}, messages, False)
-    asked = Asked.of(body, messages, wire.in_letters(messages), {"max_tokens": 9})
+    body = chat_completions.request_body({"model": "m", "max_tokens": 9}, messages, False)
+    asked = Asked.of(body, messages, chat_completions.picture_bytes(messages), {"max_tokens": 9})
     assert len(text.encode()) + picture_at_most(784, 420) <= asked.prompt_at_most
     assert asked.prompt_at_most < 6 * len(text.encode()) + picture_at_most(784, 420) + 700
     assert picture_at_most(784, 420) > 1105  # GPT-4o's; Qwen takes 420

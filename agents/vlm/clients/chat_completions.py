@@ -11,8 +11,8 @@ from weakref import WeakKeyDictionary
 from pydantic import Field, ValidationError
 
 from agents.vlm.chat import Message, Picture, Reply, Usage
-from agents.vlm.clients.lenient import OrNone, Wire
 from agents.vlm.clients.tokens import Asked, Claimed, usage_of
+from agents.vlm.clients.tolerant_model import OrNone, TolerantModel
 from agents.vlm.settings import Prices
 
 _LONGEST_WORD = 200  # characters of a model's name, or of why it stopped
@@ -26,7 +26,7 @@ _ENCODED: WeakKeyDictionary[Picture, bytes] = WeakKeyDictionary()
 # -- what is sent ----------------------------------------------------------------------------------
 
 
-def in_letters(messages: Sequence[Message]) -> int:
+def picture_bytes(messages: Sequence[Message]) -> int:
     """How many bytes of a request the pictures of a conversation take."""
     return sum(
         len(_picture(part)) for each in messages for part in each.parts if isinstance(part, Picture)
@@ -85,34 +85,34 @@ def _picture(picture: Picture) -> bytes:
 # -- what comes back -------------------------------------------------------------------------------
 
 
-class _Function(Wire):
+class _Function(TolerantModel):
     arguments: OrNone[str] = None
 
 
-class _Call(Wire):
+class _ToolCall(TolerantModel):
     function: OrNone[_Function] = None
 
 
-class _Said(Wire):
+class _AssistantMessage(TolerantModel):
     content: str | None = None
     refusal: OrNone[str] = None
     reasoning_content: OrNone[str] = None  # vLLM, SGLang, DeepSeek
     reasoning: OrNone[str] = None  # Ollama, OpenRouter, later vLLM
-    tool_calls: OrNone[tuple[_Call, ...]] = None
+    tool_calls: OrNone[tuple[_ToolCall, ...]] = None
 
 
-class _Choice(Wire):
-    message: _Said
+class _Choice(TolerantModel):
+    message: _AssistantMessage
     finish_reason: OrNone[str] = None
 
 
-class Completion(Wire):
+class Completion(TolerantModel):
     """What a server answers, as far as we read it."""
 
     choices: tuple[_Choice, ...] = Field(min_length=1)
 
 
-class Bill(Wire):
+class Billing(TolerantModel):
     """What an answer says of its costs; it may be no reply otherwise."""
 
     model: OrNone[str] = None
@@ -130,15 +130,15 @@ def read_completion(body: bytes) -> Completion:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(map(str, first["loc"])) or "the body"
-        raise ValueError(f"{where}: {first['msg']}; it says: {server_words(body)}") from None
+        raise ValueError(f"{where}: {first['msg']}; it says: {error_text(body)}") from None
 
 
-def read_bill(body: bytes) -> Bill:
+def read_billing(body: bytes) -> Billing:
     """What a body says of its costs: nothing, where it is not JSON."""
     try:
-        return Bill.model_validate_json(body)
+        return Billing.model_validate_json(body)
     except ValidationError:
-        return Bill()
+        return Billing()
 
 
 def reply_of(completion: Completion) -> Reply:
@@ -155,7 +155,7 @@ def reply_of(completion: Completion) -> Reply:
     )
 
 
-def billed(bill: Bill, asked: Asked, reply: Reply | None) -> tuple[str, Usage]:
+def billed_usage(bill: Billing, asked: Asked, reply: Reply | None) -> tuple[str, Usage]:
     """Which model answered, and the tokens that are paid for, never too few.
 
     Args:
@@ -192,7 +192,7 @@ def cost_of(usage: Usage, prices: Prices) -> float:
     return paid / 1_000_000
 
 
-def server_words(body: bytes) -> str:
+def error_text(body: bytes) -> str:
     """What a server says in the body of an error, in one line."""
     try:
         said = json.loads(body if len(body) <= _LONGEST_ERROR else "")

@@ -7,7 +7,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, WrapValidator
 
 
-class Wire(BaseModel):
+class TolerantModel(BaseModel):
     """Servers leave out fields, send null for them, and add their own."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
