@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 from pydantic import Field, ValidationError
 
 from agents.vlm.chat import Message, Picture, Reply, Usage
-from agents.vlm.clients.tokens import Asked, Claimed, usage_of
+from agents.vlm.clients.tokens import ReportedUsage, RequestSize, usage_of
 from agents.vlm.clients.tolerant_model import OrNone, TolerantModel
 from agents.vlm.settings import Prices
 
@@ -116,7 +116,7 @@ class Billing(TolerantModel):
     """What an answer says of its costs; it may be no reply otherwise."""
 
     model: OrNone[str] = None
-    usage: OrNone[Claimed] = None
+    usage: OrNone[ReportedUsage] = None
 
 
 def read_completion(body: bytes) -> Completion:
@@ -155,7 +155,9 @@ def reply_of(completion: Completion) -> Reply:
     )
 
 
-def billed_usage(bill: Billing, asked: Asked, reply: Reply | None) -> tuple[str, Usage]:
+def billed_usage(
+    bill: Billing, request_size: RequestSize, reply: Reply | None
+) -> tuple[str, Usage]:
     """Which model answered, and the tokens that are paid for, never too few.
 
     Args:
@@ -167,7 +169,7 @@ def billed_usage(bill: Billing, asked: Asked, reply: Reply | None) -> tuple[str,
     if reply is not None:
         said = sum(len(each.encode()) for each in (reply.text, reply.reasoning, reply.call))
         cut = reply.finish == "length"
-    return (bill.model or "")[:_LONGEST_WORD], usage_of(bill.usage, asked, said, cut)
+    return (bill.model or "")[:_LONGEST_WORD], usage_of(bill.usage, request_size, said, cut)
 
 
 def _without_thoughts(text: str) -> tuple[str, str]:

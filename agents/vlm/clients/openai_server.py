@@ -30,7 +30,7 @@ from agents.vlm.clients.decision_schema import REQUEST_FIELDS
 from agents.vlm.clients.failures import Failure, failure_of
 from agents.vlm.clients.redaction import DiscreetLogs, Secrets
 from agents.vlm.clients.supervisor import AGAIN, Request, RequestSupervisor, duration
-from agents.vlm.clients.tokens import Asked
+from agents.vlm.clients.tokens import RequestSize
 from agents.vlm.clients.transport import Pace, WholeAnswers
 from agents.vlm.settings import AgentSettings, Server
 from er_gym.rollout.agent import CannotGoOn
@@ -125,13 +125,13 @@ class OpenAIClient:
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
         """The next turn, as :class:`agents.vlm.chat.Client` has it."""
         body = self._body(messages, seed)
-        asked = Asked.of(body, messages, picture_bytes(messages), self._fields)
+        request_size = RequestSize.of(body, messages, picture_bytes(messages), self._fields)
         request = self._supervisor.request(seed)
         request.of = self._settings.server.tries
         late = 0
         for request.attempt in itertools.count(1):
             self._check(request)
-            answer = self._try(body, asked, request)
+            answer = self._try(body, request_size, request)
             if isinstance(answer, Reply):
                 self._answered = True
                 request.answered()
@@ -172,7 +172,7 @@ class OpenAIClient:
             self._supervisor.stop(str(error), waits_for_answers=True)
             raise
 
-    def _try(self, body: bytes, asked: Asked, request: Request) -> Reply | Failure:
+    def _try(self, body: bytes, request_size: RequestSize, request: Request) -> Reply | Failure:
         """A reply, or why there is none. It is not raised, so that no exception that may hold the
         key is the context of another."""
         began = time.monotonic()
@@ -189,33 +189,33 @@ class OpenAIClient:
             answer = error
         except BaseException:  # the run ends, or Ctrl-C
             if request.answering:
-                self._enter(b"", asked, None, "the run has ended", request, began)
+                self._enter(b"", request_size, None, "the run has ended", request, began)
             raise
         if isinstance(answer, openai.OpenAIError):
             failure = failure_of(
                 answer, key_from=self._settings.server.key_from, answered=self._answered
             )
             if request.answering:
-                self._enter(b"", asked, None, failure.words, request, began)
+                self._enter(b"", request_size, None, failure.words, request, began)
             return failure
         try:
             said, rejected = reply_of(read_completion(answer.content)), ""
         except ValueError as error:
             said, rejected = None, str(error)
-        reply = self._enter(answer.content, asked, said, rejected, request, began)
+        reply = self._enter(answer.content, request_size, said, rejected, request, began)
         return reply or Failure(rejected, passes=True)
 
     def _enter(
         self,
         body: bytes,
-        asked: Asked,
+        request_size: RequestSize,
         said: Reply | None,
         rejected: str,
         request: Request,
         began: float,
     ) -> Reply | None:
         """Enter what an answer cost, reply or not; the reply with that, and without secrets."""
-        model, usage = billed_usage(read_billing(body), asked, said)
+        model, usage = billed_usage(read_billing(body), request_size, said)
         cost, model = cost_of(usage, self.prices), self._secrets.strike(model)
         self._ledger.enter(
             Entry.of(

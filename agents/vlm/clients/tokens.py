@@ -40,7 +40,7 @@ def picture_at_most(width: int, height: int) -> int:
 
 
 @dataclass(frozen=True)
-class Asked:
+class RequestSize:
     """What a request holds, as far as its tokens depend on it.
 
     Attributes:
@@ -58,12 +58,12 @@ class Asked:
     @staticmethod
     def of(
         body: bytes, messages: Sequence[Message], picture_bytes: int, fields: Mapping[str, Any]
-    ) -> Asked:
+    ) -> RequestSize:
         """Of a request's body, in which the pictures of ``messages`` take ``picture_bytes`` bytes."""
         shown = [part for each in messages for part in each.parts if isinstance(part, Picture)]
         limits = (fields.get("max_tokens"), fields.get("max_completion_tokens"))
         known = [each for each in limits if type(each) is int and each > 0]
-        return Asked(
+        return RequestSize(
             text=len(body) - picture_bytes,
             pictures=sum(picture_at_most(each.width, each.height) for each in shown),
             max_tokens=min(known, default=None),
@@ -95,7 +95,7 @@ class _Details(TolerantModel):
     reasoning_tokens: _Count = None
 
 
-class Claimed(TolerantModel):
+class ReportedUsage(TolerantModel):
     """A server's count; -1 stands for a value that is no count."""
 
     prompt_tokens: _Count = None
@@ -104,7 +104,9 @@ class Claimed(TolerantModel):
     completion_tokens_details: OrNone[_Details] = None
 
 
-def usage_of(claimed: Claimed | None, asked: Asked, said: int | None, cut: bool = False) -> Usage:
+def usage_of(
+    reported: ReportedUsage | None, request_size: RequestSize, said: int | None, cut: bool = False
+) -> Usage:
     """The tokens of a request and its reply, never too few.
 
     Args:
@@ -113,39 +115,41 @@ def usage_of(claimed: Claimed | None, asked: Asked, said: int | None, cut: bool 
         said: bytes of the reply's words, thoughts and call; None where it cannot be read.
         cut: whether the reply ended at the limit.
     """
-    claimed = claimed or Claimed()
+    reported = reported or ReportedUsage()
     estimated = False
-    prompt = claimed.prompt_tokens
-    if prompt is None or not _possible_prompt(prompt, asked):
-        prompt, estimated = asked.prompt_at_most, True
-    cached = (claimed.prompt_tokens_details or _Details()).cached_tokens or 0
+    prompt = reported.prompt_tokens
+    if prompt is None or not _possible_prompt(prompt, request_size):
+        prompt, estimated = request_size.prompt_at_most, True
+    cached = (reported.prompt_tokens_details or _Details()).cached_tokens or 0
     if not 0 <= cached <= prompt:
         cached, estimated = 0, True
-    completion = claimed.completion_tokens
-    if completion is None or not _possible_completion(completion, asked, said):
-        completion, estimated = _completion_at_most(asked, said, cut), True
-    reasoning = (claimed.completion_tokens_details or _Details()).reasoning_tokens or 0
-    if not _possible_completion(reasoning, asked, 0):
+    completion = reported.completion_tokens
+    if completion is None or not _possible_completion(completion, request_size, said):
+        completion, estimated = _completion_at_most(request_size, said, cut), True
+    reasoning = (reported.completion_tokens_details or _Details()).reasoning_tokens or 0
+    if not _possible_completion(reasoning, request_size, 0):
         reasoning, estimated = 0, True
     if reasoning > completion:  # some servers count thoughts beside the words, not among them
         completion, estimated = completion + reasoning, True
     return Usage(prompt, completion, cached, reasoning, estimated)
 
 
-def _possible_prompt(count: int, asked: Asked) -> bool:
-    least = max(1, asked.text // _BYTES_OF_A_TOKEN)
-    return least <= count <= 2 * asked.prompt_at_most + _PROVIDERS_OWN
+def _possible_prompt(count: int, request_size: RequestSize) -> bool:
+    least = max(1, request_size.text // _BYTES_OF_A_TOKEN)
+    return least <= count <= 2 * request_size.prompt_at_most + _PROVIDERS_OWN
 
 
-def _possible_completion(count: int, asked: Asked, said: int | None) -> bool:
+def _possible_completion(count: int, request_size: RequestSize, said: int | None) -> bool:
     said = said or 0
     least = 0 if not said else max(1, said // _BYTES_OF_A_TOKEN)
-    limit = _UNLIMITED if asked.max_tokens is None else _BEYOND_LIMIT * asked.max_tokens
+    limit = (
+        _UNLIMITED if request_size.max_tokens is None else _BEYOND_LIMIT * request_size.max_tokens
+    )
     return least <= count <= max(limit, said + _MARKS)
 
 
-def _completion_at_most(asked: Asked, said: int | None, cut: bool) -> int:
-    limit = asked.max_tokens or 0
+def _completion_at_most(request_size: RequestSize, said: int | None, cut: bool) -> int:
+    limit = request_size.max_tokens or 0
     if said is None:
         return limit or _UNLIMITED
-    return max(said + _MARKS, limit if cut or asked.thinks else 0)
+    return max(said + _MARKS, limit if cut or request_size.thinks else 0)

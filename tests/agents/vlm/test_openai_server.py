@@ -31,7 +31,7 @@ from agents.vlm.clients import chat_completions, supervisor
 from agents.vlm.clients.budget import Budget, Ledger
 from agents.vlm.clients.openai_server import OpenAIClient
 from agents.vlm.clients.supervisor import RequestSupervisor
-from agents.vlm.clients.tokens import Asked, picture_at_most, usage_of
+from agents.vlm.clients.tokens import RequestSize, picture_at_most, usage_of
 from agents.vlm.clients.transport import LARGEST_ANSWER, Pace
 from agents.vlm.settings import AgentSettings, Prices, Server
 from er_gym.rollout.agent import CannotGoOn
@@ -353,7 +353,9 @@ def test_an_estimate_is_from_above_in_any_script(text: str) -> None:
     picture = Picture(b"jpeg", "image/jpeg", 784, 420)
     messages = (Message("user", (text, picture)),)
     body = chat_completions.request_body({"model": "m", "max_tokens": 9}, messages, False)
-    asked = Asked.of(body, messages, chat_completions.picture_bytes(messages), {"max_tokens": 9})
+    asked = RequestSize.of(
+        body, messages, chat_completions.picture_bytes(messages), {"max_tokens": 9}
+    )
     assert len(text.encode()) + picture_at_most(784, 420) <= asked.prompt_at_most
     assert asked.prompt_at_most < 6 * len(text.encode()) + picture_at_most(784, 420) + 700
     assert picture_at_most(784, 420) > 1105  # GPT-4o's; Qwen takes 420
