@@ -48,12 +48,12 @@ class Failure:
         pause: seconds that the server asks to wait; None if it does not.
     """
 
-    words: str
-    passes: bool = False
-    ends: str = ""
-    late: bool = False
-    unreached: bool = False
-    pause: float | None = None
+    message: str
+    retryable: bool = False
+    fatal: str = ""
+    timed_out: bool = False
+    no_server: bool = False
+    retry_after: float | None = None
 
 
 def failure_of(error: openai.OpenAIError, *, key_from: str, answered: bool) -> Failure:
@@ -72,7 +72,7 @@ def failure_of(error: openai.OpenAIError, *, key_from: str, answered: bool) -> F
         return Failure(words)
     late = isinstance(cause, httpx2.ReadTimeout)
     alone = late or isinstance(cause, (httpx2.ConnectError, httpx2.ConnectTimeout))
-    return Failure(words, passes=True, late=late, unreached=alone and not answered)
+    return Failure(words, retryable=True, timed_out=late, no_server=alone and not answered)
 
 
 def _of_status(error: openai.APIStatusError, key_from: str, answered: bool) -> Failure:
@@ -82,20 +82,20 @@ def _of_status(error: openai.APIStatusError, key_from: str, answered: bool) -> F
     if 300 <= status < 400:
         place = headers.get("location") or "nowhere"
         ends = f"requests are not sent on to {place}; if the server is there, give its base_url"
-        return Failure(words, ends=ends)
+        return Failure(words, fatal=ends)
     if _NO_MONEY in (error.code, error.type):
-        return Failure(words, ends="there is no money left for this key")
+        return Failure(words, fatal="there is no money left for this key")
     if status in _REFUSED:
-        return Failure(words, ends=_REFUSED[status].format(key_from=key_from))
+        return Failure(words, fatal=_REFUSED[status].format(key_from=key_from))
     about_this = _ABOUT_ONE_CONVERSATION.search(f"{error.code} {said}")
     if status in _MALFORMED and not answered and not about_this:
-        return Failure(words, ends="no request like this will do better")
+        return Failure(words, fatal="no request like this will do better")
     passes = status in _MAY_PASS or status >= 500
     asked_to = headers.get("x-should-retry") != "false"
-    return Failure(words, passes=passes and asked_to, pause=asked_pause(headers))
+    return Failure(words, retryable=passes and asked_to, retry_after=requested_pause(headers))
 
 
-def asked_pause(headers: httpx2.Headers) -> float | None:
+def requested_pause(headers: httpx2.Headers) -> float | None:
     """The seconds that a server asks to wait, infinity among them; None if it does not ask, or asks
     for what is no time to come."""
     text = headers.get("retry-after", "")

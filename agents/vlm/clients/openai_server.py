@@ -137,12 +137,12 @@ class OpenAIClient:
                 request.answered()
                 return replace(answer, seconds=time.monotonic() - request.began)
             what = self._line(answer)
-            if answer.ends:
+            if answer.fatal:
                 raise self._supervisor.stop(self._with_tries(what, request))
-            late += answer.late
-            if not answer.passes or request.attempt == request.of or late == _LATE_TRIES:
+            late += answer.timed_out
+            if not answer.retryable or request.attempt == request.of or late == _LATE_TRIES:
                 what = self._with_tries(what, request)
-                if answer.unreached:
+                if answer.no_server:
                     raise self._supervisor.stop(f"{what}; {_SEE_TO_IT}, and {AGAIN}")
                 raise request.gave_up(what)
             self._pause(answer, what, request)
@@ -196,14 +196,14 @@ class OpenAIClient:
                 answer, key_from=self._settings.server.key_from, answered=self._answered
             )
             if request.answering:
-                self._enter(b"", request_size, None, failure.words, request, began)
+                self._enter(b"", request_size, None, failure.message, request, began)
             return failure
         try:
             said, rejected = reply_of(read_completion(answer.content)), ""
         except ValueError as error:
             said, rejected = None, str(error)
         reply = self._enter(answer.content, request_size, said, rejected, request, began)
-        return reply or Failure(rejected, passes=True)
+        return reply or Failure(rejected, retryable=True)
 
     def _enter(
         self,
@@ -246,13 +246,13 @@ class OpenAIClient:
     def _pause(self, failure: Failure, what: str, request: Request) -> None:
         """Say what went wrong, and wait; CannotGoOn where that would be too long."""
         growing = min(_LONGEST_PAUSE, _FIRST_PAUSE * 2.0 ** min(request.attempt - 1, 10))
-        pause = failure.pause or growing * random.uniform(0.75, 1.0)
+        pause = failure.retry_after or growing * random.uniform(0.75, 1.0)
         left = request.left()
         if pause > left:
             raise self._supervisor.stop(
                 f"{what}; the server asks to wait {duration(pause)}, and {duration(left)} of "
                 f"--max-minutes are left; {AGAIN}"
-                if failure.pause
+                if failure.retry_after
                 else f"{what}; the minutes of --max-minutes are over; {AGAIN}"
             )
         if pause > _LONGEST_ASKED and math.isinf(left):
@@ -260,14 +260,14 @@ class OpenAIClient:
                 f"{what}; the server asks to wait {duration(pause)}: {AGAIN} after that, or give "
                 "--max-minutes of more, and it is waited for"
             )
-        of = min(request.of, request.attempt + 1) if failure.late else request.of
+        of = min(request.of, request.attempt + 1) if failure.timed_out else request.of
         request.retry(what, pause, of)
         request.wait(pause)
 
     def _line(self, failure: Failure) -> str:
         """One line that says who and what; never the key."""
-        words = self._plain(failure.words)
-        ends = f"; {self._plain(failure.ends)}" if failure.ends else ""
+        words = self._plain(failure.message)
+        ends = f"; {self._plain(failure.fatal)}" if failure.fatal else ""
         return f"{self._model} at {self._where}: {words}{ends}"
 
     def _plain(self, words: str) -> str:
