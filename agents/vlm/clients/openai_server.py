@@ -31,7 +31,7 @@ from agents.vlm.clients.failures import Failure, failure_of
 from agents.vlm.clients.redaction import DiscreetLogs, Secrets
 from agents.vlm.clients.supervisor import AGAIN, Request, RequestSupervisor, duration
 from agents.vlm.clients.tokens import RequestSize
-from agents.vlm.clients.transport import Pace, WholeAnswers
+from agents.vlm.clients.transport import BoundedTransport, RateLimiter
 from agents.vlm.settings import AgentSettings, Server
 from er_gym.rollout.agent import CannotGoOn
 
@@ -98,8 +98,8 @@ class OpenAIClient:
         self.identity = json.dumps(
             {"server": place, "fields": self._fields, "seed": settings.seed}, sort_keys=True
         )
-        self._pace = Pace(server.requests_per_minute)
-        self._transport = WholeAnswers(url, server.timeout, server.connect)
+        self._rate_limiter = RateLimiter(server.requests_per_minute)
+        self._transport = BoundedTransport(url, server.timeout, server.connect)
         plain = url.copy_with(query=None, fragment=None)
         options: dict[str, Any] = {
             # The SDK wants one; without a key the header is left out of every request.
@@ -164,7 +164,7 @@ class OpenAIClient:
 
     def _check(self, request: Request) -> None:
         """Wait for one's turn; CannotGoOn where there is none."""
-        self._pace.wait(request)
+        self._rate_limiter.wait(request)
         try:
             self._ledger.check()
         except CannotGoOn as error:
@@ -176,7 +176,7 @@ class OpenAIClient:
         """A reply, or why there is none. It is not raised, so that no exception that may hold the
         key is the context of another."""
         began = time.monotonic()
-        self._transport.serve(request)
+        self._transport.begin_try(request)
         answer: httpx2.Response | openai.OpenAIError
         try:
             answer = self._sdk.post(

@@ -41,7 +41,7 @@ class AnswerTooLong(OpenAIError):
     """An answer without end."""
 
 
-class Pace:
+class RateLimiter:
     """Spreads requests evenly, over all threads of the process.
 
     Args:
@@ -61,7 +61,7 @@ class Pace:
         request.wait(max(0.0, turn - time.monotonic()))
 
 
-class WholeAnswers(httpx2.BaseTransport):
+class BoundedTransport(httpx2.BaseTransport):
     """A transport for one server.
 
     Args:
@@ -72,19 +72,19 @@ class WholeAnswers(httpx2.BaseTransport):
     """
 
     def __init__(self, url: httpx2.URL, timeout: float, connect: float) -> None:
-        self._clock = _Clock()
+        self._deadline = _TryDeadline()
         self._timeout, self._query = timeout, url.query
         self._pool = httpcore2.ConnectionPool(
             ssl_context=httpx2.create_ssl_context() if url.scheme == "https" else None,
             proxy=_proxy_for(str(url)),
             max_connections=None,
             keepalive_expiry=5.0,
-            network_backend=_TimedBackend(self._clock, connect),
+            network_backend=_TimedBackend(self._deadline, connect),
         )
 
-    def serve(self, request: Request) -> None:
+    def begin_try(self, request: Request) -> None:
         """What this thread sends next is a try of this request."""
-        self._clock.request = request
+        self._deadline.request = request
 
     def handle_request(self, request: httpx2.Request) -> httpx2.Response:
         """Send a request and read the answer to its end.
@@ -94,11 +94,11 @@ class WholeAnswers(httpx2.BaseTransport):
             AnswerTooLong: it has no end.
             CannotGoOn: the run ends meanwhile.
         """
-        self._clock.start(self._timeout)
+        self._deadline.start(self._timeout)
         try:
             return self._whole(request)
         except httpcore2.TimeoutException as error:
-            self._clock.request.left(answering=True)  # it may be the run's end that came first
+            self._deadline.request.left(answering=True)  # it may be the run's end that came first
             if isinstance(error, _NoConnection):
                 raise httpx2.ConnectTimeout(str(error), request=request) from None
             late = f"no whole answer within {self._timeout:g} s"
@@ -126,7 +126,7 @@ class WholeAnswers(httpx2.BaseTransport):
                 extensions=request.extensions,
             )
         )
-        self._clock.request.answering = 200 <= answer.status < 300
+        self._deadline.request.answering = 200 <= answer.status < 300
         try:
             parts, size = [], 0
             for part in answer.iter_stream():
@@ -191,7 +191,7 @@ def _without_user(netloc: str) -> str:
 # -- time ------------------------------------------------------------------------------------------
 
 
-class _Clock(threading.local):
+class _TryDeadline(threading.local):
     """How much time a try has left; a request is one thread's from beginning to end."""
 
     request: Request
@@ -220,20 +220,20 @@ class _Clock(threading.local):
 class _TimedStream(httpcore2.NetworkStream):
     """A connection on which no wait goes beyond the time that is left."""
 
-    def __init__(self, inner: httpcore2.NetworkStream, clock: _Clock) -> None:
-        self._inner, self._clock = inner, clock
+    def __init__(self, inner: httpcore2.NetworkStream, clock: _TryDeadline) -> None:
+        self._inner, self._deadline = inner, clock
 
     def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
         while True:
-            left = self._clock.left()
+            left = self._deadline.left()
             try:
                 return self._inner.read(max_bytes, min(left, _LOOK))
             except httpcore2.ReadTimeout:
-                self._clock.look()
+                self._deadline.look()
 
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
         for start in range(0, len(buffer), _AT_ONCE):
-            self._inner.write(buffer[start : start + _AT_ONCE], self._clock.left())
+            self._inner.write(buffer[start : start + _AT_ONCE], self._deadline.left())
 
     def start_tls(
         self,
@@ -241,8 +241,10 @@ class _TimedStream(httpcore2.NetworkStream):
         server_hostname: str | None = None,
         timeout: float | None = None,
     ) -> httpcore2.NetworkStream:
-        left = self._clock.left()
-        return _TimedStream(self._inner.start_tls(ssl_context, server_hostname, left), self._clock)
+        left = self._deadline.left()
+        return _TimedStream(
+            self._inner.start_tls(ssl_context, server_hostname, left), self._deadline
+        )
 
     def get_extra_info(self, info: str) -> Any:
         return self._inner.get_extra_info(info)
@@ -258,8 +260,8 @@ class _NoConnection(httpcore2.ConnectTimeout):
 class _TimedBackend(httpcore2.NetworkBackend):
     """Makes such connections."""
 
-    def __init__(self, clock: _Clock, connect: float) -> None:
-        self._inner, self._clock, self._connect = httpcore2.SyncBackend(), clock, connect
+    def __init__(self, clock: _TryDeadline, connect: float) -> None:
+        self._inner, self._deadline, self._connect = httpcore2.SyncBackend(), clock, connect
 
     def connect_tcp(
         self,
@@ -269,7 +271,7 @@ class _TimedBackend(httpcore2.NetworkBackend):
         local_address: str | None = None,
         socket_options: Iterable[httpcore2.SOCKET_OPTION] | None = None,
     ) -> httpcore2.NetworkStream:
-        left = self._clock.left()
+        left = self._deadline.left()
         try:
             stream = self._inner.connect_tcp(
                 host, port, min(left, self._connect), local_address, socket_options
@@ -278,4 +280,4 @@ class _TimedBackend(httpcore2.NetworkBackend):
             if left <= self._connect:
                 raise
             raise _NoConnection(f"no connection within {self._connect:g} s") from None
-        return _TimedStream(stream, self._clock)
+        return _TimedStream(stream, self._deadline)

@@ -32,7 +32,7 @@ from agents.vlm.clients.budget import Budget, Ledger
 from agents.vlm.clients.openai_server import OpenAIClient
 from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.clients.tokens import RequestSize, picture_at_most, usage_of
-from agents.vlm.clients.transport import LARGEST_ANSWER, Pace
+from agents.vlm.clients.transport import LARGEST_ANSWER, RateLimiter
 from agents.vlm.settings import AgentSettings, Prices, Server
 from er_gym.rollout.agent import CannotGoOn
 
@@ -604,7 +604,7 @@ def test_requests_are_spread(naughty: NaughtyServer, make: Make) -> None:
 
 
 def test_who_waits_for_a_turn_is_let_go() -> None:
-    pace, run = Pace(1), RequestSupervisor()
+    pace, run = RateLimiter(1), RequestSupervisor()
     pace.wait(run.request(0))
     raised: list[BaseException] = []
 
