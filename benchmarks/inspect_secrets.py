@@ -69,22 +69,22 @@ def _plain(output: ModelOutput | Exception, secrets: Secrets) -> ModelOutput | E
         _strike_error(output, secrets)
         return output
     said = output.model_dump()
-    plain = secrets.strike_all(said)
+    plain = secrets.redact_all(said)
     return output if plain == said else ModelOutput.model_validate(plain)
 
 
 def _plain_call(call: ModelCall | None, secrets: Secrets) -> ModelCall | None:
     # In place: Inspect may hold it already.
     if call is not None and call.response is not None:
-        call.response = secrets.strike_all(call.response)
+        call.response = secrets.redact_all(call.response)
     return call
 
 
 def _strike_error(error: BaseException | None, secrets: Secrets) -> None:
     """Strike secrets out of an exception, and of those that it came of."""
     while error is not None:
-        error.args = tuple(secrets.strike_all(each) for each in error.args)
+        error.args = tuple(secrets.redact_all(each) for each in error.args)
         for name, value in vars(error).items():
             if isinstance(value, (str, dict, list)):
-                setattr(error, name, secrets.strike_all(value))
+                setattr(error, name, secrets.redact_all(value))
         error = error.__cause__ or error.__context__

@@ -143,7 +143,7 @@ def plain_settings(settings: AgentSettings) -> dict[str, Any]:
 def without_secrets(settings: AgentSettings, value: dict[str, Any]) -> dict[str, Any]:
     """A JSON value without the key that the settings name."""
     key = os.environ.get(settings.server.key_from, "").strip()
-    plain: dict[str, Any] = Secrets(key, settings.server.base_url).strike_all(value)
+    plain: dict[str, Any] = Secrets(key, settings.server.base_url).redact_all(value)
     return plain
 
 

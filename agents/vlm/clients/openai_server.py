@@ -28,7 +28,7 @@ from agents.vlm.clients.chat_completions import (
 )
 from agents.vlm.clients.decision_schema import REQUEST_FIELDS
 from agents.vlm.clients.failures import Failure, failure_of
-from agents.vlm.clients.redaction import DiscreetLogs, Secrets
+from agents.vlm.clients.redaction import RedactingLogFilter, Secrets
 from agents.vlm.clients.supervisor import AGAIN, Request, RequestSupervisor, duration
 from agents.vlm.clients.tokens import RequestSize
 from agents.vlm.clients.transport import BoundedTransport, RateLimiter
@@ -91,7 +91,7 @@ class OpenAIClient:
         self._where = f"{url.scheme}://{url.netloc.decode()}{url.path}".rstrip("/")
         self._key = _key(server, url)
         self._secrets = Secrets(self._key, str(url))
-        self._logs = DiscreetLogs(self._secrets)
+        self._logs = RedactingLogFilter(self._secrets)
         self._fields = _fixed_fields(model, settings)
         self._answered = False
         place = f"{url.scheme}://{url.host}{url.path}".rstrip("/")
@@ -216,7 +216,7 @@ class OpenAIClient:
     ) -> Reply | None:
         """Enter what an answer cost, reply or not; the reply with that, and without secrets."""
         model, usage = billed_usage(read_billing(body), request_size, said)
-        cost, model = cost_of(usage, self.prices), self._secrets.strike(model)
+        cost, model = cost_of(usage, self.prices), self._secrets.redact(model)
         self._ledger.enter(
             Entry.of(
                 usage,
@@ -229,13 +229,13 @@ class OpenAIClient:
         )
         if said is None:
             return None
-        strike = self._secrets.strike
+        redact = self._secrets.redact
         return replace(
             said,
-            text=strike(said.text),
-            reasoning=strike(said.reasoning),
-            call=strike(said.call),
-            finish=strike(said.finish),
+            text=redact(said.text),
+            reasoning=redact(said.reasoning),
+            call=redact(said.call),
+            finish=redact(said.finish),
             model=model,
             usage=usage,
             cost=cost,
@@ -272,7 +272,7 @@ class OpenAIClient:
 
     def _plain(self, words: str) -> str:
         """Short, printable, in one line and without secrets."""
-        words = self._secrets.strike(words)  # whole, so before anything is cut off
+        words = self._secrets.redact(words)  # whole, so before anything is cut off
         words = " ".join("".join(c if c.isprintable() else " " for c in words).split())
         return words if len(words) <= _LONGEST_WORDS else words[:_LONGEST_WORDS] + "…"
 

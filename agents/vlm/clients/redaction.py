@@ -12,7 +12,7 @@ import re
 from typing import Any
 from urllib.parse import parse_qsl, quote, unquote, urlsplit
 
-STRUCK = "***"
+REDACTED = "***"
 LONG = 8
 """Characters. What is shorter is part of too many words to be struck out wherever it stands."""
 LOGS = (
@@ -54,26 +54,26 @@ class Secrets:
         self._anywhere = re.compile("|".join(patterns)) if patterns else None
         self._after = re.compile(rf"(?i:{told})(?:{after})(?!\w)") if after else None
 
-    def strike(self, text: str) -> str:
+    def redact(self, text: str) -> str:
         """The text without them."""
         if self._anywhere is not None:
-            text = self._anywhere.sub(STRUCK, text)
+            text = self._anywhere.sub(REDACTED, text)
         if self._after is not None:
-            text = self._after.sub(rf"\g<1>{STRUCK}", text)
+            text = self._after.sub(rf"\g<1>{REDACTED}", text)
         return text
 
-    def strike_all(self, value: Any) -> Any:
+    def redact_all(self, value: Any) -> Any:
         """A JSON value without them in any of its strings, names of fields included."""
         if isinstance(value, str):
-            return self.strike(value)
+            return self.redact(value)
         if isinstance(value, dict):
-            return {self.strike_all(name): self.strike_all(each) for name, each in value.items()}
+            return {self.redact_all(name): self.redact_all(each) for name, each in value.items()}
         if isinstance(value, (list, tuple)):
-            return [self.strike_all(each) for each in value]
+            return [self.redact_all(each) for each in value]
         return value
 
 
-class DiscreetLogs:
+class RedactingLogFilter:
     """Strikes secrets out of what the packages that carry requests log, until it is closed."""
 
     def __init__(self, secrets: Secrets) -> None:
@@ -84,7 +84,7 @@ class DiscreetLogs:
     def filter(self, record: logging.LogRecord) -> bool:
         """Let a record pass, without secrets."""
         said = record.getMessage()
-        plain = self._secrets.strike(said)
+        plain = self._secrets.redact(said)
         if plain != said:
             record.msg, record.args = plain, ()
         return True
