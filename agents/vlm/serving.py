@@ -32,7 +32,7 @@ _SECONDS = 30
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ServeOptions:
     """How a model is to be served.
 
     Attributes:
@@ -109,50 +109,50 @@ class _Engine:
     """
 
     start: tuple[str, ...]
-    arguments: Callable[[str, Wanted, int], list[str]]
+    arguments: Callable[[str, ServeOptions, int], list[str]]
     name: Callable[[str], str]
     ready: str
     needs: frozenset[str]
     install: str
     cannot: tuple[str, ...] = ()
-    bench: Callable[[Wanted], tuple[str, ...]] = lambda wanted: _ONE_AT_A_TIME
+    bench: Callable[[ServeOptions], tuple[str, ...]] = lambda options: _ONE_AT_A_TIME
     environment: Callable[[int], dict[str, str]] = field(default=lambda port: {})
 
 
-def _vllm(model: str, wanted: Wanted, gpus: int) -> list[str]:
+def _vllm(model: str, options: ServeOptions, gpus: int) -> list[str]:
     bounds = Pictures()
     pixels = {"min_pixels": bounds.min_pixels, "max_pixels": bounds.max_pixels}
     return [
         model,
-        *("--host", HOST, "--port", str(wanted.port)),
-        *("--served-model-name", wanted.name or model),
-        *("--max-model-len", str(wanted.context or 32_768)),
+        *("--host", HOST, "--port", str(options.port)),
+        *("--served-model-name", options.name or model),
+        *("--max-model-len", str(options.context or 32_768)),
         *("--tensor-parallel-size", str(max(gpus, 1))),
         # What is said at a turn is what was said at the last, and a little more.
         "--enable-prefix-caching",
         # Models without eyes ignore both. No video: memory would be kept for the longest there is.
-        *("--limit-mm-per-prompt", json.dumps({"image": wanted.pictures, "video": 0})),
+        *("--limit-mm-per-prompt", json.dumps({"image": options.pictures, "video": 0})),
         *("--mm-processor-kwargs", json.dumps(pixels)),
     ]
 
 
-def _transformers(model: str, wanted: Wanted, gpus: int) -> list[str]:
-    return [model, "--host", HOST, "--port", str(wanted.port)]
+def _transformers(model: str, options: ServeOptions, gpus: int) -> list[str]:
+    return [model, "--host", HOST, "--port", str(options.port)]
 
 
-def _llama_cpp(model: str, wanted: Wanted, gpus: int) -> list[str]:
+def _llama_cpp(model: str, options: ServeOptions, gpus: int) -> list[str]:
     return [
-        *("--model", model, "--model_alias", wanted.name or Path(model).stem),
-        *("--host", HOST, "--port", str(wanted.port)),
-        *("--n_ctx", str(wanted.context or 8_192)),
+        *("--model", model, "--model_alias", options.name or Path(model).stem),
+        *("--host", HOST, "--port", str(options.port)),
+        *("--n_ctx", str(options.context or 8_192)),
         *("--n_gpu_layers", "-1" if gpus else "0"),
         # Otherwise it keeps a number for each token of the context and word of the vocabulary.
         *("--logits_all", "false"),
     ]
 
 
-def _bench_of_llama_cpp(wanted: Wanted) -> tuple[str, ...]:
-    blind = () if _EYES in wanted.more else ("--agent-config", "text")
+def _bench_of_llama_cpp(options: ServeOptions) -> tuple[str, ...]:
+    blind = () if _EYES in options.more else ("--agent-config", "text")
     return (*_ONE_AT_A_TIME, *blind)
 
 
@@ -164,7 +164,7 @@ ENGINES: dict[str, _Engine] = {
         ready="/health",
         needs=frozenset({"vllm"}),
         install="vllm",
-        bench=lambda wanted: (),
+        bench=lambda options: (),
     ),
     "transformers": _Engine(
         ("-m", "transformers.cli.transformers", "serve"),
@@ -192,7 +192,7 @@ ENGINES: dict[str, _Engine] = {
 """The servers that are known, by name."""
 
 
-def command_for(model: str, wanted: Wanted, machine: Machine) -> Command:
+def command_for(model: str, options: ServeOptions, machine: Machine) -> Command:
     """The command that serves a model.
 
     A ``.gguf`` file is for llama.cpp; any other model for vLLM where that and a GPU are there, and
@@ -206,8 +206,8 @@ def command_for(model: str, wanted: Wanted, machine: Machine) -> Command:
     Raises:
         ValueError: nothing that is installed can serve it, or not so.
     """
-    gpus = machine.gpus if wanted.gpus is None else wanted.gpus
-    name = wanted.engine or _fitting(model, machine.packages, gpus)
+    gpus = machine.gpus if options.gpus is None else options.gpus
+    name = options.engine or _fitting(model, machine.packages, gpus)
     if name not in ENGINES:
         raise ValueError(f"unknown engine {name!r}; choose one of: {', '.join(ENGINES)}")
     engine = ENGINES[name]
@@ -219,25 +219,25 @@ def command_for(model: str, wanted: Wanted, machine: Machine) -> Command:
             "name another Python that has it"
         )
     for setting in engine.cannot:
-        if getattr(wanted, setting):
+        if getattr(options, setting):
             raise ValueError(
-                f"{name} has no setting for the {setting} {getattr(wanted, setting)!r}; leave it "
+                f"{name} has no setting for the {setting} {getattr(options, setting)!r}; leave it "
                 "out, or choose another engine"
             )
-    origin = f"http://{HOST}:{wanted.port}"
+    origin = f"http://{HOST}:{options.port}"
     return Command(
         engine=name,
         argv=(
             machine.python,
             *engine.start,
-            *engine.arguments(model, wanted, gpus),
-            *wanted.more,
+            *engine.arguments(model, options, gpus),
+            *options.more,
         ),
-        environment=engine.environment(wanted.port),
-        name=wanted.name or engine.name(model),
+        environment=engine.environment(options.port),
+        name=options.name or engine.name(model),
         base_url=f"{origin}/v1",
         ready_url=f"{origin}{engine.ready}",
-        bench_options=engine.bench(wanted),
+        bench_options=engine.bench(options),
     )
 
 
@@ -247,7 +247,7 @@ def _fitting(model: str, packages: frozenset[str], gpus: int) -> str:
     return "vllm" if gpus and "vllm" in packages else "transformers"
 
 
-def look_around(python: str, environment: Mapping[str, str] = os.environ) -> Machine:
+def inspect_machine(python: str, environment: Mapping[str, str] = os.environ) -> Machine:
     """What this machine has to serve with.
 
     Args:
