@@ -17,7 +17,7 @@ from agents.vlm.settings import AgentSettings, Local
 
 _MODEL_FILES = {".json", ".jinja", ".txt", ".model", ".safetensors", ".bin"}
 _LONGEST_WORDS = 300  # characters of a library's, in an error
-_NAMES_OF_2024 = {
+_OLD_WEIGHT_NAMES = {
     r"^visual\.": "model.visual.",
     r"^model\.(?!language_model\.|visual\.)": "model.language_model.",
 }
@@ -40,9 +40,9 @@ class Checkpoint:
 
     model: Any
     tokenizer: Any
-    eyes: Any
+    image_processor: Any
     template: str | None
-    ends: frozenset[int]
+    end_tokens: frozenset[int]
     identity: str
 
 
@@ -64,32 +64,32 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
             "Hugging Face hub"
         )
     where = {"local_files_only": is_here}
-    with _plainly(f"{path} cannot be loaded"):
+    with _errors_in_one_line(f"{path} cannot be loaded"):
         config = transformers.AutoConfig.from_pretrained(path, **where)
         tokenizer = transformers.AutoTokenizer.from_pretrained(path, **where)
         # Some have a template that knows of pictures beside their tokenizer's; where it comes in
         # several kinds, the tokenizer knows which is meant for talking.
         template = ProcessorMixin.get_processor_dict(path, **where)[0].get("chat_template")
         template = template if isinstance(template, str) else None
-    has_eyes = getattr(config, "vision_config", None) is not None
-    if sees and not has_eyes:
+    has_vision = getattr(config, "vision_config", None) is not None
+    if sees and not has_vision:
         raise ValueError(f"{path} has no eyes; let the agent's setting sees be text")
     if not (template or tokenizer.chat_template):
         raise ValueError(f"{path} has no chat template, so that it cannot be talked to")
-    with _plainly(f"{path} cannot be loaded"):
+    with _errors_in_one_line(f"{path} cannot be loaded"):
         # By Pillow: a whole AutoProcessor wants torchvision, for the sake of videos.
-        eyes = (
+        image_processor = (
             transformers.AutoImageProcessor.from_pretrained(path, backend="pil", **where)
             if sees
             else None
         )
-    if sees and not (hasattr(eyes, "merge_size") and hasattr(config, "image_token_id")):
+    if sees and not (hasattr(image_processor, "merge_size") and hasattr(config, "image_token_id")):
         raise ValueError(
-            f"{path} does not see as Qwen's models do ({type(eyes).__name__}); let a server run it"
+            f"{path} does not see as Qwen's models do ({type(image_processor).__name__}); let a server run it"
         )
-    with _plainly(f"{path} cannot be loaded"):
-        model = _model(path, has_eyes, local, where)
-    ends, pad = _ends(model, tokenizer), tokenizer.pad_token_id
+    with _errors_in_one_line(f"{path} cannot be loaded"):
+        model = _model(path, has_vision, local, where)
+    ends, pad = _end_tokens(model, tokenizer), tokenizer.pad_token_id
     model.generation_config = transformers.GenerationConfig(
         do_sample=False,
         max_new_tokens=settings.sampling.max_tokens,
@@ -100,7 +100,7 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
     if local.adapter:
         model = _adapted(model, local.adapter)
     identity = _identity(path, settings, model)
-    return Checkpoint(model.eval(), tokenizer, eyes, template, ends, identity)
+    return Checkpoint(model.eval(), tokenizer, image_processor, template, ends, identity)
 
 
 def one_line(error: Exception) -> str:
@@ -108,9 +108,11 @@ def one_line(error: Exception) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split())}"[:_LONGEST_WORDS]
 
 
-def _model(path: str, has_eyes: bool, local: Local, where: dict[str, bool]) -> Any:
+def _model(path: str, has_vision: bool, local: Local, where: dict[str, bool]) -> Any:
     maker = (
-        transformers.AutoModelForImageTextToText if has_eyes else transformers.AutoModelForCausalLM
+        transformers.AutoModelForImageTextToText
+        if has_vision
+        else transformers.AutoModelForCausalLM
     )
     loaded: Any = maker.from_pretrained(
         path,
@@ -126,7 +128,7 @@ def _model(path: str, has_eyes: bool, local: Local, where: dict[str, bool]) -> A
     return model
 
 
-def _ends(model: Any, tokenizer: Any) -> frozenset[int]:
+def _end_tokens(model: Any, tokenizer: Any) -> frozenset[int]:
     theirs = model.generation_config.eos_token_id
     ends = {*(theirs if isinstance(theirs, list) else [theirs]), tokenizer.eos_token_id}
     return frozenset(ends - {None})
@@ -141,10 +143,13 @@ def _adapted(model: Any, adapter: str) -> Any:
         raise ValueError(
             f"local.adapter {adapter} is no adapter; give a directory with adapter_config.json"
         )
-    with _plainly(f"local.adapter {adapter} does not fit the model"), warnings.catch_warnings():
+    with (
+        _errors_in_one_line(f"local.adapter {adapter} does not fit the model"),
+        warnings.catch_warnings(),
+    ):
         # peft only warns of an adapter that lacks some of what it says it has.
         warnings.filterwarnings("error", message="Found missing adapter keys")
-        names = _NAMES_OF_2024 if model.config.model_type in ("qwen2_vl", "qwen2_5_vl") else None
+        names = _OLD_WEIGHT_NAMES if model.config.model_type in ("qwen2_vl", "qwen2_5_vl") else None
         return peft.PeftModel.from_pretrained(model, adapter, key_mapping=names)
 
 
@@ -180,7 +185,7 @@ def _files(path: str) -> list[list[Any]]:
 
 
 @contextmanager
-def _plainly(what: str) -> Iterator[None]:
+def _errors_in_one_line(what: str) -> Iterator[None]:
     """Whatever a broken checkpoint makes the libraries raise becomes a ValueError of one line."""
     try:
         yield

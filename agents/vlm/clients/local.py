@@ -34,7 +34,7 @@ _CLOSED = "the model has been closed"
 
 
 @dataclass(frozen=True)
-class _Row:
+class _EncodedPrompt:
     """A conversation as the model takes it.
 
     Attributes:
@@ -92,15 +92,25 @@ class LocalClient:
         )
         loaded = load(path, settings)
         self.identity = loaded.identity
-        self._model, self._ends = loaded.model, loaded.ends
-        self._tokenizer, self._template, self._eyes = loaded.tokenizer, loaded.template, loaded.eyes
+        self._model, self._end_tokens = loaded.model, loaded.end_tokens
+        self._tokenizer, self._template, self._image_processor = (
+            loaded.tokenizer,
+            loaded.template,
+            loaded.image_processor,
+        )
         config = self._model.config
-        self._place = getattr(config, "image_token_id", None)  # the token where a picture goes
-        self._longest = getattr(config.get_text_config(), "max_position_embeddings", sys.maxsize)
-        self._words = threading.Lock()  # a tokenizer is for one thread at a time
+        self._image_token = getattr(
+            config, "image_token_id", None
+        )  # the token where a picture goes
+        self._context_length = getattr(
+            config.get_text_config(), "max_position_embeddings", sys.maxsize
+        )
+        self._tokenizer_lock = threading.Lock()  # a tokenizer is for one thread at a time
         self._closing = threading.Event()
         local = settings.local
-        self._batcher: Batcher[_Row, Reply] = Batcher(self._replies, local.batch, local.wait)
+        self._batcher: Batcher[_EncodedPrompt, Reply] = Batcher(
+            self._replies, local.batch, local.wait
+        )
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
         """What the model says next.
@@ -128,22 +138,22 @@ class LocalClient:
 
     # -- a conversation becomes numbers, in the thread of whoever asks ---------------------------
 
-    def _row(self, messages: Sequence[Message], seed: int) -> _Row:
+    def _row(self, messages: Sequence[Message], seed: int) -> _EncodedPrompt:
         text = self._prompt(messages)
         ids = self._ids(text)
         pixels = grids = None
         pictures = [part for each in messages for part in each.parts if isinstance(part, Picture)]
         if pictures:
-            pixels, grids = self._seen(pictures)
-        ids = self._with_room(ids, grids)
+            pixels, grids = self._patches(pictures)
+        ids = self._with_image_tokens(ids, grids)
         most = self._settings.sampling.max_tokens
-        if len(ids) + most > self._longest:
+        if len(ids) + most > self._context_length:
             raise ModelError(
                 f"the conversation has {len(ids)} tokens, which with sampling.max_tokens {most} is "
-                f"more than the {self._longest} of {self._name}; let pictures.keep be fewer"
+                f"more than the {self._context_length} of {self._name}; let pictures.keep be fewer"
             )
         thinking = text.rstrip().endswith(_THINK)
-        return _Row(ids, pixels, grids, self._seed(seed, len(messages)), thinking)
+        return _EncodedPrompt(ids, pixels, grids, self._seed(seed, len(messages)), thinking)
 
     def _prompt(self, messages: Sequence[Message]) -> str:
         """The conversation in the model's format, up to where it is to speak."""
@@ -174,15 +184,15 @@ class LocalClient:
             return {"role": message.role, "content": [_part(part) for part in parts]}
         return {"role": message.role, "content": "\n".join(map(str, parts))}
 
-    def _seen(self, pictures: Sequence[Picture]) -> tuple[torch.Tensor, torch.Tensor]:
-        if self._eyes is None:
+    def _patches(self, pictures: Sequence[Picture]) -> tuple[torch.Tensor, torch.Tensor]:
+        if self._image_processor is None:
             raise CannotGoOn(
                 f"{self._name} was loaded without eyes, since the agent's setting sees is text, "
                 "and is shown a picture"
             )
         bounds = self._settings.pictures
         try:
-            seen = self._eyes(
+            seen = self._image_processor(
                 [Image.open(BytesIO(each.data)).convert("RGB") for each in pictures],
                 size={"shortest_edge": bounds.min_pixels, "longest_edge": bounds.max_pixels},
                 return_tensors="pt",
@@ -191,18 +201,20 @@ class LocalClient:
             raise ModelError(f"a picture cannot be seen: {one_line(error)}") from None
         return seen["pixel_values"], seen["image_grid_thw"]
 
-    def _with_room(self, ids: Sequence[int], grids: torch.Tensor | None) -> list[int]:
+    def _with_image_tokens(self, ids: Sequence[int], grids: torch.Tensor | None) -> list[int]:
         """The tokens, with that of each picture as often as the model sees patches of it."""
         counts: list[int] = []
         if grids is not None:
-            counts = (grids.prod(dim=1) // self._eyes.merge_size**2).tolist()
-        if ids.count(self._place) != len(counts):
+            counts = (grids.prod(dim=1) // self._image_processor.merge_size**2).tolist()
+        if ids.count(self._image_token) != len(counts):
             raise ModelError(
-                f"the conversation has {len(counts)} pictures and {ids.count(self._place)} places "
+                f"the conversation has {len(counts)} pictures and {ids.count(self._image_token)} places "
                 "for them; no words of it may be the model's own marks"
             )
         left = iter(counts)
-        return [one for each in ids for one in [each] * (next(left) if each == self._place else 1)]
+        return [
+            one for each in ids for one in [each] * (next(left) if each == self._image_token else 1)
+        ]
 
     def _seed(self, episode: int, messages: int) -> int:
         """Of one reply. Were it the episode's, each turn would be drawn by the same numbers."""
@@ -213,18 +225,18 @@ class LocalClient:
 
     # -- numbers become replies, in the batcher's thread -----------------------------------------
 
-    def _replies(self, rows: Sequence[_Row]) -> list[Reply]:
+    def _replies(self, rows: Sequence[_EncodedPrompt]) -> list[Reply]:
         try:
-            spoken = self._spoken(rows)
+            generated = self._generate(rows)
         except RuntimeError as error:
-            raise _plainer(error, rows) from None
+            raise _explained(error, rows) from None
         if self._closing.is_set():
             raise CannotGoOn(_CLOSED)
         if self._supervisor.over:
             raise CannotGoOn(f"the minutes are over; {AGAIN}")
-        return [self._reply(row, said) for row, said in zip(rows, spoken, strict=True)]
+        return [self._reply(row, said) for row, said in zip(rows, generated, strict=True)]
 
-    def _spoken(self, rows: Sequence[_Row]) -> list[list[int]]:
+    def _generate(self, rows: Sequence[_EncodedPrompt]) -> list[list[int]]:
         """The tokens that the model adds to each row, up to its end or to the limit."""
         longest = max(len(row.ids) for row in rows)
         gaps = [longest - len(row.ids) for row in rows]
@@ -235,16 +247,18 @@ class LocalClient:
             "input_ids": ids,
             "attention_mask": torch.tensor([[0] * gap + [1] * (longest - gap) for gap in gaps]),
         }
-        if self._place is not None and any(row.pixels is not None for row in rows):
+        if self._image_token is not None and any(row.pixels is not None for row in rows):
             inputs |= {
                 "pixel_values": torch.cat([row.pixels for row in rows if row.pixels is not None]),
                 "image_grid_thw": torch.cat([row.grids for row in rows if row.grids is not None]),
-                "mm_token_type_ids": ids.eq(self._place).int(),
+                "mm_token_type_ids": ids.eq(self._image_token).int(),
             }
         sampling = self._settings.sampling
         choices = []
         if sampling.temperature > 0:
-            choices = [_Draw(sampling.temperature, sampling.top_p, [row.seed for row in rows])]
+            choices = [
+                _SeededSampling(sampling.temperature, sampling.top_p, [row.seed for row in rows])
+            ]
 
         def closing(input_ids: torch.Tensor, scores: Any, **more: Any) -> torch.Tensor:
             ends = self._closing.is_set() or self._supervisor.over
@@ -261,11 +275,11 @@ class LocalClient:
 
     def _until_end(self, said: list[int]) -> list[int]:
         """Without what stands where a row is done and others are not."""
-        ends = (place for place, each in enumerate(said, start=1) if each in self._ends)
+        ends = (place for place, each in enumerate(said, start=1) if each in self._end_tokens)
         return said[: next(ends, None)]
 
-    def _reply(self, row: _Row, said: Sequence[int]) -> Reply:
-        with self._words:
+    def _reply(self, row: _EncodedPrompt, said: Sequence[int]) -> Reply:
+        with self._tokenizer_lock:
             text = self._tokenizer.decode(
                 said, skip_special_tokens=True, clean_up_tokenization_spaces=False
             )
@@ -278,17 +292,17 @@ class LocalClient:
                 completion=len(said),
                 reasoning=min(len(said), len(self._ids(thought))) if thought else 0,
             ),
-            finish="stop" if said[-1] in self._ends else "length",
+            finish="stop" if said[-1] in self._end_tokens else "length",
             model=self._name,
         )
 
     def _ids(self, text: str) -> list[int]:
-        with self._words:
+        with self._tokenizer_lock:
             ids: list[int] = self._tokenizer(text, add_special_tokens=False)["input_ids"]
         return ids
 
 
-class _Draw:
+class _SeededSampling:
     """Draws the next token of each row by the row's own seed, whoever else is in the batch.
 
     ``generate`` would draw all rows from one source of numbers, so that what is said depended on
@@ -329,7 +343,7 @@ def _without_thought(text: str, thinking: bool) -> tuple[str, str]:
     return thought.strip().removeprefix(_THINK).strip(), words.lstrip()
 
 
-def _plainer(error: RuntimeError, rows: Sequence[_Row]) -> Exception:
+def _explained(error: RuntimeError, rows: Sequence[_EncodedPrompt]) -> Exception:
     """What torch raises, as the batcher knows it."""
     if isinstance(error, torch.cuda.OutOfMemoryError) or "DefaultCPUAllocator" in str(error):
         tokens = max(len(row.ids) for row in rows)
