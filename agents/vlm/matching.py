@@ -17,20 +17,20 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from agents.vlm.name_embeddings import Meanings
+from agents.vlm.name_embeddings import NameEmbeddings
 from agents.vlm.names_en import MODIFIERS, NAMES_EN, SHARED_EN
 from agents.vlm.names_zh import NAMES_ZH, SHARED_ZH
 from agents.vlm.settings import Matching
 from er_gym.thor import OBJECT_TYPES
 
-How: TypeAlias = Literal["exact", "alias", "fuzzy", "meaning", "none"]
+MatchMethod: TypeAlias = Literal["exact", "alias", "fuzzy", "meaning", "none"]
 
 _SHORTEST_FUZZY = 5
 """Letters of the shortest names that may be misspelt: "Pan" is no "Pen", and "Cup" no "Cap"."""
 _LETTERS_PER_EDIT = 6
 """A name may have one wrong letter, or one more for each so many: "baseball" is no "BasketBall"."""
 _LONGEST = 100
-_NEAR = 3
+_MAX_NEAREST = 3
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Match:
 
     name: str
     object_type: str = ""
-    how: How = "none"
+    how: MatchMethod = "none"
     score: float = 0.0
     near: tuple[str, ...] = ()
 
@@ -83,7 +83,7 @@ def _key(name: str) -> str:
 @dataclass(frozen=True)
 class _Entry:
     types: tuple[str, ...]
-    how: How
+    how: MatchMethod
 
 
 def _entries() -> dict[str, _Entry]:
@@ -100,7 +100,7 @@ def _entries() -> dict[str, _Entry]:
 _ENTRIES: Mapping[str, _Entry] = _entries()
 
 
-def _looked_up(name: str) -> _Entry | None:
+def _look_up(name: str) -> _Entry | None:
     return next((_ENTRIES[key] for key in _keys(name) if key in _ENTRIES), None)
 
 
@@ -139,7 +139,7 @@ def _one_of(types: Sequence[str], prefer: Collection[str]) -> str:
 
 
 @cache
-def _letters() -> tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]:
+def _rapidfuzz() -> tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]:
     """RapidFuzz's ``extract``, its scorer ``ratio`` and its distance in edits."""
     try:
         from rapidfuzz import fuzz, process
@@ -155,9 +155,9 @@ def _letters() -> tuple[Callable[..., Any], Callable[..., Any], Callable[..., An
 _MISSPELLABLE = tuple(key for key in _ENTRIES if key.isascii() and len(key) >= _SHORTEST_FUZZY)
 
 
-def _spelt_alike(name: str, at_least: float, prefer: Collection[str]) -> tuple[str, float]:
+def _fuzzy_match(name: str, at_least: float, prefer: Collection[str]) -> tuple[str, float]:
     """The type whose name differs by few letters, and how alike it is, 0 to 1; or "" and 0."""
-    extract, ratio, edits = _letters()
+    extract, ratio, edits = _rapidfuzz()
     for key in dict.fromkeys(_keys(name)):
         if len(key) < _SHORTEST_FUZZY:
             continue
@@ -175,14 +175,14 @@ def _spelt_alike(name: str, at_least: float, prefer: Collection[str]) -> tuple[s
     return "", 0.0
 
 
-def _near_in_letters(name: str) -> tuple[str, ...]:
-    extract, ratio, _ = _letters()
+def _nearest_by_letters(name: str) -> tuple[str, ...]:
+    extract, ratio, _ = _rapidfuzz()
     found = extract(next(_keys(name)), _ENTRIES.keys(), scorer=ratio, score_cutoff=1, limit=20)
     return _first_types(_ENTRIES[key].types for key, _, _ in found)
 
 
 def _first_types(ranked: Iterable[Sequence[str]]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(each for types in ranked for each in types))[:_NEAR]
+    return tuple(dict.fromkeys(each for types in ranked for each in types))[:_MAX_NEAREST]
 
 
 # -- all of it -------------------------------------------------------------------------------------
@@ -198,7 +198,7 @@ class Matcher:
     def __init__(self, settings: Matching) -> None:
         self._settings = settings
         self._lock = threading.Lock()
-        self._meanings: Meanings | None = None
+        self._embeddings: NameEmbeddings | None = None
 
     def prepare(self) -> None:
         """Load what the first name that is hard to match would load.
@@ -206,10 +206,10 @@ class Matcher:
         Raises:
             ValueError: a package is missing, or the model cannot be loaded.
         """
-        _letters()
+        _rapidfuzz()
         if self._settings.embeddings:
             with self._lock:
-                self._meanings = self._meanings or Meanings(self._settings.embeddings)
+                self._embeddings = self._embeddings or NameEmbeddings(self._settings.embeddings)
 
     def match(self, name: str, prefer: Collection[str] = ()) -> Match:
         """What a name stands for; see :meth:`match_many`."""
@@ -234,27 +234,27 @@ class Matcher:
         return [found[name] for name in names]
 
     def _by_letters(self, name: str, plain: str, prefer: Collection[str]) -> Match:
-        if entry := _looked_up(plain):
+        if entry := _look_up(plain):
             return Match(name, _one_of(entry.types, prefer), entry.how, 1.0)
-        object_type, score = _spelt_alike(plain, self._settings.fuzzy, prefer)
+        object_type, score = _fuzzy_match(plain, self._settings.fuzzy, prefer)
         if object_type:
             return Match(name, object_type, "fuzzy", score)
-        return Match(name, near=_near_in_letters(plain))
+        return Match(name, near=_nearest_by_letters(plain))
 
     def _by_meaning(
         self, names: Mapping[str, str], prefer: Collection[str]
     ) -> Iterator[tuple[str, Match]]:
         self.prepare()
-        assert self._meanings is not None
+        assert self._embeddings is not None
         with self._lock:
-            scores = self._meanings.scores(list(names.values()))
+            scores = self._embeddings.scores(list(names.values()))
         for name, row in zip(names, scores, strict=True):
             order = np.argsort(-row, kind="stable")
-            types, score = self._meanings.types[order[0]], round(float(row[order[0]]), 4)
+            types, score = self._embeddings.types[order[0]], round(float(row[order[0]]), 4)
             if score >= self._settings.threshold:
                 yield name, Match(name, _one_of(types, prefer), "meaning", score)
             else:
-                yield name, Match(name, near=_first_types(self._meanings.types[i] for i in order))
+                yield name, Match(name, near=_first_types(self._embeddings.types[i] for i in order))
 
 
 def _normal(name: str) -> str:

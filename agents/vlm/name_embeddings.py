@@ -17,7 +17,7 @@ _REMEMBERED = 4096
 _INSIDE_A_NAME = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
-class Meanings:
+class NameEmbeddings:
     """All names of all types as vectors, of which it knows E numbers each, and whatever is asked.
 
     Args:
