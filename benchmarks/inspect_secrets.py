@@ -10,7 +10,7 @@ from typing import Any
 from inspect_ai.model import Model, ModelCall, ModelOutput, get_model
 
 from agents.vlm.clients.redaction import Secrets
-from agents.vlm.record import plain_url
+from agents.vlm.record import url_without_secrets
 
 _DONE = "_er_gym_discreet"
 
@@ -31,7 +31,7 @@ def model_at(name: str, address: str | None) -> Model:
             "--model-base-url holds a user or a password, which Inspect writes into its log; give "
             "the address alone, and the key in the provider's environment variable"
         )
-    model = get_model(name, base_url=plain_url(address), memoize=False)
+    model = get_model(name, base_url=url_without_secrets(address), memoize=False)
     if url.query:
         client: Any = getattr(model.api, "client", None)
         if not hasattr(client, "with_options"):

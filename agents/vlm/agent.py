@@ -17,8 +17,8 @@ from agents.vlm.record import (
     PictureRecord,
     RoundRecord,
     ThoughtRecord,
-    plain_settings,
-    tokens,
+    settings_to_record,
+    token_counts,
 )
 from agents.vlm.settings import AgentSettings
 from er_gym.envs.actions import NO_ACTION, Action, applies
@@ -81,7 +81,7 @@ class VLMAgent:
         self._messages.append(self._turn(obs, info))
         reply = self._client.reply(self._history(), self._seed)
         parsed = parse(reply.text, reply.call, self._settings.decide)
-        action, problem, matched = self._understand(parsed, info)
+        action, problem, matched = self._resolve(parsed, info)
         said = "\n".join(filter(None, (reply.text, reply.call))) or "(nothing)"
         self._messages.append(Message("assistant", (said,), reply.reasoning))
         thoughts = [ThoughtRecord(kind=each.kind, text=each.text) for each in parsed.thoughts]
@@ -99,7 +99,7 @@ class VLMAgent:
                 finish=reply.finish,
                 model=reply.model,
                 kept=reply.from_cache,
-                **tokens(reply.usage),
+                **token_counts(reply.usage),
             )
         )
         thought = "\n".join(f"{each.kind}: {each.text}" for each in parsed.thoughts)
@@ -111,7 +111,7 @@ class VLMAgent:
             cost=reply.cost,
             cached=reply.from_cache,
         )
-        return Decision(action or _as_written(parsed, said), thought, took)
+        return Decision(action or _unreadable_action(parsed, said), thought, took)
 
     # -- what is said to the model ---------------------------------------------------------------
 
@@ -166,9 +166,7 @@ class VLMAgent:
 
     # -- what the model says ---------------------------------------------------------------------
 
-    def _understand(
-        self, parsed: Parsed, info: Mapping[str, Any]
-    ) -> tuple[Action | None, str, str]:
+    def _resolve(self, parsed: Parsed, info: Mapping[str, Any]) -> tuple[Action | None, str, str]:
         """The action, None where the object is unknown; what is wrong with it, "" if nothing; and
         how a name became a type."""
         if parsed.problem or parsed.verb in verbs.BARE_VERBS:
@@ -203,10 +201,12 @@ class VLMAgent:
             scene=self._task.scene,
             instruction=self._task.instruction,
             agent=self._name,
-            settings=plain_settings(self._settings),
+            settings=settings_to_record(self._settings),
             prompts=self._prompts.name,
             prompts_digest=self._prompts.digest,
-            messages=[_kept(message, f"{PICTURES}/{stem}", files) for message in self._messages],
+            messages=[
+                _message_record(message, f"{PICTURES}/{stem}", files) for message in self._messages
+            ],
             rounds=rounds,
             prompt_tokens=sum(each.prompt_tokens for each in rounds),
             completion_tokens=sum(each.completion_tokens for each in rounds),
@@ -218,7 +218,7 @@ class VLMAgent:
         return files
 
 
-def _as_written(parsed: Parsed, said: str) -> str:
+def _unreadable_action(parsed: Parsed, said: str) -> str:
     """What is handed to the environment in place of an action: the verb and the name that no type
     has, else the reply. To the default protocol both name no action; the paper's counts the former
     as a step."""
@@ -227,7 +227,7 @@ def _as_written(parsed: Parsed, said: str) -> str:
     return NO_ACTION + said[:_LONGEST_QUOTE]
 
 
-def _kept(message: Message, folder: str, files: dict[str, bytes]) -> MessageRecord:
+def _message_record(message: Message, folder: str, files: dict[str, bytes]) -> MessageRecord:
     """A message as it is kept; its pictures go into ``files``."""
     parts: list[str | PictureRecord] = []
     for part in message.parts:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["AgentFactory", "consequential", "load_settings", "speaks", "agent_name_forms"]
 
 _WHAT = "agent"
-_OF_NO_CONSEQUENCE: Mapping[str, Any] = {
+_NOT_COMPARED: Mapping[str, Any] = {
     "server": {"base_url", "key_from", "timeout", "connect", "tries", "requests_per_minute"},
     "local": {"device_map", "batch", "wait"},
     "prompts": {"dataset"},
@@ -144,7 +144,7 @@ class AgentFactory:
             self._events.add(server_event.model_dump_json())
 
 
-def consequential(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:
+def comparable_settings(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:
     """What of the settings decides what an agent says: two runs compare if theirs are equal."""
-    kept = settings.model_dump(mode="json", exclude=dict(_OF_NO_CONSEQUENCE))
+    kept = settings.model_dump(mode="json", exclude=dict(_NOT_COMPARED))
     return {**without_secrets(settings, kept), "prompts_digest": prompts_digest}

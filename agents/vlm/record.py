@@ -133,10 +133,10 @@ class ConversationRecord(_Record):
     error: str = ""
 
 
-def plain_settings(settings: AgentSettings) -> dict[str, Any]:
+def settings_to_record(settings: AgentSettings) -> dict[str, Any]:
     """Settings as they may be kept: a server's address without user, password and query."""
     kept = without_secrets(settings, settings.model_dump(mode="json"))
-    kept["server"]["base_url"] = plain_url(settings.server.base_url)
+    kept["server"]["base_url"] = url_without_secrets(settings.server.base_url)
     return kept
 
 
@@ -147,13 +147,13 @@ def without_secrets(settings: AgentSettings, value: dict[str, Any]) -> dict[str,
     return plain
 
 
-def plain_url(address: str) -> str:
+def url_without_secrets(address: str) -> str:
     """An address without user, password, query and fragment."""
     url = urlsplit(address)
     return urlunsplit((url.scheme, url.netloc.rpartition("@")[2], url.path, "", ""))
 
 
-def tokens(usage: Usage) -> dict[str, Any]:
+def token_counts(usage: Usage) -> dict[str, Any]:
     """The token counts of a round, under the names of :class:`RoundRecord`."""
     return {
         "prompt_tokens": usage.prompt,

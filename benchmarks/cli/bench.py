@@ -175,7 +175,7 @@ def bench(
             suite_digest=asked.digest,
             suite_size=len(fitted.tasks),
             agent=agent,
-            agent_settings=voice.consequential if voice else {},
+            agent_settings=voice.comparable_settings if voice else {},
             env=env,
             seed=seed,
             er_gym=__version__,
