@@ -7,9 +7,10 @@ import time
 
 import pytest
 
-from agents.vlm.parsing import LONGEST, Parsed, Thought, parse
-from agents.vlm.parsing_rules import RULES
-from agents.vlm.parsing_words import THOUGHT_TAGS, VERBS
+from agents.vlm.parsing import Parsed, Thought, parse
+from agents.vlm.parsing.reply import LONGEST
+from agents.vlm.parsing.rules import RULES
+from agents.vlm.parsing.vocabulary import THOUGHT_TAGS, VERBS
 from er_gym.envs.actions import parse as action_of
 from er_gym.tasks import verbs
 

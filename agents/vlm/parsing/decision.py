@@ -7,9 +7,9 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from agents.vlm.parsing_json import Found, fields_in, objects_in
-from agents.vlm.parsing_rules import RULES
-from agents.vlm.parsing_words import (
+from agents.vlm.parsing.json_objects import Found, fields_in, objects_in
+from agents.vlm.parsing.rules import RULES
+from agents.vlm.parsing.vocabulary import (
     ALONE,
     ARTICLE,
     CLAUSE,

@@ -7,7 +7,7 @@ from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from agents.vlm.parsing_words import (
+from agents.vlm.parsing.vocabulary import (
     CALL_TAGS,
     DECISION,
     DECISION_TAGS,
@@ -20,7 +20,7 @@ from agents.vlm.parsing_words import (
 @dataclass(frozen=True)
 class Thought:
     """A part of a reply that decides nothing; ``kind`` is one of the values of
-    :data:`~agents.vlm.parsing_words.THOUGHT_TAGS`."""
+    :data:`~agents.vlm.parsing.vocabulary.THOUGHT_TAGS`."""
 
     kind: str
     text: str

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from agents.vlm.parsing_words import plain
+from agents.vlm.parsing.vocabulary import plain
 
 _DOUBLE, _SINGLE = r'"([^"\\]*(?:\\.[^"\\]*)*)"?', r"'([^'\\]*(?:\\.[^'\\]*)*)'?"
 _PAIR = re.compile(

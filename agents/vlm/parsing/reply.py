@@ -3,7 +3,7 @@
 The normal form is ``<Observation>…</Observation><Planning>…</Planning><DecisionMaking>navigate to
 Fridge</DecisionMaking>``; or, where it is asked for, a tool call or a JSON object. Models differ
 from it in many ways; those that are understood are listed in
-:data:`agents.vlm.parsing_rules.RULES`, and a reply tells which it needed. Nothing is guessed beyond
+:data:`agents.vlm.parsing.rules.RULES`, and a reply tells which it needed. Nothing is guessed beyond
 them: any other reply has a problem, in words for the model.
 
 Where a reply decides more than once, the last decision counts, because models weigh before they
@@ -17,7 +17,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from agents.vlm.parsing_decision import (
+from agents.vlm.parsing.decision import (
     FENCE,
     MOST,
     Words,
@@ -25,10 +25,10 @@ from agents.vlm.parsing_decision import (
     read_decision,
     read_fields,
 )
-from agents.vlm.parsing_json import Found
-from agents.vlm.parsing_rules import RULES, label
-from agents.vlm.parsing_tags import Layout, TaggedDecision, Thought, take_apart
-from agents.vlm.parsing_words import THOUGHT_TAGS
+from agents.vlm.parsing.json_objects import Found
+from agents.vlm.parsing.rules import RULES, label
+from agents.vlm.parsing.tags import Layout, TaggedDecision, Thought, take_apart
+from agents.vlm.parsing.vocabulary import THOUGHT_TAGS
 from er_gym.tasks import verbs
 
 LONGEST = 200_000
@@ -49,7 +49,7 @@ class Parsed:
         name: what the model calls the object, as it wrote it; "" for a bare verb.
         thoughts: in order. Text outside of tags is a thought where no tags hold any.
         rules: names of the tolerances that were needed, of
-            :data:`~agents.vlm.parsing_rules.RULES`, in its order.
+            :data:`~agents.vlm.parsing.rules.RULES`, in its order.
         problem: what is wrong and what to write instead; "" where there is a verb.
     """
 
