@@ -8,7 +8,7 @@ from typing import Any
 
 from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture
 from agents.vlm.matching import Matcher
-from agents.vlm.parsing import Parsed, parse
+from agents.vlm.parsing import ParsedReply, parse
 from agents.vlm.pictures import encode
 from agents.vlm.prompt_set import LastAction, PromptSet, TurnContext, interleave_pictures
 from agents.vlm.record import (
@@ -166,7 +166,9 @@ class VLMAgent:
 
     # -- what the model says ---------------------------------------------------------------------
 
-    def _resolve(self, parsed: Parsed, info: Mapping[str, Any]) -> tuple[Action | None, str, str]:
+    def _resolve(
+        self, parsed: ParsedReply, info: Mapping[str, Any]
+    ) -> tuple[Action | None, str, str]:
         """The action, None where the object is unknown; what is wrong with it, "" if nothing; and
         how a name became a type."""
         if parsed.problem or parsed.verb in verbs.BARE_VERBS:
@@ -218,7 +220,7 @@ class VLMAgent:
         return files
 
 
-def _unreadable_action(parsed: Parsed, said: str) -> str:
+def _unreadable_action(parsed: ParsedReply, said: str) -> str:
     """What is handed to the environment in place of an action: the verb and the name that no type
     has, else the reply. To the default protocol both name no action; the paper's counts the former
     as a step."""

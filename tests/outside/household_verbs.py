@@ -1,6 +1,6 @@
 """A verb of another package: docs/extending.md."""
 
-from er_gym.tasks.verbs import Verb, Words
+from er_gym.tasks.verbs import ParsedAction, Verb
 
 CLEAN = Verb(
     name="clean",
@@ -13,8 +13,10 @@ CLEAN = Verb(
     makes=(("isDirty", False),),
     otherwise="It is clean already, or never gets dirty.",
     words={
-        "en": Words(said=("wipe off", "scrub"), meaning="wipe an object with what you hold."),
-        "zh": Words(said=("擦干净",), meaning="用手里的海绵或抹布擦干净物体。"),
+        "en": ParsedAction(
+            said=("wipe off", "scrub"), meaning="wipe an object with what you hold."
+        ),
+        "zh": ParsedAction(said=("擦干净",), meaning="用手里的海绵或抹布擦干净物体。"),
     },
 )
 FILL = Verb(

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from agents.vlm.parsing.vocabulary import plain
+from agents.vlm.parsing.vocabulary import normalized
 
 _DOUBLE, _SINGLE = r'"([^"\\]*(?:\\.[^"\\]*)*)"?', r"'([^'\\]*(?:\\.[^'\\]*)*)'?"
 _PAIR = re.compile(
@@ -22,16 +22,16 @@ _DEEPER = {"{": 1, "[": 1, "}": -1, "]": -1}
 
 
 @dataclass(frozen=True)
-class Found:
+class JsonObject:
     """An object found in a text: where it begins, and its fields, by plain name."""
 
     start: int
     fields: Mapping[str, str]
 
 
-def objects_in(text: str, most: int) -> list[Found]:
+def objects_in(text: str, most: int) -> list[JsonObject]:
     """The last objects of a text, and lists of objects, each list as one; in order."""
-    return [Found(start, fields_in(text[start:end])) for start, end in _spans(text)[-most:]]
+    return [JsonObject(start, fields_in(text[start:end])) for start, end in _spans(text)[-most:]]
 
 
 def _spans(text: str) -> list[tuple[int, int]]:
@@ -60,7 +60,7 @@ def fields_in(text: str) -> dict[str, str]:
         value = _unescaped(double) if double is not None else single if single is not None else bare
         if double is not None and value.lstrip().startswith("{"):
             fields = {**fields_in(value), **fields}  # arguments as JSON inside of JSON
-        fields.setdefault(plain(pair[1] or pair[2]), value.strip())
+        fields.setdefault(normalized(pair[1] or pair[2]), value.strip())
     return fields
 
 

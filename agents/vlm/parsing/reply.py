@@ -20,14 +20,14 @@ from typing import Literal
 from agents.vlm.parsing.decision import (
     FENCE,
     MOST,
-    Words,
+    ParsedAction,
     find_fields,
     read_decision,
     read_fields,
 )
-from agents.vlm.parsing.json_objects import Found
+from agents.vlm.parsing.json_objects import JsonObject
 from agents.vlm.parsing.rules import RULES, label
-from agents.vlm.parsing.tags import Layout, TaggedDecision, Thought, take_apart
+from agents.vlm.parsing.tags import TaggedDecision, TaggedReply, Thought, split_at_tags
 from agents.vlm.parsing.vocabulary import THOUGHT_TAGS
 from er_gym.tasks import verbs
 
@@ -41,7 +41,7 @@ _EXAMPLE = f"'{verbs.NAVIGATE} Fridge'"
 
 
 @dataclass(frozen=True)
-class Parsed:
+class ParsedReply:
     """A reply, read.
 
     Attributes:
@@ -60,7 +60,9 @@ class Parsed:
     problem: str = ""
 
 
-def parse(text: str, call: str = "", decide: Literal["tags", "tools", "json"] = "tags") -> Parsed:
+def parse(
+    text: str, call: str = "", decide: Literal["tags", "tools", "json"] = "tags"
+) -> ParsedReply:
     """Read a reply. Whatever it is, nothing is raised.
 
     Args:
@@ -70,13 +72,13 @@ def parse(text: str, call: str = "", decide: Literal["tags", "tools", "json"] = 
         decide: what the model was asked for. For ``json``, a text that is a JSON object needs no
             rule; all else is understood alike.
     """
-    layout = take_apart(text[-LONGEST:])
+    layout = split_at_tags(text[-LONGEST:])
     if len(text) > LONGEST:
         layout.rules.append("long")
     chosen = _chosen(layout, call[-LONGEST:])
     if chosen is None:
         problem = "has no decision" if text.strip() else "is empty"
-        return Parsed(
+        return ParsedReply(
             thoughts=layout.all_thoughts(layout.outside),
             rules=_in_order(layout.rules),
             problem=f"The reply {problem}. Decide on one action, such as {_EXAMPLE}.",
@@ -86,7 +88,7 @@ def parse(text: str, call: str = "", decide: Literal["tags", "tools", "json"] = 
     if _is_json(call) if call.strip() else decide == "json" and _is_json(text):
         rules = [rule for rule in rules if rule != "json"]
     problem = _problem(words, chosen.said)
-    return Parsed(
+    return ParsedReply(
         verb="" if problem else words.verb,
         name="" if problem else words.name,
         thoughts=layout.all_thoughts(chosen.before, chosen.thoughts),
@@ -100,7 +102,7 @@ def _in_order(rules: Iterable[str]) -> tuple[str, ...]:
     return tuple(rule.name for rule in RULES if rule.name in needed)
 
 
-def _problem(words: Words, said: str) -> str:
+def _problem(words: ParsedAction, said: str) -> str:
     """What to tell the model of a decision that cannot be done; "" if it can."""
     if not words.verb:
         said = " ".join(said[: 4 * _LONGEST_QUOTE].split())
@@ -130,14 +132,14 @@ class _Chosen:
         thoughts: that came with it.
     """
 
-    words: Words
+    words: ParsedAction
     said: str
     before: Iterable[str] = ()
     rules: tuple[str, ...] = ()
     thoughts: tuple[Thought, ...] = ()
 
 
-def _chosen(layout: Layout, call: str) -> _Chosen | None:
+def _chosen(layout: TaggedReply, call: str) -> _Chosen | None:
     """The decision of a reply, readable or not."""
     if call.strip():
         return _from_call(call, layout)
@@ -154,7 +156,7 @@ def _chosen(layout: Layout, call: str) -> _Chosen | None:
     return outside
 
 
-def _from_call(call: str, layout: Layout) -> _Chosen:
+def _from_call(call: str, layout: TaggedReply) -> _Chosen:
     found = find_fields(call)
     thoughts = _thoughts_in(found) if found else ()
     return _Chosen(read_decision(call), call, layout.outside, thoughts=thoughts)
@@ -202,7 +204,7 @@ def _json_in(text: str) -> _Chosen | None:
     )
 
 
-def _thoughts_in(found: Found) -> tuple[Thought, ...]:
+def _thoughts_in(found: JsonObject) -> tuple[Thought, ...]:
     """Fields of a JSON object that are named as thoughts are."""
     return tuple(
         Thought(THOUGHT_TAGS[name], text)
@@ -230,7 +232,7 @@ def _bare_in(text: str) -> _Chosen | None:
     if any(line.lstrip().startswith(FENCE) for line in lines):
         lines = [line for line in lines if not line.lstrip().startswith(FENCE)]
         rules.append("code fence")
-    actions: list[Words] = []
+    actions: list[ParsedAction] = []
     for line in lines[: -1 - MOST : -1]:
         if len(line) > _LONGEST_BARE_LINE or len(line.split()) > _LONGEST_BARE:
             break

@@ -12,7 +12,7 @@ class Rule:
     """A way in which a reply may differ from the normal form and be understood.
 
     Attributes:
-        name: as :class:`~agents.vlm.parsing.Parsed` lists it.
+        name: as :class:`~agents.vlm.parsing.ParsedReply` lists it.
         about: what is let pass.
         rewrite: makes a line of a decision more normal, if that is all it takes; applied in the
             order of :data:`RULES`, and needed if it changes something.

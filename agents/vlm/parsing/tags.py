@@ -13,7 +13,7 @@ from agents.vlm.parsing.vocabulary import (
     DECISION_TAGS,
     THINK,
     THOUGHT_TAGS,
-    plain,
+    normalized,
 )
 
 
@@ -57,7 +57,7 @@ class TaggedDecision:
 
 
 @dataclass
-class Layout:
+class TaggedReply:
     """A reply, taken apart.
 
     Attributes:
@@ -88,7 +88,7 @@ class Layout:
 def _tags(text: str) -> list[_Tag]:
     tags = []
     for found in _TAG.finditer(text):
-        name = plain(found[2])
+        name = normalized(found[2])
         kind = DECISION if name in DECISION_TAGS | CALL_TAGS else THOUGHT_TAGS.get(name, "")
         if kind:
             closes = bool(found[1])
@@ -96,11 +96,11 @@ def _tags(text: str) -> list[_Tag]:
     return tags
 
 
-def take_apart(text: str) -> Layout:
+def split_at_tags(text: str) -> TaggedReply:
     """Take a reply apart at its tags. Linear in the length of the text."""
     tags = _tags(text)
     ends_of_thinking = [n for n, tag in enumerate(tags) if tag.closes and tag.name == THINK]
-    layout = Layout()
+    layout = TaggedReply()
     at = number = 0
     while number < len(tags):
         tag = tags[number]
@@ -126,7 +126,7 @@ def take_apart(text: str) -> Layout:
     return layout
 
 
-def _add(layout: Layout, tag: _Tag, end: _Tag | None, body: str) -> None:
+def _add(layout: TaggedReply, tag: _Tag, end: _Tag | None, body: str) -> None:
     """Add what stands behind a tag; ``end`` is its end tag."""
     if not body.strip():
         return
@@ -135,7 +135,7 @@ def _add(layout: Layout, tag: _Tag, end: _Tag | None, body: str) -> None:
         layout.rules += rules
         layout.thoughts.append(Thought(tag.kind, body.strip()))
         if tag.name == THINK and end:
-            layout.weighed += take_apart(body).decisions
+            layout.weighed += split_at_tags(body).decisions
         return
     if tag.name in CALL_TAGS:
         rules.append("tool call")
@@ -144,7 +144,7 @@ def _add(layout: Layout, tag: _Tag, end: _Tag | None, body: str) -> None:
     layout.decisions.append(TaggedDecision(body, len(layout.outside), tuple(rules)))
 
 
-def _end_without_start(layout: Layout, tag: _Tag, body: str) -> None:
+def _end_without_start(layout: TaggedReply, tag: _Tag, body: str) -> None:
     """Add what stands before an end tag, back to the tag before it."""
     if not body.strip():
         return

@@ -24,7 +24,7 @@ THOUGHT_TAGS: Mapping[str, str] = {
     }.items()
     for name in names.split()
 }
-"""How a tag or a field is called, as :func:`plain` has it, to the kind of thought."""
+"""How a tag or a field is called, as :func:`normalized` has it, to the kind of thought."""
 
 DECISION_TAGS = frozenset(
     {
@@ -88,6 +88,6 @@ EDGES = " \t\r\n.,;:!?\"'`*_~=()[]{}<>-。、…“”‘’"
 _NOT_IN_WORDS = re.compile(r"[\W_]+")
 
 
-def plain(name: str) -> str:
+def normalized(name: str) -> str:
     """A tag's or field's name without case, spaces, hyphens and underscores."""
     return _NOT_IN_WORDS.sub("", name).casefold()
