@@ -22,7 +22,13 @@ if TYPE_CHECKING:
     from agents.vlm.clients.supervisor import ServerEvent
     from er_gym.rollout.json_lines import JsonLines
 
-__all__ = ["AgentFactory", "consequential", "load_settings", "speaks", "agent_name_forms"]
+__all__ = [
+    "AgentFactory",
+    "agent_name_forms",
+    "comparable_settings",
+    "is_model_agent",
+    "load_settings",
+]
 
 _WHAT = "agent"
 _NOT_COMPARED: Mapping[str, Any] = {

@@ -208,9 +208,9 @@ def _keep(frame: NDArray[np.uint8], file: Path, show: Any, force: bool) -> None:
         show(picture)
 
 
-def _window(options: bool | None) -> Any:
+def _window(wanted: bool | None) -> Any:
     """What shows a picture in a window, None where there is none or none is wanted."""
-    if options is False:
+    if wanted is False:
         return None
     try:
         import tkinter
@@ -221,7 +221,7 @@ def _window(options: bool | None) -> Any:
     except (
         Exception
     ) as error:  # no Tk, no display: tkinter.TclError is no class where it is missing
-        if options:
+        if wanted:
             raise BadInput(f"there is no window here: {error}") from None
         return None
     root.title("er-gym")

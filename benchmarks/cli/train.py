@@ -39,8 +39,8 @@ def train_rl(
 
     with bad_input():
         file = config_file(config)
-        options = load_config(file, overrides, {} if seed is None else {"seed": seed})
-    run = out or Path("runs") / "rl" / f"{file.stem}-{options.seed}"
+        wanted = load_config(file, overrides, {} if seed is None else {"seed": seed})
+    run = out or Path("runs") / "rl" / f"{file.stem}-{wanted.seed}"
     try:
         from agents.rl import train as training
     except ImportError as error:
@@ -50,7 +50,7 @@ def train_rl(
         ) from error
     try:
         with bad_input():
-            model = training.train(options, run, show_progress=True, trust=trust)
+            model = training.train(wanted, run, show_progress=True, trust=trust)
     except (RuntimeError, EOFError, MemoryError) as error:
         raise click.ClickException(f"{error}; what has been learnt is in {run}") from error
     except KeyboardInterrupt:

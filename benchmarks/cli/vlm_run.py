@@ -70,8 +70,8 @@ class VLMRun:
     def env(self) -> dict[str, Any]:
         """The environment's arguments that it asks for."""
         size = {"width": self.settings.pictures.width, "height": self.settings.pictures.height}
-        options = {name: value for name, value in size.items() if value is not None}
-        return {**options, "obs_mode": self.settings.obs_mode}
+        wanted = {name: value for name, value in size.items() if value is not None}
+        return {**wanted, "obs_mode": self.settings.obs_mode}
 
     def factory(self, run: Path) -> AgentFactory:
         """What makes the agents of a run; it keeps replies and bills in the run directory."""

@@ -1,6 +1,6 @@
 """A verb of another package: docs/extending.md."""
 
-from er_gym.tasks.verbs import ParsedAction, Verb
+from er_gym.tasks.verbs import Verb, Words
 
 CLEAN = Verb(
     name="clean",
@@ -13,10 +13,8 @@ CLEAN = Verb(
     makes=(("isDirty", False),),
     otherwise="It is clean already, or never gets dirty.",
     words={
-        "en": ParsedAction(
-            said=("wipe off", "scrub"), meaning="wipe an object with what you hold."
-        ),
-        "zh": ParsedAction(said=("擦干净",), meaning="用手里的海绵或抹布擦干净物体。"),
+        "en": Words(said=("wipe off", "scrub"), meaning="wipe an object with what you hold."),
+        "zh": Words(said=("擦干净",), meaning="用手里的海绵或抹布擦干净物体。"),
     },
 )
 FILL = Verb(

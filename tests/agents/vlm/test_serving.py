@@ -106,7 +106,7 @@ COMMANDS = [
 
 
 @pytest.mark.parametrize(
-    ("model", "wanted", "machine", "argv"),
+    ("model", "options", "machine", "argv"),
     [case[1:] for case in COMMANDS],
     ids=[case[0] for case in COMMANDS],
 )
@@ -129,7 +129,7 @@ REFUSALS = [
 ]
 
 
-@pytest.mark.parametrize(("model", "wanted", "machine", "says"), REFUSALS)
+@pytest.mark.parametrize(("model", "options", "machine", "says"), REFUSALS)
 def test_what_cannot_be_served_is_refused_in_a_line(model, options, machine, says):
     with pytest.raises(ValueError, match=r"^[^\n]+$") as refused:
         command_for(model, options, machine)
@@ -148,7 +148,7 @@ def test_where_and_as_what_a_model_is_served():
 
 
 @pytest.mark.parametrize(
-    ("model", "wanted", "options"),
+    ("model", "options", "bench_options"),
     [
         (QWEN, ServeOptions(1), ""),
         (QWEN, ServeOptions(1, engine="transformers"), "--concurrency 1"),
@@ -156,8 +156,8 @@ def test_where_and_as_what_a_model_is_served():
         ("x.gguf", ServeOptions(1, more=("--clip_model_path", "y.gguf")), "--concurrency 1"),
     ],
 )
-def test_how_to_play_with_it(model, options, options):
-    assert command_for(model, options, FULL).bench_options == tuple(options.split())
+def test_how_to_play_with_it(model, options, bench_options):
+    assert command_for(model, options, FULL).bench_options == tuple(bench_options.split())
 
 
 def test_the_command_line_offers_the_engines_that_there_are():
