@@ -10,7 +10,7 @@ from typing import Any
 import torch
 
 from agents.rl.config import load_config
-from agents.rl.policy_observation import Perception
+from agents.rl.policy_observation import PolicyObservation
 from agents.rl.saved import FOREIGN, MODEL, untrusted
 from agents.rl.train import CONFIG, FAMILIES, load_model
 from er_gym.envs.actions import ACTIONS
@@ -42,7 +42,7 @@ class RLAgent:
         family = FAMILIES[config.algorithm.name]
         self._model = _loaded(file, file.stat().st_mtime_ns, trust)
         self._masks = not family.needs_mask
-        self._perception = Perception(config.env, family.needs_mask)
+        self._policy_observation = PolicyObservation(config.env, family.needs_mask)
         self.obs_mode: str = config.env.obs_mode
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
@@ -52,10 +52,10 @@ class RLAgent:
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """What the policy does."""
         if self._instruction is not None:
-            seen = self._perception.begin(obs, info, self._instruction)
+            seen = self._policy_observation.reset(obs, info, self._instruction)
             self._instruction = None
         else:
-            seen = self._perception.see(obs, info)
+            seen = self._policy_observation.observe(obs, info)
         masks = {"action_masks": info["action_mask"]} if self._masks else {}
         action, _ = self._model.predict(seen, deterministic=True, **masks)
         return Decision(ACTIONS[int(action)])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from agents.rl.config import Episodes
 from agents.rl.demonstrations import Demonstrations, demonstrate
-from agents.rl.policy_observation import Obs, Perception
+from agents.rl.policy_observation import Obs, PolicyObservation
 from er_gym.envs.embodied_env import EmbodiedEnv, verification_env
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.envs.wrappers import KeyActionShaping
@@ -41,7 +41,7 @@ class TrainingRules(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
-    """Draws tasks of the wanted types, and shows the learner what :class:`Perception` makes.
+    """Draws tasks of the wanted types, and shows the learner what :class:`PolicyObservation` makes.
 
     Args:
         env: an ``EmbodiedEnv``, shaped or not.
@@ -55,13 +55,13 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         env: gymnasium.Env[Any, Any],
         source: EpisodeSource,
         types: Sequence[str],
-        perception: Perception,
+        policy_observation: PolicyObservation,
     ) -> None:
         super().__init__(env)
-        self._source, self._perception = source, perception
+        self._source, self._policy_observation = source, policy_observation
         self.set_types(types)
         self._rng = np.random.default_rng()
-        self.observation_space = perception.space
+        self.observation_space = policy_observation.space
 
     def set_types(self, types: Sequence[str]) -> None:
         """Draw tasks of these types from the next episode on.
@@ -79,13 +79,13 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
             self._rng = np.random.default_rng(seed)
         obs, info = self.env.reset(seed=seed, options=options or {"task": self._draw()})
         info["seen"] = obs
-        return self._perception.begin(obs, info, info["task"].instruction), info
+        return self._policy_observation.reset(obs, info, info["task"].instruction), info
 
     def step(self, action: Any) -> tuple[Obs, Any, bool, bool, dict[str, Any]]:
         """Do an action."""
         obs, reward, terminated, truncated, info = self.env.step(action)
         info["seen"] = obs
-        return self._perception.see(obs, info), reward, terminated, truncated, info
+        return self._policy_observation.observe(obs, info), reward, terminated, truncated, info
 
     def action_masks(self) -> NDArray[np.int8]:
         """(A,) int8, the actions that are legal now."""
@@ -144,7 +144,7 @@ def make_env(
     source = make_source(options.episodes, verification_env)
     if isinstance(source, TaskList):
         source = source.share(*share)
-    return LearningEnv(env, source, options.types, Perception(options, with_mask))
+    return LearningEnv(env, source, options.types, PolicyObservation(options, with_mask))
 
 
 def for_evaluation(options: Episodes, episodes: str) -> Episodes:

@@ -19,7 +19,7 @@ from er_gym.envs.wrappers import make_encoder
 Obs = dict[str, NDArray[Any]]
 
 
-class Perception:
+class PolicyObservation:
     """Makes the learner's observation of the environment's.
 
     - ``state``: as the environment has it.
@@ -47,13 +47,13 @@ class Perception:
             entries["mask"] = spaces.Box(0, 1, (len(ACTIONS),), np.int8)
         self.space = spaces.Dict(entries)
 
-    def begin(self, obs: Mapping[str, Any], info: Mapping[str, Any], instruction: str) -> Obs:
+    def reset(self, obs: Mapping[str, Any], info: Mapping[str, Any], instruction: str) -> Obs:
         """The first observation of an episode."""
         self._frames.clear()
         self._told = self._encode(instruction) if self._encode is not None else None
-        return self.see(obs, info)
+        return self.observe(obs, info)
 
-    def see(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Obs:
+    def observe(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Obs:
         """The next one."""
         made: Obs = {"state": obs["state"]}
         if self._told is not None:

@@ -41,7 +41,7 @@ from agents.rl.callbacks import (
 from agents.rl.cloning import clone, watch
 from agents.rl.config import Episodes, Evaluation, TrainConfig, WarmStart, load_config
 from agents.rl.envs import for_evaluation, make_env
-from agents.rl.policy_observation import Perception
+from agents.rl.policy_observation import PolicyObservation
 from agents.rl.saved import FOREIGN, MODEL, nothing, restore, save, untrusted
 from agents.rl.vec_env import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS
@@ -282,7 +282,7 @@ def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
         raise untrusted(file)
     config = load_config(file.parent / CONFIG)
     family = FAMILIES[config.algorithm.name]
-    space = Perception(config.env, family.needs_mask).space
+    space = PolicyObservation(config.env, family.needs_mask).space
     model = family.make(config, config.algorithm, nothing(space, len(ACTIONS), config.vec.envs))
     if not foreign:
         restore(file, model)
