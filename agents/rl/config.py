@@ -33,7 +33,7 @@ def _known_types(types: tuple[str, ...]) -> tuple[str, ...]:
     return types
 
 
-class Episodes(_Model):
+class EnvConfig(_Model):
     """Which episodes are played, and what the agent perceives of them.
 
     Attributes:
@@ -71,7 +71,7 @@ class Episodes(_Model):
     _types = field_validator("types")(_known_types)
 
 
-class Vectorised(_Model):
+class VecEnvConfig(_Model):
     """How many environments, in how many processes."""
 
     envs: Annotated[int, Field(gt=0, le=4096)] = 128
@@ -187,8 +187,8 @@ class TrainConfig(_Model):
     algorithm: Algorithm = PPO()
     total_steps: Positive
     seed: int = Field(0, ge=0, lt=2**32)
-    env: Episodes = Episodes()
-    vec: Vectorised = Vectorised()
+    env: EnvConfig = EnvConfig()
+    vec: VecEnvConfig = VecEnvConfig()
     evaluation: Evaluation | None = Evaluation()
     curriculum: tuple[Phase, ...] = ()
     warm_start: WarmStart | None = None
@@ -211,7 +211,7 @@ class TrainConfig(_Model):
         return self
 
     @model_validator(mode="after")
-    def _can_be_warmed(self) -> TrainConfig:
+    def _warm_start_needs_ppo(self) -> TrainConfig:
         if self.warm_start is not None and self.algorithm.name != "ppo":
             raise ValueError(
                 f"warm_start goes with ppo, not with {self.algorithm.name}: leave one out"

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.rl.config import Episodes
+from agents.rl.config import EnvConfig
 from agents.rl.demonstrations import Demonstrations, demonstrate
 from agents.rl.policy_observation import Obs, PolicyObservation
 from er_gym.envs.embodied_env import EmbodiedEnv, verification_env
@@ -107,7 +107,7 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
 
 
 def make_env(
-    options: Episodes,
+    options: EnvConfig,
     gamma: float = 1.0,
     with_mask: bool = False,
     with_text: bool = False,
@@ -147,6 +147,6 @@ def make_env(
     return LearningEnv(env, source, options.types, PolicyObservation(options, with_mask))
 
 
-def for_evaluation(options: Episodes, episodes: str) -> Episodes:
+def evaluation_config(options: EnvConfig, episodes: str) -> EnvConfig:
     """The same, on other episodes, with the reward as the environment has it."""
     return options.model_copy(update={"episodes": episodes, **dict.fromkeys(_TRAINING_ONLY, 0.0)})

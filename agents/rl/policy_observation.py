@@ -11,7 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from PIL import Image
 
-from agents.rl.config import Episodes
+from agents.rl.config import EnvConfig
 from er_gym.envs.actions import ACTIONS
 from er_gym.envs.observations import STATE_LAYOUT
 from er_gym.envs.wrappers import make_encoder
@@ -29,7 +29,7 @@ class PolicyObservation:
     - ``mask``: (A,) int8, the legal actions, for learners that have no other way to be told.
     """
 
-    def __init__(self, options: Episodes, with_mask: bool = False) -> None:
+    def __init__(self, options: EnvConfig, with_mask: bool = False) -> None:
         self._size = (options.width, options.height)
         self._frames: deque[NDArray[np.uint8]] = deque(maxlen=options.frames)
         self._encode = make_encoder(options.instruction) if options.instruction else None

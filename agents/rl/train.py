@@ -39,8 +39,8 @@ from agents.rl.callbacks import (
     Threads,
 )
 from agents.rl.cloning import clone, watch
-from agents.rl.config import Episodes, Evaluation, TrainConfig, WarmStart, load_config
-from agents.rl.envs import for_evaluation, make_env
+from agents.rl.config import EnvConfig, Evaluation, TrainConfig, WarmStart, load_config
+from agents.rl.envs import evaluation_config, make_env
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.saved import FOREIGN, MODEL, nothing, restore, save, untrusted
 from agents.rl.vec_env import WorkerVecEnv
@@ -125,7 +125,7 @@ def _train(
     family = FAMILIES[config.algorithm.name]
     # Continued, a run plays other episodes than when it was begun.
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
-    env = vectorised(config, config.env, seed)
+    env = make_vec_env(config, config.env, seed)
     checkpoints = Checkpoints(run, config.checkpoint_every)
     callbacks = [checkpoints, Threads(config.threads), ByType(), *more]
     held_out = None
@@ -205,7 +205,7 @@ def _warm(model: BaseAlgorithm, config: TrainConfig, how: WarmStart, run: Path, 
 
 
 def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOut:
-    env = vectorised(config, for_evaluation(config.env, asked.episodes), _EVALUATION_SEED)
+    env = make_vec_env(config, evaluation_config(config.env, asked.episodes), _EVALUATION_SEED)
     return HeldOut(env, asked.every, asked.count, _EVALUATION_SEED)
 
 
@@ -300,7 +300,7 @@ def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
     return found
 
 
-def vectorised(config: TrainConfig, options: Episodes, seed: int) -> VecEnv:
+def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int) -> VecEnv:
     """``config.vec.envs`` environments in worker processes, seeded one after the other; each
     process plays in its share of the rooms."""
     family = FAMILIES[config.algorithm.name]

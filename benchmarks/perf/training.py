@@ -24,7 +24,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
 from agents.rl.callbacks import Threads
 from agents.rl.config import PPO, TrainConfig, config_file, load_config
 from agents.rl.ppo import make
-from agents.rl.train import quick_arithmetic, vectorised
+from agents.rl.train import make_vec_env, quick_arithmetic
 
 
 @dataclass
@@ -86,7 +86,7 @@ def measure(model: OnPolicyAlgorithm, env: VecEnv, steps: int, threads: int) -> 
 def ours(config: TrainConfig, steps: int) -> tuple[Clock, Rates]:
     """MaskablePPO on an er-gym configuration."""
     assert isinstance(config.algorithm, PPO), config.algorithm.name
-    env = vectorised(config, config.env, config.seed)
+    env = make_vec_env(config, config.env, config.seed)
     try:
         return measure(make(config, config.algorithm, env), env, steps, config.threads)
     finally:

@@ -14,7 +14,7 @@ from agents.rl.cloning import clone, watch
 from agents.rl.config import TrainConfig, WarmStart
 from agents.rl.demonstrations import demonstrate
 from agents.rl.envs import make_env
-from agents.rl.train import FAMILIES, train, vectorised
+from agents.rl.train import FAMILIES, make_vec_env, train
 from er_gym.envs.actions import INDEX, Action
 from er_gym.rollout.agent import Decision
 
@@ -52,7 +52,7 @@ def test_a_policy_comes_to_do_what_the_teacher_did(make_config: Make) -> None:
     config = make_config()
     how = WarmStart(teacher="oracle", episodes=20, epochs=150, batch_size=32, learning_rate=3e-3)
     seen = watch(config, how, seed=0)
-    env = vectorised(config, config.env, 0)
+    env = make_vec_env(config, config.env, 0)
     try:
         model = FAMILIES["ppo"].make(config, config.algorithm, env)
         agreed = clone(model, seen, how, seed=0)

@@ -19,7 +19,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
 from agents.rl import dqn
 from agents.rl.agent import RLAgent
-from agents.rl.config import Episodes, Network, TrainConfig, Vectorised
+from agents.rl.config import EnvConfig, Network, TrainConfig, VecEnvConfig
 from agents.rl.envs import make_env
 from agents.rl.saved import save
 from agents.rl.train import FAMILIES, load_last, prepare
@@ -28,7 +28,7 @@ from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks.suites import load_suite
 
 ENVS = 2
-EPISODES = Episodes(episodes="mini", types=("single_pickup",))
+EPISODES = EnvConfig(episodes="mini", types=("single_pickup",))
 NAMES = pytest.mark.parametrize("name", ["dqn", "qrdqn"])
 
 
@@ -46,7 +46,7 @@ def configured(name: str, **settings: Any) -> TrainConfig:
         algorithm={"name": name, "quantiles": 5, "target_update_interval": 20, **few, **settings},
         total_steps=1000,
         env=EPISODES,
-        vec=Vectorised(envs=ENVS, workers=1),
+        vec=VecEnvConfig(envs=ENVS, workers=1),
         network=Network(width=8, kind=4),
     )
 

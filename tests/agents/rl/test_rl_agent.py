@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from agents import make_agent
 from agents.rl.agent import RLAgent
-from agents.rl.config import Episodes, TrainConfig
+from agents.rl.config import EnvConfig, TrainConfig
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.train import train
 from benchmarks.cli.main import cli
@@ -68,7 +68,7 @@ def test_a_run_that_is_not_there(tmp_path: Path) -> None:
 
 
 def test_pictures_are_made_small_and_stacked() -> None:
-    options = Episodes(obs_mode="rgb+state", width=32, height=18, frames=2, instruction="hashed")
+    options = EnvConfig(obs_mode="rgb+state", width=32, height=18, frames=2, instruction="hashed")
     policy_observation = PolicyObservation(options, with_mask=True)
     env = EmbodiedEnv((), obs_mode="rgb+state", width=64, height=36)
     obs, info = env.reset(options={"task": MINI[0]})
