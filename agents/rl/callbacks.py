@@ -56,7 +56,7 @@ class Checkpoints(BaseCallback):
         return True
 
 
-class Curve(KVWriter):
+class CurveWriter(KVWriter):
     """Appends what the logger is told to ``curve.jsonl``, a line each time, with steps and seconds.
 
     A run that is continued drops the lines that came after its checkpoint.
@@ -100,7 +100,7 @@ def read_curve(run: Path) -> list[dict[str, float]]:
     return lines
 
 
-class HeldOut(MaskableEvalCallback):
+class HeldOutEvaluation(MaskableEvalCallback):
     """sb3-contrib's evaluation, every so many steps rather than calls, between two rollouts."""
 
     def __init__(self, env: Any, every: int, count: int, seed: int) -> None:
@@ -108,23 +108,23 @@ class HeldOut(MaskableEvalCallback):
         self._every, self._seed = every, seed
 
     def _on_training_start(self) -> None:
-        self._looked_at = self.num_timesteps
+        self._evaluated_at = self.num_timesteps
 
     def _on_rollout_start(self) -> None:
-        if self.num_timesteps - self._looked_at >= self._every:
-            self.look()
+        if self.num_timesteps - self._evaluated_at >= self._every:
+            self.evaluate()
 
     def _on_step(self) -> bool:
         return True
 
-    def look(self) -> None:
+    def evaluate(self) -> None:
         """Evaluate now, on the same episodes every time."""
-        self._looked_at = self.num_timesteps
+        self._evaluated_at = self.num_timesteps
         self.eval_env.seed(self._seed)
         super()._on_step()
 
 
-class Threads(BaseCallback):
+class TorchThreads(BaseCallback):
     """Torch has so many threads to learn with, and one while the environments need the cores."""
 
     def __init__(self, threads: int) -> None:
@@ -149,7 +149,7 @@ class Curriculum(BaseCallback):
         self._phases, self._after = phases, tuple(types)
         self._now: tuple[str, ...] | None = None
 
-    def tell(self, env: VecEnv, steps: int) -> None:
+    def set_types(self, env: VecEnv, steps: int) -> None:
         """Say it for the episodes that begin after so many steps."""
         types = next((phase.types for phase in self._phases if steps < phase.until), self._after)
         if types != self._now:
@@ -157,13 +157,13 @@ class Curriculum(BaseCallback):
             env.env_method("set_types", types)
 
     def _on_rollout_start(self) -> None:
-        self.tell(self.training_env, self.num_timesteps)
+        self.set_types(self.training_env, self.num_timesteps)
 
     def _on_step(self) -> bool:
         return True
 
 
-class ByType(BaseCallback):
+class SuccessByType(BaseCallback):
     """Logs the success rate over its last episodes of each task type that was played."""
 
     def __init__(self, over: int = 100) -> None:

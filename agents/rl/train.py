@@ -31,12 +31,12 @@ from agents.configs import dump
 from agents.rl import dqn, ppo
 from agents.rl.callbacks import (
     CURVE,
-    ByType,
     Checkpoints,
     Curriculum,
-    Curve,
-    HeldOut,
-    Threads,
+    CurveWriter,
+    HeldOutEvaluation,
+    SuccessByType,
+    TorchThreads,
 )
 from agents.rl.cloning import clone, watch
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, WarmStart, load_config
@@ -127,7 +127,7 @@ def _train(
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
     env = make_vec_env(config, config.env, seed)
     checkpoints = Checkpoints(run, config.checkpoint_every)
-    callbacks = [checkpoints, Threads(config.threads), ByType(), *more]
+    callbacks = [checkpoints, TorchThreads(config.threads), SuccessByType(), *more]
     held_out = None
     try:
         if config.evaluation is not None:
@@ -135,7 +135,7 @@ def _train(
             callbacks.append(held_out)
         if config.curriculum:
             curriculum = Curriculum(config.curriculum, config.env.types)
-            curriculum.tell(env, steps)
+            curriculum.set_types(env, steps)
             callbacks.append(curriculum)
         if show_progress:
             callbacks.append(ProgressBarCallback())
@@ -159,7 +159,7 @@ def _train(
             if checkpoints.steps:
                 checkpoints.save()
         if held_out is not None:
-            held_out.look()
+            held_out.evaluate()
         model.logger.close()
     finally:
         env.close()
@@ -204,9 +204,9 @@ def _warm(model: BaseAlgorithm, config: TrainConfig, how: WarmStart, run: Path, 
         )
 
 
-def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOut:
+def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOutEvaluation:
     env = make_vec_env(config, evaluation_config(config.env, asked.episodes), _EVALUATION_SEED)
-    return HeldOut(env, asked.every, asked.count, _EVALUATION_SEED)
+    return HeldOutEvaluation(env, asked.every, asked.count, _EVALUATION_SEED)
 
 
 def prepare(config: TrainConfig, run: Path) -> bool:
@@ -311,7 +311,7 @@ def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int) -> VecEnv:
 
 
 def _logger(config: TrainConfig, run: Path, steps: int) -> Logger:
-    writers: list[KVWriter] = [Curve(run, steps)]
+    writers: list[KVWriter] = [CurveWriter(run, steps)]
     if config.tensorboard:
         writers.append(TensorBoardOutputFormat(str(run / TENSORBOARD)))
     if config.wandb:

@@ -21,7 +21,7 @@ from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
 
-from agents.rl.callbacks import Threads
+from agents.rl.callbacks import TorchThreads
 from agents.rl.config import PPO, TrainConfig, config_file, load_config
 from agents.rl.ppo import make
 from agents.rl.train import make_vec_env, quick_arithmetic
@@ -79,7 +79,7 @@ def measure(model: OnPolicyAlgorithm, env: VecEnv, steps: int, threads: int) -> 
     model.policy.forward = choose  # type: ignore[method-assign]
     model.train = clock.around("learning", model.train)  # type: ignore[method-assign]
     with clock("all"):
-        model.learn(steps, callback=CallbackList([rates, Threads(threads)]))
+        model.learn(steps, callback=CallbackList([rates, TorchThreads(threads)]))
     return clock, rates
 
 
