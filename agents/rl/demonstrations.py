@@ -68,10 +68,10 @@ def demonstrate(
         successes += info["success"]
         if info["success"] or not successes_only:
             kept.append(_of(env, steps, gamma))
-    return replace(joined(kept), episodes=episodes, successes=successes)
+    return replace(concatenate(kept), episodes=episodes, successes=successes)
 
 
-def joined(parts: Sequence[Demonstrations]) -> Demonstrations:
+def concatenate(parts: Sequence[Demonstrations]) -> Demonstrations:
     """All in one."""
     return Demonstrations(
         obs={key: np.concatenate([part.obs[key] for part in parts]) for key in parts[0].obs},

@@ -38,7 +38,7 @@ from agents.rl.callbacks import (
     SuccessByType,
     TorchThreads,
 )
-from agents.rl.cloning import clone, watch
+from agents.rl.cloning import clone_behaviour, collect_demonstrations
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, WarmStart, load_config
 from agents.rl.envs import evaluation_config, make_env
 from agents.rl.policy_observation import PolicyObservation
@@ -142,7 +142,7 @@ def _train(
         if model is None:
             model = family.make(config, config.algorithm, env)
             if config.warm_start is not None:
-                _warm(model, config, config.warm_start, run, seed)
+                _warm_start(model, config, config.warm_start, run, seed)
             env.seed(seed)
         else:
             model.set_env(env)
@@ -182,23 +182,25 @@ def quick_arithmetic() -> Iterator[None]:
         Distribution.set_default_validate_args(__debug__)
 
 
-def _warm(model: BaseAlgorithm, config: TrainConfig, how: WarmStart, run: Path, seed: int) -> None:
+def _warm_start(
+    model: BaseAlgorithm, config: TrainConfig, warm_start: WarmStart, run: Path, seed: int
+) -> None:
     assert isinstance(model, MaskablePPO)  # a configuration of another learner has no warm start
-    seen = watch(config, how, seed)
-    agreement = clone(model, seen, how, seed)
-    rate = seen.successes / seen.episodes
+    demonstrations = collect_demonstrations(config, warm_start, seed)
+    agreement = clone_behaviour(model, demonstrations, warm_start, seed)
+    rate = demonstrations.successes / demonstrations.episodes
     told = {
         "teacher_success": rate,
-        "steps": len(seen),
-        "refused": seen.refused,
-        "unread": seen.unread,
+        "steps": len(demonstrations),
+        "refused": demonstrations.refused,
+        "unread": demonstrations.unread,
         "agreement": agreement,
     }
     write_whole(run / WARM_START, json.dumps(told))
-    if seen.refused or seen.unread:
+    if demonstrations.refused or demonstrations.unread:
         warnings.warn(
-            f"cloning {how.teacher}: of its {len(seen) + seen.refused + seen.unread:,} steps "
-            f"{seen.refused:,} illegal ones and {seen.unread:,} whose text names no action are "
+            f"cloning {warm_start.teacher}: of its {len(demonstrations) + demonstrations.refused + demonstrations.unread:,} steps "
+            f"{demonstrations.refused:,} illegal ones and {demonstrations.unread:,} whose text names no action are "
             "left out",
             stacklevel=2,
         )
