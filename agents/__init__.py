@@ -45,7 +45,7 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
     """An agent by name: one of :data:`AGENTS`, ``package.module:Class``, ``rl:RUN`` for a trained
     policy, or, with the settings that are the default, a model's (:mod:`agents.vlm.factory`).
 
-    ``trust``: whether a policy may be read from a file that can run code (:mod:`agents.rl.saved`).
+    ``trust``: whether a policy may be read from a file that can run code (:mod:`agents.rl.model_file`).
 
     Raises:
         ValueError: there is none of that name, or it cannot be made; the message lists those there

@@ -10,8 +10,8 @@ from typing import Any
 import torch
 
 from agents.rl.config import load_config
+from agents.rl.model_file import MODEL, SB3_MODEL, untrusted_model
 from agents.rl.policy_observation import PolicyObservation
-from agents.rl.saved import FOREIGN, MODEL, untrusted
 from agents.rl.train import CONFIG, FAMILIES, load_model
 from er_gym.envs.actions import ACTIONS
 from er_gym.rollout.agent import Decision
@@ -37,7 +37,7 @@ class RLAgent:
     def __init__(self, path: str | Path, trust: bool = False) -> None:
         file = _model_file(Path(path))
         if file.suffix == ".zip" and not trust:
-            raise untrusted(file)
+            raise untrusted_model(file)
         config = load_config(file.parent / CONFIG)
         family = FAMILIES[config.algorithm.name]
         self._model = _loaded(file, file.stat().st_mtime_ns, trust)
@@ -62,7 +62,7 @@ class RLAgent:
 
 
 def _model_file(path: Path) -> Path:
-    for file in (path, path / MODEL, path / FOREIGN):
+    for file in (path, path / MODEL, path / SB3_MODEL):
         if file.is_file() and (file.name == MODEL or file.suffix == ".zip"):
             return file
     raise ValueError(

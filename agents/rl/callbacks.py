@@ -15,7 +15,7 @@ from stable_baselines3.common.logger import KVWriter
 from stable_baselines3.common.vec_env import VecEnv
 
 from agents.rl.config import Phase
-from agents.rl.saved import save
+from agents.rl.model_file import save
 from er_gym.tasks.reading import read_bytes
 from er_gym.writing import write_whole
 

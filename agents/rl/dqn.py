@@ -228,11 +228,11 @@ def make(config: TrainConfig, settings: DQNSettings, env: VecEnv) -> BaseAlgorit
     return LegalDQN(TypeDQNPolicy, env, **given)
 
 
-def load_foreign_dqn(file: Path) -> LegalDQN:
+def load_sb3_dqn(file: Path) -> LegalDQN:
     """A learner as Stable-Baselines3 saved it, which may run what is in the file."""
     return LegalDQN.load(file, device="cpu")
 
 
-def load_foreign_qrdqn(file: Path) -> LegalQRDQN:
+def load_sb3_qrdqn(file: Path) -> LegalQRDQN:
     """A learner as Stable-Baselines3 saved it, which may run what is in the file."""
     return LegalQRDQN.load(file, device="cpu")

@@ -35,6 +35,6 @@ def make(config: TrainConfig, settings: PPO, env: VecEnv) -> MaskablePPO:
     )
 
 
-def load_foreign(file: Path) -> MaskablePPO:
+def load_sb3(file: Path) -> MaskablePPO:
     """A learner as Stable-Baselines3 saved it, which may run what is in the file."""
     return MaskablePPO.load(file, device="cpu")

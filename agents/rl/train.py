@@ -1,7 +1,7 @@
 """A training run from its configuration: begun, or continued from its last checkpoint.
 
 A run directory holds ``config.yaml`` (all of the configuration), ``model.npz`` (the last
-checkpoint, whole at any time, see :mod:`agents.rl.saved`), ``curve.jsonl`` (what was logged, with
+checkpoint, whole at any time, see :mod:`agents.rl.model_file`), ``curve.jsonl`` (what was logged, with
 steps and seconds) and ``tensorboard/``. Running the same again continues; when all steps are done
 it does nothing.
 """
@@ -41,8 +41,8 @@ from agents.rl.callbacks import (
 from agents.rl.cloning import clone_behaviour, collect_demonstrations
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, WarmStart, load_config
 from agents.rl.envs import evaluation_config, make_env
+from agents.rl.model_file import MODEL, SB3_MODEL, placeholder_env, restore, save, untrusted_model
 from agents.rl.policy_observation import PolicyObservation
-from agents.rl.saved import FOREIGN, MODEL, nothing, restore, save, untrusted
 from agents.rl.vec_env import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS
 from er_gym.locking import sole_user
@@ -51,7 +51,7 @@ from er_gym.writing import YAML_MARK, is_ours, make_folder, write_whole
 CONFIG = "config.yaml"
 WARM_START = "warm_start.json"
 TENSORBOARD = "tensorboard"
-_OF_A_RUN = (MODEL, FOREIGN, CURVE, WARM_START, TENSORBOARD)
+_OF_A_RUN = (MODEL, SB3_MODEL, CURVE, WARM_START, TENSORBOARD)
 _EVALUATION_SEED = 10_000
 """Every evaluation of every run begins with the same episodes."""
 
@@ -60,16 +60,16 @@ class Family(NamedTuple):
     """How the learners of a family are made and loaded."""
 
     make: Callable[[TrainConfig, Any, VecEnv], BaseAlgorithm]
-    load_foreign: Callable[[Path], BaseAlgorithm]
+    load_sb3: Callable[[Path], BaseAlgorithm]
     """Reads a file of Stable-Baselines3, which may run what is in it."""
     needs_mask: bool
     """Whether the observation has to hold the action mask."""
 
 
 FAMILIES = {
-    "ppo": Family(ppo.make, ppo.load_foreign, needs_mask=False),
-    "dqn": Family(dqn.make, dqn.load_foreign_dqn, needs_mask=True),
-    "qrdqn": Family(dqn.make, dqn.load_foreign_qrdqn, needs_mask=True),
+    "ppo": Family(ppo.make, ppo.load_sb3, needs_mask=False),
+    "dqn": Family(dqn.make, dqn.load_sb3_dqn, needs_mask=True),
+    "qrdqn": Family(dqn.make, dqn.load_sb3_qrdqn, needs_mask=True),
 }
 
 
@@ -221,7 +221,7 @@ def prepare(config: TrainConfig, run: Path) -> bool:
         RunConflict: it is another run's, or holds files that er-gym did not write.
     """
     file = run / CONFIG
-    new = not any((run / name).exists() for name in (MODEL, FOREIGN))
+    new = not any((run / name).exists() for name in (MODEL, SB3_MODEL))
     if file.exists() and new and not is_ours(file):
         raise RunConflict(f"{file} is there, and er-gym did not write it; give another --out")
     if not file.exists():
@@ -264,7 +264,7 @@ def _differences(one: dict[str, Any], other: dict[str, Any], path: str = "") -> 
 
 def load_last(run: Path, trust: bool = False) -> BaseAlgorithm | None:
     """The learner of a run's last checkpoint, None if there is none yet; see :func:`load_model`."""
-    file = next((run / name for name in (MODEL, FOREIGN) if (run / name).exists()), None)
+    file = next((run / name for name in (MODEL, SB3_MODEL) if (run / name).exists()), None)
     return None if file is None else load_model(file, trust)
 
 
@@ -281,16 +281,18 @@ def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
     """
     foreign = file.suffix == ".zip"
     if foreign and not trust:
-        raise untrusted(file)
+        raise untrusted_model(file)
     config = load_config(file.parent / CONFIG)
     family = FAMILIES[config.algorithm.name]
     space = PolicyObservation(config.env, family.needs_mask).space
-    model = family.make(config, config.algorithm, nothing(space, len(ACTIONS), config.vec.envs))
+    model = family.make(
+        config, config.algorithm, placeholder_env(space, len(ACTIONS), config.vec.envs)
+    )
     if not foreign:
         restore(file, model)
         return model
     try:
-        found = family.load_foreign(file)
+        found = family.load_sb3(file)
     except Exception as error:  # its classes may be anybody's, and raise anything
         raise ValueError(f"{file} cannot be read as a model: {error}") from error
     for name in ("observation_space", "action_space"):

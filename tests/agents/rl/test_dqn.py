@@ -21,7 +21,7 @@ from agents.rl import dqn
 from agents.rl.agent import RLAgent
 from agents.rl.config import EnvConfig, Network, TrainConfig, VecEnvConfig
 from agents.rl.envs import make_env
-from agents.rl.saved import save
+from agents.rl.model_file import save
 from agents.rl.train import FAMILIES, load_last, prepare
 from er_gym.envs.actions import INDEX
 from er_gym.envs.embodied_env import EmbodiedEnv

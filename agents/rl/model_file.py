@@ -31,7 +31,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 from er_gym.writing import write_whole
 
 MODEL = "model.npz"
-FOREIGN = "model.zip"
+SB3_MODEL = "model.zip"
 """What Stable-Baselines3 writes, and what runs of er-gym 0.1.0 hold."""
 _FORMAT = 1
 _ABOUT = "about"
@@ -48,7 +48,7 @@ class UntrustedModel(ValueError):
     """A file that can run code when it is read; the message says how to read it all the same."""
 
 
-def untrusted(file: Path) -> UntrustedModel:
+def untrusted_model(file: Path) -> UntrustedModel:
     """The refusal of one of Stable-Baselines3's files."""
     return UntrustedModel(
         f"{file} is a file of Stable-Baselines3, and reading it runs whatever code is in it: "
@@ -177,13 +177,13 @@ def _optimizer(archive: zipfile.ZipFile, model: BaseAlgorithm) -> dict[str, Any]
 # -- where no environment is needed --------------------------------------------------------------
 
 
-class _Nothing(gymnasium.Env[Any, Any]):
+class _UnplayableEnv(gymnasium.Env[Any, Any]):
     """Has spaces, and cannot be played."""
 
     def __init__(self, sees: spaces.Space[Any], actions: spaces.Discrete) -> None:
         self.observation_space, self.action_space = sees, actions
 
 
-def nothing(sees: spaces.Space[Any], actions: int, count: int) -> VecEnv:
+def placeholder_env(sees: spaces.Space[Any], actions: int, count: int) -> VecEnv:
     """In place of environments, to make a learner with that only plays, or gets them later."""
-    return DummyVecEnv([lambda: _Nothing(sees, spaces.Discrete(actions))] * count)
+    return DummyVecEnv([lambda: _UnplayableEnv(sees, spaces.Discrete(actions))] * count)

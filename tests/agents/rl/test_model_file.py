@@ -19,7 +19,7 @@ from click.testing import CliRunner
 from agents import make_agent
 from agents.rl.agent import RLAgent
 from agents.rl.config import TrainConfig
-from agents.rl.saved import FOREIGN, MODEL, UntrustedModel
+from agents.rl.model_file import MODEL, SB3_MODEL, UntrustedModel
 from agents.rl.train import CONFIG, load_last, train
 from benchmarks.cli.main import cli
 
@@ -53,13 +53,13 @@ class Writes:
 def hostile(copied: Path) -> tuple[Path, Path]:
     """A run directory with a model of Stable-Baselines3 that writes a file, and that file."""
     written = copied / "written"
-    load_last(copied).save(copied / FOREIGN)
-    with zipfile.ZipFile(copied / FOREIGN) as archive:
+    load_last(copied).save(copied / SB3_MODEL)
+    with zipfile.ZipFile(copied / SB3_MODEL) as archive:
         parts = {name: archive.read(name) for name in archive.namelist()}
     data = json.loads(parts["data"])
     code = base64.b64encode(pickle.dumps(Writes(written))).decode()
     data["policy_class"] = {":type:": "x", ":serialized:": code}
-    with zipfile.ZipFile(copied / FOREIGN, "w") as archive:
+    with zipfile.ZipFile(copied / SB3_MODEL, "w") as archive:
         for name, content in {**parts, "data": json.dumps(data).encode()}.items():
             archive.writestr(name, content)
     (copied / MODEL).unlink()
@@ -70,7 +70,7 @@ def test_a_zip_that_runs_code_is_refused_and_does_not_run(hostile: tuple[Path, P
     path, written = hostile
     for refused in (
         lambda: make_agent(f"rl:{path}"),
-        lambda: RLAgent(path / FOREIGN),
+        lambda: RLAgent(path / SB3_MODEL),
         lambda: load_last(path),
     ):
         with pytest.raises(UntrustedModel, match=r"runs whatever code is in it.*give --trust"):
@@ -101,7 +101,7 @@ def test_a_run_of_before_is_read_with_trust_and_then_needs_none(
     copied: Path, make_config: Make, tmp_path: Path
 ) -> None:
     before = load_last(copied)
-    before.save(copied / FOREIGN)
+    before.save(copied / SB3_MODEL)
     (copied / MODEL).unlink()
     command = ["bench", "--suite", "mini", "--limit", "1", "--agent", f"rl:{copied}"]
     command += ["--instances", "explore", "--out", str(tmp_path / "out"), "--trust"]
