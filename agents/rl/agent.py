@@ -12,7 +12,7 @@ import torch
 from agents.rl.config import load_config
 from agents.rl.model_file import MODEL, SB3_MODEL, untrusted_model
 from agents.rl.policy_observation import PolicyObservation
-from agents.rl.train import CONFIG, FAMILIES, load_model
+from agents.rl.train import ALGORITHMS, CONFIG, load_model
 from er_gym.envs.actions import ACTIONS
 from er_gym.rollout.agent import Decision
 from er_gym.tasks.task import Task
@@ -39,10 +39,10 @@ class RLAgent:
         if file.suffix == ".zip" and not trust:
             raise untrusted_model(file)
         config = load_config(file.parent / CONFIG)
-        family = FAMILIES[config.algorithm.name]
+        spec = ALGORITHMS[config.algorithm.name]
         self._model = _loaded(file, file.stat().st_mtime_ns, trust)
-        self._masks = not family.needs_mask
-        self._policy_observation = PolicyObservation(config.env, family.needs_mask)
+        self._masks = not spec.needs_mask
+        self._policy_observation = PolicyObservation(config.env, spec.needs_mask)
         self.obs_mode: str = config.env.obs_mode
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:

@@ -56,7 +56,7 @@ _EVALUATION_SEED = 10_000
 """Every evaluation of every run begins with the same episodes."""
 
 
-class Family(NamedTuple):
+class AlgorithmSpec(NamedTuple):
     """How the learners of a family are made and loaded."""
 
     make: Callable[[TrainConfig, Any, VecEnv], BaseAlgorithm]
@@ -66,10 +66,10 @@ class Family(NamedTuple):
     """Whether the observation has to hold the action mask."""
 
 
-FAMILIES = {
-    "ppo": Family(ppo.make, ppo.load_sb3, needs_mask=False),
-    "dqn": Family(dqn.make, dqn.load_sb3_dqn, needs_mask=True),
-    "qrdqn": Family(dqn.make, dqn.load_sb3_qrdqn, needs_mask=True),
+ALGORITHMS = {
+    "ppo": AlgorithmSpec(ppo.make, ppo.load_sb3, needs_mask=False),
+    "dqn": AlgorithmSpec(dqn.make, dqn.load_sb3_dqn, needs_mask=True),
+    "qrdqn": AlgorithmSpec(dqn.make, dqn.load_sb3_qrdqn, needs_mask=True),
 }
 
 
@@ -100,7 +100,7 @@ def train(
         KeyboardInterrupt: Ctrl-C; what has been learnt is saved.
     """
     with sole_user(run):
-        new = prepare(config, run)
+        new = prepare_run(config, run)
         try:
             return _train(config, run, show_progress, trust, more)
         except BaseException:  # Ctrl-C too
@@ -116,13 +116,13 @@ def _train(
     trust: bool,
     more: tuple[BaseCallback, ...],
 ) -> BaseAlgorithm:
-    model = load_last(run, trust)
+    model = load_last_checkpoint(run, trust)
     if model is not None and not (run / MODEL).exists():
         save(model, run)  # from now on it needs no trust
     steps = 0 if model is None else model.num_timesteps
     if model is not None and steps >= config.total_steps:
         return model
-    family = FAMILIES[config.algorithm.name]
+    spec = ALGORITHMS[config.algorithm.name]
     # Continued, a run plays other episodes than when it was begun.
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
     env = make_vec_env(config, config.env, seed)
@@ -140,7 +140,7 @@ def _train(
         if show_progress:
             callbacks.append(ProgressBarCallback())
         if model is None:
-            model = family.make(config, config.algorithm, env)
+            model = spec.make(config, config.algorithm, env)
             if config.warm_start is not None:
                 _warm_start(model, config, config.warm_start, run, seed)
             env.seed(seed)
@@ -149,7 +149,7 @@ def _train(
             set_random_seed(seed)
         model.set_logger(_logger(config, run, steps))
         try:
-            with quick_arithmetic():
+            with fast_arithmetic():
                 model.learn(
                     config.total_steps - steps,
                     callback=CallbackList(callbacks),
@@ -169,7 +169,7 @@ def _train(
 
 
 @contextmanager
-def quick_arithmetic() -> Iterator[None]:
+def fast_arithmetic() -> Iterator[None]:
     """Tiny numbers count as 0, and distributions do not check what they are given, for a while."""
     # What Adam remembers of weights that get no gradient, such as those of types that no room of
     # the training has, fades until every operation on it takes a hundred times as long.
@@ -211,7 +211,7 @@ def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOutEvaluation:
     return HeldOutEvaluation(env, asked.every, asked.count, _EVALUATION_SEED)
 
 
-def prepare(config: TrainConfig, run: Path) -> bool:
+def prepare_run(config: TrainConfig, run: Path) -> bool:
     """Make the run directory, or see that it is this run's; returns whether the run is new.
 
     More steps may be asked for than before; anything else has to be the same. A run that was killed
@@ -262,7 +262,7 @@ def _differences(one: dict[str, Any], other: dict[str, Any], path: str = "") -> 
     return ", ".join(filter(None, found))
 
 
-def load_last(run: Path, trust: bool = False) -> BaseAlgorithm | None:
+def load_last_checkpoint(run: Path, trust: bool = False) -> BaseAlgorithm | None:
     """The learner of a run's last checkpoint, None if there is none yet; see :func:`load_model`."""
     file = next((run / name for name in (MODEL, SB3_MODEL) if (run / name).exists()), None)
     return None if file is None else load_model(file, trust)
@@ -283,16 +283,16 @@ def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
     if foreign and not trust:
         raise untrusted_model(file)
     config = load_config(file.parent / CONFIG)
-    family = FAMILIES[config.algorithm.name]
-    space = PolicyObservation(config.env, family.needs_mask).space
-    model = family.make(
+    spec = ALGORITHMS[config.algorithm.name]
+    space = PolicyObservation(config.env, spec.needs_mask).space
+    model = spec.make(
         config, config.algorithm, placeholder_env(space, len(ACTIONS), config.vec.envs)
     )
     if not foreign:
         restore(file, model)
         return model
     try:
-        found = family.load_sb3(file)
+        found = spec.load_sb3(file)
     except Exception as error:  # its classes may be anybody's, and raise anything
         raise ValueError(f"{file} cannot be read as a model: {error}") from error
     for name in ("observation_space", "action_space"):
@@ -307,8 +307,8 @@ def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
 def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int) -> VecEnv:
     """``config.vec.envs`` environments in worker processes, seeded one after the other; each
     process plays in its share of the rooms."""
-    family = FAMILIES[config.algorithm.name]
-    make = partial(make_env, options, config.algorithm.gamma, family.needs_mask)
+    spec = ALGORITHMS[config.algorithm.name]
+    make = partial(make_env, options, config.algorithm.gamma, spec.needs_mask)
     env = VecMonitor(WorkerVecEnv([make] * config.vec.envs, config.vec.workers))
     env.seed(seed)
     return env

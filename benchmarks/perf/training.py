@@ -24,7 +24,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
 from agents.rl.callbacks import TorchThreads
 from agents.rl.config import PPO, TrainConfig, config_file, load_config
 from agents.rl.ppo import make
-from agents.rl.train import make_vec_env, quick_arithmetic
+from agents.rl.train import fast_arithmetic, make_vec_env
 
 
 @dataclass
@@ -135,7 +135,7 @@ def main(config: str, steps: int, peer_steps: int, overrides: tuple[str, ...]) -
     asked = load_config(config_file(config), overrides)
     if not isinstance(asked.algorithm, PPO):
         raise click.BadParameter(f"{config} is of {asked.algorithm.name}; give one of ppo")
-    with quick_arithmetic():
+    with fast_arithmetic():
         show(config, *ours(asked, steps), steps)
         show("PPO on MiniGrid", *minigrid(asked, peer_steps), peer_steps)
 

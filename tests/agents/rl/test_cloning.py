@@ -14,7 +14,7 @@ from agents.rl.cloning import clone_behaviour, collect_demonstrations
 from agents.rl.config import TrainConfig, WarmStart
 from agents.rl.demonstrations import demonstrate
 from agents.rl.envs import make_env
-from agents.rl.train import FAMILIES, make_vec_env, train
+from agents.rl.train import ALGORITHMS, make_vec_env, train
 from er_gym.envs.actions import INDEX, Action
 from er_gym.rollout.agent import Decision
 
@@ -54,7 +54,7 @@ def test_a_policy_comes_to_do_what_the_teacher_did(make_config: Make) -> None:
     seen = collect_demonstrations(config, how, seed=0)
     env = make_vec_env(config, config.env, 0)
     try:
-        model = FAMILIES["ppo"].make(config, config.algorithm, env)
+        model = ALGORITHMS["ppo"].make(config, config.algorithm, env)
         agreed = clone_behaviour(model, seen, how, seed=0)
     finally:
         env.close()
