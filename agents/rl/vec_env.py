@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from agents.rl.vec_worker import Batch, serve
+from agents.rl.vec_worker import StepBatch, serve
 from er_gym.rollout.processes import CONTEXT, end_processes, start_process
 
 _CLOSING = 5.0
@@ -64,7 +64,7 @@ class WorkerVecEnv(VecEnv):
             self._send(worker, "reset", each)
         self._reset_seeds()
         self._reset_options()
-        obs, *_ = self._together(self._all_answers())
+        obs, *_ = self._concatenated(self._all_answers())
         return obs
 
     def step_async(self, actions: NDArray[np.intp]) -> None:
@@ -75,9 +75,9 @@ class WorkerVecEnv(VecEnv):
     def step_wait(self) -> VecEnvStepReturn:
         """Wait for what came of them."""
         answers = self._all_answers()
-        return self._together(answers)
+        return self._concatenated(answers)
 
-    def _together(self, batches: Sequence[Batch]) -> VecEnvStepReturn:
+    def _concatenated(self, batches: Sequence[StepBatch]) -> VecEnvStepReturn:
         self._masks = np.concatenate([batch.masks for batch in batches])
         obs = {key: np.concatenate([batch.obs[key] for batch in batches]) for key in batches[0].obs}
         rewards = np.concatenate([batch.rewards for batch in batches])

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from agents.rl.policy_observation import Obs
 
 
-class Batch(NamedTuple):
+class StepBatch(NamedTuple):
     """What k environments answer: arrays of k rows.
 
     Attributes:
@@ -39,13 +39,13 @@ class Batch(NamedTuple):
     infos: list[dict[str, Any]]
 
 
-class Envs:
+class WorkerEnvs:
     """A few environments in this process."""
 
     def __init__(self, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]]) -> None:
         self.envs = [each() for each in make]
 
-    def reset(self, seeds: Sequence[int | None]) -> Batch:
+    def reset(self, seeds: Sequence[int | None]) -> StepBatch:
         """Begin an episode in each."""
         began = [env.reset(seed=seed) for env, seed in zip(self.envs, seeds, strict=True)]
         nothing = np.zeros(len(began), np.float32)
@@ -57,7 +57,7 @@ class Envs:
             [{} for _ in began],
         )
 
-    def step(self, actions: NDArray[np.intp]) -> Batch:
+    def step(self, actions: NDArray[np.intp]) -> StepBatch:
         """Do one action in each; where an episode ends, the next begins."""
         all_obs, rewards, dones, masks, infos = [], [], [], [], []
         for env, action in zip(self.envs, actions.tolist(), strict=True):
@@ -112,25 +112,25 @@ def _batch(
     dones: NDArray[np.bool_],
     masks: list[NDArray[np.int8]],
     infos: list[dict[str, Any]],
-) -> Batch:
+) -> StepBatch:
     stacked = {key: np.stack([each[key] for each in obs]) for key in obs[0]}
-    return Batch(stacked, rewards, dones, np.stack(masks), infos)
+    return StepBatch(stacked, rewards, dones, np.stack(masks), infos)
 
 
 def serve(pipe: Connection, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]]) -> None:
-    """Answer ``(method of Envs, arguments)`` with ``(error or None, answer)`` until told to close,
+    """Answer ``(method of WorkerEnvs, arguments)`` with ``(error or None, answer)`` until told to close,
     or until the other end is gone."""
     # A batch process does not push the trainer aside when it is woken: on a machine with as many
     # cores as workers, the others would otherwise wait for their actions until it is done.
     with contextlib.suppress(AttributeError, OSError):  # not everywhere, nor always allowed
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
-    envs: Envs | None = None
+    envs: WorkerEnvs | None = None
     try:
         while True:
             method, args = pipe.recv()
             try:
                 if envs is None:
-                    envs = Envs(make)
+                    envs = WorkerEnvs(make)
                 answer: tuple[Exception | None, Any] = (None, getattr(envs, method)(*args))
             except Exception as error:  # whatever it is, the trainer has to hear of it
                 answer = (error, None)
