@@ -33,8 +33,8 @@ class Goal:
     """
 
     kind: str
-    thing: str
-    place: str = ""
+    object_type: str
+    target: str = ""
     source: str = ""
 
 
@@ -190,7 +190,7 @@ class _Reader:
             self.source.setdefault(self.theme, name)
         elif before == "with" and self.verb == SLICE:
             if self.goals and self.goals[-1].kind == SLICE:
-                self.goals[-1] = replace(self.goals[-1], place=name)
+                self.goals[-1] = replace(self.goals[-1], target=name)
         elif before == "from":
             return
         else:
@@ -204,7 +204,7 @@ class _Reader:
             self.verb == TOGGLE
             and before == "on"
             and not self.of_last
-            and not (switched and self.goals[-1].thing == self.said[-1])
+            and not (switched and self.goals[-1].object_type == self.said[-1])
         )
 
     def _where(self, place: str, before: str) -> None:
@@ -215,7 +215,7 @@ class _Reader:
         if self.of_last or (self.verb in (FIND, TAKE) and before in _IN):
             self.source[self.theme] = place
             self.goals = [
-                replace(goal, source=place) if goal.thing == self.theme else goal
+                replace(goal, source=place) if goal.object_type == self.theme else goal
                 for goal in self.goals
             ]
         elif self.verb in ("", PUT, TAKE, FIND):
@@ -268,17 +268,17 @@ def tidied(goals: Iterable[Goal]) -> list[Goal]:
     for goal in goals:
         last = kept[-1] if kept else None
         if last is not None:
-            if goal.kind == FIND and goal.thing == last.thing:
+            if goal.kind == FIND and goal.object_type == last.object_type:
                 continue
-            same = goal.thing == last.thing
+            same = goal.object_type == last.object_type
             if same and last.kind in (FIND, TAKE) and goal.kind not in (OPEN, CLOSE):
                 kept[-1] = goal if goal.source else replace(goal, source=last.source)
                 continue
-            if goal == last or (same and goal.kind == last.kind and goal.place == last.place):
+            if goal == last or (same and goal.kind == last.kind and goal.target == last.target):
                 continue
             if same and goal.kind == TAKE and last.kind not in (FIND, PUT):
                 continue
-            if goal.kind == TOGGLE and last.kind == HEAT and goal.thing == "Microwave":
+            if goal.kind == TOGGLE and last.kind == HEAT and goal.object_type == "Microwave":
                 continue
         kept.append(goal)
     return kept
