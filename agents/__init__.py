@@ -27,7 +27,7 @@ __all__ = [
     "make_agent",
 ]
 
-RL = "rl:"
+RL_PREFIX = "rl:"
 """What the name of a trained policy begins with; its run directory follows."""
 AGENTS: Registry[Callable[..., Agent]] = Registry(
     kind="agent",
@@ -35,7 +35,7 @@ AGENTS: Registry[Callable[..., Agent]] = Registry(
     own={"oracle": OracleAgent, "random": RandomAgent, "searcher": SearcherAgent},
     expected="an agent's class (er_gym.rollout.agent.Agent), or a function that makes an agent",
     fits=callable,
-    others=f"{RL}RUN with a run directory of er-gym train-rl; {agent_name_forms()}",
+    others=f"{RL_PREFIX}RUN with a run directory of er-gym train-rl; {agent_name_forms()}",
 )
 """By name: how to make the agent. It is called with ``seed=`` if it takes that, else without
 arguments."""
@@ -51,15 +51,15 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
         ValueError: there is none of that name, or it cannot be made; the message lists those there
             are.
     """
-    if name.startswith(RL):
-        return _trained(name.removeprefix(RL), trust)
+    if name.startswith(RL_PREFIX):
+        return _rl_agent(name.removeprefix(RL_PREFIX), trust)
     if is_model_agent(name):
-        return _speaker(name).agent(seed)
+        return _model_agents(name).agent(seed)
     make = AGENTS.get(name)
     if name in AGENTS.own:
-        return _called(make, seed)
+        return _construct(make, seed)
     try:
-        agent = _called(make, seed)
+        agent = _construct(make, seed)
     except Exception as error:  # another package's code can raise anything
         raise PluginError(
             f"agent {name!r} cannot be made ({reason(error)}); it is called with seed= if it takes "
@@ -77,7 +77,7 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
     return agent
 
 
-def _called(make: Callable[..., Agent], seed: int) -> Agent:
+def _construct(make: Callable[..., Agent], seed: int) -> Agent:
     try:
         takes_seed = "seed" in signature(make).parameters
     except (TypeError, ValueError):  # built in, without a signature
@@ -99,15 +99,15 @@ class NamedAgent:
 
 
 @lru_cache(maxsize=4)
-def _speaker(name: str) -> AgentFactory:
+def _model_agents(name: str) -> AgentFactory:
     return AgentFactory(name, AgentSettings())
 
 
-def _trained(path: str, trust: bool) -> Agent:
+def _rl_agent(path: str, trust: bool) -> Agent:
     try:
         from agents.rl.agent import RLAgent  # late: torch
     except ImportError as error:
         raise ValueError(
-            f"agent {RL}{path} needs {error.name}, which is not installed: pip install 'er-gym[rl]'"
+            f"agent {RL_PREFIX}{path} needs {error.name}, which is not installed: pip install 'er-gym[rl]'"
         ) from error
     return RLAgent(path, trust)

@@ -137,7 +137,7 @@ def bench(
     cannot be played is set aside and named; the others are played. The options from
     --agent-config on are for agents that speak, such as openai:MODEL.
     """
-    from agents import RL
+    from agents import RL_PREFIX
     from benchmarks.cli.progress import Progress
     from benchmarks.scoring.report import load_run
     from benchmarks.scoring.tables import print_tables, tables
@@ -157,8 +157,8 @@ def bench(
         part = Shard.parse(shard) if shard is not None else None
         asked = _load_suite(suite, tasks_file, poses, protocol)
         voice = _voice(agent, spoken)
-        if trust and not agent.startswith(RL):
-            raise BadInput(f"--trust is for trained policies, {RL}RUN, not for {agent}")
+        if trust and not agent.startswith(RL_PREFIX):
+            raise BadInput(f"--trust is for trained policies, {RL_PREFIX}RUN, not for {agent}")
         env = _env_kwargs(
             asked, agent, seed, voice, protocol, trust, backend=backend, instances=instances
         )
