@@ -198,10 +198,10 @@ def _warm_start(
     }
     write_whole(run / WARM_START, json.dumps(told))
     if demonstrations.refused or demonstrations.unread:
+        played = len(demonstrations) + demonstrations.refused + demonstrations.unread
         warnings.warn(
-            f"cloning {warm_start.teacher}: of its {len(demonstrations) + demonstrations.refused + demonstrations.unread:,} steps "
-            f"{demonstrations.refused:,} illegal ones and {demonstrations.unread:,} whose text names no action are "
-            "left out",
+            f"cloning {warm_start.teacher}: of its {played:,} steps {demonstrations.refused:,} "
+            f"illegal ones and {demonstrations.unread:,} whose text names no action are left out",
             stacklevel=2,
         )
 

@@ -99,7 +99,7 @@ class Reply:
         finish: why it stopped, in the server's word: ``stop``, ``length``, ``content_filter`` …
         model: which answered, in the server's words.
         seconds: how long it took, with all tries.
-        kept: whether it was kept from an earlier request, which paid for it.
+        from_cache: whether the reply cache had it; an earlier request paid for it.
     """
 
     text: str
@@ -110,7 +110,7 @@ class Reply:
     finish: str = "stop"
     model: str = ""
     seconds: float = 0.0
-    kept: bool = False
+    from_cache: bool = False
 
 
 class ModelError(Exception):

@@ -76,7 +76,9 @@ class ReplyCache:
         if found is not None:
             return replace(found, from_cache=True, seconds=time.monotonic() - began)
         reply = self._client.reply(messages, seed)
-        text = json.dumps(asdict(reply))
+        fields = asdict(reply)
+        del fields["from_cache"]  # says how a reply was had, not what it is
+        text = json.dumps(fields)
         self._guarded(lambda cache: cache.set(key, text))
         return reply
 

@@ -309,8 +309,8 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from agents.vlm.chat import Message, Reply, Usage
-from agents.vlm.clients.budget import Budget, Ledger, Metered
-from agents.vlm.clients.watch import Watch
+from agents.vlm.clients.budget import Budget, Ledger, MeteredClient
+from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.settings import Prices
 
 class Saying:
@@ -319,7 +319,7 @@ class Saying:
 
 ledger = Ledger(Budget(max_tokens=1_000_000), Prices())
 ledger.open(Path(sys.argv[1]))
-metered = Metered(Saying(), ledger, Watch())
+metered = MeteredClient(Saying(), ledger, RequestSupervisor())
 while True:
     metered.reply((Message("user", ("hello",)),), 0)
     print(flush=True)

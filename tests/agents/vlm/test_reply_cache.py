@@ -150,14 +150,14 @@ PROGRAM = """
 import itertools, sys
 from pathlib import Path
 from agents.vlm.chat import Message, Reply
-from agents.vlm.clients.reply_cache import Kept
+from agents.vlm.clients.reply_cache import ReplyCache
 
 class Saying:
     identity = "counting"
     def reply(self, messages, seed):
         return Reply(f"from the process: {seed}" + 50_000 * (seed % 2) * "x")
 
-kept = Kept(Saying(), Path(sys.argv[1]))
+kept = ReplyCache(Saying(), Path(sys.argv[1]))
 for seed in itertools.count():
     kept.reply((Message("user", ("hello",)),), seed)
     print(seed, flush=True)
