@@ -1,4 +1,4 @@
-"""From the words of a decision to a verb and a name."""
+"""Reads a verb and an object's name from the text of a decision."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from er_gym.tasks import verbs
 
 FENCE = "```"
 MOST = 20
-"""How many lines, or objects, are tried."""
+"""The most lines, or JSON objects, that are tried."""
 _LONGEST_LINE = 300
 
 
 @dataclass(frozen=True)
 class ParsedAction:
-    """What a decision says.
+    """The action of a decision.
 
     Attributes:
-        verb: canonical; "" where there is none.
-        name: of the object; "" where there is none.
-        rules: that were needed to see it.
+        verb: a canonical verb; "" for none.
+        name: the object's name as written; "" for none.
+        rules: the rules that were needed to read it.
     """
 
     verb: str
@@ -52,7 +52,7 @@ _BY_PLAIN = {normalized(phrase): phrase for phrase in VERBS}
 
 
 def _any_of(phrases: list[str]) -> str:
-    """A pattern for phrases however their words are joined, the longest first."""
+    """A pattern for phrases with their words joined in any way, longest phrase first."""
     longest_first = sorted(phrases, key=len, reverse=True)
     return "|".join(phrase.replace(" ", r"[\s_-]{0,3}") for phrase in longest_first)
 
@@ -60,7 +60,7 @@ def _any_of(phrases: list[str]) -> str:
 _OURS = _any_of([phrase for phrase in VERBS if phrase.isascii()])
 _THEIRS = _any_of([phrase for phrase in VERBS if not phrase.isascii()])
 _VERB = re.compile(
-    # Behind Latin letters a word has to end, or the next to begin with a capital.
+    # After Latin letters the word must end, or a capital must begin the next.
     rf"\s*(?:((?i:{_OURS}))(?:(?![A-Za-z0-9])|(?<=[a-z])(?=[A-Z]))|({_THEIRS}))"
 )
 _PUT = re.compile(
@@ -100,13 +100,13 @@ _PARTED: tuple[tuple[str, str, re.Pattern[str]], ...] = (
         if verb in verbs.OBJECT_VERBS and not phrase.isascii()
     ),
 )
-"""Verbs whose words stand around a name: the rule, the verb, and what they look like."""
+"""Verbs whose words surround a name: the rule, the verb, and the pattern."""
 _CALL = re.compile(r"\s*([A-Za-z][A-Za-z_ -]{0,40})\((.*?)\)?\W*$")
 _NAMED = re.compile(r"\s*(\w+)\s?=\s?")
 
 
 def read_line(line: str) -> ParsedAction:
-    """A verb and a name from a line; no verb where it is no action."""
+    """Read a verb and a name from a line; no verb if the line is not an action."""
     narrow = unicodedata.normalize("NFKC", line[:_LONGEST_LINE])
     needed = [] if narrow == line[:_LONGEST_LINE] else ["full width"]
     line = " ".join(narrow.split())
@@ -177,7 +177,7 @@ def _said(line: str) -> ParsedAction:
 
 
 def clean_name(text: str) -> tuple[str, tuple[str, ...]]:
-    """A name without what stands around it, and the rules that this took."""
+    """A name without surrounding marks, article and clause, and the rules that this needed."""
     name = text.strip(EDGES)
     rules = ["marks"] if name != text.strip() else []
     if found := ARTICLE.match(name):
@@ -197,7 +197,7 @@ _NEXT_ACTION = re.compile(
 
 
 def _unfenced(text: str) -> str:
-    """What is in the last code fence that has anything in it; the text itself where none has."""
+    """The content of the last code fence that is not empty; the text itself if there is none."""
     inside = [
         # A word alone in the first line says which language it is.
         re.sub(r"\A(?:\w{1,12}\n|json\b|text\b)", "", block.lstrip(" ")).strip()
@@ -207,7 +207,7 @@ def _unfenced(text: str) -> str:
 
 
 def read_decision(text: str) -> ParsedAction:
-    """A verb and a name from what a decision's tag holds; no verb where it is no action."""
+    """Read a verb and a name from the text of a decision; no verb if it is not an action."""
     needed: tuple[str, ...] = ()
     if FENCE in text:
         needed, text = ("code fence",), _unfenced(text)
@@ -224,7 +224,8 @@ def read_decision(text: str) -> ParsedAction:
 
 
 def find_fields(text: str) -> JsonObject | None:
-    """The last JSON object, or list of objects, that has an action, or at least a field for one."""
+    """The last JSON object or list of objects with an action, else the last with a field for
+    one."""
     found = objects_in(text, MOST)
     found = [each for each in found if not each.fields.keys().isdisjoint(VERB_FIELDS)]
     read = (each for each in reversed(found) if read_fields(each.fields).verb)
@@ -232,7 +233,7 @@ def find_fields(text: str) -> JsonObject | None:
 
 
 def read_fields(fields: Mapping[str, str]) -> ParsedAction:
-    """A verb and a name from the fields of a JSON object."""
+    """Read a verb and a name from the fields of a JSON object."""
     for field in VERB_FIELDS:
         words = read_line(fields.get(field, ""))
         if not words.verb:

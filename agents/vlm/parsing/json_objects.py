@@ -1,4 +1,4 @@
-"""JSON as models write it: with single quotes, commas too many, or no end."""
+"""Reads JSON as models write it: with single quotes, extra commas, or no end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _PAIR = re.compile(
 )
 _OPENS = re.compile(r"\{|\[\s{0,20}\{")
 _INSIDE = re.compile(r'[{}\[\]]|"[^"\\]*(?:\\.[^"\\]*)*"?', re.DOTALL)
-"""Braces, and strings, in which braces are only letters."""
+"""Braces, and strings, whose braces do not count."""
 _DEEPER = {"{": 1, "[": 1, "}": -1, "]": -1}
 
 
@@ -30,12 +30,12 @@ class JsonObject:
 
 
 def objects_in(text: str, most: int) -> list[JsonObject]:
-    """The last objects of a text, and lists of objects, each list as one; in order."""
+    """The last ``most`` objects of a text in order; a list of objects counts as one."""
     return [JsonObject(start, fields_in(text[start:end])) for start, end in _spans(text)[-most:]]
 
 
 def _spans(text: str) -> list[tuple[int, int]]:
-    """Where they begin and end; the last may lack its end."""
+    """The start and end of each object; the last may lack its closing brace."""
     spans: list[tuple[int, int]] = []
     at = 0
     while opened := _OPENS.search(text, at):
@@ -50,9 +50,9 @@ def _spans(text: str) -> list[tuple[int, int]]:
 
 
 def fields_in(text: str) -> dict[str, str]:
-    """The fields of an object that are words, at whatever depth; of one name, the first.
+    """The string fields of an object at any depth; for equal names, the first counts.
 
-    They are read pair by pair, so that it does not matter whether the whole is well formed.
+    Fields are read pair by pair, so the object need not be valid JSON.
     """
     fields: dict[str, str] = {}
     for pair in _PAIR.finditer(text):
