@@ -1,4 +1,4 @@
-"""What went wrong with a try, and what follows: another try, the next episode, or the run's end."""
+"""Classifies a failed try: another try follows, the episode fails, or the run ends."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _REFUSED: Mapping[int, str] = {
     403: "the server does not let the key of {key_from} do this",
     404: "the server has no such model, or nothing at all at this address",
 }
-"""What is answered to whatever is asked."""
+"""Statuses that every request would get."""
 _MALFORMED = frozenset({400, 405, 415, 422})
-"""What is answered to a request that is wrong in itself, such as a parameter that is not known; or
-to a single conversation."""
+"""Statuses for a request that is invalid, for example with an unknown parameter; or for a single
+conversation."""
 _ABOUT_ONE_CONVERSATION = re.compile(
     r"context.{0,20}(length|size|window)|too long|longer than|too many (tokens|images)"
     r"|content.(filter|policy|management)|moderation",
@@ -57,11 +57,11 @@ class Failure:
 
 
 def failure_of(error: openai.OpenAIError, *, key_from: str, answered: bool) -> Failure:
-    """What an error of the SDK means.
+    """Classify an error of the OpenAI SDK.
 
     Args:
-        error: of one try.
-        key_from: where the key is from.
+        error: the error of one try.
+        key_from: the environment variable of the key.
         answered: whether the server has given a reply before.
     """
     if isinstance(error, openai.APIStatusError):
@@ -96,8 +96,8 @@ def _of_status(error: openai.APIStatusError, key_from: str, answered: bool) -> F
 
 
 def requested_pause(headers: httpx2.Headers) -> float | None:
-    """The seconds that a server asks to wait, infinity among them; None if it does not ask, or asks
-    for what is no time to come."""
+    """The seconds that a server asks to wait, possibly infinite; None without a valid future
+    time."""
     text = headers.get("retry-after", "")
     for name, scale in (("retry-after-ms", 0.001), ("retry-after", 1.0)):
         try:

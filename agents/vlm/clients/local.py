@@ -1,8 +1,8 @@
-"""A model that transformers runs in this process: Qwen2-VL, Qwen2.5-VL, Qwen3-VL and what is tuned
-from them; for agents that see text alone, any language model with a chat template.
+"""Runs a model with transformers in this process: Qwen2-VL, Qwen2.5-VL, Qwen3-VL and fine-tuned
+variants; for text-only agents, any language model with a chat template.
 
-The conversation is worked through anew for each reply: nothing that the model computed for an
-earlier turn is kept. A server that remembers (vLLM, SGLang) is faster over long episodes.
+Each reply processes the whole conversation again, without a cache between turns. A server with
+prefix caching (vLLM, SGLang) is faster for long episodes.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ _CLOSED = "the model has been closed"
 
 @dataclass(frozen=True)
 class _EncodedPrompt:
-    """A conversation as the model takes it.
+    """A conversation as input of the model.
 
     Attributes:
-        ids: of its tokens; a picture is as many as the model sees of it.
+        ids: token ids; a picture takes as many as it has merged patches.
         pixels: (patches of all pictures, values of a patch); None without pictures.
         grids: (pictures, 3): patches in time, height and width.
-        seed: of what is drawn for it.
-        thinking: whether the model is in the middle of a thought where it begins.
+        seed: the seed for sampling the reply.
+        thinking: whether the prompt ends inside a thought.
     """
 
     ids: list[int]
@@ -53,15 +53,15 @@ class _EncodedPrompt:
 
 
 class LocalClient:
-    """Replies with what a model says that is loaded here.
+    """Generates replies with a model in this process.
 
-    Conversations that wait at the same time are worked out together, ``settings.local.batch`` of
-    them; that changes nothing in what is said, up to the arithmetic's rounding: each is masked from
-    the others and draws from a seed of its own. Pictures are resized by the rule of qwen-vl-utils,
-    within ``settings.pictures``, so that each takes as many tokens as that package says.
+    Up to ``settings.local.batch`` waiting conversations are generated together. Batching does not
+    change a reply beyond rounding: each conversation is masked from the others and sampled with its
+    own seed. Pictures are resized by the rule of qwen-vl-utils within ``settings.pictures``, so
+    each takes as many tokens as that package says.
 
-    How words are chosen is what ``settings.sampling`` says; of the model's own generation_config,
-    its repetition penalty holds as well, as it does with servers.
+    ``settings.sampling`` controls sampling. Of the model's own generation_config only the
+    repetition penalty applies, as with servers.
 
     Args:
         path: a directory that ``save_pretrained`` wrote, which needs no network; or a model's name
@@ -105,7 +105,7 @@ class LocalClient:
         self._context_length = getattr(
             config.get_text_config(), "max_position_embeddings", sys.maxsize
         )
-        self._tokenizer_lock = threading.Lock()  # a tokenizer is for one thread at a time
+        self._tokenizer_lock = threading.Lock()  # a tokenizer is not thread-safe
         self._closing = threading.Event()
         local = settings.local
         self._batcher: Batcher[_EncodedPrompt, Reply] = Batcher(
@@ -113,10 +113,10 @@ class LocalClient:
         )
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
-        """What the model says next.
+        """The model's next turn.
 
-        At a temperature above 0, the seed, ``settings.seed`` and the number of messages decide what
-        is drawn; without ``settings.seed`` every draw is another.
+        At a temperature above 0, the seed, ``settings.seed`` and the number of messages determine
+        the sampling; without ``settings.seed`` each reply is sampled anew.
 
         Raises:
             ModelError: the conversation is too long for the model or for the memory, or a picture
@@ -131,12 +131,12 @@ class LocalClient:
         return replace(reply, seconds=time.monotonic() - start)
 
     def close(self) -> None:
-        """Stop at the next word, and let go of the model; whoever waits gets CannotGoOn."""
+        """Stop at the next token and release the model; waiting callers get CannotGoOn."""
         self._closing.set()
         self._batcher.close()
         self._model = None
 
-    # -- a conversation becomes numbers, in the thread of whoever asks ---------------------------
+    # -- conversation to tokens, in the caller's thread ------------------------------------------
 
     def _row(self, messages: Sequence[Message], seed: int) -> _EncodedPrompt:
         text = self._prompt(messages)
@@ -156,7 +156,7 @@ class LocalClient:
         return _EncodedPrompt(ids, pixels, grids, self._seed(seed, len(messages)), thinking)
 
     def _prompt(self, messages: Sequence[Message]) -> str:
-        """The conversation in the model's format, up to where it is to speak."""
+        """The conversation in the model's chat format, up to the model's turn."""
         effort = self._settings.reasoning.effort
         thinks = {"enable_thinking": effort != "none"} if effort else {}
         try:
@@ -177,8 +177,8 @@ class LocalClient:
     def _turn(self, message: Message) -> dict[str, Any]:
         parts = list(message.parts)
         if message.reasoning and self._settings.reasoning.in_history:
-            # In the words: templates differ in how they would have it apart, and most know nothing
-            # of it. Those that leave earlier thoughts out find them here too.
+            # In the text: templates differ in how they take thoughts separately, and most do not
+            # take them at all. Templates that drop earlier thoughts find them here too.
             parts.insert(0, f"{_THINK}\n{message.reasoning}\n{_THOUGHT}\n")
         if any(isinstance(part, Picture) for part in parts):
             return {"role": message.role, "content": [_part(part) for part in parts]}
@@ -202,7 +202,7 @@ class LocalClient:
         return seen["pixel_values"], seen["image_grid_thw"]
 
     def _with_image_tokens(self, ids: Sequence[int], grids: torch.Tensor | None) -> list[int]:
-        """The tokens, with that of each picture as often as the model sees patches of it."""
+        """The tokens, with each picture's token repeated once per merged patch."""
         counts: list[int] = []
         if grids is not None:
             counts = (grids.prod(dim=1) // self._image_processor.merge_size**2).tolist()
@@ -217,13 +217,14 @@ class LocalClient:
         ]
 
     def _seed(self, episode: int, messages: int) -> int:
-        """Of one reply. Were it the episode's, each turn would be drawn by the same numbers."""
+        """The seed of one reply. With the episode's seed, all turns would use the same random
+        numbers."""
         if self._settings.seed is None:
             return secrets.randbits(63)
         text = f"{self._settings.seed} {episode} {messages}"
         return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
 
-    # -- numbers become replies, in the batcher's thread -----------------------------------------
+    # -- tokens to replies, in the batcher's thread ----------------------------------------------
 
     def _replies(self, rows: Sequence[_EncodedPrompt]) -> list[Reply]:
         try:
@@ -237,10 +238,10 @@ class LocalClient:
         return [self._reply(row, said) for row, said in zip(rows, generated, strict=True)]
 
     def _generate(self, rows: Sequence[_EncodedPrompt]) -> list[list[int]]:
-        """The tokens that the model adds to each row, up to its end or to the limit."""
+        """The tokens that the model generates for each row, up to an end token or the limit."""
         longest = max(len(row.ids) for row in rows)
         gaps = [longest - len(row.ids) for row in rows]
-        # Filled on the left, with any token: it is masked out.
+        # Padded on the left with any token, since padding is masked out.
         filled = [row.ids[:1] * gap + row.ids for row, gap in zip(rows, gaps, strict=True)]
         ids = torch.tensor(filled)  # (rows, longest)
         inputs = {
@@ -274,7 +275,7 @@ class LocalClient:
         return [self._until_end(each) for each in out[:, longest:].tolist()]
 
     def _until_end(self, said: list[int]) -> list[int]:
-        """Without what stands where a row is done and others are not."""
+        """The tokens up to the end token; padding follows in rows that end early."""
         ends = (place for place, each in enumerate(said, start=1) if each in self._end_tokens)
         return said[: next(ends, None)]
 
@@ -303,12 +304,12 @@ class LocalClient:
 
 
 class _SeededSampling:
-    """Draws the next token of each row by the row's own seed, whoever else is in the batch.
+    """Samples the next token of each row with the row's own seed, independent of the batch.
 
-    ``generate`` would draw all rows from one source of numbers, so that what is said depended on
-    which conversations happened to wait at the same time. Here each row's logits get noise of its
-    own, such that the largest is any token with just the probability that they give it (Gumbel's
-    trick); ``generate`` then takes the largest.
+    ``generate`` would sample all rows with one generator, so a reply would depend on the other
+    conversations in the batch. Here each row's logits get Gumbel noise from the row's own
+    generator: the largest sum is then a sample from the distribution (the Gumbel-max trick), and
+    ``generate`` takes the largest.
     """
 
     def __init__(self, temperature: float, top_p: float, seeds: Sequence[int]) -> None:
@@ -322,7 +323,7 @@ class _SeededSampling:
         scores = scores / self._temperature
         if self._likeliest is not None:
             scores = self._likeliest(input_ids, scores)
-        if not self._sources:  # only now is it known which device the words come from
+        if not self._sources:  # the device is known only now
             self._sources = [torch.Generator(scores.device).manual_seed(s) for s in self._seeds]
         noise = torch.empty_like(scores)
         for row, source in zip(noise, self._sources, strict=True):
@@ -335,7 +336,7 @@ def _part(part: str | Picture) -> dict[str, str]:
 
 
 def _without_thought(text: str, thinking: bool) -> tuple[str, str]:
-    """What was thought, and what was said; ``thinking`` where the first word is thought already."""
+    """The thought and the reply; ``thinking`` says that the text begins inside a thought."""
     thought, found, words = text.partition(_THOUGHT)
     begun = thought.lstrip().startswith(_THINK)
     if not (found or begun or thinking):
@@ -344,7 +345,7 @@ def _without_thought(text: str, thinking: bool) -> tuple[str, str]:
 
 
 def _explained(error: RuntimeError, rows: Sequence[_EncodedPrompt]) -> Exception:
-    """What torch raises, as the batcher knows it."""
+    """Torch's error as the exception that the batcher expects."""
     if isinstance(error, torch.cuda.OutOfMemoryError) or "DefaultCPUAllocator" in str(error):
         tokens = max(len(row.ids) for row in rows)
         return MemoryError(

@@ -87,7 +87,7 @@ class OpenAIClient:
         self._supervisor = supervisor or RequestSupervisor()
         server = settings.server
         url = _address(server)
-        # As it may be shown: without user, password and query.
+        # For messages: without user, password and query.
         self._where = f"{url.scheme}://{url.netloc.decode()}{url.path}".rstrip("/")
         self._key = _key(server, url)
         self._secrets = Secrets(self._key, str(url))
@@ -102,12 +102,12 @@ class OpenAIClient:
         self._transport = BoundedTransport(url, server.timeout, server.connect)
         plain = url.copy_with(query=None, fragment=None)
         options: dict[str, Any] = {
-            # The SDK wants one; without a key the header is left out of every request.
+            # The SDK needs a value; without a key the header is removed from every request.
             "api_key": self._key or "none",
-            "max_retries": 0,  # its waits cannot be told, nor ended
+            "max_retries": 0,  # its waits can be neither reported nor ended
             "timeout": server.timeout,
             "default_headers": {"Accept-Encoding": "identity"},
-            # Where a server sends requests on to may be another's, and would get the pictures.
+            # A redirect may lead to another party, which would get the pictures.
             "http_client": openai.DefaultHttpxClient(
                 transport=self._transport, follow_redirects=False
             ),
@@ -149,7 +149,7 @@ class OpenAIClient:
         raise AssertionError("unreachable")
 
     def close(self) -> None:
-        """Close all connections. Whoever still waits gets a ModelError."""
+        """Close all connections. Waiting callers get a ModelError."""
         self._supervisor.close()
         self._sdk.close()
         self._logs.close()
@@ -163,18 +163,18 @@ class OpenAIClient:
     # -- one try -----------------------------------------------------------------------------------
 
     def _check(self, request: Request) -> None:
-        """Wait for one's turn; CannotGoOn where there is none."""
+        """Wait for the rate limit and check the budget; raises CannotGoOn if it is spent."""
         self._rate_limiter.wait(request)
         try:
             self._ledger.check()
         except CannotGoOn as error:
-            # The others' answers are under way, and paid for; but nobody tries again.
+            # Answers under way are paid for and awaited; no thread tries again.
             self._supervisor.stop(str(error), waits_for_answers=True)
             raise
 
     def _try(self, body: bytes, request_size: RequestSize, request: Request) -> Reply | Failure:
-        """A reply, or why there is none. It is not raised, so that no exception that may hold the
-        key is the context of another."""
+        """A reply or a failure. A failure is returned, not raised: an exception that may hold the
+        key must not become the context of another."""
         began = time.monotonic()
         self._transport.begin_try(request)
         answer: httpx2.Response | openai.OpenAIError
@@ -214,7 +214,8 @@ class OpenAIClient:
         request: Request,
         began: float,
     ) -> Reply | None:
-        """Enter what an answer cost, reply or not; the reply with that, and without secrets."""
+        """Enter an answer's cost in the ledger; return the reply with its cost and without
+        secrets."""
         model, usage = billed_usage(read_billing(body), request_size, said)
         cost, model = cost_of(usage, self.prices), self._secrets.redact(model)
         self._ledger.enter(
@@ -244,7 +245,7 @@ class OpenAIClient:
     # -- between tries -----------------------------------------------------------------------------
 
     def _pause(self, failure: Failure, what: str, request: Request) -> None:
-        """Say what went wrong, and wait; CannotGoOn where that would be too long."""
+        """Report the failure and wait; raises CannotGoOn if the wait would be too long."""
         growing = min(_LONGEST_PAUSE, _FIRST_PAUSE * 2.0 ** min(request.attempt - 1, 10))
         pause = failure.retry_after or growing * random.uniform(0.75, 1.0)
         left = request.left()
@@ -265,14 +266,16 @@ class OpenAIClient:
         request.wait(pause)
 
     def _line(self, failure: Failure) -> str:
-        """One line that says who and what; never the key."""
+        """One line with model, address and failure, without the key."""
         words = self._plain(failure.message)
         ends = f"; {self._plain(failure.fatal)}" if failure.fatal else ""
         return f"{self._model} at {self._where}: {words}{ends}"
 
     def _plain(self, words: str) -> str:
         """Short, printable, in one line and without secrets."""
-        words = self._secrets.redact(words)  # whole, so before anything is cut off
+        words = self._secrets.redact(
+            words
+        )  # before the text is cut, so that no part of a secret stays
         words = " ".join("".join(c if c.isprintable() else " " for c in words).split())
         return words if len(words) <= _LONGEST_WORDS else words[:_LONGEST_WORDS] + "…"
 
@@ -302,7 +305,7 @@ def _address(server: Server) -> httpx2.URL:
 
 
 def _key(server: Server, url: httpx2.URL) -> str:
-    """The key; "" if there is none and the server may do without."""
+    """The API key; "" if there is none and the server may not need one."""
     key = os.environ.get(server.key_from, "").strip()
     if not (key.isascii() and key.isprintable()):
         raise CannotGoOn(f"{server.key_from} holds characters that are in no key; set it anew")
@@ -318,7 +321,7 @@ def _key(server: Server, url: httpx2.URL) -> str:
 def _fixed_fields(model: str, settings: AgentSettings) -> dict[str, Any]:
     """All fields of a request but the messages and the seed.
 
-    ``extra`` overrules them, and a null in it leaves one out: some models take no temperature.
+    ``extra`` overrides them, and a null in it removes a field: some models accept no temperature.
     """
     sampling, server = settings.sampling, settings.server
     effort = settings.reasoning.effort

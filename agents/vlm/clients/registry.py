@@ -1,4 +1,4 @@
-"""The clients that give a model's replies, by the name that an agent's begins with.
+"""The registry of model clients, by the prefix of an agent's name.
 
 An agent ``openai:MODEL`` is the VLM agent with the client ``openai``. A client is a row of
 :data:`CLIENTS`; other packages add rows with an entry point in the group ``er_gym.model_clients``,
@@ -29,8 +29,8 @@ class ModelClientSpec:
         make: makes the client, given what follows the name, the agent's settings, and the run's
             ledger and watch. A client has ``reply`` and ``close`` (:class:`agents.vlm.chat.Client`)
             and ``identity``, a text that is the same for clients that reply alike.
-        opens: what follows the name, for messages: ``"MODEL"``.
-        help: what it is, in a few words.
+        opens: what follows the prefix, for messages: ``"MODEL"``.
+        help: a short description.
         install: what to install when a package is missing.
         priced: whether a reply costs what the settings' ``prices`` state.
         keeps_ledger: whether the client checks the budget and writes the ledger itself.
@@ -46,7 +46,7 @@ class ModelClientSpec:
     def open(
         self, what: str, settings: AgentSettings, ledger: Ledger, supervisor: RequestSupervisor
     ) -> CacheableClient:
-        """The client, whose replies are written into a run's ledger."""
+        """Make the client; its replies are entered into the run's ledger."""
         client = self.make(what, settings, ledger, supervisor)
         if self.keeps_ledger:
             return client
@@ -103,11 +103,11 @@ CLIENTS: Registry[ModelClientSpec] = Registry(
     expected=f"an {__name__}.ModelClientSpec",
     fits=lambda row: isinstance(row, ModelClientSpec),
 )
-"""By name."""
+"""Model clients by name."""
 
 
 def _split(name: str) -> tuple[str, str]:
-    """The client's name and what it opens; ("", "") where the name is no client's."""
+    """The client's name and what it opens; ("", "") if the name belongs to no client."""
     client, colon, opened = name.partition(":")
     if colon and client not in CLIENTS.names() and is_dotted(client + ":" + opened.split(":")[0]):
         attribute, colon, opened = opened.partition(":")
@@ -122,10 +122,10 @@ def is_model_agent(name: str) -> bool:
 
 
 def resolve_client(name: str) -> tuple[ModelClientSpec, str]:
-    """The client of an agent, and what it is to open.
+    """The client of an agent's name, and what the client opens.
 
     Raises:
-        PluginError: the name is no client's, or the client cannot be loaded.
+        PluginError: the name belongs to no client, or the client cannot be loaded.
     """
     client, opened = _split(name)
     if not client:
@@ -134,6 +134,6 @@ def resolve_client(name: str) -> tuple[ModelClientSpec, str]:
 
 
 def agent_name_forms() -> str:
-    """How agents of models are named, for messages."""
+    """The forms of model agents' names, for messages."""
     *most, last = (f"{name}:{row.opens}" for name, row in CLIENTS.own.items())
     return f"{', '.join(most)} or {last}"

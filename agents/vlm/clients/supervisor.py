@@ -1,7 +1,7 @@
-"""How long a run waits for its server, and what it tells meanwhile.
+"""Supervises the requests of a run: its time limit, its events, and its end.
 
-All requests of a run share a :class:`RequestSupervisor`: its minutes, what happens to its requests, and its end
-where the server refuses one request after another.
+All requests of a run share a :class:`RequestSupervisor`. It limits the run's minutes, reports what
+happens to requests, and stops the run if the server refuses one request after another.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ from er_gym.rollout.agent import CannotGoOn
 
 AGAIN = "run the same command again to continue"
 REFUSED = 3
-"""So many different requests refused, with no reply between them, end the run."""
+"""The run ends after this many refused requests with no reply between them."""
 _QUIET = 15.0
-"""Seconds without news after which a waiting request says so."""
+"""Seconds without an event after which a waiting request reports itself."""
 _GRACE = 5.0
-"""Seconds that an answer under way still has once the server is given up."""
+"""Seconds that an answer under way still has after the run has stopped."""
 _LONGEST_WAIT = 3600.0  # seconds of one wait; threads cannot wait for an infinite time
 
 _log = logging.getLogger(__name__)
 
 
 class ServerEvent(BaseModel):
-    """Something that a user waits for, or that went wrong; a line of ``server-events.jsonl``.
+    """A delay or a failure of the server; a line of ``server-events.jsonl``.
 
     Attributes:
         time: ISO 8601 in UTC.
         event: ``retry``: a try failed, and another follows after ``wait`` seconds; ``waiting``: no
-            answer yet; ``failed``: a request was given up; ``stopped``: the run was.
+            answer yet; ``failed``: a request was given up; ``stopped``: the run was stopped.
         what: what happened, in one line.
-        seed: of the episode; None for the run.
-        attempt, of: which try of how many.
-        wait: seconds.
+        seed: the episode's seed; None for the whole run.
+        attempt, of: the number of the try, and the most tries.
+        wait: seconds until the next try.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -67,10 +67,10 @@ Listener = Callable[[ServerEvent], None]
 
 
 class RequestSupervisor:
-    """The time of a run, and its news. One serves all threads.
+    """Supervises the requests of a run. All threads share one supervisor.
 
     Args:
-        max_minutes: of the run, counted from now; None for no limit.
+        max_minutes: the run's time limit, counted from now; None for no limit.
 
     Attributes:
         show: is called with each notice that people should see, from the thread that it is about;
@@ -99,19 +99,19 @@ class RequestSupervisor:
 
     @property
     def over(self) -> bool:
-        """Whether the minutes are."""
+        """Whether the time limit is reached."""
         return time.monotonic() >= self._ends
 
     def stop(self, why: str, *, waits_for_answers: bool = False) -> CannotGoOn:
         """End all requests that have begun.
 
         Args:
-            why: in one line.
-            waits_for_answers: whether answers that are under way are still waited for, since they
-                are paid for. Otherwise they have five seconds.
+            why: the reason, in one line.
+            waits_for_answers: whether to wait for answers under way, since they are paid for.
+                Otherwise they have five seconds.
 
         Returns:
-            What to raise.
+            The exception to raise.
         """
         with self._changed:
             self._stopped = (time.monotonic(), why, waits_for_answers)
@@ -121,7 +121,7 @@ class RequestSupervisor:
         return CannotGoOn(why)
 
     def close(self) -> None:
-        """Let no request wait any longer; it gets a ModelError."""
+        """End every wait; waiting requests get a ModelError."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -135,21 +135,21 @@ class RequestSupervisor:
         of: int = 0,
         wait: float = 0.0,
     ) -> None:
-        """Tell those who listen; for the arguments see :class:`ServerEvent`."""
+        """Report an event; for the arguments see :class:`ServerEvent`."""
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
         server_event = ServerEvent(
             time=now, event=event, what=what, seed=seed, attempt=attempt, of=of, wait=wait
         )
         self._last_news = time.monotonic()
         self.log_event(server_event)
-        if event != "stopped":  # what is raised says so
-            with contextlib.suppress(OSError, ValueError):  # nobody reads what is shown
+        if event != "stopped":  # the exception says so
+            with contextlib.suppress(OSError, ValueError):  # the terminal is closed
                 self.show(server_event)
 
     # -- for requests ------------------------------------------------------------------------------
 
     def _left(self, request: Request, answering: bool) -> float:
-        """Seconds; raises what ends the request."""
+        """The seconds left; raises the error that ends the request."""
         now = time.monotonic()
         if self._closed:
             raise ModelError("the client has been closed")
@@ -170,7 +170,7 @@ class RequestSupervisor:
         self._left(request, False)
 
     def _is_quiet(self) -> bool:
-        """Whether nothing has been heard for long; only one of those who wait hears that."""
+        """Whether there was no event for long; True for one of the waiting threads only."""
         with self._changed:
             now = time.monotonic()
             if now - self._last_news < self._quiet:
@@ -182,7 +182,7 @@ class RequestSupervisor:
         with self._changed:
             self._forget_refusals()
             self._last_reply = self._last_news = time.monotonic()
-            # A server that always takes long is no news.
+            # A server that always takes long is not reported.
             self._quiet = max(_QUIET, 2 * seconds)
 
     def _forget_refusals(self) -> None:
@@ -190,18 +190,18 @@ class RequestSupervisor:
         self._given_up = 0
 
     def _failed(self, request: Request) -> None:
-        """A try of a request has."""
+        """A try of a request failed."""
         with self._changed:
             request.failing_since = min(request.failing_since, time.monotonic())
             self._refused.add(request.number)
 
     def _gave_up(self, request: Request) -> int:
-        """How many different requests the server has refused in a row, at the end of one of them; 0
-        where that may be the fault of this one. CannotGoOn where the run has stopped meanwhile."""
+        """How many requests in a row the server has refused; 0 if the fault may lie with this
+        request alone. Raises CannotGoOn if the run has stopped meanwhile."""
         with self._changed:
             self._left(request, False)
             self._given_up += 1
-            # Nobody has had a reply all the while.
+            # No request got a reply in the meantime.
             dead = self._last_reply < request.failing_since and len(self._refused) >= REFUSED
             return len(self._refused) if dead or self._given_up >= REFUSED else 0
 
@@ -226,40 +226,40 @@ class Request:
         self._supervisor = supervisor
 
     def left(self, *, answering: bool = False) -> float:
-        """Seconds until the run's minutes are over.
+        """The seconds until the run's time limit.
 
         Args:
-            answering: whether an answer is waited for.
+            answering: whether an answer is under way.
 
         Raises:
-            CannotGoOn: they are over, or the run has stopped.
+            CannotGoOn: the limit is reached, or the run has stopped.
             ModelError: the client has been closed.
         """
         return self._supervisor._left(self, answering)
 
     def wait(self, seconds: float) -> None:
-        """Wait, unless the run ends meanwhile; raises as :meth:`left`."""
+        """Wait; raises as :meth:`left` if the run ends meanwhile."""
         self._supervisor._wait(self, seconds)
 
     def still_waiting(self, what: str, seconds: float) -> None:
-        """Say that an answer has not come for so long, if nothing else has been said for long."""
+        """Report that the answer is still missing, if there was no other event for long."""
         if self._supervisor._is_quiet():
             self._supervisor.emit("waiting", what, self.seed, self.attempt, self.of, seconds)
 
     def retry(self, what: str, wait: float, of: int) -> None:
-        """Say that a try failed, and that another of ``of`` follows."""
+        """Report that a try failed and that another of ``of`` follows."""
         self._supervisor._failed(self)
         self._supervisor.emit("retry", what, self.seed, self.attempt, of, wait)
 
     def answered(self) -> None:
-        """There is a reply."""
+        """Report a reply."""
         self._supervisor._answered(time.monotonic() - self.began)
 
     def gave_up(self, what: str) -> ModelError | CannotGoOn:
-        """What to raise where no further try follows.
+        """The exception to raise after the last try.
 
-        The run stops where the server has refused several different requests in a row; otherwise
-        something may be wrong with this one alone.
+        The run stops if the server has refused several requests in a row; otherwise the fault may
+        lie with this request alone.
         """
         self._supervisor._failed(self)
         try:
@@ -277,7 +277,7 @@ class Request:
 
 
 def duration(seconds: float) -> str:
-    """Seconds as people say them: ``0.5 s``, ``90 s``, ``10 min``, ``5 h``."""
+    """A duration for people: ``0.5 s``, ``90 s``, ``10 min``, ``5 h``."""
     if math.isinf(seconds):
         return "for ever"
     if seconds < 120:

@@ -1,8 +1,8 @@
-"""How many tokens a request took: as its server says, where that can be true, or at most.
+"""Token counts of a request: the server's counts if they are plausible, otherwise upper bounds.
 
-A budget holds only if nothing is counted too low. Where a server does not count, or its count is
-impossible, the count is an upper bound: a token stands for at least one byte of text in every
-tokenizer in use, whatever the script, and a picture for no more than with the dearest model known.
+A budget holds only if no count is too low. If a server reports no count, or an impossible one, an
+upper bound replaces it: in every tokenizer in use a token covers at least one byte of text, and a
+picture takes no more tokens than with the most expensive model known.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from agents.vlm.clients.tolerant_model import OrNone, TolerantModel
 
 _WRONG = -1
 _TEMPLATE = 512
-"""Tokens that a server's chat template may add: its system prompt, marks, words about tools."""
+"""Tokens that a server's chat template may add: a system prompt, markers, tool descriptions."""
 _MARKS = 16  # tokens around a reply
 _BYTES_OF_A_TOKEN = 64
-"""More than a token stands for on average in any text: a count below this cannot be true."""
+"""More bytes than a token covers on average in any text: a lower count cannot be true."""
 _PROVIDERS_OWN = 50_000
-"""Tokens; a prompt that a provider puts before ours may be long, but not longer."""
+"""The longest prompt, in tokens, that a provider may put before ours."""
 _BEYOND_LIMIT = 16
-"""Some servers do not hold a reasoning model to ``max_tokens``; none exceeds it so many times."""
+"""Some servers let a reasoning model exceed ``max_tokens``, but never by this factor."""
 _UNLIMITED = 131_072  # tokens of a reply, where no limit is sent
 
 
 def picture_at_most(width: int, height: int) -> int:
-    """Tokens of a picture: what gpt-4o-mini takes, 2,833 and 5,667 for each square of 512 pixels.
+    """An upper bound for a picture's tokens: gpt-4o-mini's 2,833 plus 5,667 per 512-pixel square.
 
     Open models take fewer: 256 to 1,601 for each of 4 to 12 squares (InternVL, Llama 3.2), or one
     for each 14×14 pixels or more (Pixtral, Qwen).
@@ -41,13 +41,14 @@ def picture_at_most(width: int, height: int) -> int:
 
 @dataclass(frozen=True)
 class RequestSize:
-    """What a request holds, as far as its tokens depend on it.
+    """The size of a request, for bounds on its tokens.
 
     Attributes:
-        text: bytes of its JSON without the pictures. JSON's marks are more than a template's.
-        pictures: tokens of all pictures, at most.
-        max_tokens: of the reply; None where no limit is sent.
-        thinks: whether the reply may have tokens that are not shown.
+        text: bytes of its JSON without the pictures. JSON's punctuation outweighs a template's
+            markers.
+        pictures: an upper bound for the tokens of all pictures.
+        max_tokens: the limit of the reply; None if none is sent.
+        thinks: whether the reply may have hidden tokens.
     """
 
     text: int
@@ -72,7 +73,7 @@ class RequestSize:
 
     @property
     def prompt_at_most(self) -> int:
-        """Tokens of the prompt."""
+        """An upper bound for the tokens of the prompt."""
         return self.text + self.pictures + _TEMPLATE
 
 
@@ -96,7 +97,7 @@ class _Details(TolerantModel):
 
 
 class ReportedUsage(TolerantModel):
-    """A server's count; -1 stands for a value that is no count."""
+    """The counts that a server reports; -1 stands for an invalid value."""
 
     prompt_tokens: _Count = None
     completion_tokens: _Count = None
@@ -107,12 +108,12 @@ class ReportedUsage(TolerantModel):
 def usage_of(
     reported: ReportedUsage | None, request_size: RequestSize, said: int | None, cut: bool = False
 ) -> Usage:
-    """The tokens of a request and its reply, never too few.
+    """The token counts of a request and its reply, never too low.
 
     Args:
         claimed: the server's count, if there is one.
         asked: the request.
-        said: bytes of the reply's words, thoughts and call; None where it cannot be read.
+        said: bytes of the reply's text, thoughts and call; None if it cannot be read.
         cut: whether the reply ended at the limit.
     """
     reported = reported or ReportedUsage()

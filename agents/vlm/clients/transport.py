@@ -1,7 +1,8 @@
-"""What carries the OpenAI SDK's requests: a whole answer in time, or an error of the connection.
+"""The HTTP transport of the OpenAI SDK: a whole answer within the time limit, or an error.
 
-Each call is one try. The SDK's own time limits are of single waits, so that bytes that drip have no
-end; here the whole try has one. Answers are bounded, after they are decompressed too.
+Each call is one try. The SDK's own time limits apply to single reads, so a slow trickle of bytes
+never times out; here the limit applies to the whole try. The size of answers is limited, also after
+decompression.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from openai import OpenAIError
 from agents.vlm.clients.supervisor import Request
 
 LARGEST_ANSWER = 20_000_000
-"""Bytes; what is longer is no reply."""
+"""The largest answer in bytes."""
 _AT_ONCE = 262_144  # bytes written between two looks at the clock
 _LOOK = 0.5  # seconds of waiting between two looks at the run
 
@@ -34,18 +35,18 @@ _KNOWN_TO_THE_SDK: Mapping[type[Exception], type[httpx2.TransportError]] = {
     httpcore2.ProtocolError: httpx2.RemoteProtocolError,
     httpcore2.ProxyError: httpx2.ProxyError,
 }
-"""The errors of connections, special ones first, and what the SDK takes them for."""
+"""Connection errors, special ones first, and the errors that the SDK handles."""
 
 
 class AnswerTooLong(OpenAIError):
-    """An answer without end."""
+    """An answer exceeds :data:`LARGEST_ANSWER`."""
 
 
 class RateLimiter:
-    """Spreads requests evenly, over all threads of the process.
+    """Spaces requests evenly over all threads of the process.
 
     Args:
-        per_minute: at most so many; None for no limit.
+        per_minute: the most requests per minute; None for no limit.
     """
 
     def __init__(self, per_minute: int | None) -> None:
@@ -54,7 +55,7 @@ class RateLimiter:
         self._lock = threading.Lock()
 
     def wait(self, request: Request) -> None:
-        """Wait for one's turn; raises as :meth:`~agents.vlm.clients.supervisor.Request.wait`."""
+        """Wait for the next free slot; raises as :meth:`~agents.vlm.clients.supervisor.Request.wait`."""
         with self._lock:
             turn = max(time.monotonic(), self._next)
             self._next = turn + self._gap
@@ -65,10 +66,10 @@ class BoundedTransport(httpx2.BaseTransport):
     """A transport for one server.
 
     Args:
-        url: of the server; says whether one of the environment's proxies is in between. Its query
+        url: the server's address; it decides which of the environment's proxies is used. Its query
             is sent with each request.
-        timeout: seconds for a try, from the first byte sent to the last received.
-        connect: seconds of these for a connection.
+        timeout: seconds for a try, from the first byte sent to the last byte received.
+        connect: the part of ``timeout`` for the connection, seconds.
     """
 
     def __init__(self, url: httpx2.URL, timeout: float, connect: float) -> None:
@@ -83,15 +84,15 @@ class BoundedTransport(httpx2.BaseTransport):
         )
 
     def begin_try(self, request: Request) -> None:
-        """What this thread sends next is a try of this request."""
+        """Count what this thread sends next as a try of this request."""
         self._deadline.request = request
 
     def handle_request(self, request: httpx2.Request) -> httpx2.Response:
         """Send a request and read the answer to its end.
 
         Raises:
-            httpx2.TransportError: there is none, or it is broken.
-            AnswerTooLong: it has no end.
+            httpx2.TransportError: there is no answer, or it is broken.
+            AnswerTooLong: the answer is too long.
             CannotGoOn: the run ends meanwhile.
         """
         self._deadline.start(self._timeout)
@@ -146,7 +147,7 @@ class BoundedTransport(httpx2.BaseTransport):
 
 
 def _decompressed(content: bytes, encoding: str, request: httpx2.Request) -> bytes:
-    """An answer that was compressed although none was asked for; never longer than is allowed."""
+    """Decompress an answer, up to the size limit; servers may compress without being asked."""
     encoding = encoding.strip().lower()
     if encoding in ("", "identity"):
         return content
@@ -171,7 +172,7 @@ def _too_long() -> AnswerTooLong:
 
 
 def _proxy_for(url: str) -> httpcore2.Proxy | None:
-    """The environment's proxy for a URL, as ``HTTPS_PROXY``, ``NO_PROXY`` and their like say."""
+    """The proxy for a URL, from ``HTTPS_PROXY``, ``NO_PROXY`` and related variables."""
     place = urlsplit(url)
     known = getproxies()
     proxy = known.get(place.scheme) or known.get("all")
@@ -192,7 +193,7 @@ def _without_user(netloc: str) -> str:
 
 
 class _TryDeadline(threading.local):
-    """How much time a try has left; a request is one thread's from beginning to end."""
+    """The time that a try has left; one thread handles a request from start to end."""
 
     request: Request
     _end = _began = 0.0
@@ -209,7 +210,7 @@ class _TryDeadline(threading.local):
         return left
 
     def look(self) -> None:
-        """Say that one still waits; raises what ends the run."""
+        """Report that the request still waits; raises the error that ends the run."""
         self.request.left(answering=True)
         waited, most = time.monotonic() - self._began, self._end - self._began
         self.request.still_waiting(
@@ -218,7 +219,7 @@ class _TryDeadline(threading.local):
 
 
 class _TimedStream(httpcore2.NetworkStream):
-    """A connection on which no wait goes beyond the time that is left."""
+    """A connection whose reads and writes end with the try's time."""
 
     def __init__(self, inner: httpcore2.NetworkStream, clock: _TryDeadline) -> None:
         self._inner, self._deadline = inner, clock
@@ -254,11 +255,11 @@ class _TimedStream(httpcore2.NetworkStream):
 
 
 class _NoConnection(httpcore2.ConnectTimeout):
-    """There is no connection, and there is time left."""
+    """The connection failed before the try's time was over."""
 
 
 class _TimedBackend(httpcore2.NetworkBackend):
-    """Makes such connections."""
+    """Opens connections with a time limit."""
 
     def __init__(self, clock: _TryDeadline, connect: float) -> None:
         self._inner, self._deadline, self._connect = httpcore2.SyncBackend(), clock, connect
