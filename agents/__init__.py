@@ -108,6 +108,7 @@ def _rl_agent(path: str, trust: bool) -> Agent:
         from agents.rl.agent import RLAgent  # late: torch
     except ImportError as error:
         raise ValueError(
-            f"agent {RL_PREFIX}{path} needs {error.name}, which is not installed: pip install 'er-gym[rl]'"
+            f"agent {RL_PREFIX}{path} needs {error.name}, which is not installed: "
+            "pip install 'er-gym[rl]'"
         ) from error
     return RLAgent(path, trust)

@@ -56,7 +56,8 @@ class AgentFactory:
 
     Attributes:
         client: of the model.
-        watch: the run's time and news; ``supervisor.show`` is called with what a user should hear.
+        supervisor: supervises the run's requests; ``supervisor.show`` is called with each event
+            that the user should see.
 
     Args:
         name: a model client's name and what the client opens: ``openai:MODEL``

@@ -206,12 +206,12 @@ class Ledger:
 
 
 class MeteredClient:
-    """Keeps the ledger for a client that does not: one entry a reply.
+    """Wraps a client that keeps no ledger itself, and adds one entry per reply.
 
     Args:
-        client: is asked.
-        ledger: of the run.
-        watch: of the run.
+        client: the client to wrap.
+        ledger: the run's ledger.
+        supervisor: the run's request supervisor.
     """
 
     def __init__(

@@ -158,12 +158,12 @@ def reply_of(completion: Completion) -> Reply:
 def billed_usage(
     bill: Billing, request_size: RequestSize, reply: Reply | None
 ) -> tuple[str, Usage]:
-    """Which model answered, and the tokens that are paid for, never too few.
+    """The model that answered, and the billed tokens, never too low.
 
     Args:
-        bill: what the answer says of it.
-        asked: the request.
-        reply: what was answered; None if that is no reply.
+        bill: the billing fields of the answer.
+        request_size: the size of the request.
+        reply: the reply; None if the answer has no valid one.
     """
     said, cut = None, False
     if reply is not None:

@@ -31,11 +31,11 @@ class Checkpoint:
 
     Attributes:
         model: in evaluation mode; its ``generation_config`` follows the settings.
-        tokenizer: of its words.
-        eyes: its image processor, which makes patches of pictures; None where it sees none.
-        template: of a conversation; None for the tokenizer's own.
-        ends: the tokens that end a reply.
-        identity: all that decides what it says, as JSON.
+        tokenizer: the model's tokenizer.
+        image_processor: turns pictures into patches; None for a text-only agent.
+        template: the chat template; None for the tokenizer's own.
+        end_tokens: the token ids that end a reply.
+        identity: everything that its replies depend on, as JSON.
     """
 
     model: Any
@@ -85,7 +85,8 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
         )
     if sees and not (hasattr(image_processor, "merge_size") and hasattr(config, "image_token_id")):
         raise ValueError(
-            f"{path} does not see as Qwen's models do ({type(image_processor).__name__}); let a server run it"
+            f"{path} does not see as Qwen's models do ({type(image_processor).__name__}); "
+            "let a server run it"
         )
     with _errors_in_one_line(f"{path} cannot be loaded"):
         model = _model(path, has_vision, local, where)

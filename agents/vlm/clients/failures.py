@@ -39,13 +39,13 @@ class Failure:
     """How a try failed.
 
     Attributes:
-        words: what happened, as the server or the connection says it.
-        passes: whether another try may do better.
-        ends: what to say where no request will ever do better; otherwise "".
-        late: whether the time was over.
-        unreached: whether there is no sign that a server is there: this try has had no answer, nor
-            has any before.
-        pause: seconds that the server asks to wait; None if it does not.
+        message: what happened, as the server or the connection says it.
+        retryable: whether another try may succeed.
+        fatal: why no later request can succeed; "" if one can.
+        timed_out: whether the time limit was reached.
+        no_server: whether no server seems to be there: neither this try nor any before it got an
+            answer.
+        retry_after: seconds that the server asks to wait; None if it does not ask.
     """
 
     message: str

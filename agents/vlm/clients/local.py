@@ -66,15 +66,15 @@ class LocalClient:
     Args:
         path: a directory that ``save_pretrained`` wrote, which needs no network; or a model's name
             on the Hugging Face hub.
-        settings: of the agent.
-        watch: of the run, whose minutes end a reply that is being worked out; by default there is
-            no limit.
+        settings: the agent's settings.
+        supervisor: the run's request supervisor; a reply stops when its minutes are over. By
+            default there is no limit.
 
     Attributes:
-        identity: all that decides what it says, as JSON.
+        identity: everything that the replies depend on, as JSON.
 
     Raises:
-        ValueError: there is no such model or adapter, it cannot be loaded, or does not fit the
+        ValueError: the model or adapter does not exist, cannot be loaded, or does not fit the
             settings.
     """
 
@@ -208,8 +208,9 @@ class LocalClient:
             counts = (grids.prod(dim=1) // self._image_processor.merge_size**2).tolist()
         if ids.count(self._image_token) != len(counts):
             raise ModelError(
-                f"the conversation has {len(counts)} pictures and {ids.count(self._image_token)} places "
-                "for them; no words of it may be the model's own marks"
+                f"the conversation has {len(counts)} pictures and "
+                f"{ids.count(self._image_token)} places for them; "
+                "no words of it may be the model's own marks"
             )
         left = iter(counts)
         return [

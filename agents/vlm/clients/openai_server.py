@@ -50,28 +50,28 @@ _LATE_TRIES = 2
 
 
 class OpenAIClient:
-    """Asks a server. One serves all threads.
+    """Asks a server over HTTP. All threads share one client.
 
-    What may pass is tried again, ``settings.server.tries`` times in all, each try
-    ``settings.server.timeout`` seconds at most from first to last byte: no connection, 408, 409,
-    425, 429, 5xx, and answers that are cut off or empty. Between tries it waits as long as the
-    server asks, or half a second, a second, two … Each failed try is told to ``supervisor``. An answer
-    of status 2xx is entered in the ledger before it is judged.
+    Failures that may pass are tried again, up to ``settings.server.tries`` tries in all: no
+    connection, 408, 409, 425, 429, 5xx, and answers that are cut off or empty. Each try takes at
+    most ``settings.server.timeout`` seconds from first to last byte. Between tries the client waits
+    as long as the server asks, or half a second, one second, two … Each failed try is reported to
+    ``supervisor``. An answer with status 2xx is entered in the ledger before it is checked.
 
     Args:
-        model: its name, as the server knows it; on Azure, the deployment's.
-        settings: of the agent.
-        ledger: of the run; by default nothing is written down and nothing limited.
-        watch: of the run; by default without limit.
+        model: the model's name on the server; on Azure, the deployment's name.
+        settings: the agent's settings.
+        ledger: the run's ledger; by default nothing is recorded or limited.
+        supervisor: the run's request supervisor; by default without limit.
 
     Attributes:
-        prices: what its replies' costs are worked out by.
-        identity: all but the conversation and the episode that a reply depends on, as JSON. A
-            server on another port is the same server.
+        prices: the prices for the cost of replies.
+        identity: everything that a reply depends on besides conversation and episode, as JSON. The
+            server's port does not count.
 
     Raises:
-        ValueError: the server's address does not fit.
-        CannotGoOn: there is no key, and the server is known to want one.
+        ValueError: the server's address is invalid.
+        CannotGoOn: there is no key, and the server is known to need one.
     """
 
     def __init__(

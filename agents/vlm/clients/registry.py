@@ -23,11 +23,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelClientSpec:
-    """A way to have a model's replies.
+    """A kind of model client.
 
     Attributes:
-        make: makes the client, given what follows the name, the agent's settings, and the run's
-            ledger and watch. A client has ``reply`` and ``close`` (:class:`agents.vlm.chat.Client`)
+        make: makes the client from the text after the prefix, the agent's settings, and the run's
+            ledger and supervisor. A client has ``reply`` and ``close``
+            (:class:`agents.vlm.chat.Client`)
             and ``identity``, a text that is the same for clients that reply alike.
         opens: what follows the prefix, for messages: ``"MODEL"``.
         help: a short description.

@@ -73,9 +73,9 @@ class RequestSupervisor:
         max_minutes: the run's time limit, counted from now; None for no limit.
 
     Attributes:
-        show: is called with each notice that people should see, from the thread that it is about;
+        show: is called with each event that the user should see, from the thread concerned;
             by default the module's logger warns.
-        keep: is called with every notice.
+        log_event: is called with every event.
     """
 
     def __init__(self, max_minutes: float | None = None) -> None:
@@ -210,11 +210,11 @@ class Request:
     """A request from its first try to its reply; it belongs to one thread.
 
     Attributes:
-        number: among those of the watch.
-        seed: of the episode.
-        began: monotonic seconds; ``failing_since``: of the first failed try.
-        answering: whether the try that is under way has been accepted: there is a status of 2xx.
-        attempt: which try is under way; ``of``: how many there are at most.
+        number: counts the supervisor's requests.
+        seed: the episode's seed.
+        began: monotonic seconds; ``failing_since``: the time of the first failed try.
+        answering: whether the server has accepted the current try with a status of 2xx.
+        attempt: the number of the current try; ``of``: the most tries.
     """
 
     def __init__(self, supervisor: RequestSupervisor, number: int, seed: int) -> None:

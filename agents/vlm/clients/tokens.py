@@ -60,7 +60,7 @@ class RequestSize:
     def of(
         body: bytes, messages: Sequence[Message], picture_bytes: int, fields: Mapping[str, Any]
     ) -> RequestSize:
-        """Of a request's body, in which the pictures of ``messages`` take ``picture_bytes`` bytes."""
+        """The size of a request whose pictures take ``picture_bytes`` bytes of the body."""
         shown = [part for each in messages for part in each.parts if isinstance(part, Picture)]
         limits = (fields.get("max_tokens"), fields.get("max_completion_tokens"))
         known = [each for each in limits if type(each) is int and each > 0]
@@ -111,8 +111,8 @@ def usage_of(
     """The token counts of a request and its reply, never too low.
 
     Args:
-        claimed: the server's count, if there is one.
-        asked: the request.
+        reported: the server's count, if there is one.
+        request_size: the request.
         said: bytes of the reply's text, thoughts and call; None if it cannot be read.
         cut: whether the reply ended at the limit.
     """

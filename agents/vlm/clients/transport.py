@@ -55,7 +55,7 @@ class RateLimiter:
         self._lock = threading.Lock()
 
     def wait(self, request: Request) -> None:
-        """Wait for the next free slot; raises as :meth:`~agents.vlm.clients.supervisor.Request.wait`."""
+        """Wait for the next free slot; raises as ``Request.wait`` does."""
         with self._lock:
             turn = max(time.monotonic(), self._next)
             self._next = turn + self._gap
