@@ -1,4 +1,4 @@
-"""Policies that act through ``reset`` and ``step``; :func:`make_agent` makes one by name."""
+"""Agents, which act on observations; :func:`make_agent` makes one by name."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 RL_PREFIX = "rl:"
-"""What the name of a trained policy begins with; its run directory follows."""
+"""The prefix of a trained policy's name; its run directory follows."""
 AGENTS: Registry[Callable[..., Agent]] = Registry(
     kind="agent",
     group="er_gym.agents",
@@ -37,19 +37,22 @@ AGENTS: Registry[Callable[..., Agent]] = Registry(
     fits=callable,
     others=f"{RL_PREFIX}RUN with a run directory of er-gym train-rl; {agent_name_forms()}",
 )
-"""By name: how to make the agent. It is called with ``seed=`` if it takes that, else without
-arguments."""
+"""The factories of agents by name. A factory is called with ``seed=`` if it takes a seed, else
+without arguments."""
 
 
 def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
-    """An agent by name: one of :data:`AGENTS`, ``package.module:Class``, ``rl:RUN`` for a trained
-    policy, or, with the settings that are the default, a model's (:mod:`agents.vlm.factory`).
+    """Make an agent by name: one of :data:`AGENTS`, ``package.module:Class``, ``rl:RUN`` for a
+    trained policy, or a model agent with default settings (:mod:`agents.vlm.factory`).
 
-    ``trust``: whether a policy may be read from a file that can run code (:mod:`agents.rl.model_file`).
+    Args:
+        name: the agent's name.
+        seed: of the agent's random choices.
+        trust: whether a policy may be loaded from a file that can run code
+            (:mod:`agents.rl.model_file`).
 
     Raises:
-        ValueError: there is none of that name, or it cannot be made; the message lists those there
-            are.
+        ValueError: no agent has this name, or it cannot be made; the message lists the agents.
     """
     if name.startswith(RL_PREFIX):
         return _rl_agent(name.removeprefix(RL_PREFIX), trust)
@@ -80,7 +83,7 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
 def _construct(make: Callable[..., Agent], seed: int) -> Agent:
     try:
         takes_seed = "seed" in signature(make).parameters
-    except (TypeError, ValueError):  # built in, without a signature
+    except (TypeError, ValueError):  # a builtin without a signature
         takes_seed = False
     return make(seed=seed) if takes_seed else make()
 
@@ -94,7 +97,7 @@ class NamedAgent:
     """See :func:`make_agent`."""
 
     def __call__(self, task: Task, seed: int) -> Agent:
-        """The agent of an episode."""
+        """Make the agent of an episode."""
         return make_agent(self.name, seed, trust=self.trust)
 
 

@@ -1,4 +1,4 @@
-"""Plays any suite with a policy that has been learnt."""
+"""Plays any suite with a trained policy."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from er_gym.tasks.task import Task
 
 
 class RLAgent:
-    """The policy of a run directory, playing what it thinks best (not what it would try).
+    """The policy of a run directory; it acts deterministically.
 
-    It sees what it saw in training: pictures are made as small, the instruction is encoded alike.
-    Of ``info`` it reads the action mask.
+    Its observations are made as in training: pictures have the same size, and instructions the same
+    encoding. From ``info`` it reads the action mask.
 
     Args:
-        path: the run directory; or a file, whose ``config.yaml`` is beside it: ``model.npz``, or,
-            with ``trust``, one that Stable-Baselines3 wrote.
-        trust: whether whatever code is in the latter may run.
+        path: the run directory, or a model file with its ``config.yaml`` beside it: ``model.npz``
+            or, with ``trust``, a file of Stable-Baselines3.
+        trust: whether a file of Stable-Baselines3, which can run code, may be loaded.
 
     Raises:
-        UntrustedModel: the file can run code, and ``trust`` does not allow that.
-        ValueError: there is no such run, or its model cannot be read.
+        UntrustedModel: the file can run code, and ``trust`` is False.
+        ValueError: the run does not exist, or its model cannot be read.
     """
 
     def __init__(self, path: str | Path, trust: bool = False) -> None:
@@ -50,7 +50,7 @@ class RLAgent:
         self._instruction: str | None = task.instruction
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """What the policy does."""
+        """The policy's best action."""
         if self._instruction is not None:
             seen = self._policy_observation.reset(obs, info, self._instruction)
             self._instruction = None
@@ -73,6 +73,6 @@ def _model_file(path: Path) -> Path:
 
 @lru_cache(maxsize=4)
 def _loaded(file: Path, changed: int, trust: bool) -> Any:
-    """The model in a file, read once for many episodes as long as it does not change."""
-    torch.set_num_threads(1)  # one observation at a time; and there may be several workers
+    """Load the model of a file; the cache serves many episodes while the file is unchanged."""
+    torch.set_num_threads(1)  # observations come one at a time, and several workers may run
     return load_model(file, trust)

@@ -1,7 +1,7 @@
-"""Behaviour cloning: a policy learns to do what a scripted agent did, before it learns by itself.
+"""Behaviour cloning: a policy imitates a scripted agent before reinforcement learning.
 
-The value network learns from the same episodes what they were worth: one that knows nothing would
-undo the policy in the first updates that follow.
+The value network is fitted to the returns of the same episodes: an untrained one would undo the
+policy in the first updates.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from agents.rl.vec_env import WorkerVecEnv
 
 
 def collect_demonstrations(config: TrainConfig, warm_start: WarmStart, seed: int) -> Demonstrations:
-    """Let the teacher play, in as many processes as training has.
+    """Let the teacher play in as many processes as training uses.
 
     Raises:
-        ValueError: nothing that it did can be learnt.
+        ValueError: no step of the teacher can be used.
     """
     make = partial(make_env, config.env, config.algorithm.gamma, with_text=True)
     env = WorkerVecEnv([make] * config.vec.workers, config.vec.workers)
@@ -54,10 +54,10 @@ def collect_demonstrations(config: TrainConfig, warm_start: WarmStart, seed: int
 def clone_behaviour(
     model: MaskablePPO, demonstrations: Demonstrations, warm_start: WarmStart, seed: int
 ) -> float:
-    """Fit policy and value to demonstrations.
+    """Fit policy and value network to demonstrations.
 
     Returns:
-        The share of the teacher's actions, in the last epoch, that the policy thought best.
+        The share of the teacher's actions in the last epoch that were the policy's best action.
     """
     policy = model.policy
     optimizer = torch.optim.Adam(policy.parameters(), lr=warm_start.learning_rate)

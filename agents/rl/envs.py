@@ -1,4 +1,4 @@
-"""Environments to learn in. Imports no torch: worker processes make them."""
+"""Training environments. Imports no torch, since worker processes make them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from er_gym.tasks.task import Task
 from er_gym.tasks.types import TaskType, task_type
 
 _TRAINING_ONLY = ("step_penalty", "illegal_penalty", "success_bonus", "shaping")
-"""What changes the reward."""
+"""The fields that change the reward."""
 
 
 class TrainingRules(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -41,13 +41,13 @@ class TrainingRules(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
-    """Draws tasks of the wanted types, and shows the learner what :class:`PolicyObservation` makes.
+    """Draws tasks of the given types and returns the observations of :class:`PolicyObservation` makes.
 
     Args:
         env: an ``EmbodiedEnv``, shaped or not.
-        source: where tasks come from.
-        types: which; each as often as any other, or whatever comes where there are none.
-        perception: what is shown.
+        source: draws the tasks.
+        types: the task types, drawn with equal probability; any type if empty.
+        policy_observation: makes the learner's observations.
     """
 
     def __init__(
@@ -67,14 +67,14 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         """Draw tasks of these types from the next episode on.
 
         Raises:
-            ValueError: there is none of that name.
+            ValueError: a name is not a task type.
         """
         self._types: tuple[TaskType | None, ...] = tuple(map(task_type, types)) or (None,)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Obs, dict[str, Any]]:
-        """Begin an episode, drawn unless ``options`` pin it."""
+        """Begin an episode; its task is drawn unless ``options`` name it."""
         if seed is not None:
             self._rng = np.random.default_rng(seed)
         obs, info = self.env.reset(seed=seed, options=options or {"task": self._draw()})
@@ -113,18 +113,19 @@ def make_env(
     with_text: bool = False,
     share: tuple[int, int] = (0, 1),
 ) -> gymnasium.Env[Obs, Any]:
-    """An environment to learn in.
+    """Make a training environment.
 
     Args:
+        options: the episodes, observations and reward.
         gamma: the learner's discount, for shaping.
-        share: which of how many processes it is in; each plays in rooms of its own.
         with_mask: whether the observation holds the action mask.
-        with_text: whether ``info["seen"]``, the environment's own observation, holds text, as
-            scripted agents need it.
+        with_text: whether ``info["seen"]``, the environment's own observation, holds text, which
+            scripted agents need.
+        share: ``(index, count)`` of the worker process; each plays in its own rooms.
 
     Raises:
-        ValueError: there is no such suite or encoder.
-        TaskFileError: the suite has not been made, or its file is damaged. (It is a ValueError.)
+        ValueError: the suite or the encoder does not exist.
+        TaskFileError: the suite has not been built, or its file is damaged. (It is a ValueError.)
     """
     env: gymnasium.Env[Any, Any] = TrainingRules(
         EmbodiedEnv(
@@ -148,5 +149,5 @@ def make_env(
 
 
 def evaluation_config(options: EnvConfig, episodes: str) -> EnvConfig:
-    """The same, on other episodes, with the reward as the environment has it."""
+    """The same configuration for other episodes, with the environment's own reward."""
     return options.model_copy(update={"episodes": episodes, **dict.fromkeys(_TRAINING_ONLY, 0.0)})

@@ -1,4 +1,4 @@
-"""What a learning agent is given to see, the same in training and when it plays a suite."""
+"""The learner's observation, the same in training and when the policy plays a suite."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ Obs = dict[str, NDArray[Any]]
 
 
 class PolicyObservation:
-    """Makes the learner's observation of the environment's.
+    """Makes the learner's observation from the environment's.
 
-    - ``state``: as the environment has it.
+    - ``state``: as in the environment's observation.
     - ``instruction``: (E,) float32 in [-1, 1], with an encoder.
     - ``rgb``: (height, width, 3 × frames) uint8, the last pictures, the newest last; at the
       beginning the first is repeated.
-    - ``mask``: (A,) int8, the legal actions, for learners that have no other way to be told.
+    - ``mask``: (A,) int8, the legal actions, for algorithms that read them from the observation.
     """
 
     def __init__(self, options: EnvConfig, with_mask: bool = False) -> None:

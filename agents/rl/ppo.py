@@ -13,7 +13,7 @@ from agents.rl.policy import TypePolicy
 
 
 def make(config: TrainConfig, settings: PPO, env: VecEnv) -> MaskablePPO:
-    """A learner that has learnt nothing yet."""
+    """Make an untrained learner."""
     rate = settings.learning_rate
     return MaskablePPO(
         TypePolicy,

@@ -1,4 +1,4 @@
-"""A training run from its configuration: begun, or continued from its last checkpoint.
+"""Starts a training run from its configuration, or continues it from its last checkpoint.
 
 A run directory holds ``config.yaml`` (all of the configuration), ``model.npz`` (the last
 checkpoint, whole at any time, see :mod:`agents.rl.model_file`), ``curve.jsonl`` (what was logged, with
@@ -53,17 +53,17 @@ WARM_START = "warm_start.json"
 TENSORBOARD = "tensorboard"
 _OF_A_RUN = (MODEL, SB3_MODEL, CURVE, WARM_START, TENSORBOARD)
 _EVALUATION_SEED = 10_000
-"""Every evaluation of every run begins with the same episodes."""
+"""All evaluations of all runs use the same episodes."""
 
 
 class AlgorithmSpec(NamedTuple):
-    """How the learners of a family are made and loaded."""
+    """How the learners of an algorithm are made and loaded."""
 
     make: Callable[[TrainConfig, Any, VecEnv], BaseAlgorithm]
     load_sb3: Callable[[Path], BaseAlgorithm]
-    """Reads a file of Stable-Baselines3, which may run what is in it."""
+    """Loads a file of Stable-Baselines3, which may run code in it."""
     needs_mask: bool
-    """Whether the observation has to hold the action mask."""
+    """Whether the observation must hold the action mask."""
 
 
 ALGORITHMS = {
@@ -74,7 +74,7 @@ ALGORITHMS = {
 
 
 class RunConflict(ValueError):
-    """A directory that holds another run; the message says what to do."""
+    """The directory holds another run; the message says what to do."""
 
 
 def train(
@@ -85,19 +85,20 @@ def train(
     trust: bool = False,
     more: tuple[BaseCallback, ...] = (),
 ) -> BaseAlgorithm:
-    """Train until ``config.total_steps`` are done; returns the learner.
+    """Train until ``config.total_steps`` steps are done, and return the learner.
 
     Args:
+        config: the configuration of the run.
         run: the run directory.
-        show_progress: whether to draw a bar.
-        trust: whether to read a checkpoint of before that Stable-Baselines3 wrote.
-        more: callbacks of the caller's own.
+        show_progress: whether to show a progress bar.
+        trust: whether a checkpoint of Stable-Baselines3 may be loaded.
+        more: additional callbacks.
 
     Raises:
         RunConflict: the directory holds a run of another configuration.
-        UntrustedModel: its checkpoint can run code, and ``trust`` does not allow that.
-        Locked: another process trains in it.
-        KeyboardInterrupt: Ctrl-C; what has been learnt is saved.
+        UntrustedModel: the checkpoint can run code, and ``trust`` is False.
+        Locked: another process trains in the directory.
+        KeyboardInterrupt: Ctrl-C; the learner is saved first.
     """
     with sole_user(run):
         new = prepare_run(config, run)
@@ -118,12 +119,12 @@ def _train(
 ) -> BaseAlgorithm:
     model = load_last_checkpoint(run, trust)
     if model is not None and not (run / MODEL).exists():
-        save(model, run)  # from now on it needs no trust
+        save(model, run)  # from now on the run needs no trust
     steps = 0 if model is None else model.num_timesteps
     if model is not None and steps >= config.total_steps:
         return model
     spec = ALGORITHMS[config.algorithm.name]
-    # Continued, a run plays other episodes than when it was begun.
+    # A continued run plays different episodes than at its start.
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
     env = make_vec_env(config, config.env, seed)
     checkpoints = Checkpoints(run, config.checkpoint_every)
@@ -170,9 +171,9 @@ def _train(
 
 @contextmanager
 def fast_arithmetic() -> Iterator[None]:
-    """Tiny numbers count as 0, and distributions do not check what they are given, for a while."""
-    # What Adam remembers of weights that get no gradient, such as those of types that no room of
-    # the training has, fades until every operation on it takes a hundred times as long.
+    """Flush denormal numbers to 0 and skip the validation of distributions within the context."""
+    # Adam's moments of weights without gradient, such as those of types in no training room, decay
+    # to denormal numbers, which makes every operation a hundred times slower.
     torch.set_flush_denormal(True)
     Distribution.set_default_validate_args(False)
     try:
@@ -212,13 +213,13 @@ def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOutEvaluation:
 
 
 def prepare_run(config: TrainConfig, run: Path) -> bool:
-    """Make the run directory, or see that it is this run's; returns whether the run is new.
+    """Make the run directory, or check that it belongs to this run; returns whether the run is new.
 
-    More steps may be asked for than before; anything else has to be the same. A run that was killed
-    before its first checkpoint has nothing that could be lost: it is begun anew.
+    The number of steps may grow; everything else must be equal. A run that was killed before its
+    first checkpoint is started again.
 
     Raises:
-        RunConflict: it is another run's, or holds files that er-gym did not write.
+        RunConflict: the directory belongs to another run, or holds files that er-gym did not write.
     """
     file = run / CONFIG
     new = not any((run / name).exists() for name in (MODEL, SB3_MODEL))
@@ -245,7 +246,7 @@ def prepare_run(config: TrainConfig, run: Path) -> bool:
 
 
 def _withdraw(run: Path) -> None:
-    """Remove what a run has left that had learnt nothing yet, so that another may be begun."""
+    """Remove the files of a run without a checkpoint, so that another run may use the directory."""
     shutil.rmtree(run / TENSORBOARD, ignore_errors=True)
     for name in (CURVE, WARM_START, CONFIG):
         (run / name).unlink(missing_ok=True)
@@ -263,21 +264,21 @@ def _differences(one: dict[str, Any], other: dict[str, Any], path: str = "") -> 
 
 
 def load_last_checkpoint(run: Path, trust: bool = False) -> BaseAlgorithm | None:
-    """The learner of a run's last checkpoint, None if there is none yet; see :func:`load_model`."""
+    """Load a run's last checkpoint, None if there is none yet; see :func:`load_model`."""
     file = next((run / name for name in (MODEL, SB3_MODEL) if (run / name).exists()), None)
     return None if file is None else load_model(file, trust)
 
 
 def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
-    """The learner of a file, as ``config.yaml`` beside it describes it.
+    """Load the learner of a file, with the ``config.yaml`` beside it.
 
     Args:
         file: ``model.npz``; or, with ``trust``, a file of Stable-Baselines3.
-        trust: whether whatever code is in the latter may run.
+        trust: whether a file of Stable-Baselines3, which can run code, may be loaded.
 
     Raises:
-        UntrustedModel: it may not. (It is a ValueError.)
-        ValueError: the file cannot be read, or is that of another learner.
+        UntrustedModel: ``trust`` is False, and the file can run code. (It is a ValueError.)
+        ValueError: the file cannot be read or belongs to another learner.
     """
     foreign = file.suffix == ".zip"
     if foreign and not trust:
@@ -293,7 +294,7 @@ def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
         return model
     try:
         found = spec.load_sb3(file)
-    except Exception as error:  # its classes may be anybody's, and raise anything
+    except Exception as error:  # unpickled classes can raise anything
         raise ValueError(f"{file} cannot be read as a model: {error}") from error
     for name in ("observation_space", "action_space"):
         if getattr(found, name) != getattr(model, name):
@@ -305,7 +306,7 @@ def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
 
 
 def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int) -> VecEnv:
-    """``config.vec.envs`` environments in worker processes, seeded one after the other; each
+    """Make ``config.vec.envs`` environments in worker processes with consecutive seeds; each
     process plays in its share of the rooms."""
     spec = ALGORITHMS[config.algorithm.name]
     make = partial(make_env, options, config.algorithm.gamma, spec.needs_mask)
@@ -324,7 +325,7 @@ def _logger(config: TrainConfig, run: Path, steps: int) -> Logger:
 
 
 def _start_wandb(config: TrainConfig, run: Path) -> None:
-    """Weights & Biases reads what TensorBoard is told."""
+    """Start Weights & Biases, which copies the TensorBoard logs."""
     try:
         import wandb
     except ImportError:

@@ -1,4 +1,4 @@
-"""A scripted agent that is told nothing but the instruction: it reads, searches and acts."""
+"""A scripted agent that knows only the instruction: it parses it, searches and acts."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 
 _RESERVE = 1
-"""Steps kept for "end"."""
+"""Steps reserved for "end"."""
 _MOST_VISITS = 2
-"""How often one goes to a type for nothing before it is thought to be seen through, for each that
-a room usually has."""
+"""Fruitless visits to a receptacle type, per estimated receptacle in the room, before it counts as
+searched."""
 
 _ALL_OPENED = 2
-"""So many containers in a row that are found open: all of their type have been opened."""
+"""After this many open containers of a type in a row, all of that type count as opened."""
 Steps: TypeAlias = Generator[Action, None, bool]
-"""Actions, one at a time; what it returns is whether it came to what it was for."""
+"""Yields actions one at a time and returns whether it reached its goal."""
 
 
 class _OutOfSteps(Exception):
-    """Nothing can be done any more but to end."""
+    """Only the step for "end" is left."""
 
 
 @dataclass
 class StepView:
-    """What ``info`` tells of what is perceived after a step."""
+    """The parts of ``info`` that the searcher reads after a step."""
 
     sees: frozenset[str]
     holds: str
@@ -44,7 +44,7 @@ class StepView:
 
     @staticmethod
     def of(info: Mapping[str, Any]) -> StepView:
-        """Read it."""
+        """Read ``info``."""
         return StepView(
             sees=frozenset(info["visible"]),
             holds=info["held"],
@@ -62,17 +62,17 @@ class StepView:
 
 @dataclass
 class Memory:
-    """What has been seen and done so far in an episode.
+    """What the searcher has seen and done so far in an episode.
 
     Attributes:
-        at: the type that it last went to.
-        visits: how often it went to a type.
-        sights: what was seen on arriving at a type, each time.
-        exhausted: types of which all there are have been seen.
-        found: thing to the receptacle types at which it was in view.
-        opened: container types that stand open, by its doing, to the phase in which it opened them.
-        phase: counts what it sets about, fetching and putting down.
-        stale: how many containers of a type in a row it found open.
+        at: the type that it last navigated to.
+        visits: the number of visits by type.
+        views_seen: by type, the distinct views on arrival.
+        exhausted: types whose objects have all been seen.
+        found: by object type, the receptacle types at which it was in view.
+        opened: by container type that it opened and left open, the phase in which it did so.
+        phase: counts fetches and put-downs.
+        found_open: by type, how many containers in a row were already open.
     """
 
     at: str = ""
@@ -86,11 +86,11 @@ class Memory:
 
 
 class SearcherAgent:
-    """Reads what to do, looks where things usually are, acts when what it wants is in reach.
+    """Parses the instruction, searches likely places, and acts once an object is within reach.
 
-    It knows what the instruction says and what the environment tells any agent: what it sees and
-    holds, where it may go, what is in reach and which actions are legal. It neither reads the
-    task's key actions nor its goal, nor which object an action was done to.
+    It uses the instruction and what the environment tells every agent: the visible and the held
+    objects, the navigable and the interactable types, and the legal actions. It does not read the
+    task's key actions or goal, nor which object an action affected.
     """
 
     obs_mode = "text"
@@ -104,13 +104,13 @@ class SearcherAgent:
             instruction.PUT,
         ]
         self._thought = ""
-        self._water_runs = False  # whether it has turned on the water
+        self._water_runs = False  # whether it has turned on the faucet
         self._last: Action | None = None
         self._repeats = 0
         self._steps = self._episode()
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """The next step of the plan, given what came of the last one."""
+        """The next action of the plan, given the result of the last one."""
         self._view = StepView.of(info)
         self._update_memory()
         try:
@@ -152,7 +152,7 @@ class SearcherAgent:
         return True
 
     def _step(self, verb: str, object_type: str = "", thought: str = "") -> Steps:
-        """Do one action; whether it was done."""
+        """Take one action; returns whether it succeeded."""
         action = Action(verb, object_type)
         if self._view.left <= 0:
             raise _OutOfSteps
@@ -171,13 +171,13 @@ class SearcherAgent:
     # -- searching -------------------------------------------------------------------------------
 
     def _ready(self, thing: str, verb: str) -> bool:
-        """Whether a thing is in reach, and the verb, if there is one, can be done to it."""
+        """Whether an object is within reach and, if a verb is given, the action is legal."""
         if not verb:
             return thing in self._view.reach
         return self._is_legal(verb, thing)
 
     def _reach(self, thing: str, verb: str = "", source: str = "") -> Steps:
-        """Search until a thing is in reach and the verb can be done to it."""
+        """Search until an object is within reach and the action is legal."""
         memory = self._memory
         tried: Counter[str] = Counter()
         observed = bool(memory.visits)
@@ -212,7 +212,7 @@ class SearcherAgent:
         return True
 
     def _visit(self, target: str, thing: str, verb: str) -> Steps:
-        """Go somewhere and look, into what is closed there as well."""
+        """Navigate to a place and look, also into closed containers there."""
         there = yield from self._step(
             verbs.NAVIGATE, target, f"The {thing} may be at the {target}."
         )
@@ -223,7 +223,7 @@ class SearcherAgent:
             if search_priors.opens(target) and search_priors.has(thing, "pickupable")
             else []
         )
-        if target == thing:  # it is not to be seen where one went for it: something hides it
+        if target == thing:  # it is not in view at its own place: a container hides it
             shut = [name for name in sorted(self._view.reach) if search_priors.opens(name)]
         if search_priors.opens(target):
             found_open = (
@@ -238,7 +238,7 @@ class SearcherAgent:
         return True
 
     def _look_into(self, source: str, thing: str, verb: str) -> Steps:
-        """Go where the words say a thing is; one that is in reach before it opens is another."""
+        """Navigate to the source and open it; an object in view before that is a different one."""
         if not search_priors.opens(source):
             yield from self._visit(source, thing, verb)
             return self._ready(thing, verb)
@@ -249,7 +249,7 @@ class SearcherAgent:
         return self._ready(thing, verb) and not before
 
     def _best_place(self, thing: str, tried: Mapping[str, int]) -> str:
-        """The most promising place for its price, "" when there is none left."""
+        """The navigable type with the highest score, "" if none is left."""
         scored = [
             (self._promise(thing, name, tried), name)
             for name in self._view.navigable
@@ -279,7 +279,7 @@ class SearcherAgent:
         return worth / (2.0 if search_priors.opens(place) else 1.0)
 
     def _vantage(self, thing: str, place: str, tried: Mapping[str, int]) -> float:
-        """The promise of a place from where one may see what stands somewhere by itself."""
+        """The score of a place as a viewpoint for an object that is not pickupable."""
         if tried.get(place, 0) >= search_priors.usual_number(place):
             return 0.0
         in_view = place in self._memory.found.get(thing, ())
@@ -291,7 +291,7 @@ class SearcherAgent:
         return (yield from self._reach(goal.object_type, source=goal.source))
 
     def _take(self, goal: Goal, later: Iterable[Goal] = ()) -> Steps:
-        """Take a thing, and close what it was in."""
+        """Pick up an object and close its container."""
         thing = goal.object_type
         self._memory.phase += 1
         for _ in range(3):
@@ -306,14 +306,14 @@ class SearcherAgent:
         return self._view.holds == thing
 
     def _close_up(self) -> Steps:
-        """Close what is open here."""
+        """Close the containers within reach that it opened."""
         for name in list(self._memory.opened):
             if self._is_legal(verbs.CLOSE, name):
                 yield from self._step(verbs.CLOSE, name, f"The {name} is to be closed again.")
         return True
 
     def _empty_hand(self) -> Steps:
-        """Lay down what is in the hand, where one is."""
+        """Put the held object into a receptacle within reach."""
         if self._view.holds:
             for name in sorted(self._view.reach):
                 if self._is_legal(verbs.PUT, name) and self._view.holds:
@@ -321,7 +321,7 @@ class SearcherAgent:
         return True
 
     def _put(self, goal: Goal, later: Iterable[Goal] = ()) -> Steps:
-        """Take a thing to a place and put it there."""
+        """Fetch an object and put it into its target."""
         yield from self._take(goal)
         yield from self._put_into(goal.object_type, goal.target)
         next_goal = next(iter(later), None)
@@ -330,7 +330,7 @@ class SearcherAgent:
         return True
 
     def _put_into(self, thing: str, place: str) -> Steps:
-        """Go to a place with what is in the hand, open it if need be, and put it there."""
+        """Carry the held object to a receptacle, open it if needed, and put the object there."""
         self._memory.phase += 1
         for _ in range(4):
             if not self._view.holds:
@@ -352,11 +352,12 @@ class SearcherAgent:
         return True
 
     def _opened_before(self, place: str) -> bool:
-        """Whether a container stands open from when it was opened for something else."""
+        """Whether a container was left open in an earlier phase."""
         return self._memory.opened.get(place, self._memory.phase) < self._memory.phase
 
     def _reopen(self, place: str) -> Steps:
-        """Of two transfers, what is opened counts only in its turn."""
+        """Close and open a container again: in a task of two transfers, opening counts only in
+        order."""
         if self._is_legal(verbs.CLOSE, place):
             yield from self._step(verbs.CLOSE, place, f"The {place} was open before its turn.")
             yield from self._step(verbs.OPEN, place)
@@ -373,7 +374,7 @@ class SearcherAgent:
         return (yield from self._step(verb, goal.object_type))
 
     def _process(self, goal: Goal, later: Iterable[Goal] = ()) -> Steps:
-        """Put a thing where something is done to it, do it, and take it up again."""
+        """Put an object into an appliance, run it, and pick the object up again."""
         thing = goal.object_type
         place, switch, times = _PROCESSES[goal.kind]
         yield from self._take(goal)
