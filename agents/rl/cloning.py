@@ -44,8 +44,9 @@ def collect_demonstrations(config: TrainConfig, warm_start: WarmStart, seed: int
     demonstrations = concatenate(parts)
     if not len(demonstrations):
         raise ValueError(
-            f"{warm_start.teacher} showed nothing to learn in {demonstrations.episodes} episodes ({demonstrations.successes} "
-            f"succeeded, {demonstrations.refused} illegal actions, {demonstrations.unread} texts that name no action); "
+            f"{warm_start.teacher} showed nothing to learn in {demonstrations.episodes} episodes "
+            f"({demonstrations.successes} succeeded, {demonstrations.refused} illegal actions, "
+            f"{demonstrations.unread} texts that name no action); "
             "choose another teacher or easier tasks"
         )
     return demonstrations

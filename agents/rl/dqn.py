@@ -9,7 +9,6 @@ A continued run begins with an empty replay buffer: it plays ``learning_starts``
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -89,12 +88,19 @@ def _spaces(policy: BasePolicy) -> tuple[spaces.Dict, spaces.Discrete]:
     return policy.observation_space, policy.action_space
 
 
-class TypeDQNPolicy(DQNPolicy):
-    """``policy_kwargs``: ``width``, ``kind``."""
+class _TypeWise(BasePolicy):
+    """Gives a policy the parameters of :class:`TypeNetwork`. Inherit from it before the policy."""
 
     def __init__(self, *args: Any, width: int = 64, kind: int = 16, **kwargs: Any) -> None:
         self._shape = {"width": width, "kind": kind}
         super().__init__(*args, **kwargs)
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        return {**super()._get_constructor_parameters(), **self._shape}
+
+
+class TypeDQNPolicy(_TypeWise, DQNPolicy):
+    """``policy_kwargs``: ``width``, ``kind``."""
 
     # Our network in place of Stable-Baselines3's own, which only needs to be callable.
     def make_q_net(self) -> ValueNetwork:  # type: ignore[override]
@@ -102,16 +108,9 @@ class TypeDQNPolicy(DQNPolicy):
         seen, actions = _spaces(self)
         return ValueNetwork(seen, actions, **self._shape, quantiles=1).to(self.device)
 
-    def _get_constructor_parameters(self) -> dict[str, Any]:
-        return {**super()._get_constructor_parameters(), **self._shape}
 
-
-class TypeQRDQNPolicy(QRDQNPolicy):
+class TypeQRDQNPolicy(_TypeWise, QRDQNPolicy):
     """``policy_kwargs``: ``width``, ``kind``, ``n_quantiles``."""
-
-    def __init__(self, *args: Any, width: int = 64, kind: int = 16, **kwargs: Any) -> None:
-        self._shape = {"width": width, "kind": kind}
-        super().__init__(*args, **kwargs)
 
     # As above.
     def make_quantile_net(self) -> QuantileNetwork:  # type: ignore[override]
@@ -119,9 +118,6 @@ class TypeQRDQNPolicy(QRDQNPolicy):
         seen, actions = _spaces(self)
         network = QuantileNetwork(seen, actions, **self._shape, quantiles=self.n_quantiles)
         return network.to(self.device)
-
-    def _get_constructor_parameters(self) -> dict[str, Any]:
-        return {**super()._get_constructor_parameters(), **self._shape}
 
 
 # -- the buffer ----------------------------------------------------------------------------------
@@ -209,17 +205,7 @@ def make(config: TrainConfig, settings: DQNSettings, env: VecEnv) -> BaseAlgorit
     if settings.name == "qrdqn":
         policy_kwargs["n_quantiles"] = settings.quantiles
     given: dict[str, Any] = {
-        "learning_rate": settings.learning_rate,
-        "buffer_size": settings.buffer_size,
-        "learning_starts": settings.learning_starts,
-        "batch_size": settings.batch_size,
-        "gamma": settings.gamma,
-        "train_freq": settings.train_freq,
-        "gradient_steps": settings.gradient_steps,
-        "target_update_interval": settings.target_update_interval,
-        "exploration_fraction": settings.exploration_fraction,
-        "exploration_final_eps": settings.exploration_final_eps,
-        "max_grad_norm": settings.max_grad_norm,
+        **settings.model_dump(exclude={"name", "quantiles"}),
         "replay_buffer_class": HalfReplayBuffer,
         "policy_kwargs": policy_kwargs,
         "seed": config.seed,
@@ -228,13 +214,3 @@ def make(config: TrainConfig, settings: DQNSettings, env: VecEnv) -> BaseAlgorit
     if settings.name == "qrdqn":
         return LegalQRDQN(TypeQRDQNPolicy, env, **given)
     return LegalDQN(TypeDQNPolicy, env, **given)
-
-
-def load_sb3_dqn(file: Path) -> LegalDQN:
-    """A learner as Stable-Baselines3 saved it, which may run what is in the file."""
-    return LegalDQN.load(file, device="cpu")
-
-
-def load_sb3_qrdqn(file: Path) -> LegalQRDQN:
-    """A learner as Stable-Baselines3 saved it, which may run what is in the file."""
-    return LegalQRDQN.load(file, device="cpu")

@@ -23,10 +23,10 @@ _TRAINING_ONLY = ("step_penalty", "illegal_penalty", "success_bonus", "shaping")
 
 
 class TrainingRules(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Running out of steps terminates an episode, and success is worth a bonus.
+    """The step limit terminates an episode, and success earns a bonus.
 
-    The step limit is part of the task, and how near it is stands in the observation: beyond it
-    nothing is to be had, so nothing is to be hoped for.
+    The step limit is part of the task, and the observation states how near it is. No reward follows
+    beyond it, so the value there must be 0.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], success_bonus: float) -> None:
@@ -41,7 +41,7 @@ class TrainingRules(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
-    """Draws tasks of the given types and returns the observations of :class:`PolicyObservation` makes.
+    """Draws tasks of the given types, and returns what :class:`PolicyObservation` makes of them.
 
     Args:
         env: an ``EmbodiedEnv``, shaped or not.

@@ -1,9 +1,9 @@
 """Starts a training run from its configuration, or continues it from its last checkpoint.
 
-A run directory holds ``config.yaml`` (all of the configuration), ``model.npz`` (the last
-checkpoint, whole at any time, see :mod:`agents.rl.model_file`), ``curve.jsonl`` (what was logged, with
-steps and seconds) and ``tensorboard/``. Running the same again continues; when all steps are done
-it does nothing.
+A run directory holds ``config.yaml`` (the whole configuration), ``model.npz`` (the last checkpoint,
+always complete, see :mod:`agents.rl.model_file`), ``curve.jsonl`` (the logged values with steps and
+seconds) and ``tensorboard/``. Running the same command again continues the run; once all steps are
+done, it does nothing.
 """
 
 from __future__ import annotations
@@ -60,16 +60,16 @@ class AlgorithmSpec(NamedTuple):
     """How the learners of an algorithm are made and loaded."""
 
     make: Callable[[TrainConfig, Any, VecEnv], BaseAlgorithm]
-    load_sb3: Callable[[Path], BaseAlgorithm]
-    """Loads a file of Stable-Baselines3, which may run code in it."""
+    model_class: type[BaseAlgorithm]
+    """The class that loads a file of Stable-Baselines3, which may run code in it."""
     needs_mask: bool
     """Whether the observation must hold the action mask."""
 
 
 ALGORITHMS = {
-    "ppo": AlgorithmSpec(ppo.make, ppo.load_sb3, needs_mask=False),
-    "dqn": AlgorithmSpec(dqn.make, dqn.load_sb3_dqn, needs_mask=True),
-    "qrdqn": AlgorithmSpec(dqn.make, dqn.load_sb3_qrdqn, needs_mask=True),
+    "ppo": AlgorithmSpec(ppo.make, MaskablePPO, needs_mask=False),
+    "dqn": AlgorithmSpec(dqn.make, dqn.LegalDQN, needs_mask=True),
+    "qrdqn": AlgorithmSpec(dqn.make, dqn.LegalQRDQN, needs_mask=True),
 }
 
 
@@ -293,7 +293,7 @@ def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
         restore(file, model)
         return model
     try:
-        found = spec.load_sb3(file)
+        found = spec.model_class.load(file, device="cpu")
     except Exception as error:  # unpickled classes can raise anything
         raise ValueError(f"{file} cannot be read as a model: {error}") from error
     for name in ("observation_space", "action_space"):
