@@ -55,7 +55,7 @@ class AgentFactory:
     """Makes the model agents of a run.
 
     Attributes:
-        client: of the model.
+        client: the model's client.
         supervisor: supervises the run's requests; ``supervisor.show`` is called with each event
             that the user should see.
 
