@@ -1,4 +1,4 @@
-"""Policies that act through ``reset`` and ``step``; :func:`make_agent` makes one by name."""
+"""Agents, which act on observations; :func:`make_agent` makes one by name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from inspect import signature
 from agents.scripted.oracle import OracleAgent
 from agents.scripted.random import RandomAgent
 from agents.scripted.searcher import SearcherAgent
-from agents.vlm.factory import AgentFactory, speaks, ways_to_name
+from agents.vlm.factory import AgentFactory, agent_name_forms, is_model_agent
 from agents.vlm.settings import AgentSettings
 from er_gym.plugins import PluginError, Registry, reason
 from er_gym.rollout.agent import Agent, Decision
@@ -27,39 +27,42 @@ __all__ = [
     "make_agent",
 ]
 
-RL = "rl:"
-"""What the name of a trained policy begins with; its run directory follows."""
+RL_PREFIX = "rl:"
+"""The prefix of a trained policy's name; its run directory follows."""
 AGENTS: Registry[Callable[..., Agent]] = Registry(
     kind="agent",
     group="er_gym.agents",
     own={"oracle": OracleAgent, "random": RandomAgent, "searcher": SearcherAgent},
     expected="an agent's class (er_gym.rollout.agent.Agent), or a function that makes an agent",
     fits=callable,
-    others=f"{RL}RUN with a run directory of er-gym train-rl; {ways_to_name()}",
+    others=f"{RL_PREFIX}RUN with a run directory of er-gym train-rl; {agent_name_forms()}",
 )
-"""By name: how to make the agent. It is called with ``seed=`` if it takes that, else without
-arguments."""
+"""The factories of agents by name. A factory is called with ``seed=`` if it takes a seed, else
+without arguments."""
 
 
 def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
-    """An agent by name: one of :data:`AGENTS`, ``package.module:Class``, ``rl:RUN`` for a trained
-    policy, or, with the settings that are the default, a model's (:mod:`agents.vlm.factory`).
+    """Make an agent by name: one of :data:`AGENTS`, ``package.module:Class``, ``rl:RUN`` for a
+    trained policy, or a model agent with default settings (:mod:`agents.vlm.factory`).
 
-    ``trust``: whether a policy may be read from a file that can run code (:mod:`agents.rl.saved`).
+    Args:
+        name: the agent's name.
+        seed: of the agent's random choices.
+        trust: whether a policy may be loaded from a file that can run code
+            (:mod:`agents.rl.model_file`).
 
     Raises:
-        ValueError: there is none of that name, or it cannot be made; the message lists those there
-            are.
+        ValueError: no agent has this name, or it cannot be made; the message lists the agents.
     """
-    if name.startswith(RL):
-        return _trained(name.removeprefix(RL), trust)
-    if speaks(name):
-        return _speaker(name).agent(seed)
+    if name.startswith(RL_PREFIX):
+        return _rl_agent(name.removeprefix(RL_PREFIX), trust)
+    if is_model_agent(name):
+        return _model_agents(name).agent(seed)
     make = AGENTS.get(name)
     if name in AGENTS.own:
-        return _called(make, seed)
+        return _construct(make, seed)
     try:
-        agent = _called(make, seed)
+        agent = _construct(make, seed)
     except Exception as error:  # another package's code can raise anything
         raise PluginError(
             f"agent {name!r} cannot be made ({reason(error)}); it is called with seed= if it takes "
@@ -77,10 +80,10 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
     return agent
 
 
-def _called(make: Callable[..., Agent], seed: int) -> Agent:
+def _construct(make: Callable[..., Agent], seed: int) -> Agent:
     try:
         takes_seed = "seed" in signature(make).parameters
-    except (TypeError, ValueError):  # built in, without a signature
+    except (TypeError, ValueError):  # a builtin without a signature
         takes_seed = False
     return make(seed=seed) if takes_seed else make()
 
@@ -94,20 +97,21 @@ class NamedAgent:
     """See :func:`make_agent`."""
 
     def __call__(self, task: Task, seed: int) -> Agent:
-        """The agent of an episode."""
+        """Make the agent of an episode."""
         return make_agent(self.name, seed, trust=self.trust)
 
 
 @lru_cache(maxsize=4)
-def _speaker(name: str) -> AgentFactory:
+def _model_agents(name: str) -> AgentFactory:
     return AgentFactory(name, AgentSettings())
 
 
-def _trained(path: str, trust: bool) -> Agent:
+def _rl_agent(path: str, trust: bool) -> Agent:
     try:
         from agents.rl.agent import RLAgent  # late: torch
     except ImportError as error:
         raise ValueError(
-            f"agent {RL}{path} needs {error.name}, which is not installed: pip install 'er-gym[rl]'"
+            f"agent {RL_PREFIX}{path} needs {error.name}, which is not installed: "
+            "pip install 'er-gym[rl]'"
         ) from error
     return RLAgent(path, trust)

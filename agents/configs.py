@@ -1,4 +1,4 @@
-"""YAML files that a user chooses by name or path, checked, with overrides from the command line."""
+"""Loads YAML files by name or path, validates them, and applies command-line overrides."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ def names(kind: str) -> tuple[str, ...]:
 
 
 def file_of(kind: str, name: str, what: str) -> Path:
-    """The file of a path, or of the name of one that comes with er-gym.
+    """The path of a configuration file, given its path or the name of one of er-gym's own.
 
     Args:
         kind: the directory of ``configs``.
-        what: what such a file is, for the message.
+        name: a name in that directory, or a path.
+        what: what such a file describes, for the message.
 
     Raises:
-        ValueError: there is none; the message lists those that come with er-gym.
+        ValueError: the file does not exist; the message lists er-gym's own.
     """
     if name in names(kind):
         return config_directory(kind) / f"{name}.yaml"
@@ -47,17 +48,17 @@ def load(
     overrides: Sequence[str] = (),
     more: Mapping[str, Any] | None = None,
 ) -> Settings:
-    """Read a YAML file.
+    """Read and validate a YAML file.
 
     Args:
-        model: what it has to be.
-        file: its path; all defaults for None.
-        what: what such a file is, for messages.
+        model: the pydantic model of the settings.
+        file: the path; None for all defaults.
+        what: what such a file describes, for messages.
         overrides: ``"env.types=[single_search]"``: a field's path and its value in YAML.
-        more: fields by name, overruling these in turn.
+        more: fields by name, which take precedence over the overrides.
 
     Raises:
-        ValueError: an override is none, or has no such field; what is given does not fit.
+        ValueError: an override has no ``=`` or names an unknown field, or a value is invalid.
         TaskFileError: the file cannot be read. (It is a ValueError.)
     """
     data = {} if file is None else _read(file, what)
@@ -88,5 +89,5 @@ def _put(data: dict[str, Any], path: Sequence[str], value: Any, text: str) -> No
 
 
 def dump(settings: BaseModel) -> str:
-    """The YAML of settings, with every default written out."""
+    """The settings as YAML, with all defaults written out."""
     return yaml.safe_dump(settings.model_dump(mode="json"), sort_keys=False, allow_unicode=True)

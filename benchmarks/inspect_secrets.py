@@ -10,7 +10,7 @@ from typing import Any
 from inspect_ai.model import Model, ModelCall, ModelOutput, get_model
 
 from agents.vlm.clients.redaction import Secrets
-from agents.vlm.record import plain_url
+from agents.vlm.record import url_without_secrets
 
 _DONE = "_er_gym_discreet"
 
@@ -31,7 +31,7 @@ def model_at_url(name: str, address: str | None) -> Model:
             "--model-base-url holds a user or a password, which Inspect writes into its log; give "
             "the address alone, and the key in the provider's environment variable"
         )
-    model = get_model(name, base_url=plain_url(address), memoize=False)
+    model = get_model(name, base_url=url_without_secrets(address), memoize=False)
     if url.query:
         client: Any = getattr(model.api, "client", None)
         if not hasattr(client, "with_options"):
@@ -69,22 +69,22 @@ def _redact_output(output: ModelOutput | Exception, secrets: Secrets) -> ModelOu
         _redact_error(output, secrets)
         return output
     said = output.model_dump()
-    plain = secrets.strike_all(said)
+    plain = secrets.redact_all(said)
     return output if plain == said else ModelOutput.model_validate(plain)
 
 
 def _redact_call(call: ModelCall | None, secrets: Secrets) -> ModelCall | None:
     # In place: Inspect may hold it already.
     if call is not None and call.response is not None:
-        call.response = secrets.strike_all(call.response)
+        call.response = secrets.redact_all(call.response)
     return call
 
 
 def _redact_error(error: BaseException | None, secrets: Secrets) -> None:
     """Strike secrets out of an exception, and of those that it came of."""
     while error is not None:
-        error.args = tuple(secrets.strike_all(each) for each in error.args)
+        error.args = tuple(secrets.redact_all(each) for each in error.args)
         for name, value in vars(error).items():
             if isinstance(value, (str, dict, list)):
-                setattr(error, name, secrets.strike_all(value))
+                setattr(error, name, secrets.redact_all(value))
         error = error.__cause__ or error.__context__

@@ -81,7 +81,7 @@ def test_the_files_of_the_walk_throughs_work(page: str, repository: Path, tmp_pa
 
 def test_the_groups_are_those_that_are_looked_into(page: str) -> None:
     from agents import AGENTS
-    from agents.vlm.clients.kinds import CLIENTS
+    from agents.vlm.clients.registry import CLIENTS
     from er_gym.envs.observations import OBSERVATIONS
     from er_gym.sim.actions import registry as actions
     from er_gym.sim.render.shapes import registry as shapes

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from agents import make_agent
-from agents.vlm.clients.kinds import CLIENTS, client_named, speaks
+from agents.vlm.clients.registry import CLIENTS, is_model_agent, resolve_client
 from agents.vlm.factory import AgentFactory
 from agents.vlm.settings import AgentSettings
 from er_gym import plugins
@@ -84,7 +84,7 @@ def test_an_agent_plays(name: str) -> None:
 @pytest.mark.usefixtures("_household")
 @pytest.mark.parametrize("name", ["echo:open Fridge", "household:ECHO:open Fridge"])
 def test_a_model_client_replies(name: str, tmp_path: Path) -> None:
-    assert speaks(name)
+    assert is_model_agent(name)
     speaker = AgentFactory(name, AgentSettings(sees="text"), tmp_path)
     env = EmbodiedEnv("mini", obs_mode="text")
     obs, info = env.reset(seed=0)
@@ -172,7 +172,7 @@ def test_a_wrong_agent(name: str, message: str) -> None:
 def test_other_wrong_names() -> None:
     with pytest.raises(PluginError, match=r"unknown suite 'mimi' \(did you mean mini\?\).*two-tas"):
         load_suite("mimi")
-    with pytest.raises(PluginError, match="suite 'household:ECHO' is ModelClient"):
+    with pytest.raises(PluginError, match="suite 'household:ECHO' is ModelClientSpec"):
         load_suite("household:ECHO")
     with pytest.raises(PluginError, match=r"'household:ask' cannot be made \(TypeError: .*missing"):
         load_suite("household:ask")
@@ -182,10 +182,10 @@ def test_other_wrong_names() -> None:
         ValueError, match=r"unknown obs_mode 'rgb\+hand'.*rgb, depth, instance, state, text, hands"
     ):
         EmbodiedEnv(obs_mode="rgb+hand")
-    with pytest.raises(PluginError, match="observation 'household:ECHO' is ModelClient"):
+    with pytest.raises(PluginError, match="observation 'household:ECHO' is ModelClientSpec"):
         EmbodiedEnv(obs_mode="household:ECHO")
     with pytest.raises(PluginError, match="model client 'household:HANDS' is Observation"):
-        client_named("household:HANDS:x")
+        resolve_client("household:HANDS:x")
     with pytest.raises(PluginError, match=r"unknown paraphraser 'me'.*counter; package"):
         load_ask("me")
     assert suite_registry().names()[-1] == "two-tasks"

@@ -1,4 +1,4 @@
-"""Agents that learn by reinforcement; needs the extra ``rl`` (torch, Stable-Baselines3).
+"""Reinforcement learning agents; they need the extra ``rl`` (torch, Stable-Baselines3).
 
-Nothing here is imported before it is used: worker processes do without torch.
+This file imports nothing, since worker processes must not import torch.
 """

@@ -1,4 +1,4 @@
-"""Plays any suite with a policy that has been learnt."""
+"""Plays any suite with a trained policy."""
 
 from __future__ import annotations
 
@@ -10,39 +10,39 @@ from typing import Any
 import torch
 
 from agents.rl.config import load_config
-from agents.rl.policy_observation import Perception
-from agents.rl.saved import FOREIGN, MODEL, untrusted
-from agents.rl.train import CONFIG, FAMILIES, load_model
+from agents.rl.model_file import MODEL, SB3_MODEL, untrusted_model
+from agents.rl.policy_observation import PolicyObservation
+from agents.rl.train import ALGORITHMS, CONFIG, load_model
 from er_gym.envs.actions import ACTIONS
 from er_gym.rollout.agent import Decision
 from er_gym.tasks.task import Task
 
 
 class RLAgent:
-    """The policy of a run directory, playing what it thinks best (not what it would try).
+    """The policy of a run directory; it acts deterministically.
 
-    It sees what it saw in training: pictures are made as small, the instruction is encoded alike.
-    Of ``info`` it reads the action mask.
+    Its observations are made as in training: pictures have the same size, and instructions the same
+    encoding. From ``info`` it reads the action mask.
 
     Args:
-        path: the run directory; or a file, whose ``config.yaml`` is beside it: ``model.npz``, or,
-            with ``trust``, one that Stable-Baselines3 wrote.
-        trust: whether whatever code is in the latter may run.
+        path: the run directory, or a model file with its ``config.yaml`` beside it: ``model.npz``
+            or, with ``trust``, a file of Stable-Baselines3.
+        trust: whether a file of Stable-Baselines3, which can run code, may be loaded.
 
     Raises:
-        UntrustedModel: the file can run code, and ``trust`` does not allow that.
-        ValueError: there is no such run, or its model cannot be read.
+        UntrustedModel: the file can run code, and ``trust`` is False.
+        ValueError: the run does not exist, or its model cannot be read.
     """
 
     def __init__(self, path: str | Path, trust: bool = False) -> None:
         file = _model_file(Path(path))
         if file.suffix == ".zip" and not trust:
-            raise untrusted(file)
+            raise untrusted_model(file)
         config = load_config(file.parent / CONFIG)
-        family = FAMILIES[config.algorithm.name]
+        spec = ALGORITHMS[config.algorithm.name]
         self._model = _loaded(file, file.stat().st_mtime_ns, trust)
-        self._masks = not family.needs_mask
-        self._perception = Perception(config.env, family.needs_mask)
+        self._masks = not spec.needs_mask
+        self._policy_observation = PolicyObservation(config.env, spec.needs_mask)
         self.obs_mode: str = config.env.obs_mode
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
@@ -50,19 +50,19 @@ class RLAgent:
         self._instruction: str | None = task.instruction
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """What the policy does."""
+        """The policy's best action."""
         if self._instruction is not None:
-            seen = self._perception.begin(obs, info, self._instruction)
+            seen = self._policy_observation.reset(obs, info, self._instruction)
             self._instruction = None
         else:
-            seen = self._perception.see(obs, info)
+            seen = self._policy_observation.observe(obs, info)
         masks = {"action_masks": info["action_mask"]} if self._masks else {}
         action, _ = self._model.predict(seen, deterministic=True, **masks)
         return Decision(ACTIONS[int(action)])
 
 
 def _model_file(path: Path) -> Path:
-    for file in (path, path / MODEL, path / FOREIGN):
+    for file in (path, path / MODEL, path / SB3_MODEL):
         if file.is_file() and (file.name == MODEL or file.suffix == ".zip"):
             return file
     raise ValueError(
@@ -73,6 +73,6 @@ def _model_file(path: Path) -> Path:
 
 @lru_cache(maxsize=4)
 def _loaded(file: Path, changed: int, trust: bool) -> Any:
-    """The model in a file, read once for many episodes as long as it does not change."""
-    torch.set_num_threads(1)  # one observation at a time; and there may be several workers
+    """Load the model of a file; the cache serves many episodes while the file is unchanged."""
+    torch.set_num_threads(1)  # observations come one at a time, and several workers may run
     return load_model(file, trust)

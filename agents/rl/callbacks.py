@@ -1,4 +1,4 @@
-"""What happens beside learning: checkpoints, the curve, evaluation, the curriculum."""
+"""Training callbacks: checkpoints, learning curve, evaluation, curriculum."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stable_baselines3.common.logger import KVWriter
 from stable_baselines3.common.vec_env import VecEnv
 
 from agents.rl.config import Phase
-from agents.rl.saved import save
+from agents.rl.model_file import save
 from er_gym.tasks.reading import read_bytes
 from er_gym.writing import write_atomic
 
@@ -23,11 +23,11 @@ CURVE = "curve.jsonl"
 
 
 class Checkpoints(BaseCallback):
-    """Saves the model every so many steps, between one update and the next rollout.
+    """Saves the model every ``every`` steps, between an update and the next rollout.
 
     Attributes:
-        steps: how many had been made when a rollout last began or ended: between these, what has
-            been played is lost with the process, and a model is saved as one of so many steps.
+        steps: the number of steps when a rollout last began or ended. A saved model counts as one
+            of this many steps, since a partial rollout is lost with the process.
     """
 
     def __init__(self, run: Path, every: int) -> None:
@@ -56,10 +56,10 @@ class Checkpoints(BaseCallback):
         return True
 
 
-class Curve(KVWriter):
-    """Appends what the logger is told to ``curve.jsonl``, a line each time, with steps and seconds.
+class CurveWriter(KVWriter):
+    """Writes each logger dump as a line of ``curve.jsonl``, with steps and seconds.
 
-    A run that is continued drops the lines that came after its checkpoint.
+    A continued run drops the lines after its checkpoint.
     """
 
     def __init__(self, run: Path, steps: int) -> None:
@@ -79,7 +79,7 @@ class Curve(KVWriter):
             file.write(json.dumps(line) + "\n")
 
     def close(self) -> None:
-        """Nothing to do: each line is written when it comes."""
+        """Nothing to do: each line is written at once."""
 
 
 def _is_number(value: object) -> bool:
@@ -87,7 +87,7 @@ def _is_number(value: object) -> bool:
 
 
 def read_curve(run: Path) -> list[dict[str, float]]:
-    """The lines of a run's curve so far; a half-written line is left out."""
+    """The lines of a run's curve; a half-written line is skipped."""
     file = run / CURVE
     lines = []
     for text in read_bytes(file).split(b"\n") if file.exists() else ():
@@ -100,32 +100,32 @@ def read_curve(run: Path) -> list[dict[str, float]]:
     return lines
 
 
-class HeldOut(MaskableEvalCallback):
-    """sb3-contrib's evaluation, every so many steps rather than calls, between two rollouts."""
+class HeldOutEvaluation(MaskableEvalCallback):
+    """sb3-contrib's evaluation every ``every`` steps, between rollouts, rather than by calls."""
 
     def __init__(self, env: Any, every: int, count: int, seed: int) -> None:
         super().__init__(env, n_eval_episodes=count, eval_freq=1, verbose=0, warn=False)
         self._every, self._seed = every, seed
 
     def _on_training_start(self) -> None:
-        self._looked_at = self.num_timesteps
+        self._evaluated_at = self.num_timesteps
 
     def _on_rollout_start(self) -> None:
-        if self.num_timesteps - self._looked_at >= self._every:
-            self.look()
+        if self.num_timesteps - self._evaluated_at >= self._every:
+            self.evaluate()
 
     def _on_step(self) -> bool:
         return True
 
-    def look(self) -> None:
+    def evaluate(self) -> None:
         """Evaluate now, on the same episodes every time."""
-        self._looked_at = self.num_timesteps
+        self._evaluated_at = self.num_timesteps
         self.eval_env.seed(self._seed)
         super()._on_step()
 
 
-class Threads(BaseCallback):
-    """Torch has so many threads to learn with, and one while the environments need the cores."""
+class TorchThreads(BaseCallback):
+    """Gives torch ``threads`` threads for updates and one during rollouts, which need the cores."""
 
     def __init__(self, threads: int) -> None:
         super().__init__()
@@ -142,29 +142,29 @@ class Threads(BaseCallback):
 
 
 class Curriculum(BaseCallback):
-    """Says to the environments which task types it is the turn of."""
+    """Sets the task types of the current phase in the environments."""
 
     def __init__(self, phases: Sequence[Phase], types: Sequence[str]) -> None:
         super().__init__()
         self._phases, self._after = phases, tuple(types)
         self._now: tuple[str, ...] | None = None
 
-    def tell(self, env: VecEnv, steps: int) -> None:
-        """Say it for the episodes that begin after so many steps."""
+    def set_types(self, env: VecEnv, steps: int) -> None:
+        """Set the task types for episodes that begin after ``steps`` steps."""
         types = next((phase.types for phase in self._phases if steps < phase.until), self._after)
         if types != self._now:
             self._now = types
             env.env_method("set_types", types)
 
     def _on_rollout_start(self) -> None:
-        self.tell(self.training_env, self.num_timesteps)
+        self.set_types(self.training_env, self.num_timesteps)
 
     def _on_step(self) -> bool:
         return True
 
 
-class ByType(BaseCallback):
-    """Logs the success rate over its last episodes of each task type that was played."""
+class SuccessByType(BaseCallback):
+    """Logs the success rate of each task type over its last ``over`` episodes."""
 
     def __init__(self, over: int = 100) -> None:
         super().__init__()

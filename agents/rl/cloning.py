@@ -1,7 +1,7 @@
-"""Behaviour cloning: a policy learns to do what a scripted agent did, before it learns by itself.
+"""Behaviour cloning: a policy imitates a scripted agent before reinforcement learning.
 
-The value network learns from the same episodes what they were worth: one that knows nothing would
-undo the policy in the first updates that follow.
+The value network is fitted to the returns of the same episodes: an untrained one would undo the
+policy in the first updates.
 """
 
 from __future__ import annotations
@@ -15,66 +15,76 @@ from sb3_contrib import MaskablePPO
 from torch.nn import functional
 
 from agents.rl.config import TrainConfig, WarmStart
-from agents.rl.demonstrations import Demonstrations, joined
+from agents.rl.demonstrations import Demonstrations, concatenate
 from agents.rl.envs import make_env
 from agents.rl.vec_env import WorkerVecEnv
 
 
-def watch(config: TrainConfig, how: WarmStart, seed: int) -> Demonstrations:
-    """Let the teacher play, in as many processes as training has.
+def collect_demonstrations(config: TrainConfig, warm_start: WarmStart, seed: int) -> Demonstrations:
+    """Let the teacher play in as many processes as training uses.
 
     Raises:
-        ValueError: nothing that it did can be learnt.
+        ValueError: no step of the teacher can be used.
     """
     make = partial(make_env, config.env, config.algorithm.gamma, with_text=True)
     env = WorkerVecEnv([make] * config.vec.workers, config.vec.workers)
     try:
         env.seed(seed)
         env.reset()
-        share = -(-how.episodes // config.vec.workers)
+        share = -(-warm_start.episodes // config.vec.workers)
         parts = env.env_method(
-            "demonstrate", how.teacher, share, config.algorithm.gamma, how.successes_only
+            "demonstrate",
+            warm_start.teacher,
+            share,
+            config.algorithm.gamma,
+            warm_start.successes_only,
         )
     finally:
         env.close()
-    seen = joined(parts)
-    if not len(seen):
+    demonstrations = concatenate(parts)
+    if not len(demonstrations):
         raise ValueError(
-            f"{how.teacher} showed nothing to learn in {seen.episodes} episodes ({seen.successes} "
-            f"succeeded, {seen.refused} illegal actions, {seen.unread} texts that name no action); "
+            f"{warm_start.teacher} showed nothing to learn in {demonstrations.episodes} episodes "
+            f"({demonstrations.successes} succeeded, {demonstrations.refused} illegal actions, "
+            f"{demonstrations.unread} texts that name no action); "
             "choose another teacher or easier tasks"
         )
-    return seen
+    return demonstrations
 
 
-def clone(model: MaskablePPO, seen: Demonstrations, how: WarmStart, seed: int) -> float:
-    """Fit policy and value to demonstrations.
+def clone_behaviour(
+    model: MaskablePPO, demonstrations: Demonstrations, warm_start: WarmStart, seed: int
+) -> float:
+    """Fit policy and value network to demonstrations.
 
     Returns:
-        The share of the teacher's actions, in the last epoch, that the policy thought best.
+        The share of the teacher's actions in the last epoch that were the policy's best action.
     """
     policy = model.policy
-    optimizer = torch.optim.Adam(policy.parameters(), lr=how.learning_rate)
+    optimizer = torch.optim.Adam(policy.parameters(), lr=warm_start.learning_rate)
     random = np.random.default_rng(seed)
     policy.set_training_mode(True)
     agreed = 0
-    for _ in range(how.epochs):
+    for _ in range(warm_start.epochs):
         agreed = 0
         for rows in np.array_split(
-            random.permutation(len(seen)), max(1, len(seen) // how.batch_size)
+            random.permutation(len(demonstrations)),
+            max(1, len(demonstrations) // warm_start.batch_size),
         ):
             # The policy takes dictionaries, though its annotation asks for one Tensor.
-            obs: Any = policy.obs_to_tensor({key: all_[rows] for key, all_ in seen.obs.items()})[0]
-            actions = torch.as_tensor(seen.actions[rows])
-            masks = torch.as_tensor(seen.masks[rows])
+            obs: Any = policy.obs_to_tensor(
+                {key: all_[rows] for key, all_ in demonstrations.obs.items()}
+            )[0]
+            actions = torch.as_tensor(demonstrations.actions[rows])
+            masks = torch.as_tensor(demonstrations.masks[rows])
             values, log_prob, _ = policy.evaluate_actions(obs, actions, action_masks=masks)
-            worth = torch.as_tensor(seen.returns[rows])
+            worth = torch.as_tensor(demonstrations.returns[rows])
             loss = 0.5 * functional.mse_loss(values.flatten(), worth) - log_prob.mean()
             optimizer.zero_grad()
             loss.backward()
             torch.nn.utils.clip_grad_norm_(policy.parameters(), model.max_grad_norm)
             optimizer.step()
             with torch.no_grad():
-                best = policy.get_distribution(obs, seen.masks[rows]).mode()
+                best = policy.get_distribution(obs, demonstrations.masks[rows]).mode()
             agreed += int((best == actions).sum())
-    return agreed / len(seen)
+    return agreed / len(demonstrations)

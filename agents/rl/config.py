@@ -1,7 +1,8 @@
-"""What a training run is: one YAML file, checked. Imports neither torch nor environments.
+"""The configuration of a training run: one validated YAML file. Imports neither torch nor
+environments.
 
-Every field has a default or an error that names it; ``er-gym train-rl --config FILE --set
-env.types=[single_search]`` overrules any of them.
+Every field has a default, or an error names it. ``er-gym train-rl --config FILE --set
+env.types=[single_search]`` overrides a field.
 """
 
 from __future__ import annotations
@@ -33,26 +34,26 @@ def _known_types(types: tuple[str, ...]) -> tuple[str, ...]:
     return types
 
 
-class Episodes(_Model):
-    """Which episodes are played, and what the agent perceives of them.
+class EnvConfig(_Model):
+    """The episodes, the observations and the reward.
 
     Attributes:
-        episodes: a suite's name, a task file, or ``generate`` for the live generator.
-        types: of these task types, each as often as any other; all that there are where empty.
+        episodes: a suite's name, a task file, or ``generate`` for newly generated tasks.
+        types: the task types, drawn with equal probability; all types if empty.
         obs_mode: ``state``, with ``rgb`` or ``depth`` or both before it. (The numbers of
             ``instance`` are names, nothing that a network could reckon with.)
         instruction: the encoder of the instruction, as
             :func:`er_gym.envs.wrappers.make_encoder` has it; "" for none, since ``state`` says
             which types it names.
         width, height: of the pictures, pixels.
-        frames: how many of the last pictures are seen at once.
+        frames: the number of stacked pictures.
         instances: ``explore``, or ``target``, which gives away which object a task is about.
         step_penalty, illegal_penalty: subtracted from the reward, in training only.
-        success_bonus: added to it for a success, in training only: what counts in the end is one
-            action among many that are worth as much.
-        shaping: scale of the potential of key actions left, in training only; 0 for none
+        success_bonus: added to the reward for a success, in training only, since the last key
+            action alone is worth no more than any other.
+        shaping: scale of the potential of the key actions left, in training only; 0 for none
             (:class:`er_gym.envs.wrappers.KeyActionShaping`).
-        max_steps: an episode's step limit; the task type's own where none is given.
+        max_steps: the step limit of an episode; None for the task type's own.
     """
 
     episodes: str = "train"
@@ -72,20 +73,20 @@ class Episodes(_Model):
     _types = field_validator("types")(_known_types)
 
 
-class Vectorised(_Model):
-    """How many environments, in how many processes."""
+class VecEnvConfig(_Model):
+    """The number of environments and of worker processes."""
 
     envs: Annotated[int, Field(gt=0, le=4096)] = 128
     workers: Annotated[int, Field(gt=0, le=256)] = 2
 
 
 class Evaluation(_Model):
-    """How it is doing on scenes that it does not train on, every so often.
+    """Regular evaluation on held-out scenes.
 
     Attributes:
         episodes: a suite's name or a task file.
-        every: so many steps.
-        count: episodes each time.
+        every: steps between two evaluations.
+        count: episodes per evaluation.
     """
 
     episodes: str = "er-1k"
@@ -94,7 +95,7 @@ class Evaluation(_Model):
 
 
 class Phase(_Model):
-    """A part of a curriculum: these task types, until so many steps have been made."""
+    """A phase of a curriculum: the task types until ``until`` steps."""
 
     until: Positive
     types: tuple[str, ...] = Field(min_length=1)
@@ -103,12 +104,12 @@ class Phase(_Model):
 
 
 class WarmStart(_Model):
-    """Behaviour cloning before anything else.
+    """Behaviour cloning before reinforcement learning.
 
     Attributes:
-        teacher: who is imitated: ``searcher``, or ``oracle``, which knows the key actions.
-        episodes: how many of its are watched.
-        successes_only: whether those in which it fails are left out.
+        teacher: the imitated agent: ``searcher``, or ``oracle``, which knows the key actions.
+        episodes: the number of its episodes.
+        successes_only: whether failed episodes are left out.
         epochs, batch_size, learning_rate: of the supervised training.
     """
 
@@ -121,15 +122,16 @@ class WarmStart(_Model):
 
 
 class Network(_Model):
-    """The network: ``width`` of its layers, and length ``kind`` of a type's learnt vector."""
+    """The network: the ``width`` of its layers, and the length ``kind`` of an object type's
+    embedding."""
 
     width: Annotated[int, Field(gt=0, le=8192)] = 64
     kind: Annotated[int, Field(gt=0, le=8192)] = 16
 
 
 class PPO(_Model):
-    """MaskablePPO of sb3-contrib; the names are its own, but for ``final_learning_rate``: the share
-    of the learning rate that is left in the end."""
+    """MaskablePPO of sb3-contrib, with its parameter names. ``final_learning_rate`` is added: the
+    share of the learning rate that remains at the end."""
 
     name: Literal["ppo"] = "ppo"
     learning_rate: Rate = 2e-3
@@ -147,7 +149,8 @@ class PPO(_Model):
 
 
 class DQN(_Model):
-    """DQN, or QR-DQN with ``quantiles``, over legal actions; the names are Stable-Baselines3's."""
+    """DQN, or QR-DQN with ``quantiles``, over legal actions, with Stable-Baselines3's parameter
+    names."""
 
     name: Literal["dqn", "qrdqn"]
     learning_rate: Rate = 1e-3
@@ -171,25 +174,25 @@ class TrainConfig(_Model):
     """A training run.
 
     Attributes:
-        algorithm: which, and its settings.
-        total_steps: environment steps in all; a run goes on to the end of its last rollout.
-        seed: of everything that is random. The same seed gives the same policy on the same machine
-            with the same ``vec`` and ``threads``, if nothing interrupts it.
-        env, vec, evaluation, network: see there.
-        curriculum: phases, in order; after the last, ``env.types``.
-        warm_start: none where it is not given.
-        checkpoint_every: so many steps; at the end of the rollout that passes them.
-        threads: of torch, while it learns. More than one helps little with so small a network, and
-            costs a lot where something else runs on the same cores.
-        tensorboard: whether to write its logs.
-        wandb: the project of Weights & Biases to log to as well; "" for none.
+        algorithm: the algorithm and its parameters.
+        total_steps: environment steps in all; a run completes its last rollout.
+        seed: of all random choices. The same seed gives the same policy on the same machine with
+            the same ``vec`` and ``threads``, if the run is not interrupted.
+        env, vec, evaluation, network: see their classes.
+        curriculum: phases in order; ``env.types`` follow after the last.
+        warm_start: behaviour cloning; None for none.
+        checkpoint_every: steps between two checkpoints; a checkpoint is written after the rollout.
+        threads: torch's threads for updates. More than one helps little with so small a network,
+            and costs much if other processes need the cores.
+        tensorboard: whether to write TensorBoard logs.
+        wandb: the Weights & Biases project to log to; "" for none.
     """
 
     algorithm: Algorithm = PPO()
     total_steps: Positive
     seed: int = Field(0, ge=0, lt=2**32)
-    env: Episodes = Episodes()
-    vec: Vectorised = Vectorised()
+    env: EnvConfig = EnvConfig()
+    vec: VecEnvConfig = VecEnvConfig()
     evaluation: Evaluation | None = Evaluation()
     curriculum: tuple[Phase, ...] = ()
     warm_start: WarmStart | None = None
@@ -212,7 +215,7 @@ class TrainConfig(_Model):
         return self
 
     @model_validator(mode="after")
-    def _can_be_warmed(self) -> TrainConfig:
+    def _warm_start_needs_ppo(self) -> TrainConfig:
         if self.warm_start is not None and self.algorithm.name != "ppo":
             raise ValueError(
                 f"warm_start goes with ppo, not with {self.algorithm.name}: leave one out"
@@ -221,15 +224,15 @@ class TrainConfig(_Model):
 
 
 def config_names() -> tuple[str, ...]:
-    """The names of the runs that come with er-gym, in alphabetical order."""
+    """The names of er-gym's own training configurations, in alphabetical order."""
     return configs.names("rl")
 
 
 def config_file(name: str) -> Path:
-    """The file of a run: a path, or the name of one that comes with er-gym.
+    """The file of a training configuration: a path, or the name of one of er-gym's own.
 
     Raises:
-        ValueError: there is none; the message lists those that come with er-gym.
+        ValueError: the file does not exist; the message lists er-gym's own.
     """
     return configs.file_of("rl", name, _WHAT)
 
@@ -240,7 +243,7 @@ def load_config(
     """Read a run's YAML, see :func:`agents.configs.load`.
 
     Raises:
-        ValueError: an override is none, or has no such field; what is given does not fit.
+        ValueError: an override has no ``=`` or names an unknown field, or a value is invalid.
         TaskFileError: the file cannot be read. (It is a ValueError.)
     """
     return configs.load(TrainConfig, file, _WHAT, overrides, more)

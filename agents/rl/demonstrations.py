@@ -1,4 +1,4 @@
-"""Episodes of a scripted agent, as a learner would have seen them. Imports no torch."""
+"""Episodes of a scripted agent with the learner's observations. Imports no torch."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from er_gym.rollout.loop import transitions
 
 @dataclass(frozen=True, eq=False)
 class Demonstrations:
-    """N steps of some episodes: those in which the teacher did something legal.
+    """N steps from episodes of a teacher: those with a legal action.
 
     Attributes:
         obs: by the observation's keys, (N, …).
-        masks: (N, A) int8, what was legal.
-        actions: (N,) what was done.
-        returns: (N,) float32, the discounted rewards from there to the end of the episode.
-        episodes, successes: how many were played, and how many of them succeeded.
-        refused, unread: how many steps are left out because what the teacher did was illegal, or
-            was text that names no action.
+        masks: (N, A) int8, the legal actions.
+        actions: (N,) the teacher's actions.
+        returns: (N,) float32, the discounted return from each step on.
+        episodes, successes: the numbers of episodes played and of successes.
+        refused, unread: the numbers of steps left out because the action was illegal, or was text
+            that names no action.
     """
 
     obs: Obs
@@ -47,12 +47,14 @@ class Demonstrations:
 def demonstrate(
     env: gymnasium.Env[Obs, Any], teacher: str, episodes: int, gamma: float, successes_only: bool
 ) -> Demonstrations:
-    """Let an agent play in an environment whose ``info["seen"]`` has what the agent sees.
+    """Let an agent play in an environment whose ``info["seen"]`` holds the agent's observation.
 
     Args:
-        teacher: its name.
+        env: the learner's environment.
+        teacher: the agent's name.
+        episodes: the number of episodes.
         gamma: the discount of ``returns``.
-        successes_only: whether the steps of episodes that fail are left out.
+        successes_only: whether the steps of failed episodes are left out.
     """
     kept = [_of(env, [], gamma)]
     successes = 0
@@ -68,11 +70,11 @@ def demonstrate(
         successes += info["success"]
         if info["success"] or not successes_only:
             kept.append(_of(env, steps, gamma))
-    return replace(joined(kept), episodes=episodes, successes=successes)
+    return replace(concatenate(kept), episodes=episodes, successes=successes)
 
 
-def joined(parts: Sequence[Demonstrations]) -> Demonstrations:
-    """All in one."""
+def concatenate(parts: Sequence[Demonstrations]) -> Demonstrations:
+    """Concatenate demonstrations along the steps."""
     return Demonstrations(
         obs={key: np.concatenate([part.obs[key] for part in parts]) for key in parts[0].obs},
         masks=np.concatenate([part.masks for part in parts]),
@@ -93,13 +95,13 @@ class _Step(NamedTuple):
 
     @property
     def index(self) -> int:
-        """Of the action; -1 for one that is not in the action space."""
+        """The index of the action; -1 for an action outside of the action space."""
         return -1 if self.action is None else INDEX.get(self.action, -1)
 
 
 def _of(env: gymnasium.Env[Obs, Any], steps: Sequence[_Step], gamma: float) -> Demonstrations:
-    """An episode. What is left out of it is nothing to learn, but its reward and the time that it
-    took count in the returns of the steps before."""
+    """The demonstrations of an episode. Steps that are left out still count in the returns of
+    earlier steps."""
     returns = np.zeros(len(steps), np.float32)
     ahead = 0.0
     for number in reversed(range(len(steps))):

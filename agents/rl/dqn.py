@@ -1,15 +1,14 @@
 """DQN and QR-DQN over the legal actions (Stable-Baselines3, sb3-contrib).
 
-The observation tells the action mask, under ``mask``. What is illegal is worth next to nothing, now
-and in the target's maximum, and is not tried out either.
+The observation holds the action mask under ``mask``. Illegal actions get a very low value, also in
+the target's maximum, and are never explored.
 
-A run that is continued begins with an empty replay buffer: it plays ``learning_starts`` steps as it
-last did before it learns again.
+A continued run begins with an empty replay buffer: it plays ``learning_starts`` steps with its last
+    policy before it learns again.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,17 +34,18 @@ from agents.rl.network import TypeNetwork
 from agents.rl.policy_observation import Obs
 
 _NEVER = -1e6
-"""What an illegal action is worth. Finite: where an episode has ended it is multiplied by 0."""
+"""The value of an illegal action. It is finite, since it is multiplied by 0 at the end of an
+episode."""
 _LOG_EVERY = 100
-"""Episodes between two lines of the curve: as many as the means in it are over."""
+"""Episodes between two lines of the curve; its means cover as many."""
 
 
 # -- the network ---------------------------------------------------------------------------------
 
 
 class QuantileNetwork(BasePolicy):
-    """N quantiles of what is to come after each action: those of the state, which all actions
-    share, and what an action adds to each of them."""
+    """N quantiles of the return of each action: the state's quantiles, which all actions share,
+    plus the action's advantage for each."""
 
     def __init__(
         self, space: spaces.Dict, actions: spaces.Discrete, width: int, kind: int, quantiles: int
@@ -56,10 +56,10 @@ class QuantileNetwork(BasePolicy):
         self.value = nn.Sequential(nn.Linear(self.network.summary_width, width), nn.ReLU(), value)
         for last in (self.network.each, self.network.bare, value):
             with torch.no_grad():
-                last.weight.mul_(0.1)  # begin by expecting nothing much of anything
+                last.weight.mul_(0.1)  # start with values near 0
 
     def forward(self, obs: PyTorchObs) -> Tensor:
-        """(B, N, A); of illegal actions very low numbers."""
+        """(B, N, A) quantiles; very low for illegal actions."""
         seen = preprocess_obs(obs, self.observation_space)
         assert isinstance(seen, dict)
         more, summary = self.network(seen)  # (B, A, N), (B, summary)
@@ -72,10 +72,10 @@ class QuantileNetwork(BasePolicy):
 
 
 class ValueNetwork(QuantileNetwork):
-    """What is to come after each action, on average."""
+    """The expected return of each action."""
 
     def forward(self, obs: PyTorchObs) -> Tensor:
-        """(B, A); of illegal actions very low numbers."""
+        """(B, A) values; very low for illegal actions."""
         return super().forward(obs)[:, 0]
 
     def _predict(self, observation: PyTorchObs, deterministic: bool = True) -> Tensor:
@@ -88,29 +88,29 @@ def _spaces(policy: BasePolicy) -> tuple[spaces.Dict, spaces.Discrete]:
     return policy.observation_space, policy.action_space
 
 
-class TypeDQNPolicy(DQNPolicy):
-    """``policy_kwargs``: ``width``, ``kind``."""
+class _TypeWise(BasePolicy):
+    """Gives a policy the parameters of :class:`TypeNetwork`. Inherit from it before the policy."""
 
     def __init__(self, *args: Any, width: int = 64, kind: int = 16, **kwargs: Any) -> None:
         self._shape = {"width": width, "kind": kind}
         super().__init__(*args, **kwargs)
-
-    # Ours in place of Stable-Baselines3's own network, of which nothing else is asked.
-    def make_q_net(self) -> ValueNetwork:  # type: ignore[override]
-        """Another one, online or target."""
-        seen, actions = _spaces(self)
-        return ValueNetwork(seen, actions, **self._shape, quantiles=1).to(self.device)
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
         return {**super()._get_constructor_parameters(), **self._shape}
 
 
-class TypeQRDQNPolicy(QRDQNPolicy):
-    """``policy_kwargs``: ``width``, ``kind``, ``n_quantiles``."""
+class TypeDQNPolicy(_TypeWise, DQNPolicy):
+    """``policy_kwargs``: ``width``, ``kind``."""
 
-    def __init__(self, *args: Any, width: int = 64, kind: int = 16, **kwargs: Any) -> None:
-        self._shape = {"width": width, "kind": kind}
-        super().__init__(*args, **kwargs)
+    # Our network in place of Stable-Baselines3's own, which only needs to be callable.
+    def make_q_net(self) -> ValueNetwork:  # type: ignore[override]
+        """Another one, online or target."""
+        seen, actions = _spaces(self)
+        return ValueNetwork(seen, actions, **self._shape, quantiles=1).to(self.device)
+
+
+class TypeQRDQNPolicy(_TypeWise, QRDQNPolicy):
+    """``policy_kwargs``: ``width``, ``kind``, ``n_quantiles``."""
 
     # As above.
     def make_quantile_net(self) -> QuantileNetwork:  # type: ignore[override]
@@ -119,15 +119,12 @@ class TypeQRDQNPolicy(QRDQNPolicy):
         network = QuantileNetwork(seen, actions, **self._shape, quantiles=self.n_quantiles)
         return network.to(self.device)
 
-    def _get_constructor_parameters(self) -> dict[str, Any]:
-        return {**super()._get_constructor_parameters(), **self._shape}
-
 
 # -- the buffer ----------------------------------------------------------------------------------
 
 
 class HalfReplayBuffer(DictReplayBuffer):
-    """Keeps floats, which are in [-1, 1], in float16; the policy makes them float32 again.
+    """Stores floats, which are in [-1, 1], as float16; the policy converts them back to float32.
 
     A transition of ``state`` (2259,) and ``mask`` (286,), before and after, takes 9.6 kB, 50 000 of
     them 480 MB, rather than 930 MB in float32. Pictures of 128 × 72 add 55 kB to each.
@@ -147,9 +144,9 @@ class HalfReplayBuffer(DictReplayBuffer):
 
 
 class _Legal(OffPolicyAlgorithm):
-    """Explores among legal actions, each environment for itself; learns from a filled buffer.
+    """Explores legal actions, independently in each environment, and learns from a filled buffer.
 
-    To be inherited from before DQN or QRDQN.
+    A mixin: inherit from it before DQN or QRDQN.
     """
 
     exploration_rate: float
@@ -162,8 +159,8 @@ class _Legal(OffPolicyAlgorithm):
         deterministic: bool = False,
         action_masks: Any = None,
     ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...] | None]:
-        """What is thought best, or tried. Masks are read from the observation, not from
-        ``action_masks``, which sb3-contrib's evaluation gives to every learner."""
+        """The best action or an exploratory one. Masks are read from the observation;
+        ``action_masks``, which sb3-contrib's evaluation passes to every learner, is ignored."""
         return self._act(observation, 0.0 if deterministic else self.exploration_rate), state
 
     def _sample_action(
@@ -182,14 +179,15 @@ class _Legal(OffPolicyAlgorithm):
         return np.where(tries, lots.argmax(axis=-1), best)
 
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
-        """Learn, unless the buffer is as good as empty, as it is when a run is continued."""
+        """Learn, unless the buffer has fewer than ``learning_starts`` steps, as in a continued
+        run."""
         buffer = self.replay_buffer
         assert buffer is not None
         if buffer.full or buffer.size() * buffer.n_envs >= self.learning_starts:
             super().train(gradient_steps, batch_size)
 
     def learn(self, *args: Any, **kwargs: Any) -> Any:
-        """Go on until so many more steps are made."""
+        """See Stable-Baselines3; logs every 100 episodes by default."""
         return super().learn(*args, **{"log_interval": _LOG_EVERY, **kwargs})
 
 
@@ -198,26 +196,16 @@ class LegalDQN(_Legal, DQN):
 
 
 class LegalQRDQN(_Legal, QRDQN):
-    """QR-DQN, which learns how what is to come is distributed, over the legal actions."""
+    """QR-DQN, which learns the distribution of returns, over the legal actions."""
 
 
 def make(config: TrainConfig, settings: DQNSettings, env: VecEnv) -> BaseAlgorithm:
-    """A learner that has learnt nothing yet; which, ``settings.name`` says."""
+    """Make an untrained learner: DQN or QR-DQN, by ``settings.name``."""
     policy_kwargs = config.network.model_dump()
     if settings.name == "qrdqn":
         policy_kwargs["n_quantiles"] = settings.quantiles
     given: dict[str, Any] = {
-        "learning_rate": settings.learning_rate,
-        "buffer_size": settings.buffer_size,
-        "learning_starts": settings.learning_starts,
-        "batch_size": settings.batch_size,
-        "gamma": settings.gamma,
-        "train_freq": settings.train_freq,
-        "gradient_steps": settings.gradient_steps,
-        "target_update_interval": settings.target_update_interval,
-        "exploration_fraction": settings.exploration_fraction,
-        "exploration_final_eps": settings.exploration_final_eps,
-        "max_grad_norm": settings.max_grad_norm,
+        **settings.model_dump(exclude={"name", "quantiles"}),
         "replay_buffer_class": HalfReplayBuffer,
         "policy_kwargs": policy_kwargs,
         "seed": config.seed,
@@ -226,13 +214,3 @@ def make(config: TrainConfig, settings: DQNSettings, env: VecEnv) -> BaseAlgorit
     if settings.name == "qrdqn":
         return LegalQRDQN(TypeQRDQNPolicy, env, **given)
     return LegalDQN(TypeDQNPolicy, env, **given)
-
-
-def load_foreign_dqn(file: Path) -> LegalDQN:
-    """A learner as Stable-Baselines3 saved it, which may run what is in the file."""
-    return LegalDQN.load(file, device="cpu")
-
-
-def load_foreign_qrdqn(file: Path) -> LegalQRDQN:
-    """A learner as Stable-Baselines3 saved it, which may run what is in the file."""
-    return LegalQRDQN.load(file, device="cpu")

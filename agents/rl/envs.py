@@ -1,4 +1,4 @@
-"""Environments to learn in. Imports no torch: worker processes make them."""
+"""Training environments. Imports no torch, since worker processes make them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.rl.config import Episodes
+from agents.rl.config import EnvConfig
 from agents.rl.demonstrations import Demonstrations, demonstrate
-from agents.rl.policy_observation import Obs, Perception
+from agents.rl.policy_observation import Obs, PolicyObservation
 from er_gym.envs.embodied_env import EmbodiedEnv, verification_env
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.envs.wrappers import KeyActionShaping
@@ -19,14 +19,14 @@ from er_gym.tasks.task import Task
 from er_gym.tasks.types import TaskType, task_type
 
 _TRAINING_ONLY = ("step_penalty", "illegal_penalty", "success_bonus", "shaping")
-"""What changes the reward."""
+"""The fields that change the reward."""
 
 
 class TrainingRules(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Running out of steps terminates an episode, and success is worth a bonus.
+    """The step limit terminates an episode, and success earns a bonus.
 
-    The step limit is part of the task, and how near it is stands in the observation: beyond it
-    nothing is to be had, so nothing is to be hoped for.
+    The step limit is part of the task, and the observation states how near it is. No reward follows
+    beyond it, so the value there must be 0.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], success_bonus: float) -> None:
@@ -41,13 +41,13 @@ class TrainingRules(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
-    """Draws tasks of the wanted types, and shows the learner what :class:`Perception` makes.
+    """Draws tasks of the given types, and returns what :class:`PolicyObservation` makes of them.
 
     Args:
         env: an ``EmbodiedEnv``, shaped or not.
-        source: where tasks come from.
-        types: which; each as often as any other, or whatever comes where there are none.
-        perception: what is shown.
+        source: draws the tasks.
+        types: the task types, drawn with equal probability; any type if empty.
+        policy_observation: makes the learner's observations.
     """
 
     def __init__(
@@ -55,37 +55,37 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         env: gymnasium.Env[Any, Any],
         source: EpisodeSource,
         types: Sequence[str],
-        perception: Perception,
+        policy_observation: PolicyObservation,
     ) -> None:
         super().__init__(env)
-        self._source, self._perception = source, perception
+        self._source, self._policy_observation = source, policy_observation
         self.set_types(types)
         self._rng = np.random.default_rng()
-        self.observation_space = perception.space
+        self.observation_space = policy_observation.space
 
     def set_types(self, types: Sequence[str]) -> None:
         """Draw tasks of these types from the next episode on.
 
         Raises:
-            ValueError: there is none of that name.
+            ValueError: a name is not a task type.
         """
         self._types: tuple[TaskType | None, ...] = tuple(map(task_type, types)) or (None,)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Obs, dict[str, Any]]:
-        """Begin an episode, drawn unless ``options`` pin it."""
+        """Begin an episode; its task is drawn unless ``options`` name it."""
         if seed is not None:
             self._rng = np.random.default_rng(seed)
         obs, info = self.env.reset(seed=seed, options=options or {"task": self._draw()})
         info["seen"] = obs
-        return self._perception.begin(obs, info, info["task"].instruction), info
+        return self._policy_observation.reset(obs, info, info["task"].instruction), info
 
     def step(self, action: Any) -> tuple[Obs, Any, bool, bool, dict[str, Any]]:
         """Do an action."""
         obs, reward, terminated, truncated, info = self.env.step(action)
         info["seen"] = obs
-        return self._perception.see(obs, info), reward, terminated, truncated, info
+        return self._policy_observation.observe(obs, info), reward, terminated, truncated, info
 
     def action_masks(self) -> NDArray[np.int8]:
         """(A,) int8, the actions that are legal now."""
@@ -107,24 +107,25 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
 
 
 def make_env(
-    options: Episodes,
+    options: EnvConfig,
     gamma: float = 1.0,
     with_mask: bool = False,
     with_text: bool = False,
     share: tuple[int, int] = (0, 1),
 ) -> gymnasium.Env[Obs, Any]:
-    """An environment to learn in.
+    """Make a training environment.
 
     Args:
+        options: the episodes, observations and reward.
         gamma: the learner's discount, for shaping.
-        share: which of how many processes it is in; each plays in rooms of its own.
         with_mask: whether the observation holds the action mask.
-        with_text: whether ``info["seen"]``, the environment's own observation, holds text, as
-            scripted agents need it.
+        with_text: whether ``info["seen"]``, the environment's own observation, holds text, which
+            scripted agents need.
+        share: ``(index, count)`` of the worker process; each plays in its own rooms.
 
     Raises:
-        ValueError: there is no such suite or encoder.
-        TaskFileError: the suite has not been made, or its file is damaged. (It is a ValueError.)
+        ValueError: the suite or the encoder does not exist.
+        TaskFileError: the suite has not been built, or its file is damaged. (It is a ValueError.)
     """
     env: gymnasium.Env[Any, Any] = TrainingRules(
         EmbodiedEnv(
@@ -144,9 +145,9 @@ def make_env(
     source = make_source(options.episodes, verification_env)
     if isinstance(source, TaskList):
         source = source.share(*share)
-    return LearningEnv(env, source, options.types, Perception(options, with_mask))
+    return LearningEnv(env, source, options.types, PolicyObservation(options, with_mask))
 
 
-def for_evaluation(options: Episodes, episodes: str) -> Episodes:
-    """The same, on other episodes, with the reward as the environment has it."""
+def evaluation_config(options: EnvConfig, episodes: str) -> EnvConfig:
+    """The same configuration for other episodes, with the environment's own reward."""
     return options.model_copy(update={"episodes": episodes, **dict.fromkeys(_TRAINING_ONLY, 0.0)})

@@ -1,11 +1,10 @@
-"""A network over object types: the same weights for every type, so that what is learnt about one
-serves for all.
+"""A network over object types that shares its weights among all types.
 
-The state observation is a table with a row of features for each object type. Only the types that
-matter now, those that can be gone to or handled, held or named, are looked at, some 20 of 124:
-nothing else can be acted on. Each type's row goes through the same layers, together with what the
-type is (a learnt vector and AI2-THOR's properties of it), how it goes with the types that the
-instruction names, and a summary of all other types. Out come a number for each verb with that type.
+The state observation is a table with a row of features for each object type. The network
+processes only the types that are navigable, interactable, held or named by the instruction, some
+20 of 124, since no other type can be acted on. Each type's row passes through the same layers,
+with the type's embedding and AI2-THOR properties, its fit to the types that the instruction names,
+and a summary of all other types. The output is one number for each verb with that type.
 """
 
 from __future__ import annotations
@@ -27,24 +26,24 @@ TYPES = tuple(OBJECT_TYPES)
 _PROPERTIES = tuple(
     sorted({name for kind in OBJECT_TYPES.values() for name in kind.properties} - {"canBeUsedUp"})
 )
-"""Policies were trained without the one that is left out: it would change the sizes of layers."""
+"""Trained policies lack the excluded property; adding it would change layer sizes."""
 _MATTERS = [FEATURES.index(name) for name in ("navigable", "interactable", "held", "goal")]
 _GOAL = FEATURES.index("goal")
 _MANY = 8
-"""So many types have something to say, at a guess."""
+"""The approximate number of processed types, for scaling sums."""
 _NOWHERE = len(ACTIONS)
-"""Where the number for a verb goes that makes no sense with a type: it is cut off."""
+"""The index for verbs that do not apply to a type; this column is dropped."""
 
 
 class TypeNetwork(nn.Module):
-    """Numbers for every action, and a summary for a value.
+    """Outputs numbers for every action, and a summary for a value head.
 
     Args:
         space: with a key ``state``; optionally ``instruction`` (E,), and ``rgb`` and ``depth``
             (channels, H, W), as Stable-Baselines3 turns pictures; a ``mask`` is not looked at.
         width: of the layers.
         kind: length of the learnt vector of a type.
-        outputs: how many numbers an action gets: 1 for a logit or a value, more for quantiles.
+        outputs: numbers per action: 1 for a logit or a value, more for quantiles.
     """
 
     properties: Tensor
@@ -104,7 +103,7 @@ class TypeNetwork(nn.Module):
         first = (goal == 1).float() @ kinds  # (B, K)
         later = (goal * (goal < 1)) @ kinds
         wanted = torch.cat([first, later], dim=1)
-        # How well a type goes with what is wanted: an apple is looked for in a fridge.
+        # How well a type fits the instruction's types: an apple is searched for in a fridge.
         fit = functional.embedding(which, self.offers(kinds)) * self.asks(wanted).index_select(
             0, at
         )

@@ -16,7 +16,7 @@ from agents.rl.network import TypeNetwork
 
 
 class TypeFeatures(BaseFeaturesExtractor):
-    """(B, actions × outputs + summary): all that :class:`TypeNetwork` says, side by side."""
+    """(B, actions × outputs + summary): the outputs of :class:`TypeNetwork`, concatenated."""
 
     def __init__(
         self, observation_space: spaces.Dict, width: int = 64, kind: int = 16, outputs: int = 1
@@ -32,7 +32,7 @@ class TypeFeatures(BaseFeaturesExtractor):
 
 
 class _Split(nn.Module):
-    """Takes logits and summary apart again, as Stable-Baselines3's policies have it."""
+    """Splits the features into logits and summary, as Stable-Baselines3's policies expect."""
 
     def __init__(self, logits: int, summary: int) -> None:
         super().__init__()
@@ -77,7 +77,7 @@ class TypePolicy(MaskableActorCriticPolicy):
         )
         for last in (network.each, network.bare, value):
             with torch.no_grad():
-                last.weight.mul_(0.1)  # begin by trying everything alike
+                last.weight.mul_(0.1)  # start with a nearly uniform policy
         settings: dict[str, Any] = {"lr": lr_schedule(1), **self.optimizer_kwargs}
         self.optimizer = self.optimizer_class(self.parameters(), **settings)
 

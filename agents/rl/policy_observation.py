@@ -1,4 +1,4 @@
-"""What a learning agent is given to see, the same in training and when it plays a suite."""
+"""The learner's observation, the same in training and when the policy plays a suite."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from PIL import Image
 
-from agents.rl.config import Episodes
+from agents.rl.config import EnvConfig
 from er_gym.envs.actions import ACTIONS
 from er_gym.envs.observations import STATE_LAYOUT
 from er_gym.envs.wrappers import make_encoder
@@ -23,19 +23,19 @@ DEPTH_RANGE = 10.0
 """Metres; few rooms are longer."""
 
 
-class Perception:
-    """Makes the learner's observation of the environment's.
+class PolicyObservation:
+    """Makes the learner's observation from the environment's.
 
-    - ``state``: as the environment has it.
+    - ``state``: as in the environment's observation.
     - ``instruction``: (E,) float32 in [-1, 1], with an encoder.
     - ``rgb``: (height, width, 3 × frames) uint8, the last pictures, the newest last; at the
       beginning the first is repeated.
     - ``depth``: (height, width, frames) uint8, the same of the last depths; 255 is
       :data:`DEPTH_RANGE` and beyond.
-    - ``mask``: (A,) int8, the legal actions, for learners that have no other way to be told.
+    - ``mask``: (A,) int8, the legal actions, for algorithms that read them from the observation.
     """
 
-    def __init__(self, options: Episodes, with_mask: bool = False) -> None:
+    def __init__(self, options: EnvConfig, with_mask: bool = False) -> None:
         self._size = (options.width, options.height)
         self._encode = make_encoder(options.instruction) if options.instruction else None
         self._with_mask = with_mask
@@ -56,14 +56,14 @@ class Perception:
             entries["mask"] = spaces.Box(0, 1, (len(ACTIONS),), np.int8)
         self.space = spaces.Dict(entries)
 
-    def begin(self, obs: Mapping[str, Any], info: Mapping[str, Any], instruction: str) -> Obs:
+    def reset(self, obs: Mapping[str, Any], info: Mapping[str, Any], instruction: str) -> Obs:
         """The first observation of an episode."""
         for images in self._images.values():
             images.clear()
         self._told = self._encode(instruction) if self._encode is not None else None
-        return self.see(obs, info)
+        return self.observe(obs, info)
 
-    def see(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Obs:
+    def observe(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Obs:
         """The next one."""
         made: Obs = {"state": obs["state"]}
         if self._told is not None:

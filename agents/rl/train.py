@@ -1,9 +1,9 @@
-"""A training run from its configuration: begun, or continued from its last checkpoint.
+"""Starts a training run from its configuration, or continues it from its last checkpoint.
 
-A run directory holds ``config.yaml`` (all of the configuration), ``model.npz`` (the last
-checkpoint, whole at any time, see :mod:`agents.rl.saved`), ``curve.jsonl`` (what was logged, with
-steps and seconds) and ``tensorboard/``. Running the same again continues; when all steps are done
-it does nothing.
+A run directory holds ``config.yaml`` (the whole configuration), ``model.npz`` (the last checkpoint,
+always complete, see :mod:`agents.rl.model_file`), ``curve.jsonl`` (the logged values with steps and
+seconds) and ``tensorboard/``. Running the same command again continues the run; once all steps are
+done, it does nothing.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ from agents.configs import dump
 from agents.rl import dqn, ppo
 from agents.rl.callbacks import (
     CURVE,
-    ByType,
     Checkpoints,
     Curriculum,
-    Curve,
-    HeldOut,
-    Threads,
+    CurveWriter,
+    HeldOutEvaluation,
+    SuccessByType,
+    TorchThreads,
 )
-from agents.rl.cloning import clone, watch
-from agents.rl.config import Episodes, Evaluation, TrainConfig, WarmStart, load_config
-from agents.rl.envs import for_evaluation, make_env
-from agents.rl.policy_observation import Perception
-from agents.rl.saved import FOREIGN, MODEL, nothing, restore, save, untrusted
+from agents.rl.cloning import clone_behaviour, collect_demonstrations
+from agents.rl.config import EnvConfig, Evaluation, TrainConfig, WarmStart, load_config
+from agents.rl.envs import evaluation_config, make_env
+from agents.rl.model_file import MODEL, SB3_MODEL, placeholder_env, restore, save, untrusted_model
+from agents.rl.policy_observation import PolicyObservation
 from agents.rl.vec_env import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS
 from er_gym.locking import exclusive_use
@@ -51,30 +51,30 @@ from er_gym.writing import YAML_MARK, is_ours, make_folder, write_atomic
 CONFIG = "config.yaml"
 WARM_START = "warm_start.json"
 TENSORBOARD = "tensorboard"
-_OF_A_RUN = (MODEL, FOREIGN, CURVE, WARM_START, TENSORBOARD)
+_OF_A_RUN = (MODEL, SB3_MODEL, CURVE, WARM_START, TENSORBOARD)
 _EVALUATION_SEED = 10_000
-"""Every evaluation of every run begins with the same episodes."""
+"""All evaluations of all runs use the same episodes."""
 
 
-class Family(NamedTuple):
-    """How the learners of a family are made and loaded."""
+class AlgorithmSpec(NamedTuple):
+    """How the learners of an algorithm are made and loaded."""
 
     make: Callable[[TrainConfig, Any, VecEnv], BaseAlgorithm]
-    load_foreign: Callable[[Path], BaseAlgorithm]
-    """Reads a file of Stable-Baselines3, which may run what is in it."""
+    model_class: type[BaseAlgorithm]
+    """The class that loads a file of Stable-Baselines3, which may run code in it."""
     needs_mask: bool
-    """Whether the observation has to hold the action mask."""
+    """Whether the observation must hold the action mask."""
 
 
-FAMILIES = {
-    "ppo": Family(ppo.make, ppo.load_foreign, needs_mask=False),
-    "dqn": Family(dqn.make, dqn.load_foreign_dqn, needs_mask=True),
-    "qrdqn": Family(dqn.make, dqn.load_foreign_qrdqn, needs_mask=True),
+ALGORITHMS = {
+    "ppo": AlgorithmSpec(ppo.make, MaskablePPO, needs_mask=False),
+    "dqn": AlgorithmSpec(dqn.make, dqn.LegalDQN, needs_mask=True),
+    "qrdqn": AlgorithmSpec(dqn.make, dqn.LegalQRDQN, needs_mask=True),
 }
 
 
 class RunConflict(ValueError):
-    """A directory that holds another run; the message says what to do."""
+    """The directory holds another run; the message says what to do."""
 
 
 def train(
@@ -85,22 +85,23 @@ def train(
     trust: bool = False,
     more: tuple[BaseCallback, ...] = (),
 ) -> BaseAlgorithm:
-    """Train until ``config.total_steps`` are done; returns the learner.
+    """Train until ``config.total_steps`` steps are done, and return the learner.
 
     Args:
+        config: the configuration of the run.
         run: the run directory.
-        show_progress: whether to draw a bar.
-        trust: whether to read a checkpoint of before that Stable-Baselines3 wrote.
-        more: callbacks of the caller's own.
+        show_progress: whether to show a progress bar.
+        trust: whether a checkpoint of Stable-Baselines3 may be loaded.
+        more: additional callbacks.
 
     Raises:
         RunConflict: the directory holds a run of another configuration.
-        UntrustedModel: its checkpoint can run code, and ``trust`` does not allow that.
-        Locked: another process trains in it.
-        KeyboardInterrupt: Ctrl-C; what has been learnt is saved.
+        UntrustedModel: the checkpoint can run code, and ``trust`` is False.
+        Locked: another process trains in the directory.
+        KeyboardInterrupt: Ctrl-C; the learner is saved first.
     """
     with exclusive_use(run):
-        new = prepare(config, run)
+        new = prepare_run(config, run)
         try:
             return _train(config, run, show_progress, trust, more)
         except BaseException:  # Ctrl-C too
@@ -116,18 +117,18 @@ def _train(
     trust: bool,
     more: tuple[BaseCallback, ...],
 ) -> BaseAlgorithm:
-    model = load_last(run, trust)
+    model = load_last_checkpoint(run, trust)
     if model is not None and not (run / MODEL).exists():
-        save(model, run)  # from now on it needs no trust
+        save(model, run)  # from now on the run needs no trust
     steps = 0 if model is None else model.num_timesteps
     if model is not None and steps >= config.total_steps:
         return model
-    family = FAMILIES[config.algorithm.name]
-    # Continued, a run plays other episodes than when it was begun.
+    spec = ALGORITHMS[config.algorithm.name]
+    # A continued run plays different episodes than at its start.
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
-    env = vectorised(config, config.env, seed)
+    env = make_vec_env(config, config.env, seed)
     checkpoints = Checkpoints(run, config.checkpoint_every)
-    callbacks = [checkpoints, Threads(config.threads), ByType(), *more]
+    callbacks = [checkpoints, TorchThreads(config.threads), SuccessByType(), *more]
     held_out = None
     try:
         if config.evaluation is not None:
@@ -135,21 +136,21 @@ def _train(
             callbacks.append(held_out)
         if config.curriculum:
             curriculum = Curriculum(config.curriculum, config.env.types)
-            curriculum.tell(env, steps)
+            curriculum.set_types(env, steps)
             callbacks.append(curriculum)
         if show_progress:
             callbacks.append(ProgressBarCallback())
         if model is None:
-            model = family.make(config, config.algorithm, env)
+            model = spec.make(config, config.algorithm, env)
             if config.warm_start is not None:
-                _warm(model, config, config.warm_start, run, seed)
+                _warm_start(model, config, config.warm_start, run, seed)
             env.seed(seed)
         else:
             model.set_env(env)
             set_random_seed(seed)
         model.set_logger(_logger(config, run, steps))
         try:
-            with quick_arithmetic():
+            with fast_arithmetic():
                 model.learn(
                     config.total_steps - steps,
                     callback=CallbackList(callbacks),
@@ -159,7 +160,7 @@ def _train(
             if checkpoints.steps:
                 checkpoints.save()
         if held_out is not None:
-            held_out.look()
+            held_out.evaluate()
         model.logger.close()
     finally:
         env.close()
@@ -169,10 +170,10 @@ def _train(
 
 
 @contextmanager
-def quick_arithmetic() -> Iterator[None]:
-    """Tiny numbers count as 0, and distributions do not check what they are given, for a while."""
-    # What Adam remembers of weights that get no gradient, such as those of types that no room of
-    # the training has, fades until every operation on it takes a hundred times as long.
+def fast_arithmetic() -> Iterator[None]:
+    """Flush denormal numbers to 0 and skip the validation of distributions within the context."""
+    # Adam's moments of weights without gradient, such as those of types in no training room, decay
+    # to denormal numbers, which makes every operation a hundred times slower.
     torch.set_flush_denormal(True)
     Distribution.set_default_validate_args(False)
     try:
@@ -182,44 +183,46 @@ def quick_arithmetic() -> Iterator[None]:
         Distribution.set_default_validate_args(__debug__)
 
 
-def _warm(model: BaseAlgorithm, config: TrainConfig, how: WarmStart, run: Path, seed: int) -> None:
+def _warm_start(
+    model: BaseAlgorithm, config: TrainConfig, warm_start: WarmStart, run: Path, seed: int
+) -> None:
     assert isinstance(model, MaskablePPO)  # a configuration of another learner has no warm start
-    seen = watch(config, how, seed)
-    agreement = clone(model, seen, how, seed)
-    rate = seen.successes / seen.episodes
+    demonstrations = collect_demonstrations(config, warm_start, seed)
+    agreement = clone_behaviour(model, demonstrations, warm_start, seed)
+    rate = demonstrations.successes / demonstrations.episodes
     told = {
         "teacher_success": rate,
-        "steps": len(seen),
-        "refused": seen.refused,
-        "unread": seen.unread,
+        "steps": len(demonstrations),
+        "refused": demonstrations.refused,
+        "unread": demonstrations.unread,
         "agreement": agreement,
     }
     write_atomic(run / WARM_START, json.dumps(told))
-    if seen.refused or seen.unread:
+    if demonstrations.refused or demonstrations.unread:
+        played = len(demonstrations) + demonstrations.refused + demonstrations.unread
         warnings.warn(
-            f"cloning {how.teacher}: of its {len(seen) + seen.refused + seen.unread:,} steps "
-            f"{seen.refused:,} illegal ones and {seen.unread:,} whose text names no action are "
-            "left out",
+            f"cloning {warm_start.teacher}: of its {played:,} steps {demonstrations.refused:,} "
+            f"illegal ones and {demonstrations.unread:,} whose text names no action are left out",
             stacklevel=2,
         )
 
 
-def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOut:
-    env = vectorised(config, for_evaluation(config.env, asked.episodes), _EVALUATION_SEED)
-    return HeldOut(env, asked.every, asked.count, _EVALUATION_SEED)
+def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOutEvaluation:
+    env = make_vec_env(config, evaluation_config(config.env, asked.episodes), _EVALUATION_SEED)
+    return HeldOutEvaluation(env, asked.every, asked.count, _EVALUATION_SEED)
 
 
-def prepare(config: TrainConfig, run: Path) -> bool:
-    """Make the run directory, or see that it is this run's; returns whether the run is new.
+def prepare_run(config: TrainConfig, run: Path) -> bool:
+    """Make the run directory, or check that it belongs to this run; returns whether the run is new.
 
-    More steps may be asked for than before; anything else has to be the same. A run that was killed
-    before its first checkpoint has nothing that could be lost: it is begun anew.
+    The number of steps may grow; everything else must be equal. A run that was killed before its
+    first checkpoint is started again.
 
     Raises:
-        RunConflict: it is another run's, or holds files that er-gym did not write.
+        RunConflict: the directory belongs to another run, or holds files that er-gym did not write.
     """
     file = run / CONFIG
-    new = not any((run / name).exists() for name in (MODEL, FOREIGN))
+    new = not any((run / name).exists() for name in (MODEL, SB3_MODEL))
     if file.exists() and new and not is_ours(file):
         raise RunConflict(f"{file} is there, and er-gym did not write it; give another --out")
     if not file.exists():
@@ -243,7 +246,7 @@ def prepare(config: TrainConfig, run: Path) -> bool:
 
 
 def _withdraw(run: Path) -> None:
-    """Remove what a run has left that had learnt nothing yet, so that another may be begun."""
+    """Remove the files of a run without a checkpoint, so that another run may use the directory."""
     shutil.rmtree(run / TENSORBOARD, ignore_errors=True)
     for name in (CURVE, WARM_START, CONFIG):
         (run / name).unlink(missing_ok=True)
@@ -260,36 +263,38 @@ def _differences(one: dict[str, Any], other: dict[str, Any], path: str = "") -> 
     return ", ".join(filter(None, found))
 
 
-def load_last(run: Path, trust: bool = False) -> BaseAlgorithm | None:
-    """The learner of a run's last checkpoint, None if there is none yet; see :func:`load_model`."""
-    file = next((run / name for name in (MODEL, FOREIGN) if (run / name).exists()), None)
+def load_last_checkpoint(run: Path, trust: bool = False) -> BaseAlgorithm | None:
+    """Load a run's last checkpoint, None if there is none yet; see :func:`load_model`."""
+    file = next((run / name for name in (MODEL, SB3_MODEL) if (run / name).exists()), None)
     return None if file is None else load_model(file, trust)
 
 
 def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
-    """The learner of a file, as ``config.yaml`` beside it describes it.
+    """Load the learner of a file, with the ``config.yaml`` beside it.
 
     Args:
         file: ``model.npz``; or, with ``trust``, a file of Stable-Baselines3.
-        trust: whether whatever code is in the latter may run.
+        trust: whether a file of Stable-Baselines3, which can run code, may be loaded.
 
     Raises:
-        UntrustedModel: it may not. (It is a ValueError.)
-        ValueError: the file cannot be read, or is that of another learner.
+        UntrustedModel: ``trust`` is False, and the file can run code. (It is a ValueError.)
+        ValueError: the file cannot be read or belongs to another learner.
     """
     foreign = file.suffix == ".zip"
     if foreign and not trust:
-        raise untrusted(file)
+        raise untrusted_model(file)
     config = load_config(file.parent / CONFIG)
-    family = FAMILIES[config.algorithm.name]
-    space = Perception(config.env, family.needs_mask).space
-    model = family.make(config, config.algorithm, nothing(space, len(ACTIONS), config.vec.envs))
+    spec = ALGORITHMS[config.algorithm.name]
+    space = PolicyObservation(config.env, spec.needs_mask).space
+    model = spec.make(
+        config, config.algorithm, placeholder_env(space, len(ACTIONS), config.vec.envs)
+    )
     if not foreign:
         restore(file, model)
         return model
     try:
-        found = family.load_foreign(file)
-    except Exception as error:  # its classes may be anybody's, and raise anything
+        found = spec.model_class.load(file, device="cpu")
+    except Exception as error:  # unpickled classes can raise anything
         raise ValueError(f"{file} cannot be read as a model: {error}") from error
     for name in ("observation_space", "action_space"):
         if getattr(found, name) != getattr(model, name):
@@ -300,18 +305,18 @@ def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
     return found
 
 
-def vectorised(config: TrainConfig, options: Episodes, seed: int) -> VecEnv:
-    """``config.vec.envs`` environments in worker processes, seeded one after the other; each
+def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int) -> VecEnv:
+    """Make ``config.vec.envs`` environments in worker processes with consecutive seeds; each
     process plays in its share of the rooms."""
-    family = FAMILIES[config.algorithm.name]
-    make = partial(make_env, options, config.algorithm.gamma, family.needs_mask)
+    spec = ALGORITHMS[config.algorithm.name]
+    make = partial(make_env, options, config.algorithm.gamma, spec.needs_mask)
     env = VecMonitor(WorkerVecEnv([make] * config.vec.envs, config.vec.workers))
     env.seed(seed)
     return env
 
 
 def _logger(config: TrainConfig, run: Path, steps: int) -> Logger:
-    writers: list[KVWriter] = [Curve(run, steps)]
+    writers: list[KVWriter] = [CurveWriter(run, steps)]
     if config.tensorboard:
         writers.append(TensorBoardOutputFormat(str(run / TENSORBOARD)))
     if config.wandb:
@@ -320,7 +325,7 @@ def _logger(config: TrainConfig, run: Path, steps: int) -> Logger:
 
 
 def _start_wandb(config: TrainConfig, run: Path) -> None:
-    """Weights & Biases reads what TensorBoard is told."""
+    """Start Weights & Biases, which copies the TensorBoard logs."""
     try:
         import wandb
     except ImportError:

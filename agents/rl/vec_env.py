@@ -1,4 +1,4 @@
-"""Environments in worker processes, as Stable-Baselines3 wants them."""
+"""A Stable-Baselines3 VecEnv with environments in worker processes."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from agents.rl.vec_worker import Batch, serve
+from agents.rl.vec_worker import StepBatch, serve
 from er_gym.rollout.processes import CONTEXT, end_processes, start_process
 
 _CLOSING = 5.0
-"""Seconds that a worker has to close before it is stopped."""
+"""Seconds that a worker has to close before it is killed."""
 
 
 class WorkerVecEnv(VecEnv):
-    """Like ``SubprocVecEnv``, with several environments a process and the masks coming along.
+    """Like ``SubprocVecEnv``, with several environments per process, and masks sent with
+    observations.
 
-    ``SubprocVecEnv`` works too. This one is for speed: on two cores, 32 environments in two
-    processes answer in a batch each, share what the engine remembers of a room, and tell their
-    action masks with the observations rather than when asked once more.
+    ``SubprocVecEnv`` works too; this class is faster. With 32 environments in two processes, each
+    process answers with one batch, its environments share the engine's caches of a room, and action
+    masks come with the observations rather than by another request.
 
     Args:
-        make: makes an environment each, given ``share=(index, count)`` of the process that it is
-            made in; has to be picklable.
-        workers: how many processes; they are spawned, and import no torch.
+        make: one factory per environment, called with ``share=(index, count)`` of its process;
+            factories must be picklable.
+        workers: the number of processes; they are spawned and import no torch.
 
     Raises:
         RuntimeError: a worker process died; at any method.
@@ -64,20 +65,20 @@ class WorkerVecEnv(VecEnv):
             self._send(worker, "reset", each)
         self._reset_seeds()
         self._reset_options()
-        obs, *_ = self._together(self._all_answers())
+        obs, *_ = self._concatenated(self._all_answers())
         return obs
 
     def step_async(self, actions: NDArray[np.intp]) -> None:
-        """Send the actions off."""
+        """Send the actions."""
         for worker, rows in enumerate(self._rows):
             self._send(worker, "step", actions[rows])
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Wait for what came of them."""
+        """Wait for the results."""
         answers = self._all_answers()
-        return self._together(answers)
+        return self._concatenated(answers)
 
-    def _together(self, batches: Sequence[Batch]) -> VecEnvStepReturn:
+    def _concatenated(self, batches: Sequence[StepBatch]) -> VecEnvStepReturn:
         self._masks = np.concatenate([batch.masks for batch in batches])
         obs = {key: np.concatenate([batch.obs[key] for batch in batches]) for key in batches[0].obs}
         rewards = np.concatenate([batch.rewards for batch in batches])
@@ -91,19 +92,19 @@ class WorkerVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any
     ) -> list[Any]:
-        """Call a method of some environments, all for None; one answer each."""
+        """Call a method of some environments (None for all); one result each."""
         if method_name == "action_masks":  # as sb3-contrib asks at every step
             return list(self._masks[list(self._get_indices(indices))])
         return self._ask_some(indices, lambda rows: ("call", method_name, rows, args, kwargs))
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of some environments, all for None."""
+        """An attribute of some environments (None for all)."""
         if attr_name == "action_masks":
             return [self.action_masks] * len(list(self._get_indices(indices)))
         return self._ask_some(indices, lambda rows: ("get", attr_name, rows))
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Set an attribute of some environments, all for None."""
+        """Set an attribute of some environments (None for all)."""
         self._ask_some(indices, lambda rows: ("set", attr_name, rows, value))
 
     def env_is_wrapped(self, wrapper_class: Any, indices: VecEnvIndices = None) -> list[bool]:
@@ -121,7 +122,7 @@ class WorkerVecEnv(VecEnv):
         for process, pipe in zip(self._processes, self._pipes, strict=True):
             deadline = time.monotonic() + _CLOSING
             with contextlib.suppress(EOFError, OSError):
-                # What it still has to say is taken off it, lest it wait for that.
+                # Drain the pipe, so that the worker does not block on a send.
                 while process.is_alive() and time.monotonic() < deadline:
                     if pipe.poll(0.05):
                         pipe.recv()
@@ -138,7 +139,7 @@ class WorkerVecEnv(VecEnv):
     def _ask_some(
         self, indices: VecEnvIndices, question: Callable[[list[int]], tuple[Any, ...]]
     ) -> list[Any]:
-        """Ask the workers that have some environments; answers in the order of these."""
+        """Ask the workers that hold some environments; results in the order of ``indices``."""
         wanted = list(self._get_indices(indices))
         answers: dict[int, Any] = {}
         asked = []

@@ -1,8 +1,8 @@
-"""What a worker process does: several environments, stepped one after the other.
+"""A worker process that steps several environments one after the other.
 
-Imports no torch: a worker starts in a second and stays small. Several environments share one
-process because the engine remembers what it worked out about a room for the whole process, and
-because one message then carries a batch.
+It imports no torch: a worker starts in a second and stays small. Several environments share one
+process because the engine caches its results about a room per process, and because one message then
+carries a batch.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from agents.rl.policy_observation import Obs
 
 
-class Batch(NamedTuple):
-    """What k environments answer: arrays of k rows.
+class StepBatch(NamedTuple):
+    """The results of k environments: arrays of k rows.
 
     Attributes:
-        obs: by the observation's keys, (k, …); after the end of an episode the next one's first.
+        obs: by the observation's keys, (k, …); after the end of an episode, the first of the next.
         rewards: (k,) float32.
         dones: (k,) bool.
         masks: (k, A) int8, the actions that are legal now.
@@ -39,13 +39,13 @@ class Batch(NamedTuple):
     infos: list[dict[str, Any]]
 
 
-class Envs:
-    """A few environments in this process."""
+class WorkerEnvs:
+    """The environments of this process."""
 
     def __init__(self, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]]) -> None:
         self.envs = [each() for each in make]
 
-    def reset(self, seeds: Sequence[int | None]) -> Batch:
+    def reset(self, seeds: Sequence[int | None]) -> StepBatch:
         """Begin an episode in each."""
         began = [env.reset(seed=seed) for env, seed in zip(self.envs, seeds, strict=True)]
         nothing = np.zeros(len(began), np.float32)
@@ -57,7 +57,7 @@ class Envs:
             [{} for _ in began],
         )
 
-    def step(self, actions: NDArray[np.intp]) -> Batch:
+    def step(self, actions: NDArray[np.intp]) -> StepBatch:
         """Do one action in each; where an episode ends, the next begins."""
         all_obs, rewards, dones, masks, infos = [], [], [], [], []
         for env, action in zip(self.envs, actions.tolist(), strict=True):
@@ -80,14 +80,14 @@ class Envs:
         return _batch(all_obs, np.array(rewards, np.float32), np.array(dones), masks, infos)
 
     def call(self, name: str, rows: Sequence[int], args: Any, kwargs: Any) -> list[Any]:
-        """Call a method of some, wherever it is in their wrappers."""
+        """Call a method of some environments, wherever it is in their wrappers."""
         return [self.envs[row].get_wrapper_attr(name)(*args, **kwargs) for row in rows]
 
     def get(self, name: str, rows: Sequence[int]) -> list[Any]:
-        """An attribute of some.
+        """An attribute of some environments.
 
         Raises:
-            AttributeError: they have none of that name.
+            AttributeError: they have no such attribute.
         """
         return [self.envs[row].get_wrapper_attr(name) for row in rows]
 
@@ -112,27 +112,27 @@ def _batch(
     dones: NDArray[np.bool_],
     masks: list[NDArray[np.int8]],
     infos: list[dict[str, Any]],
-) -> Batch:
+) -> StepBatch:
     stacked = {key: np.stack([each[key] for each in obs]) for key in obs[0]}
-    return Batch(stacked, rewards, dones, np.stack(masks), infos)
+    return StepBatch(stacked, rewards, dones, np.stack(masks), infos)
 
 
 def serve(pipe: Connection, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]]) -> None:
-    """Answer ``(method of Envs, arguments)`` with ``(error or None, answer)`` until told to close,
-    or until the other end is gone."""
-    # A batch process does not push the trainer aside when it is woken: on a machine with as many
-    # cores as workers, the others would otherwise wait for their actions until it is done.
+    """Answer ``(method of WorkerEnvs, arguments)`` with ``(error or None, result)``, until
+    ``close`` is called or the pipe is closed."""
+    # With SCHED_BATCH a woken worker does not preempt the trainer. Otherwise, with as many workers
+    # as cores, the other workers would wait for their actions until it is done.
     with contextlib.suppress(AttributeError, OSError):  # not everywhere, nor always allowed
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
-    envs: Envs | None = None
+    envs: WorkerEnvs | None = None
     try:
         while True:
             method, args = pipe.recv()
             try:
                 if envs is None:
-                    envs = Envs(make)
+                    envs = WorkerEnvs(make)
                 answer: tuple[Exception | None, Any] = (None, getattr(envs, method)(*args))
-            except Exception as error:  # whatever it is, the trainer has to hear of it
+            except Exception as error:  # every error is sent to the trainer
                 answer = (error, None)
             pipe.send(answer)
             if method == "close":

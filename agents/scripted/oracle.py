@@ -1,4 +1,4 @@
-"""The ceiling: an agent that knows the key actions."""
+"""The upper bound of every comparison: an agent that knows the key actions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from er_gym.tasks.task import Task
 
 
 class OracleAgent:
-    """Plays as :class:`~er_gym.envs.solver.Solver` does."""
+    """Takes the actions of :class:`~er_gym.envs.solver.Solver`."""
 
     obs_mode = "text"
 

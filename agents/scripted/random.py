@@ -1,4 +1,4 @@
-"""The floor of every comparison: an agent that does any legal thing."""
+"""The lower bound of every comparison: an agent that takes random legal actions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class RandomAgent:
     """Draws uniformly from the legal actions.
 
     Args:
-        seed: of its own random generator, so that episodes can be replayed.
+        seed: of the agent's own random generator, which makes episodes reproducible.
     """
 
     obs_mode = "text"
@@ -27,5 +27,5 @@ class RandomAgent:
         """Nothing to prepare."""
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """Any legal action."""
+        """A random legal action."""
         return Decision(int(self._random.choice(np.flatnonzero(info["action_mask"]))))

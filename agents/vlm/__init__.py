@@ -1,1 +1,1 @@
-"""Agents that look, think and act by way of a language model, with eyes or without."""
+"""Agents that a vision-language model or a text-only language model drives."""

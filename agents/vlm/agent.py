@@ -1,4 +1,4 @@
-"""The agent that looks, thinks and acts by way of a model: one conversation an episode."""
+"""The agent that a language model drives, in one conversation per episode."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import Any
 
 from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture
 from agents.vlm.matching import Matcher
-from agents.vlm.parsing import Parsed, parse
+from agents.vlm.parsing import ParsedReply, parse
 from agents.vlm.pictures import encode
-from agents.vlm.prompt_set import Did, Now, PromptSet, parts_of
+from agents.vlm.prompt_set import LastAction, PromptSet, TurnContext, interleave_pictures
 from agents.vlm.record import (
     ConversationRecord,
     MessageRecord,
     PictureRecord,
     RoundRecord,
     ThoughtRecord,
-    plain_settings,
-    tokens,
+    settings_to_record,
+    token_counts,
 )
 from agents.vlm.settings import AgentSettings
 from er_gym.envs.actions import NO_ACTION, Action, applies
@@ -32,18 +32,18 @@ _LONGEST_QUOTE = 200
 
 
 class VLMAgent:
-    """Plays one episode after another; keeps the conversation of the last.
+    """Plays episodes one after another and keeps the conversation of the last one.
 
-    What has been sent is never changed afterwards, so that a server can go on from what it
-    remembers; only pictures beyond ``settings.pictures.keep`` are left out.
+    Messages never change once they are sent, so that a server can reuse its prefix cache. The only
+    exception: pictures beyond ``settings.pictures.keep`` are left out.
 
     Args:
-        client: gives the model's turns.
-        settings: of the agent.
-        prompts: the words that the model is given.
-        matcher: what object types the names stand for that it writes.
-        seed: of the episode; the client's.
-        name: its spec, for the record.
+        client: asks the model.
+        settings: the agent's settings.
+        prompts: the texts that the model is given.
+        matcher: finds the object type for a name that the model writes.
+        seed: of the episode; the client gets it with every request.
+        name: the agent's name, for the conversation record.
     """
 
     attachment_folders = (PICTURES, CONVERSATIONS)
@@ -72,16 +72,16 @@ class VLMAgent:
         self._rounds: list[RoundRecord] = []
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """Say what has come of the last action, and do what the model decides.
+        """Tell the model the result of its last action, and return what it decides.
 
         Raises:
-            ModelError: the model gives no reply.
-            CannotGoOn: nor will it ever.
+            ModelError: the model gives no reply in this episode.
+            CannotGoOn: no later request can succeed either.
         """
         self._messages.append(self._turn(obs, info))
         reply = self._client.reply(self._history(), self._seed)
         parsed = parse(reply.text, reply.call, self._settings.decide)
-        action, problem, matched = self._understand(parsed, info)
+        action, problem, matched = self._resolve(parsed, info)
         said = "\n".join(filter(None, (reply.text, reply.call))) or "(nothing)"
         self._messages.append(Message("assistant", (said,), reply.reasoning))
         thoughts = [ThoughtRecord(kind=each.kind, text=each.text) for each in parsed.thoughts]
@@ -98,8 +98,8 @@ class VLMAgent:
                 cost=reply.cost,
                 finish=reply.finish,
                 model=reply.model,
-                kept=reply.kept,
-                **tokens(reply.usage),
+                kept=reply.from_cache,
+                **token_counts(reply.usage),
             )
         )
         thought = "\n".join(f"{each.kind}: {each.text}" for each in parsed.thoughts)
@@ -109,17 +109,17 @@ class VLMAgent:
             prompt_tokens=reply.usage.prompt,
             completion_tokens=reply.usage.completion,
             cost=reply.cost,
-            cached=reply.kept,
+            cached=reply.from_cache,
         )
-        return Decision(action or _as_written(parsed, said), thought, took)
+        return Decision(action or _unreadable_action(parsed, said), thought, took)
 
-    # -- what is said to the model ---------------------------------------------------------------
+    # -- messages to the model -------------------------------------------------------------------
 
     def _turn(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Message:
-        """The user's next turn: the task, or what came of the last action."""
+        """The next user message: the task, or the result of the last action."""
         assert self._task is not None
         pictures = self._pictures(obs, info)
-        now = Now(
+        turn = TurnContext(
             task=self._task.instruction,
             decide=self._settings.decide,
             sees=self._settings.sees,
@@ -128,7 +128,7 @@ class VLMAgent:
             max_steps=info["max_steps"],
         )
         if not self._rounds:
-            return Message("user", parts_of(self._prompts.first(now), pictures))
+            return Message("user", interleave_pictures(self._prompts.first(turn), pictures))
         answer = {"feedback": info["feedback"], "success": bool(info["action_success"])}
         if answer["success"]:  # the paper's protocol finds something even in an unusable reply
             answer |= {"action": str(info["action"]), "problem": ""}
@@ -136,17 +136,17 @@ class VLMAgent:
         if last.problem:
             told = self._prompts.feedback(problem=last.problem, decide=self._settings.decide)
             return Message("user", (told,))
-        did = Did(
+        last_action = LastAction(
             action=last.action,
             success=last.success,
             feedback=last.feedback,
             pictures=len(pictures),
         )
-        return Message("user", parts_of(self._prompts.next(now, did), pictures))
+        return Message("user", interleave_pictures(self._prompts.next(turn, last_action), pictures))
 
     def _pictures(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> list[Picture]:
-        """What is seen: after an ``observe`` the views to the right, behind and left, as many as
-        the prompts have words for; and what is ahead."""
+        """The pictures of a turn: the current view, and after ``observe`` also the views to the
+        right, behind and left, as many as the prompts expect."""
         if self._settings.sees == "text":
             return []
         shown = [obs["rgb"]]
@@ -157,20 +157,20 @@ class VLMAgent:
         return [encode(picture, self._settings.pictures) for picture in shown]
 
     def _history(self) -> list[Message]:
-        """The conversation as it is sent."""
+        """The messages of the next request."""
         messages = self._messages
         if not self._settings.reasoning.in_history:
             messages = [replace(message, reasoning="") for message in messages]
         keep = self._settings.pictures.keep
         return messages if keep is None else _with_last_pictures(messages, keep)
 
-    # -- what the model says ---------------------------------------------------------------------
+    # -- replies of the model --------------------------------------------------------------------
 
-    def _understand(
-        self, parsed: Parsed, info: Mapping[str, Any]
+    def _resolve(
+        self, parsed: ParsedReply, info: Mapping[str, Any]
     ) -> tuple[Action | None, str, str]:
-        """The action, None where the object is unknown; what is wrong with it, "" if nothing; and
-        how a name became a type."""
+        """The action (None if the object is unknown), its problem ("" if none), and how the name
+        was matched with a type."""
         if parsed.problem or parsed.verb in verbs.BARE_VERBS:
             return (None if parsed.problem else Action(parsed.verb)), parsed.problem, ""
         at_hand = (*info["interactable"], *info["navigable"])
@@ -186,7 +186,7 @@ class VLMAgent:
     # -- the record ------------------------------------------------------------------------------
 
     def attachments(self, episode: EpisodeRecord, stem: str) -> dict[str, bytes]:
-        """The conversation and its pictures, by path; nothing if the episode never began."""
+        """The conversation and its pictures, by path; empty if the episode never began."""
         if self._task is None:
             return {}
         files: dict[str, bytes] = {}
@@ -203,10 +203,12 @@ class VLMAgent:
             scene=self._task.scene,
             instruction=self._task.instruction,
             agent=self._name,
-            settings=plain_settings(self._settings),
+            settings=settings_to_record(self._settings),
             prompts=self._prompts.name,
             prompts_digest=self._prompts.digest,
-            messages=[_kept(message, f"{PICTURES}/{stem}", files) for message in self._messages],
+            messages=[
+                _message_record(message, f"{PICTURES}/{stem}", files) for message in self._messages
+            ],
             rounds=rounds,
             prompt_tokens=sum(each.prompt_tokens for each in rounds),
             completion_tokens=sum(each.completion_tokens for each in rounds),
@@ -218,17 +220,18 @@ class VLMAgent:
         return files
 
 
-def _as_written(parsed: Parsed, said: str) -> str:
-    """What is handed to the environment in place of an action: the verb and the name that no type
-    has, else the reply. To the default protocol both name no action; the paper's counts the former
-    as a step."""
+def _unreadable_action(parsed: ParsedReply, said: str) -> str:
+    """The text that the environment gets in place of an action: the verb with the unknown name, or
+    else the reply.
+    Under the default protocol neither names an action; the paper's protocol counts the first as a
+    step."""
     if parsed.verb:
         return " ".join(f"{parsed.verb} {parsed.name}".split())[:_LONGEST_QUOTE]
     return NO_ACTION + said[:_LONGEST_QUOTE]
 
 
-def _kept(message: Message, folder: str, files: dict[str, bytes]) -> MessageRecord:
-    """A message as it is kept; its pictures go into ``files``."""
+def _message_record(message: Message, folder: str, files: dict[str, bytes]) -> MessageRecord:
+    """A message for the record; its pictures are added to ``files``."""
     parts: list[str | PictureRecord] = []
     for part in message.parts:
         if isinstance(part, str):
@@ -243,7 +246,7 @@ def _kept(message: Message, folder: str, files: dict[str, bytes]) -> MessageReco
 
 
 def _with_last_pictures(messages: Sequence[Message], keep: int) -> list[Message]:
-    """The messages with all pictures left out but those of the last and a few before it."""
+    """The messages with the pictures of the last message and the ``keep`` pictures before it."""
     *before, last = messages
     left = sum(isinstance(part, Picture) for message in before for part in message.parts) - keep
     shown = []

@@ -1,4 +1,4 @@
-"""What is said to a model and what it says, whoever serves it."""
+"""Messages to a model and its replies, the same for every client."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Picture:
 
 Part: TypeAlias = str | Picture
 LEFT_OUT = "[picture no longer shown]"
-"""The part that stands for an earlier picture that is not sent again."""
+"""The text that replaces an earlier picture that is not sent again."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,10 @@ class Message:
     """A turn of a conversation.
 
     Attributes:
-        role: whose.
+        role: who speaks.
         parts: texts and pictures, in order.
-        reasoning: what a reasoning model thought before an ``assistant`` turn, where it is to be
-            given back to it; otherwise "".
+        reasoning: the thoughts of a reasoning model before an ``assistant`` turn, if they are sent
+            back to the model; otherwise "".
     """
 
     role: Role
@@ -55,13 +55,13 @@ class Message:
 
 @dataclass(frozen=True)
 class Usage:
-    """What a reply took, in tokens, as the server counts them.
+    """Token counts of a request and its reply, as the server reports them.
 
     Attributes:
-        prompt: of the conversation sent; ``cached``: how many of them the server remembered.
-        completion: of the reply; ``reasoning``: how many of them were thought and not said.
-        estimated: whether the server's count was missing or impossible, so that some of these are
-            upper bounds (:mod:`agents.vlm.clients.tokens`).
+        prompt: tokens of the messages sent; ``cached``: those found in the server's prefix cache.
+        completion: tokens of the reply; ``reasoning``: those spent on thoughts.
+        estimated: whether a reported count was missing or impossible; an upper bound replaces such
+            a count (:mod:`agents.vlm.clients.tokens`).
     """
 
     prompt: int = 0
@@ -81,25 +81,24 @@ class Usage:
 
     @property
     def total(self) -> int:
-        """Prompt and completion."""
+        """Prompt and completion tokens together."""
         return self.prompt + self.completion
 
 
 @dataclass(frozen=True)
 class Reply:
-    """What a model said.
+    """A reply of a model.
 
     Attributes:
-        text: its words.
-        reasoning: what it thought, where the server tells that apart from its words.
-        call: the arguments of the tool call that it made, as JSON text; "" where it made none.
-        usage: tokens.
-        cost: what was paid for it, US dollars, by the prices that the settings state; 0 where they
-            state none.
-        finish: why it stopped, in the server's word: ``stop``, ``length``, ``content_filter`` …
-        model: which answered, in the server's words.
-        seconds: how long it took, with all tries.
-        kept: whether it was kept from an earlier request, which paid for it.
+        text: the text of the reply.
+        reasoning: the thoughts before it, if the server returns them separately.
+        call: the arguments of the tool call as JSON text; "" without a tool call.
+        usage: token counts.
+        cost: US dollars, by the prices of the settings; 0 without prices.
+        finish: the finish reason as the server gives it: ``stop``, ``length``, ``content_filter`` …
+        model: the model's name as the server gives it.
+        seconds: how long the request took, all tries included.
+        from_cache: whether the reply cache had it; an earlier request paid for it.
     """
 
     text: str
@@ -110,28 +109,28 @@ class Reply:
     finish: str = "stop"
     model: str = ""
     seconds: float = 0.0
-    kept: bool = False
+    from_cache: bool = False
 
 
 class ModelError(Exception):
-    """A model gave no reply, for good; the episode is over and can be played again."""
+    """A request failed after all tries. The episode ends; it can be played again."""
 
 
 class Client(Protocol):
-    """Whatever gives the next turn of a conversation. Called from many threads at once."""
+    """Asks a model for the next turn of a conversation. Many threads may call it at once."""
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
         """The next turn.
 
         Args:
-            messages: the conversation so far; the last is the user's.
-            seed: of the episode: two episodes that say the same may get other replies.
+            messages: the conversation so far; the last message is the user's.
+            seed: of the episode; equal messages in two episodes may get different replies.
 
         Raises:
-            ModelError: there is none, though others may be had.
-            CannotGoOn: no further reply can be had: the key is refused, there is no
-                such model, the budget is spent.
+            ModelError: this request failed; others may succeed.
+            CannotGoOn: no later request can succeed: the server refuses the key, the model does
+                not exist, or the budget is spent.
         """
 
     def close(self) -> None:
-        """Let go of what it holds."""
+        """Release connections, files and memory."""

@@ -1,4 +1,4 @@
-"""What all the agents of a run share that speak: a model's client, prompts, a matcher of names."""
+"""What all model agents of a run share: the model's client, the prompts and the name matcher."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from agents import configs
 from agents.vlm.chat import Client
-from agents.vlm.clients.kinds import client_named, speaks, ways_to_name
+from agents.vlm.clients.registry import agent_name_forms, is_model_agent, resolve_client
 from agents.vlm.record import without_secrets
 from agents.vlm.settings import AgentSettings, Prices
 from er_gym.rollout.events import Cost
@@ -19,49 +19,56 @@ from er_gym.rollout.run_directory import REPLIES, SERVER_EVENTS, SPENDING
 if TYPE_CHECKING:
     from agents.vlm.agent import VLMAgent
     from agents.vlm.clients.budget import Budget
-    from agents.vlm.clients.watch import Notice
+    from agents.vlm.clients.supervisor import ServerEvent
     from er_gym.rollout.json_lines import JsonLines
 
-__all__ = ["AgentFactory", "consequential", "load_settings", "speaks", "ways_to_name"]
+__all__ = [
+    "AgentFactory",
+    "agent_name_forms",
+    "comparable_settings",
+    "is_model_agent",
+    "load_settings",
+]
 
 _WHAT = "agent"
-_OF_NO_CONSEQUENCE: Mapping[str, Any] = {
+_NOT_COMPARED: Mapping[str, Any] = {
     "server": {"base_url", "key_from", "timeout", "connect", "tries", "requests_per_minute"},
     "local": {"device_map", "batch", "wait"},
     "prompts": {"dataset"},
     "prices": True,
 }
-"""Settings that change when and where a model answers, and not what it says. Prompts are known by
-their digest."""
+"""Settings that change when and where a model answers, but not its replies. The digest stands for
+the prompts."""
 
 
 def load_settings(name: str | None, overrides: Sequence[str] = ()) -> AgentSettings:
-    """The settings of an agent: a file of ``configs/agents`` by name, or any by path.
+    """Read an agent's settings from a file of ``configs/agents`` by name, or from any file by path.
 
     Raises:
-        ValueError: there is no such file, or it does not fit, or an override does not.
+        ValueError: the file does not exist, or the file or an override is invalid.
     """
     file = configs.file_of("agents", name, _WHAT) if name else None
     return configs.load(AgentSettings, file, _WHAT, overrides)
 
 
 class AgentFactory:
-    """Makes the agents of a run.
+    """Makes the model agents of a run.
 
     Attributes:
-        client: of the model.
-        watch: the run's time and news; ``watch.show`` is called with what a user should hear.
+        client: the model's client.
+        supervisor: supervises the run's requests; ``supervisor.show`` is called with each event
+            that the user should see.
 
     Args:
-        name: a model client's name and what it is to open: ``openai:MODEL``
-            (:data:`agents.vlm.clients.kinds.CLIENTS`).
-        settings: of the agent.
-        directory: where replies are kept, so that none is paid for twice, what has been spent, and
-            what went wrong with the server; without it, nothing is kept.
-        budget: what may be spent.
+        name: a model client's name and what the client opens: ``openai:MODEL``
+            (:data:`agents.vlm.clients.registry.CLIENTS`).
+        settings: the agents' settings.
+        directory: holds the reply cache, the ledger and the server events. Without a directory
+            nothing is stored.
+        budget: what the run may spend.
 
     Raises:
-        ValueError: the name, the prompts or the matcher's model are not there, packages are
+        ValueError: the name, the prompts or the matcher's model do not exist, a package is
             missing, or the directory's ledger is a link.
         CannotGoOn: there is no key, or the model cannot be loaded.
     """
@@ -76,7 +83,7 @@ class AgentFactory:
         from agents.vlm.matching import Matcher
         from agents.vlm.prompts import load_prompts
 
-        kind, opened = client_named(name)
+        kind, opened = resolve_client(name)
         self.name, self.settings = name, settings
         self.prompts = load_prompts(settings.prompts)
         self._matcher = Matcher(settings.matching)
@@ -86,19 +93,19 @@ class AgentFactory:
         self._directory = directory
         try:
             from agents.vlm.clients.budget import Budget, Ledger
-            from agents.vlm.clients.watch import Watch
+            from agents.vlm.clients.supervisor import RequestSupervisor
 
             asked = budget or Budget()
-            self.watch = Watch(asked.max_minutes)
+            self.supervisor = RequestSupervisor(asked.max_minutes)
             self._ledger = Ledger(asked, settings.prices if kind.priced else Prices())
-            client = kind.open(opened, settings, self._ledger, self.watch)
+            client = kind.open(opened, settings, self._ledger, self.supervisor)
             self.client: Client = client
             if directory is not None:
-                from agents.vlm.clients.reply_cache import Kept
+                from agents.vlm.clients.reply_cache import ReplyCache
 
                 self._ledger.open(directory / SPENDING)
-                self.watch.keep = self._keep
-                self.client = Kept(client, directory / REPLIES)
+                self.supervisor.log_event = self._keep
+                self.client = ReplyCache(client, directory / REPLIES)
         except ImportError as error:
             raise ValueError(
                 f"agent {name} needs {error.name}, which is not installed: "
@@ -115,7 +122,7 @@ class AgentFactory:
 
     @property
     def cost(self) -> Cost | None:
-        """What the run has cost so far; None where nothing is written down."""
+        """The cost of the run so far; None without a directory."""
         if self._directory is None:
             return None
         spent = self._ledger.spent
@@ -127,24 +134,24 @@ class AgentFactory:
         )
 
     def close(self) -> None:
-        """Let go of the client."""
+        """Close the client, the ledger and the event log."""
         self.client.close()
         self._ledger.close()
         if self._events is not None:
             self._events.close()
 
-    def _keep(self, notice: Notice) -> None:
-        """Write down what went wrong; the file is made when something does."""
+    def _keep(self, server_event: ServerEvent) -> None:
+        """Append an event to the log; the first event creates the file."""
         from er_gym.rollout.json_lines import JsonLines
 
         assert self._directory is not None
-        # A full disk is told where something is lost by it.
+        # A full disk is reported where it loses data that matters.
         with contextlib.suppress(OSError, ValueError), self._keeping:
             self._events = self._events or JsonLines(self._directory / SERVER_EVENTS)
-            self._events.add(notice.model_dump_json())
+            self._events.add(server_event.model_dump_json())
 
 
-def consequential(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:
-    """What of the settings decides what an agent says: two runs compare if theirs are equal."""
-    kept = settings.model_dump(mode="json", exclude=dict(_OF_NO_CONSEQUENCE))
+def comparable_settings(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:
+    """The settings that decide an agent's replies. Two runs are comparable if these are equal."""
+    kept = settings.model_dump(mode="json", exclude=dict(_NOT_COMPARED))
     return {**without_secrets(settings, kept), "prompts_digest": prompts_digest}

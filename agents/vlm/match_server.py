@@ -1,4 +1,4 @@
-"""Matching over HTTP, for clients in other languages than Python. For this machine alone.
+"""Name matching over HTTP, for programs in other languages. It listens on this machine only.
 
 ::
 
@@ -7,8 +7,8 @@
     GET  /health                                                     {"status": "ok"}
 
 A match is ``{"name", "object_type", "how", "score", "near"}``, as
-:class:`~agents.vlm.matching.Match` has them. Whatever is wrong is answered by ``{"error": …}``, of
-one line, and a status of 4xx or 5xx.
+:class:`~agents.vlm.matching.Match` has them. A failed request is
+answered with ``{"error": …}`` in one line and a status of 4xx or 5xx.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _Names = Annotated[list[str], Field(max_length=_MOST_NAMES)]
 
 
 class MatchRequest(BaseModel):
-    """A name, or names, to be matched; see :meth:`~agents.vlm.matching.Matcher.match_many`."""
+    """One name or several names to match; see :meth:`~agents.vlm.matching.Matcher.match_many`."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -49,7 +49,7 @@ class MatchRequest(BaseModel):
 
 
 def make_app(matcher: Matcher) -> Flask:
-    """The application."""
+    """The Flask application."""
     app = Flask(__name__)
     app.config["MAX_CONTENT_LENGTH"] = _LARGEST_BODY
 
@@ -85,18 +85,20 @@ def _one_line(error: ValidationError) -> str:
 
 
 def serve(matcher: Matcher, port: int) -> None:
-    """Answer requests until interrupted; the first line that it prints says where.
+    """Answer requests until interrupted. The first line of output is the address.
 
     Args:
-        matcher: answers; what it has to load is loaded before.
-        port: of this machine; any free one for 0.
+        matcher: matches the names; its model is loaded before the first request.
+        port: of this machine; 0 for any free port.
 
     Raises:
-        ValueError: the matcher's model cannot be loaded, or the port cannot be had.
+        ValueError: the matcher's model cannot be loaded, or the port is taken.
     """
     matcher.prepare()
     app = make_app(matcher)
-    with socket.socket() as listening:  # ours, for werkzeug ends the process if it cannot have it
+    with (
+        socket.socket() as listening
+    ):  # our own socket: werkzeug ends the process if the port is taken
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listening.bind((HOST, port))

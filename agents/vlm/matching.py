@@ -1,8 +1,8 @@
-"""The object type that a name stands for which a model has written.
+"""Finds the object type for a name that a model has written.
 
-Names are looked up first, by letters alone: case, spaces, plurals, articles and numbers do not
-matter. Where that fails they are compared, by letters with RapidFuzz and, where a model is given
-for it, by meaning with sentence-transformers.
+A name is first looked up. Case, spaces, plurals, articles and numbers do not matter. If the lookup
+fails, RapidFuzz compares the spelling. If the settings name a sentence-transformers model, that
+model then compares the meaning.
 """
 
 from __future__ import annotations
@@ -17,43 +17,44 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from agents.vlm.name_embeddings import Meanings
+from agents.vlm.name_embeddings import NameEmbeddings
 from agents.vlm.names_en import MODIFIERS, NAMES_EN, SHARED_EN
 from agents.vlm.names_zh import NAMES_ZH, SHARED_ZH
 from agents.vlm.settings import Matching
 from er_gym.thor import OBJECT_TYPES
 
-How: TypeAlias = Literal["exact", "alias", "fuzzy", "meaning", "none"]
+MatchMethod: TypeAlias = Literal["exact", "alias", "fuzzy", "meaning", "none"]
 
 _SHORTEST_FUZZY = 5
-"""Letters of the shortest names that may be misspelt: "Pan" is no "Pen", and "Cup" no "Cap"."""
+"""Shorter names are not matched fuzzily: "Pan" is not "Pen", and "Cup" is not "Cap"."""
 _LETTERS_PER_EDIT = 6
-"""A name may have one wrong letter, or one more for each so many: "baseball" is no "BasketBall"."""
+"""One edit is allowed per this many letters, at least one: "baseball" is not "BasketBall"."""
 _LONGEST = 100
-_NEAR = 3
+_MAX_NEAREST = 3
 
 
 @dataclass(frozen=True)
 class Match:
-    """What a name stands for.
+    """The result of matching a name.
 
     Attributes:
-        name: as it was given.
-        object_type: "" for none.
-        how: by the type's own name, by another name of it, by letters, by meaning, or not at all.
-        score: how alike, 1 for what was looked up: share of letters, or cosine; 0 for none.
-        near: for none, the types that come nearest, at most three.
+        name: the name as it was given.
+        object_type: the matched type; "" for none.
+        how: by the type's own name, by an alias, by spelling, by meaning, or not at all.
+        score: similarity from 0 to 1: 1 for a lookup, else the spelling ratio or the cosine; 0 for
+            none.
+        near: without a match, the nearest types, at most three.
     """
 
     name: str
     object_type: str = ""
-    how: How = "none"
+    how: MatchMethod = "none"
     score: float = 0.0
     near: tuple[str, ...] = ()
 
     @property
     def problem(self) -> str:
-        """What to tell of a name that stands for none; "" for one that does."""
+        """The feedback for an unmatched name; "" for a matched one."""
         if self.object_type:
             return ""
         name = self.name if len(self.name) <= _LONGEST else self.name[: _LONGEST - 1] + "…"
@@ -65,7 +66,7 @@ class Match:
         return f"{words}; the nearest {'are' if others else 'is'} {known}."
 
 
-# -- looked up -------------------------------------------------------------------------------------
+# -- lookup ----------------------------------------------------------------------------------------
 
 _WORD = re.compile(r"[^\W_]+")
 _NUMBER = re.compile(r"\d+$")
@@ -73,7 +74,7 @@ _PLURALS = (
     *(("ies", "y"), ("ves", "f"), ("ves", "fe"), ("s", "")),
     *((f"{end}es", end) for end in ("s", "x", "z", "ch", "sh", "o")),
 )
-"""Ends of plurals and of their singulars."""
+"""Plural endings and the singular endings that replace them."""
 
 
 def _key(name: str) -> str:
@@ -83,11 +84,11 @@ def _key(name: str) -> str:
 @dataclass(frozen=True)
 class _Entry:
     types: tuple[str, ...]
-    how: How
+    how: MatchMethod
 
 
 def _entries() -> dict[str, _Entry]:
-    """What can be looked up, by key."""
+    """All known names, by lookup key."""
     entries = {_key(name): _Entry((name,), "exact") for name in OBJECT_TYPES}
     for names in (NAMES_EN, NAMES_ZH):
         for object_type, others in names.items():
@@ -100,12 +101,12 @@ def _entries() -> dict[str, _Entry]:
 _ENTRIES: Mapping[str, _Entry] = _entries()
 
 
-def _looked_up(name: str) -> _Entry | None:
+def _look_up(name: str) -> _Entry | None:
     return next((_ENTRIES[key] for key in _keys(name) if key in _ENTRIES), None)
 
 
 def _keys(name: str) -> Iterator[str]:
-    """By what to look a name up, the likeliest first."""
+    """The lookup keys of a name, most likely first."""
     first, *parts = name.split("|")  # AI2-THOR's ids: Sink|-00.50|+00.90|+01.20|SinkBasin
     if parts and parts[-1][:1].isalpha():
         first = parts[-1]
@@ -115,7 +116,7 @@ def _keys(name: str) -> Iterator[str]:
     plainer = list(words)
     while len(plainer) > 1 and (plainer[0] in MODIFIERS or plainer[0].isdigit()):
         plainer.pop(0)
-    # "bowl of fruit", but not "slice of bread", which has been looked up as it stands before.
+    # "bowl of fruit" becomes "bowl"; "slice of bread" is found as it stands before that.
     outer = plainer[: plainer.index("of")] if "of" in plainer else plainer
     for each in (words, plainer, outer):
         yield from _with_singulars(_NUMBER.sub("", "".join(each)))
@@ -131,15 +132,15 @@ def _with_singulars(key: str) -> Iterator[str]:
 
 
 def _one_of(types: Sequence[str], prefer: Collection[str]) -> str:
-    """The first that is preferred, else the first."""
+    """The first preferred type, else the first type."""
     return next((each for each in types if each in prefer), types[0])
 
 
-# -- compared by letters ---------------------------------------------------------------------------
+# -- spelling --------------------------------------------------------------------------------------
 
 
 @cache
-def _letters() -> tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]:
+def _rapidfuzz() -> tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]:
     """RapidFuzz's ``extract``, its scorer ``ratio`` and its distance in edits."""
     try:
         from rapidfuzz import fuzz, process
@@ -148,16 +149,16 @@ def _letters() -> tuple[Callable[..., Any], Callable[..., Any], Callable[..., An
         raise ValueError(
             f"matching names needs RapidFuzz ({error}): pip install 'er-gym[vlm]'"
         ) from error
-    # ratio, not WRatio and its like: these take "Towel" for a HandTowelHolder.
+    # ratio, not WRatio: WRatio takes "Towel" for a HandTowelHolder.
     return process.extract, fuzz.ratio, OSA.distance
 
 
 _MISSPELLABLE = tuple(key for key in _ENTRIES if key.isascii() and len(key) >= _SHORTEST_FUZZY)
 
 
-def _spelt_alike(name: str, at_least: float, prefer: Collection[str]) -> tuple[str, float]:
-    """The type whose name differs by few letters, and how alike it is, 0 to 1; or "" and 0."""
-    extract, ratio, edits = _letters()
+def _fuzzy_match(name: str, at_least: float, prefer: Collection[str]) -> tuple[str, float]:
+    """The type with the most similar spelling and its score from 0 to 1; "" and 0 for none."""
+    extract, ratio, edits = _rapidfuzz()
     for key in dict.fromkeys(_keys(name)):
         if len(key) < _SHORTEST_FUZZY:
             continue
@@ -175,53 +176,54 @@ def _spelt_alike(name: str, at_least: float, prefer: Collection[str]) -> tuple[s
     return "", 0.0
 
 
-def _near_in_letters(name: str) -> tuple[str, ...]:
-    extract, ratio, _ = _letters()
+def _nearest_by_letters(name: str) -> tuple[str, ...]:
+    extract, ratio, _ = _rapidfuzz()
     found = extract(next(_keys(name)), _ENTRIES.keys(), scorer=ratio, score_cutoff=1, limit=20)
     return _first_types(_ENTRIES[key].types for key, _, _ in found)
 
 
 def _first_types(ranked: Iterable[Sequence[str]]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(each for types in ranked for each in types))[:_NEAR]
+    return tuple(dict.fromkeys(each for types in ranked for each in types))[:_MAX_NEAREST]
 
 
-# -- all of it -------------------------------------------------------------------------------------
+# -- the matcher -----------------------------------------------------------------------------------
 
 
 class Matcher:
-    """Finds object types for names. May be asked by many threads at once.
+    """Finds object types for names. Many threads may use it at once.
 
     Args:
-        settings: how alike a name must be to one that is known.
+        settings: the similarity that a match needs.
     """
 
     def __init__(self, settings: Matching) -> None:
         self._settings = settings
         self._lock = threading.Lock()
-        self._meanings: Meanings | None = None
+        self._embeddings: NameEmbeddings | None = None
 
     def prepare(self) -> None:
-        """Load what the first name that is hard to match would load.
+        """Load packages and the model now rather than at the first hard name.
 
         Raises:
             ValueError: a package is missing, or the model cannot be loaded.
         """
-        _letters()
+        _rapidfuzz()
         if self._settings.embeddings:
             with self._lock:
-                self._meanings = self._meanings or Meanings(self._settings.embeddings)
+                self._embeddings = self._embeddings or NameEmbeddings(self._settings.embeddings)
 
     def match(self, name: str, prefer: Collection[str] = ()) -> Match:
-        """What a name stands for; see :meth:`match_many`."""
+        """Match one name; see :meth:`match_many`."""
         return self.match_many((name,), prefer)[0]
 
     def match_many(self, names: Sequence[str], prefer: Collection[str] = ()) -> list[Match]:
-        """What names stand for; what letters do not tell is asked of the model all at once.
+        """Match names. The embedding model gets all names that spelling does not match in one
+        batch.
 
         Args:
-            names: as models write them.
-            prefer: the types that are at hand. Of several types that one name has ("table") one of
-                these is meant.
+            names: as a model wrote them.
+            prefer: the types within reach. If a name ("table") stands for several types, one of
+                these is chosen.
 
         Raises:
             ValueError: see :meth:`prepare`.
@@ -234,27 +236,27 @@ class Matcher:
         return [found[name] for name in names]
 
     def _by_letters(self, name: str, plain: str, prefer: Collection[str]) -> Match:
-        if entry := _looked_up(plain):
+        if entry := _look_up(plain):
             return Match(name, _one_of(entry.types, prefer), entry.how, 1.0)
-        object_type, score = _spelt_alike(plain, self._settings.fuzzy, prefer)
+        object_type, score = _fuzzy_match(plain, self._settings.fuzzy, prefer)
         if object_type:
             return Match(name, object_type, "fuzzy", score)
-        return Match(name, near=_near_in_letters(plain))
+        return Match(name, near=_nearest_by_letters(plain))
 
     def _by_meaning(
         self, names: Mapping[str, str], prefer: Collection[str]
     ) -> Iterator[tuple[str, Match]]:
         self.prepare()
-        assert self._meanings is not None
+        assert self._embeddings is not None
         with self._lock:
-            scores = self._meanings.scores(list(names.values()))
+            scores = self._embeddings.scores(list(names.values()))
         for name, row in zip(names, scores, strict=True):
             order = np.argsort(-row, kind="stable")
-            types, score = self._meanings.types[order[0]], round(float(row[order[0]]), 4)
+            types, score = self._embeddings.types[order[0]], round(float(row[order[0]]), 4)
             if score >= self._settings.threshold:
                 yield name, Match(name, _one_of(types, prefer), "meaning", score)
             else:
-                yield name, Match(name, near=_first_types(self._meanings.types[i] for i in order))
+                yield name, Match(name, near=_first_types(self._embeddings.types[i] for i in order))
 
 
 def _normal(name: str) -> str:

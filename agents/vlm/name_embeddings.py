@@ -1,4 +1,4 @@
-"""Names of object types compared by meaning, with a model of sentence-transformers."""
+"""Compares names with those of object types by meaning, with a sentence-transformers model."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _REMEMBERED = 4096
 _INSIDE_A_NAME = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
-class Meanings:
-    """All names of all types as vectors, of which it knows E numbers each, and whatever is asked.
+class NameEmbeddings:
+    """Embeds the T names of all object types as vectors of length E, and caches queried names.
 
     Args:
-        model: of sentence-transformers. A name may be downloaded, a directory is on this machine.
+        model: a sentence-transformers model. A name may be downloaded; a directory is local.
 
     Raises:
-        ValueError: it cannot be loaded, or the package is missing.
+        ValueError: the model cannot be loaded, or the package is missing.
     """
 
     def __init__(self, model: str) -> None:
@@ -36,11 +36,11 @@ class Meanings:
         names |= {name: (kind,) for kind, others in NAMES_EN.items() for name in others}
         names.update(SHARED_EN)
         self.types = tuple(names.values())
-        """(T,) What each name stands for."""
+        """(T,) the object types of each name."""
         self._names = self._encode(list(names))
 
     def scores(self, names: Sequence[str]) -> NDArray[np.float32]:
-        """(N, T) cosines of names with those of types."""
+        """(N, T) cosines between the given names and the names of the types."""
         new = [name for name in dict.fromkeys(names) if name not in self._vectors]
         if new:
             if len(self._vectors) + len(new) > _REMEMBERED:
@@ -48,12 +48,12 @@ class Meanings:
                 new = list(dict.fromkeys(names))
             self._vectors.update(zip(new, self._encode(new), strict=True))
         vectors = np.stack([self._vectors[name] for name in names])
-        # Rounded, since the last digits depend on what else is encoded at the same time.
+        # Rounded, since the last digits depend on the other names in the batch.
         return np.asarray((vectors @ self._names.T).round(4))
 
 
 def _encoder(model: str) -> Callable[[list[str]], NDArray[np.float32]]:
-    """Texts to vectors of length 1, (N, E)."""
+    """A function from N texts to unit vectors, (N, E)."""
     try:
         library = import_module("sentence_transformers")
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""What object types are called in English, other than by their own names."""
+"""English names of object types, beside the types' own names."""
 
 from __future__ import annotations
 

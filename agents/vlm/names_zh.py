@@ -1,4 +1,4 @@
-"""What object types are called in Chinese."""
+"""Chinese names of object types."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""The words of a training file in the paper's format, for the models that were trained on it.
+"""Prompts from a training file in the paper's format, for models that were trained on it.
 
 The file is a list of conversations, in JSON or JSON Lines: ``messages`` with ``role`` and
 ``content``, or ``conversations`` with ``from`` and ``value``. The user asks for a task, the
-assistant decides between ``<DecisionMaking>`` tags, the user shows what came of it, and so on. What
-is the same in all of them is what the model is used to; task, action and feedback differ, and are
-found by that. No text of the file is a template: braces in it are braces.
+assistant decides between ``<DecisionMaking>`` tags, the user shows what came of it, and so on. The
+text that all conversations share is the prompt. Task, action and feedback are the parts that
+differ. The file's texts are not templates: braces in them are plain braces.
 """
 
 from __future__ import annotations
@@ -20,17 +20,25 @@ from itertools import islice
 from pathlib import Path
 from typing import TextIO
 
-from agents.vlm.prompt_set import IMAGE, MARK, Decide, Did, Now, PromptSet, Sees
+from agents.vlm.prompt_set import (
+    IMAGE,
+    IMAGE_MARK,
+    Decide,
+    LastAction,
+    PromptSet,
+    Sees,
+    TurnContext,
+)
 from er_gym.envs.actions import parse
 from er_gym.tasks import verbs
 from er_gym.tasks.reading import open_file
 
 ENOUGH = 500
-"""So many conversations show what all of them have in common."""
+"""How many conversations are read to find the text that all of them share."""
 
 _TASK, _ACTION, _FEEDBACK = "\ufdd1", "\ufdd2", "\ufdd3"
-"""Where these go in a text: no characters, just as :data:`~agents.vlm.prompt_set.MARK` is none."""
-_RESERVED = re.compile(f"[{MARK}{_TASK}{_ACTION}{_FEEDBACK}]")
+"""Mark the slots of a text; Unicode noncharacters as :data:`~agents.vlm.prompt_set.IMAGE_MARK`."""
+_RESERVED = re.compile(f"[{IMAGE_MARK}{_TASK}{_ACTION}{_FEEDBACK}]")
 _STOPS = ".!?。！？"
 _SLOT = re.compile(f"([{_TASK}{_ACTION}{_FEEDBACK}])([{_STOPS}]?)")
 _ROLES = {
@@ -46,18 +54,18 @@ _TROUBLE = re.compile(
     r"not (?:able|allowed|possible)|did ?n[o'’]t work)\b|失败|无法|不能|没有成功",
     re.IGNORECASE,
 )
-"""Words that tell of an action that did not work."""
+"""Words that report a failed action."""
 _TOKEN = re.compile(r"[^\W\u2e80-\u9fff]+|\s+|.", re.DOTALL)
-"""Words, spaces, and all else one by one: so are Chinese words, which no space divides."""
+"""A word, a run of spaces, or one other character; Chinese text is split into characters."""
 _ODD_ONE_IN = 20
-"""What all texts but one in so many share, they share."""
+"""One text in this many may differ from what the others share."""
 _TOO_FEW, _ENDS, _MANY, _COMMON = 3, 12, 12, 0.2
-"""Where fewer than 3 words are shared, there may be several wordings: texts that begin, or end,
-with the same 12 tokens. One counts if it is that of a fifth of the texts, and they share 12 words:
-less may be a turn of phrase in the tasks."""
+"""If all texts share fewer than 3 words, the file may have several wordings: groups of texts that
+begin or end with the same 12 tokens. A wording counts if a fifth of the texts have it and share 12
+words; with less, it may be a phrase in the tasks."""
 _BEGUN = re.compile(r"[.:!?。：！？\n]\s*([^.:!?。：！？\n]*)$")
 _ENDED = re.compile(r"([^.!?。！？\n]*)[.!?。！？\n]")
-"""A sentence that is begun at the end of a text, or ended at the beginning."""
+"""A sentence that starts at the end of a text, or ends at its beginning."""
 _BETWEEN = re.compile(r"[\s\[\],]*")
 _CHUNK = 1 << 20  # characters
 _LARGEST_ITEM = 1 << 24  # characters of a conversation; its pictures are files
@@ -68,12 +76,12 @@ _VERBS_LONGEST_FIRST = sorted(
 
 @dataclass(frozen=True)
 class Words:
-    """What the user says, with slots.
+    """The user's texts, with slots for task, action and feedback.
 
     Attributes:
         system, first: the system's message, and the first turn.
-        usual: the turn after an action; ``after``: by verb, where it is another.
-        failed: the turn after one that failed; "" where none does.
+        usual: the turn after an action; ``after``: by verb, for verbs with another turn.
+        failed: the turn after a failed action; "" if no action fails.
     """
 
     system: str
@@ -85,10 +93,11 @@ class Words:
 
 @dataclass(frozen=True, kw_only=True)
 class DerivedPrompts:
-    """A set of prompts read off a training file; see :class:`PromptSet`.
+    """A set of prompts derived from a training file; see :class:`PromptSet`.
 
     Attributes:
-        samples: how many conversations were read; ``odd``: how many others were passed over.
+        samples: the number of conversations read; ``odd``: the number of other items, which are
+            skipped.
     """
 
     name: str
@@ -104,7 +113,7 @@ class DerivedPrompts:
         """See :class:`PromptSet`.
 
         Raises:
-            ValueError: something else than pictures and tags is asked for.
+            ValueError: ``decide`` is not tags, or ``sees`` is not pictures.
         """
         if (decide, sees) != ("tags", "pictures"):
             raise ValueError(
@@ -113,20 +122,20 @@ class DerivedPrompts:
             )
         return self.words.system
 
-    def first(self, now: Now) -> str:
+    def first(self, turn: TurnContext) -> str:
         """See :class:`PromptSet`."""
-        return _with_pictures(_filled(self.words.first, {_TASK: now.task}), 1)
+        return _with_pictures(_filled(self.words.first, {_TASK: turn.task}), 1)
 
-    def next(self, now: Now, did: Did) -> str:
-        """See :class:`PromptSet`. Where no action of the file fails, feedback stands at the end."""
-        text = self.words.after.get(_verb(did.action), self.words.usual)
-        if not did.success:
+    def next(self, turn: TurnContext, last_action: LastAction) -> str:
+        """See :class:`PromptSet`. If no action of the file fails, the feedback is appended."""
+        text = self.words.after.get(_verb(last_action.action), self.words.usual)
+        if not last_action.success:
             text = self.words.failed or f"{text}\n{_FEEDBACK}"
-        values = {_TASK: now.task, _ACTION: did.action, _FEEDBACK: did.feedback}
-        return _with_pictures(_filled(text, values), did.pictures)
+        values = {_TASK: turn.task, _ACTION: last_action.action, _FEEDBACK: last_action.feedback}
+        return _with_pictures(_filled(text, values), last_action.pictures)
 
     def feedback(self, *, problem: str, decide: Decide) -> str:
-        """See :class:`PromptSet`. The paper's files have no such turn: er-gym's own words."""
+        """See :class:`PromptSet`. The paper's files have no such turn, so er-gym's text is used."""
         return self.fallback.feedback(problem=problem, decide=decide)
 
 
@@ -135,10 +144,10 @@ def read_prompts(path: Path, fallback: PromptSet) -> DerivedPrompts:
 
     Args:
         path: the file.
-        fallback: has the words for what such files lack.
+        fallback: the prompts for turns that such files lack.
 
     Raises:
-        ValueError: it cannot be read, or does not show which words are the task's.
+        ValueError: the file cannot be read, or the task cannot be told from the text around it.
     """
     found: list[_Sample | None] = []
     try:
@@ -162,7 +171,7 @@ def read_prompts(path: Path, fallback: PromptSet) -> DerivedPrompts:
     words = _words(samples, path)
     odd = len(found) - len(samples)
     digest = hashlib.sha256(f"{words}{fallback.digest}".encode())
-    shown = words.after.get(verbs.OBSERVE, "").count(MARK)
+    shown = words.after.get(verbs.OBSERVE, "").count(IMAGE_MARK)
     return DerivedPrompts(
         name=path.name,
         digest=digest.hexdigest(),
@@ -236,7 +245,7 @@ def _sample(item: object) -> _Sample | None:
     alternating = ("user", "assistant") * len(said)
     if any(role != expected for (role, _), expected in zip(said, alternating, strict=False)):
         return None
-    asked = tuple(_RESERVED.sub("", text).replace(IMAGE, MARK) for _, text in said[::2])
+    asked = tuple(_RESERVED.sub("", text).replace(IMAGE, IMAGE_MARK) for _, text in said[::2])
     decided = tuple(_decision(text) for _, text in said[1::2])
     return _Sample(system, asked, decided) if any(decided) else None
 
@@ -246,7 +255,7 @@ def _decision(text: str) -> str:
     return " ".join(decisions[-1].split()).strip(" .") if decisions else ""
 
 
-# -- what conversations have in common -----------------------------------------------------------
+# -- the text that conversations share -----------------------------------------------------------
 
 
 def _words(samples: Sequence[_Sample], path: Path) -> Words:
@@ -279,8 +288,8 @@ def _words(samples: Sequence[_Sample], path: Path) -> Words:
 def _turns(sample: _Sample, before: str, after: str) -> Iterator[tuple[str, str]]:
     """The user's later turns with slots, each with the verb of the action before it.
 
-    After a verb without object, no slot is needed for it: the words are kept for that verb alone,
-    which may well be one of them for another reason ("you can also observe").
+    A turn after a verb without an object needs no action slot: its text is kept for that verb
+        alone. The verb may also occur in the text for another reason ("you can also observe").
     """
     first = sample.asked[0]
     fits = first.startswith(before) and first.endswith(after)
@@ -296,7 +305,7 @@ def _turns(sample: _Sample, before: str, after: str) -> Iterator[tuple[str, str]
 
 
 def _verb(text: str) -> str:
-    """The verb that an action begins with, "" if with none."""
+    """The verb at the beginning of an action, "" if there is none."""
     words = f"{' '.join(text.lower().split())} "
     for verb in _VERBS_LONGEST_FIRST:
         if words.startswith(f"{verb} "):
@@ -305,14 +314,14 @@ def _verb(text: str) -> str:
 
 
 def _mention(decision: str) -> re.Pattern[str]:
-    """Finds an action in a text: as it was decided, or as er-gym spells it."""
+    """A pattern for an action in a text, in the model's spelling or in er-gym's."""
     spellings = sorted({decision, str(parse(decision) or decision)}, key=len, reverse=True)
     forms = (r"\s+".join(map(re.escape, spelling.split())) for spelling in spellings)
     return re.compile(rf"(?<!\w)(?:{'|'.join(forms)})(?!\w)", re.IGNORECASE)
 
 
 def _usual(texts: Sequence[str]) -> str:
-    """The text that most are; of several that are common, one that tells of no trouble."""
+    """The most common text; among several common ones, the one that reports no failure."""
     counts = Counter(texts)
     most = max(counts.values())
     if 10 * most < len(texts):
@@ -322,7 +331,8 @@ def _usual(texts: Sequence[str]) -> str:
 
 
 def _by_verb(turns: Sequence[tuple[str, str]]) -> dict[str, str]:
-    """The text that more than half of the turns after a verb are, for verbs that have one."""
+    """By verb, the text of more than half of the turns after it; verbs without such a text are left
+    out."""
     texts = defaultdict(list)
     for verb, text in turns:
         texts[verb].append(text)
@@ -337,7 +347,7 @@ def _trouble(text: str) -> int:
 
 
 def _around_feedback(texts: Sequence[str]) -> str:
-    """What texts share, with a slot for the sentence in which they differ."""
+    """The text that all share, with a slot for the sentence in which they differ."""
     different = list(dict.fromkeys(texts))
     if len(different) == 1:
         return different[0]
@@ -351,9 +361,9 @@ def _around_feedback(texts: Sequence[str]) -> str:
 
 
 def _frame(texts: Sequence[str]) -> tuple[str, str]:
-    """What different texts share before and after what differs, in whole words.
+    """The shared beginning and end of different texts, in whole words.
 
-    Where they are of several wordings, it is that of the most common one.
+    With several wordings, those of the most common one.
     """
     rows = [_TOKEN.findall(text) for text in texts]
     frame = _shared(rows)
@@ -372,7 +382,8 @@ def _frame(texts: Sequence[str]) -> tuple[str, str]:
 
 
 def _shared(rows: Sequence[Sequence[str]]) -> tuple[str, str]:
-    """What all rows of tokens, but for odd ones, begin and end with; a token is left between."""
+    """The common beginning and end of the token rows, odd rows aside; at least one token stays
+    between."""
     needed = len(rows) - len(rows) // _ODD_ONE_IN
     before, rows = _beginning(rows, needed)
     after, _ = _beginning([row[len(before) :][::-1] for row in rows], needed)
@@ -382,7 +393,7 @@ def _shared(rows: Sequence[Sequence[str]]) -> tuple[str, str]:
 def _beginning(
     rows: Sequence[Sequence[str]], needed: int
 ) -> tuple[list[str], Sequence[Sequence[str]]]:
-    """The tokens that enough rows begin with, none of them whole; and these rows."""
+    """The tokens that at least ``needed`` rows begin with, and these rows; no row is used up."""
     common: list[str] = []
     while True:
         place = len(common)
@@ -395,7 +406,7 @@ def _beginning(
 
 
 def _count(texts: Sequence[str]) -> int:
-    """How many words there are."""
+    """The number of words."""
     return sum(token[0].isalnum() for text in texts for token in _TOKEN.findall(text))
 
 
@@ -403,7 +414,7 @@ def _count(texts: Sequence[str]) -> int:
 
 
 def _filled(text: str, values: Mapping[str, str]) -> str:
-    """The text with values in its slots; at the end of a sentence, the value's own stop counts."""
+    """Fill the slots; a value that ends with its own full stop replaces the slot's."""
 
     def value(found: re.Match[str]) -> str:
         slot, stop = found.groups()
@@ -414,12 +425,13 @@ def _filled(text: str, values: Mapping[str, str]) -> str:
 
 
 def _with_pictures(text: str, pictures: int) -> str:
-    """The text with so many marks: too few are followed by more, the last of too many left out."""
-    few = pictures - text.count(MARK)
+    """The text with exactly ``pictures`` marks: marks are added after the last one, or removed from
+    the end."""
+    few = pictures - text.count(IMAGE_MARK)
     if few > 0:
-        head, mark, tail = text.rpartition(MARK)
-        return f"{head}{mark}{MARK * few}{tail}"
+        head, mark, tail = text.rpartition(IMAGE_MARK)
+        return f"{head}{mark}{IMAGE_MARK * few}{tail}"
     for _ in range(-few):
-        head, _, tail = text.rpartition(MARK)
+        head, _, tail = text.rpartition(IMAGE_MARK)
         text = head + tail
     return text

@@ -1,4 +1,4 @@
-"""Pictures as they are sent: of a size that suits Qwen's models, as JPEG or PNG."""
+"""Encodes pictures for a model: at a size that suits Qwen's models, as JPEG or PNG."""
 
 from __future__ import annotations
 
@@ -14,21 +14,22 @@ from agents.vlm.chat import Picture
 from agents.vlm.settings import Pictures
 
 FACTOR = 28
-"""Qwen2-VL and Qwen2.5-VL see a picture in squares of so many pixels: one token each."""
+"""Qwen2-VL and Qwen2.5-VL divide a picture into squares of this side, in pixels: one token each."""
 _LONGEST = 200
-"""More times as long as wide, and their processors refuse a picture."""
+"""The largest aspect ratio that their processors accept."""
 
 
 def fitted(width: int, height: int, settings: Pictures) -> tuple[int, int]:
     """The width and height at which a picture is sent, pixels.
 
-    A picture within ``min_pixels`` and ``max_pixels`` stays as it is; the model's own processor
-    rounds its sides. Any other gets sides that are multiples of :data:`FACTOR`: the nearest to its
-    own where these are within the bounds, else as much smaller or larger as needed, at about the
-    same aspect ratio. This is ``smart_resize`` of qwen-vl-utils, except that no side becomes 0.
+    A picture within ``min_pixels`` and ``max_pixels`` keeps its size; the model's own processor
+    rounds its sides. Any other picture gets sides that are multiples of :data:`FACTOR`. The sides
+    are the nearest multiples if these are within the bounds; otherwise both are scaled until they
+    are, at about the same aspect ratio. This is ``smart_resize`` of qwen-vl-utils, except that no
+    side becomes 0.
 
     Raises:
-        ValueError: a side is 0, or one is more than 200 times as long as the other.
+        ValueError: a side is 0, or one side is more than 200 times as long as the other.
     """
     if min(width, height) < 1 or max(width, height) > _LONGEST * min(width, height):
         raise ValueError(
@@ -50,13 +51,14 @@ def fitted(width: int, height: int, settings: Pictures) -> tuple[int, int]:
 
 
 def encode(rgb: NDArray[np.uint8], settings: Pictures) -> Picture:
-    """A picture as a file; the same picture always gives the same bytes.
+    """Encode a picture as a file; equal pictures give equal bytes.
 
     Args:
         rgb: (height, width, 3) uint8.
 
     Raises:
-        ValueError: it is of another shape or type, or cannot be shown (:func:`fitted`).
+        ValueError: the array has another shape or type, or the picture cannot be sent
+            (:func:`fitted`).
     """
     if rgb.dtype != np.uint8 or rgb.ndim != 3 or rgb.shape[2] != 3:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""What a set of prompts is, and how pictures find their places in its words."""
+"""The interface of a set of prompts, and how pictures are placed in its texts."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ Decide: TypeAlias = Literal["tags", "tools", "json"]
 Sees: TypeAlias = Literal["pictures", "text"]
 
 THOUGHTS = ("Observation", "Planning", "Thinking", "Reflection", "Verification")
-"""The kinds of thought that the paper's models write, each between tags of its name."""
+"""The kinds of thought that the paper's models write, each between tags with its name."""
 IMAGE = "<image>"
-"""Where a picture goes, in templates and training files."""
-MARK = "\ufdd0"
-"""The same in rendered text. It is no character, so that nobody writes it: an ``<image>`` in the
-words of a task is just that."""
+"""Marks the place of a picture in templates and training files."""
+IMAGE_MARK = "\ufdd0"
+"""Marks the place of a picture in rendered text. It is a Unicode noncharacter, which no text
+contains; an ``<image>`` in a task's instruction therefore stays text."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Now:
-    """What a turn is about.
+class TurnContext:
+    """The episode at a turn.
 
     Attributes:
-        task: its instruction.
-        decide, sees: as :class:`~agents.vlm.settings.AgentSettings` has them.
-        scene_text: the environment's observation ``text``, for ``sees="text"``.
-        steps: taken so far; ``max_steps``: of the episode, 0 where it is not known.
+        task: the task's instruction.
+        decide, sees: see :class:`~agents.vlm.settings.AgentSettings`.
+        scene_text: the environment's ``text`` observation, for ``sees="text"``.
+        steps: how many steps were taken so far; ``max_steps``: the episode's step limit, 0 if
+            unknown.
     """
 
     task: str
@@ -40,13 +41,13 @@ class Now:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Did:
-    """What was done last.
+class LastAction:
+    """The last action and its result.
 
     Attributes:
         action: such as ``navigate to Fridge``.
         success, feedback: the environment's answer.
-        pictures: how many it shows.
+        pictures: the number of pictures that show the result.
     """
 
     action: str
@@ -56,15 +57,15 @@ class Did:
 
 
 class PromptSet(Protocol):
-    """The words of one kind of conversation. Texts have a :data:`MARK` for each picture.
+    """The texts of one kind of conversation. A text holds an :data:`IMAGE_MARK` for each picture.
 
     Attributes:
         name: such as ``default/en``.
-        digest: sha256, in hex, of all that its words are made from.
-        about: where they are from, in a line for people.
-        after_observe: how many pictures the model expects after an ``observe``: 1 is what is ahead;
-            3 are what is right, behind and left; 4 are these and what is ahead. None for as many as
-            there are.
+        digest: sha256, in hex, of everything that the texts are made from.
+        about: one line for people that says where the texts come from.
+        after_observe: the number of pictures that the model expects after ``observe``: 1 for the
+            view ahead; 3 for right, behind and left; 4 for these and the view ahead. None for all
+            that there are.
     """
 
     @property
@@ -77,29 +78,29 @@ class PromptSet(Protocol):
     def after_observe(self) -> int | None: ...
 
     def system(self, *, decide: Decide, sees: Sees) -> str:
-        """What the model is and how it replies; "" where there is no such message."""
+        """The system message: the model's role and the format of its replies; "" for no message."""
 
-    def first(self, now: Now) -> str:
-        """The first turn: the task, and what is seen, in one picture or in words."""
+    def first(self, turn: TurnContext) -> str:
+        """The first user message: the task and the first observation, as a picture or as text."""
 
-    def next(self, now: Now, did: Did) -> str:
-        """The turn after an action."""
+    def next(self, turn: TurnContext, last_action: LastAction) -> str:
+        """The user message after an action."""
 
     def feedback(self, *, problem: str, decide: Decide) -> str:
-        """The turn after a reply that names no action that can be taken; without a picture.
+        """The user message after a reply without a usable action; it has no picture.
 
         Args:
-            problem: what is wrong with it, in words.
+            problem: what is wrong with the reply.
         """
 
 
-def parts_of(text: str, pictures: Sequence[Picture]) -> tuple[Part, ...]:
-    """Text with pictures in place of its marks, in order.
+def interleave_pictures(text: str, pictures: Sequence[Picture]) -> tuple[Part, ...]:
+    """Split a text at its marks and put the pictures there, in order.
 
     Raises:
-        ValueError: there are not as many pictures as marks.
+        ValueError: the number of pictures is not the number of marks.
     """
-    first, *rest = text.split(MARK)
+    first, *rest = text.split(IMAGE_MARK)
     if len(rest) != len(pictures):
         raise ValueError(f"the text has {len(rest)} places for {len(pictures)} pictures")
     parts: list[Part] = [first]
@@ -108,6 +109,6 @@ def parts_of(text: str, pictures: Sequence[Picture]) -> tuple[Part, ...]:
     return tuple(part for part in parts if part)
 
 
-def unmarked(text: str) -> str:
-    """Words of others, in which nothing can be taken for a mark."""
-    return text.replace(MARK, "")
+def without_marks(text: str) -> str:
+    """A text without marks, for texts from outside."""
+    return text.replace(IMAGE_MARK, "")

@@ -1,4 +1,4 @@
-"""The words that a model is given: templates of ``configs/prompts``, or a training file's own."""
+"""Loads prompts: templates of ``configs/prompts``, or the texts of a training file."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from agents.vlm.templates import directory_of, load_templates
 
 
 def load_prompts(settings: Prompts) -> PromptSet:
-    """The prompts that settings ask for, tried out once.
+    """Load the prompts that the settings name, and render each once as a check.
 
     Raises:
-        ValueError: there are none such, a template or the training file is wrong, or Jinja is
-            missing; one line says where and why.
+        ValueError: the prompts do not exist, a template or the training file is invalid, or Jinja
+            is missing. The message is one line with the place and the reason.
     """
     templates = load_templates(directory_of(settings.profile, settings.language))
     if not settings.dataset:

@@ -1,7 +1,7 @@
-"""What is kept of a conversation: a wire format, pictures by path.
+"""The file format of a recorded conversation; pictures are stored beside it, by path.
 
-A change that an older reader would misread takes a new ``format``. There is never a key in it: none
-is in the settings either, and of a server's address only the part without user and password.
+A change that an older reader would misread needs a new ``format``. A record never holds a key: the
+settings hold none, and a server's address is stored without user and password.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ class _Record(BaseModel):
 
 
 class PictureRecord(_Record):
-    """A picture that was shown.
+    """A picture that the model was shown.
 
     Attributes:
-        path: of the file, from the run directory on.
+        path: the file, relative to the run directory.
         digest: sha256 of its bytes, in hex.
         width, height: pixels.
     """
@@ -37,7 +37,7 @@ class PictureRecord(_Record):
 
 
 class MessageRecord(_Record):
-    """A turn, as it was when it was said: later requests may leave out its pictures."""
+    """A message as it was first sent; later requests may leave out its pictures."""
 
     role: Role
     parts: list[str | PictureRecord]
@@ -45,28 +45,29 @@ class MessageRecord(_Record):
 
 
 class ThoughtRecord(_Record):
-    """A thought, and of which kind: Observation, Planning, Thinking, Reflection, Verification."""
+    """A thought; its kind is Observation, Planning, Thinking, Reflection or Verification."""
 
     kind: str
     text: str
 
 
 class RoundRecord(_Record):
-    """A reply and what came of it.
+    """A reply and its result.
 
     Attributes:
-        message: which of the conversation's messages the reply is.
-        thoughts: what it says before the decision.
-        action: what was done, in the environment's words; "" where no action could be read.
-        name: what the model called the object; ``matched`` how that became a type: ``exact``,
-            ``alias``, ``fuzzy``, ``meaning``.
-        rules: which tolerances were needed to read the reply.
-        problem: what was wrong with it, as the model was told.
+        message: the index of the reply among the conversation's messages.
+        thoughts: the thoughts before the decision.
+        action: the action as the environment writes it; "" if none could be read.
+        name: the model's name for the object; ``matched``: how it was matched with a type:
+            ``exact``, ``alias``, ``fuzzy``, ``meaning``.
+        rules: the tolerance rules that were needed to read the reply.
+        problem: what was wrong with the reply, as the model was told.
         feedback, success: the environment's answer.
         seconds, prompt_tokens, completion_tokens, cached_tokens, reasoning_tokens, cost, finish,
         model: see :class:`agents.vlm.chat.Reply`; cost in US dollars.
-        estimated: whether the tokens are upper bounds, since the server's count cannot be true.
-        kept: whether it was kept from an earlier request, which paid for it.
+        estimated: whether the token counts are upper bounds, since the server's counts cannot be
+            true.
+        kept: whether the reply came from the reply cache; an earlier request paid for it.
     """
 
     message: int
@@ -91,7 +92,7 @@ class RoundRecord(_Record):
 
     @property
     def usage(self) -> Usage:
-        """Its tokens."""
+        """The token counts."""
         return Usage(
             self.prompt_tokens,
             self.completion_tokens,
@@ -105,15 +106,15 @@ class ConversationRecord(_Record):
     """The conversation of one episode.
 
     Attributes:
-        task_id, scene, instruction: the task's.
-        agent: its spec, such as ``openai:MODEL``.
-        settings: :class:`~agents.vlm.settings.AgentSettings`, less what an address might give away.
-        prompts, prompts_digest: the name of the set of prompts, and sha256 of its templates.
-        messages: from the system's to the last reply.
+        task_id, scene, instruction: of the task.
+        agent: the agent's name, such as ``openai:MODEL``.
+        settings: :class:`~agents.vlm.settings.AgentSettings` without secrets in addresses.
+        prompts, prompts_digest: the name of the set of prompts, and the sha256 of its templates.
+        messages: all messages, from the system message to the last reply.
         rounds: one for each reply.
-        prompt_tokens, completion_tokens, cost: over all rounds, whenever they were paid for.
+        prompt_tokens, completion_tokens, cost: sums over all rounds, cached replies included.
         estimated: whether some of these are upper bounds.
-        error: what the episode crashed with, in one line; "" if it did not.
+        error: the error that ended the episode, in one line; "" if none did.
     """
 
     format: Literal["er-gym/conversation/1"] = "er-gym/conversation/1"
@@ -133,27 +134,27 @@ class ConversationRecord(_Record):
     error: str = ""
 
 
-def plain_settings(settings: AgentSettings) -> dict[str, Any]:
-    """Settings as they may be kept: a server's address without user, password and query."""
+def settings_to_record(settings: AgentSettings) -> dict[str, Any]:
+    """The settings for a record: the server's address has no user, password and query."""
     kept = without_secrets(settings, settings.model_dump(mode="json"))
-    kept["server"]["base_url"] = plain_url(settings.server.base_url)
+    kept["server"]["base_url"] = url_without_secrets(settings.server.base_url)
     return kept
 
 
 def without_secrets(settings: AgentSettings, value: dict[str, Any]) -> dict[str, Any]:
-    """A JSON value without the key that the settings name."""
+    """A JSON value from which the key that the settings name is removed."""
     key = os.environ.get(settings.server.key_from, "").strip()
-    plain: dict[str, Any] = Secrets(key, settings.server.base_url).strike_all(value)
+    plain: dict[str, Any] = Secrets(key, settings.server.base_url).redact_all(value)
     return plain
 
 
-def plain_url(address: str) -> str:
+def url_without_secrets(address: str) -> str:
     """An address without user, password, query and fragment."""
     url = urlsplit(address)
     return urlunsplit((url.scheme, url.netloc.rpartition("@")[2], url.path, "", ""))
 
 
-def tokens(usage: Usage) -> dict[str, Any]:
+def token_counts(usage: Usage) -> dict[str, Any]:
     """The token counts of a round, under the names of :class:`RoundRecord`."""
     return {
         "prompt_tokens": usage.prompt,

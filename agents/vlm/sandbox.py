@@ -1,8 +1,8 @@
-"""A Jinja environment whose templates reach nothing, and do only so much.
+"""A sandboxed Jinja environment that also limits how much work a template does.
 
-Jinja's own sandbox keeps templates from Python's insides. It does not keep them from
+Jinja's own sandbox blocks access to Python internals. It does not stop
 ``{% for a in range(99999) %}{% for b in range(99999) %}`` or ``{{ "x" * 10 ** 10 }}``. Here every
-loop, call, filter and operator is paid for out of a budget, before it is done.
+loop, call, filter and operator is charged against a budget before it runs.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from jinja2.utils import Namespace
 from jinja2.visitor import NodeTransformer
 
 BUDGET = 2_000_000
-"""Characters that a template may handle each time it is rendered; a prompt has some thousands."""
+"""Characters that one rendering may process; a prompt has a few thousand."""
 STEP = 1_000
-"""What a round of a loop, a call or an include costs: there may be 2,000 of them."""
+"""The charge for a loop iteration, a call or an include: 2,000 of them use up the budget."""
 _DEEPEST = 4
-"""How deeply lists may be nested: what shares its parts can be as long as it likes."""
+"""The deepest nesting of lists: nested lists that share parts can become arbitrarily long."""
 _EACH, _MADE = "_each", "_made"
 _STRINGS = (str, bytes)
 _CONTAINERS = (list, tuple, dict, set)
 
 
 class BoundedEnvironment(SandboxedEnvironment):
-    """A sandboxed environment whose templates stop when they have done :data:`BUDGET`.
+    """A sandboxed environment that stops a template once it has used up :data:`BUDGET`.
 
-    A template may be rendered in several threads; :meth:`begin` is called in each before.
+    Several threads may render a template; each calls :meth:`begin` first.
 
     Raises:
-        SecurityError: while rendering, a template does too much, or formats with widths.
-        TemplateSyntaxError: while compiling, it is no template; ValueError: it has a recursive
-            loop.
+        SecurityError: while rendering, a template exceeds the budget or formats with widths.
+        TemplateSyntaxError: while compiling, the template is invalid; ValueError: it has a
+            recursive loop.
     """
 
     intercepted_binops = frozenset({"+", "*", "**", "%"})
@@ -52,11 +52,11 @@ class BoundedEnvironment(SandboxedEnvironment):
         self.filters["format"] = _no_format
 
     def begin(self) -> None:
-        """Fill up this thread's budget."""
+        """Reset this thread's budget."""
         self._bill.left = BUDGET
 
     def pay(self, amount: int) -> None:
-        """Take from this thread's budget, or raise SecurityError."""
+        """Charge this thread's budget; raises SecurityError if it is used up."""
         self._bill.left = getattr(self._bill, "left", BUDGET) - amount
         if self._bill.left < 0:
             raise SecurityError("a template that does too much; make its loops and texts smaller")
@@ -64,14 +64,14 @@ class BoundedEnvironment(SandboxedEnvironment):
     # -- Jinja's hooks ---------------------------------------------------------------------------
 
     def call(self, context: Any, function: Any, *args: Any, **kwargs: Any) -> Any:
-        """Call something, once it is paid for."""
+        """Charge for a call, then do it."""
         if getattr(function, "__name__", "") in ("format", "format_map"):
             _no_format()
         self.pay(STEP + _product([getattr(function, "__self__", None)], args, kwargs.values()))
         return super().call(context, function, *args, **kwargs)
 
     def call_binop(self, context: Any, operator: str, left: Any, right: Any) -> Any:
-        """Work out ``left operator right``, once it is paid for."""
+        """Charge for ``left operator right``, then compute it."""
         if operator == "%" and isinstance(left, _STRINGS):
             _no_format()
         if operator == "**":
@@ -89,10 +89,10 @@ class BoundedEnvironment(SandboxedEnvironment):
     def _parse(self, source: str, name: str | None, filename: str | None) -> nodes.Template:
         return _Priced().visit(super()._parse(source, name, filename))  # type: ignore[no-any-return]
 
-    # -- prices ----------------------------------------------------------------------------------
+    # -- charges ---------------------------------------------------------------------------------
 
     def _paid(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """A filter or a test that is paid for; what Jinja notes on filters stays with it."""
+        """Wrap a filter or a test so that it is charged; attributes that Jinja sets are kept."""
 
         @wraps(function)
         def paid(*args: Any, **kwargs: Any) -> Any:
@@ -122,7 +122,7 @@ class BoundedEnvironment(SandboxedEnvironment):
 
 
 class _Priced(NodeTransformer):
-    """Leads loops and joined texts to where they are paid for."""
+    """Rewrites loops, lists and joined texts so that they are charged."""
 
     def visit_For(self, node: nodes.For) -> nodes.Node:
         self.generic_visit(node)
@@ -155,7 +155,7 @@ def _filtered(node: nodes.Expr, name: str) -> nodes.Filter:
 
 
 def _product(*groups: Any) -> int:
-    """How much work values can make of one another: the product of their sizes."""
+    """An upper bound on the work of combining values: the product of their sizes."""
     total = 1
     for value in chain.from_iterable(map(_values, groups)):
         total *= max(1, _size(value))
@@ -169,7 +169,7 @@ def _values(group: Any) -> Iterable[Any]:
 
 
 def _size(value: Any) -> int:
-    """The length of a text or a list, whole texts in it counted; a number as what it is."""
+    """The length of a text, the total length of a list's items, or a number's absolute value."""
     if isinstance(value, bool) or value is None:
         return 1
     if isinstance(value, (int, float)):

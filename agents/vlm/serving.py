@@ -1,7 +1,7 @@
-"""Which existing server runs a model, and how it is told to fit agents that speak.
+"""Chooses an existing inference server for a model and its command line for model agents.
 
-Nothing here starts a server: :func:`command_for` makes a command line of a model, what is wanted
-and what the machine has.
+Nothing here starts a server: :func:`command_for` makes a command line from the model, the options
+and the machine.
 
 Sources: ``vllm serve`` of vLLM 0.33, ``transformers serve`` of transformers 5.23, and
 ``llama_cpp.server`` of llama-cpp-python 0.3.36.
@@ -20,29 +20,29 @@ from pathlib import Path
 from agents.vlm.settings import Pictures
 
 HOST = "127.0.0.1"
-"""The only address that a server listens on: none of them asks who is there."""
+"""The only address that a server listens on, since none of the servers authenticates clients."""
 
 _ONE_AT_A_TIME = ("--concurrency", "1")
-"""For servers that do not work out several replies at once: conversations that wait for each other
-run into the time-out of a reply."""
+"""For servers that generate one reply at a time: conversations that wait for each other would time
+out."""
 _EYES = "--clip_model_path"
-"""The argument of llama.cpp's server without which a model sees nothing."""
+"""The argument of llama.cpp's server that loads a model's vision encoder."""
 _SECONDS = 30
-"""How long a program that is asked what there is may take to say so."""
+"""The time limit of a program that inspects the machine."""
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ServeOptions:
     """How a model is to be served.
 
     Attributes:
-        port: of :data:`HOST`.
-        engine: one of :data:`ENGINES`; the fitting one for "".
-        name: what requests call the model; the engine's own choice for "".
-        pictures: how many a conversation may have.
-        context: how many tokens a conversation may have; the engine's own limit here for None.
-        gpus: how many the model is shared out over; all of NVIDIA's that there are for None.
-        more: further arguments of the server, as it takes them.
+        port: on :data:`HOST`.
+        engine: one of :data:`ENGINES`; "" to choose by model and machine.
+        name: the model's name in requests; "" for the engine's own choice.
+        pictures: the most pictures in a conversation.
+        context: the most tokens in a conversation; None for the engine's default here.
+        gpus: the number of GPUs that share the model; None for all NVIDIA GPUs.
+        more: further arguments of the server.
     """
 
     port: int
@@ -56,12 +56,12 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Machine:
-    """What there is to serve with.
+    """The machine that serves.
 
     Attributes:
         python: the path of the interpreter that runs the server.
-        packages: which of those that an engine needs it has.
-        gpus: how many of NVIDIA's may be used.
+        packages: the installed packages among those that engines need.
+        gpus: the number of usable NVIDIA GPUs.
     """
 
     python: str
@@ -76,11 +76,11 @@ class Command:
     Attributes:
         engine: one of :data:`ENGINES`.
         argv: the command.
-        environment: variables that it needs besides those there are.
-        name: what requests call the model.
-        base_url: where the OpenAI-compatible interface will be.
+        environment: additional environment variables.
+        name: the model's name in requests.
+        base_url: the address of the OpenAI-compatible interface.
         ready_url: answers with 200 once the model is loaded.
-        bench_options: options of ``er-gym bench`` that it calls for.
+        bench_options: options of ``er-gym bench`` that this server needs.
     """
 
     engine: str
@@ -97,62 +97,62 @@ class _Engine:
     """A kind of server.
 
     Attributes:
-        start: what its command begins with, after the interpreter.
-        arguments: of the model, what is wanted and the number of GPUs.
-        name: what requests call a model unless another name is wanted.
+        start: the beginning of its command, after the interpreter.
+        arguments: the arguments, given the model, the options and the number of GPUs.
+        name: the default name of a model in requests.
         ready: the path that answers once the model is loaded.
-        needs: packages, by the names they are imported by.
-        install: what brings them.
-        cannot: which of what may be wanted it has no setting for.
-        bench: options of ``er-gym bench`` that it calls for, of what is wanted.
-        environment: of the port.
+        needs: the packages that it needs, by import name.
+        install: what ``pip install`` is given for them.
+        cannot: the options that it does not support.
+        bench: the options of ``er-gym bench`` that it needs, given the options.
+        environment: environment variables, given the port.
     """
 
     start: tuple[str, ...]
-    arguments: Callable[[str, Wanted, int], list[str]]
+    arguments: Callable[[str, ServeOptions, int], list[str]]
     name: Callable[[str], str]
     ready: str
     needs: frozenset[str]
     install: str
     cannot: tuple[str, ...] = ()
-    bench: Callable[[Wanted], tuple[str, ...]] = lambda wanted: _ONE_AT_A_TIME
+    bench: Callable[[ServeOptions], tuple[str, ...]] = lambda options: _ONE_AT_A_TIME
     environment: Callable[[int], dict[str, str]] = field(default=lambda port: {})
 
 
-def _vllm(model: str, wanted: Wanted, gpus: int) -> list[str]:
+def _vllm(model: str, options: ServeOptions, gpus: int) -> list[str]:
     bounds = Pictures()
     pixels = {"min_pixels": bounds.min_pixels, "max_pixels": bounds.max_pixels}
     return [
         model,
-        *("--host", HOST, "--port", str(wanted.port)),
-        *("--served-model-name", wanted.name or model),
-        *("--max-model-len", str(wanted.context or 32_768)),
+        *("--host", HOST, "--port", str(options.port)),
+        *("--served-model-name", options.name or model),
+        *("--max-model-len", str(options.context or 32_768)),
         *("--tensor-parallel-size", str(max(gpus, 1))),
-        # What is said at a turn is what was said at the last, and a little more.
+        # Each request repeats the previous one and adds a little.
         "--enable-prefix-caching",
-        # Models without eyes ignore both. No video: memory would be kept for the longest there is.
-        *("--limit-mm-per-prompt", json.dumps({"image": wanted.pictures, "video": 0})),
+        # Text-only models ignore both. No video: memory would be reserved for the longest one.
+        *("--limit-mm-per-prompt", json.dumps({"image": options.pictures, "video": 0})),
         *("--mm-processor-kwargs", json.dumps(pixels)),
     ]
 
 
-def _transformers(model: str, wanted: Wanted, gpus: int) -> list[str]:
-    return [model, "--host", HOST, "--port", str(wanted.port)]
+def _transformers(model: str, options: ServeOptions, gpus: int) -> list[str]:
+    return [model, "--host", HOST, "--port", str(options.port)]
 
 
-def _llama_cpp(model: str, wanted: Wanted, gpus: int) -> list[str]:
+def _llama_cpp(model: str, options: ServeOptions, gpus: int) -> list[str]:
     return [
-        *("--model", model, "--model_alias", wanted.name or Path(model).stem),
-        *("--host", HOST, "--port", str(wanted.port)),
-        *("--n_ctx", str(wanted.context or 8_192)),
+        *("--model", model, "--model_alias", options.name or Path(model).stem),
+        *("--host", HOST, "--port", str(options.port)),
+        *("--n_ctx", str(options.context or 8_192)),
         *("--n_gpu_layers", "-1" if gpus else "0"),
-        # Otherwise it keeps a number for each token of the context and word of the vocabulary.
+        # Otherwise it stores the logits of every token of the context.
         *("--logits_all", "false"),
     ]
 
 
-def _bench_of_llama_cpp(wanted: Wanted) -> tuple[str, ...]:
-    blind = () if _EYES in wanted.more else ("--agent-config", "text")
+def _bench_of_llama_cpp(options: ServeOptions) -> tuple[str, ...]:
+    blind = () if _EYES in options.more else ("--agent-config", "text")
     return (*_ONE_AT_A_TIME, *blind)
 
 
@@ -164,7 +164,7 @@ ENGINES: dict[str, _Engine] = {
         ready="/health",
         needs=frozenset({"vllm"}),
         install="vllm",
-        bench=lambda wanted: (),
+        bench=lambda options: (),
     ),
     "transformers": _Engine(
         ("-m", "transformers.cli.transformers", "serve"),
@@ -174,7 +174,7 @@ ENGINES: dict[str, _Engine] = {
         needs=frozenset({"transformers", "fastapi", "uvicorn", "openai", "torch"}),
         install="'transformers[serving]>=5.13' torchvision",
         cannot=("name", "context"),
-        # Otherwise it looks on the internet for a newer version of itself.
+        # Otherwise it checks online for a newer version of itself.
         environment=lambda port: {"HF_HUB_DISABLE_UPDATE_CHECK": "1"},
     ),
     "llama_cpp": _Engine(
@@ -185,29 +185,29 @@ ENGINES: dict[str, _Engine] = {
         needs=frozenset({"llama_cpp", "fastapi", "uvicorn", "sse_starlette", "starlette_context"}),
         install="'llama-cpp-python[server]'",
         bench=_bench_of_llama_cpp,
-        # These overrule its arguments, and a shell may have them for another reason.
+        # These override its arguments, and a shell may have set them for another purpose.
         environment=lambda port: {"HOST": HOST, "PORT": str(port)},
     ),
 }
-"""The servers that are known, by name."""
+"""The supported servers, by name."""
 
 
-def command_for(model: str, wanted: Wanted, machine: Machine) -> Command:
+def command_for(model: str, options: ServeOptions, machine: Machine) -> Command:
     """The command that serves a model.
 
-    A ``.gguf`` file is for llama.cpp; any other model for vLLM where that and a GPU are there, and
-    otherwise for transformers.
+    llama.cpp serves a ``.gguf`` file. vLLM serves any other model if vLLM and a GPU are available;
+    otherwise transformers does.
 
     Args:
         model: a directory, a ``.gguf`` file, or a name on a model hub.
-        wanted: how.
-        machine: what is there to serve with.
+        options: how to serve it.
+        machine: the machine that serves.
 
     Raises:
-        ValueError: nothing that is installed can serve it, or not so.
+        ValueError: no installed server can serve the model, or not with these options.
     """
-    gpus = machine.gpus if wanted.gpus is None else wanted.gpus
-    name = wanted.engine or _fitting(model, machine.packages, gpus)
+    gpus = machine.gpus if options.gpus is None else options.gpus
+    name = options.engine or _fitting(model, machine.packages, gpus)
     if name not in ENGINES:
         raise ValueError(f"unknown engine {name!r}; choose one of: {', '.join(ENGINES)}")
     engine = ENGINES[name]
@@ -219,25 +219,25 @@ def command_for(model: str, wanted: Wanted, machine: Machine) -> Command:
             "name another Python that has it"
         )
     for setting in engine.cannot:
-        if getattr(wanted, setting):
+        if getattr(options, setting):
             raise ValueError(
-                f"{name} has no setting for the {setting} {getattr(wanted, setting)!r}; leave it "
+                f"{name} has no setting for the {setting} {getattr(options, setting)!r}; leave it "
                 "out, or choose another engine"
             )
-    origin = f"http://{HOST}:{wanted.port}"
+    origin = f"http://{HOST}:{options.port}"
     return Command(
         engine=name,
         argv=(
             machine.python,
             *engine.start,
-            *engine.arguments(model, wanted, gpus),
-            *wanted.more,
+            *engine.arguments(model, options, gpus),
+            *options.more,
         ),
-        environment=engine.environment(wanted.port),
-        name=wanted.name or engine.name(model),
+        environment=engine.environment(options.port),
+        name=options.name or engine.name(model),
         base_url=f"{origin}/v1",
         ready_url=f"{origin}{engine.ready}",
-        bench_options=engine.bench(wanted),
+        bench_options=engine.bench(options),
     )
 
 
@@ -247,15 +247,15 @@ def _fitting(model: str, packages: frozenset[str], gpus: int) -> str:
     return "vllm" if gpus and "vllm" in packages else "transformers"
 
 
-def look_around(python: str, environment: Mapping[str, str] = os.environ) -> Machine:
-    """What this machine has to serve with.
+def inspect_machine(python: str, environment: Mapping[str, str] = os.environ) -> Machine:
+    """Find the packages and GPUs of this machine.
 
     Args:
-        python: the path of an interpreter. A server often has a virtual environment of its own.
-        environment: the environment's variables.
+        python: the path of an interpreter. A server often has its own virtual environment.
+        environment: the environment variables.
 
     Raises:
-        ValueError: it is no interpreter that runs.
+        ValueError: the interpreter does not run.
     """
     asked = sorted(set().union(*(engine.needs for engine in ENGINES.values())))
     question = f"import importlib.util as u; print(*filter(u.find_spec, {asked!r}))"
@@ -270,7 +270,7 @@ def look_around(python: str, environment: Mapping[str, str] = os.environ) -> Mac
 
 
 def _gpus(environment: Mapping[str, str]) -> int:
-    """How many GPUs there are by ``nvidia-smi``, or as many as ``CUDA_VISIBLE_DEVICES`` leaves."""
+    """The number of GPUs that ``nvidia-smi`` lists and ``CUDA_VISIBLE_DEVICES`` allows."""
     program = shutil.which("nvidia-smi", path=environment.get("PATH", os.defpath))
     if program is None:
         return 0

@@ -1,7 +1,7 @@
-"""What an agent that speaks is: one YAML file, checked. Imports no model.
+"""The settings of a model agent: one validated YAML file. Imports no model.
 
-``configs/agents/NAME.yaml`` are those that come with er-gym; every field has a default. Keys are
-never here: a setting names the environment variable that holds one.
+er-gym's own files are ``configs/agents/NAME.yaml``. Every field has a default. Settings never hold
+an API key; they name the environment variable that holds it.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ class _Settings(BaseModel):
 
 
 class Pictures(_Settings):
-    """What is seen, and how it is sent.
+    """Which pictures are sent, and how.
 
     Attributes:
-        format, quality: of the files; quality is JPEG's, 1 to 95.
-        min_pixels, max_pixels: a picture with fewer or more is scaled, as Qwen's models are fed:
-            both sides multiples of 28.
-        keep: how many pictures of earlier turns stay in the conversation, the last ones; all for
-            None. Another becomes a few words, which costs a server what it remembered of the
-            conversation.
-        views: whether ``observe`` shows the three pictures that it takes.
-        width, height: of what is drawn, pixels; the suite's own for None.
+        format, quality: the file format; quality is JPEG's, 1 to 95.
+        min_pixels, max_pixels: a picture with fewer or more pixels is scaled as Qwen's models
+            expect, to sides that are multiples of 28.
+        keep: how many of the last pictures of earlier turns stay in the conversation; None for all.
+            Each older picture is replaced by a short text, which invalidates the server's prefix
+            cache.
+        views: whether the three pictures that ``observe`` takes are sent.
+        width, height: the size of rendered frames in pixels; None for the suite's own size.
     """
 
     format: Literal["jpeg", "png"] = "jpeg"
@@ -60,12 +60,12 @@ class Pictures(_Settings):
 
 
 class Prompts(_Settings):
-    """Which words the model is given.
+    """Which prompts the model is given.
 
     Attributes:
-        profile: a directory of ``configs/prompts``, or the path of one.
+        profile: a directory of ``configs/prompts``, or a path to one like it.
         language: ``en`` or ``zh``.
-        dataset: a training file in the paper's format, whose own words are used instead.
+        dataset: a training file in the paper's format, whose texts are used instead.
     """
 
     profile: str = "default"
@@ -74,7 +74,7 @@ class Prompts(_Settings):
 
 
 class Sampling(_Settings):
-    """How the model chooses its words; ``max_tokens`` is of one reply, thoughts included."""
+    """Sampling parameters; ``max_tokens`` limits one reply, thoughts included."""
 
     temperature: float = Field(0.0, ge=0)
     top_p: float = Field(1.0, gt=0, le=1)
@@ -82,12 +82,12 @@ class Sampling(_Settings):
 
 
 class Reasoning(_Settings):
-    """What is done with what a reasoning model thinks before it speaks.
+    """How a reasoning model's thoughts are handled.
 
     Attributes:
-        effort: passed on to the server; "" for its own.
-        in_history: whether earlier thoughts are given back to the model; most servers ask that they
-            be left out.
+        effort: the reasoning effort sent to the server; "" for the server's default.
+        in_history: whether earlier thoughts are sent back to the model; most servers ask to leave
+            them out.
     """
 
     effort: Literal["", "none", "minimal", "low", "medium", "high"] = ""
@@ -95,13 +95,13 @@ class Reasoning(_Settings):
 
 
 class Matching(_Settings):
-    """How a name that a model writes becomes an object type.
+    """How a name that a model writes is matched with an object type.
 
     Attributes:
-        fuzzy: how alike letters must be, 0 to 100.
-        embeddings: a sentence-transformers model, by name or directory, to ask where letters do not
-            help; "" for none.
-        threshold: how alike meanings must be, cosine.
+        fuzzy: the lowest spelling similarity of a match, 0 to 100.
+        embeddings: a sentence-transformers model, by name or directory, for names that spelling
+            does not match; "" for none.
+        threshold: the lowest cosine similarity of a match by meaning.
     """
 
     fuzzy: float = Field(86.0, ge=0, le=100)
@@ -110,7 +110,7 @@ class Matching(_Settings):
 
 
 class Prices(_Settings):
-    """US dollars for a million tokens; ``cached_prompt`` as ``prompt`` where it is not given."""
+    """US dollars per million tokens; ``cached_prompt`` defaults to ``prompt``."""
 
     prompt: Dollars = 0.0
     completion: Dollars = 0.0
@@ -118,22 +118,22 @@ class Prices(_Settings):
 
 
 class Server(_Settings):
-    """Where an OpenAI-compatible server is, and how long requests wait for it.
+    """The address and limits of an OpenAI-compatible server.
 
     Attributes:
-        base_url: such as ``http://127.0.0.1:8000/v1``; OpenAI's own where empty. A query string is
+        base_url: such as ``http://127.0.0.1:8000/v1``; OpenAI's own if empty. A query string is
             sent with each request.
-        key_from: the environment variable that holds the key. Without a value none is sent, which
-            is right for servers of one's own.
-        api_version: of Azure's; its presence says that the server is Azure's.
-        timeout: seconds for one try, from the first byte sent to the last received.
-        connect: seconds of these for a connection.
-        tries: how often a request is sent when what goes wrong may pass: no connection, 408, 409,
-            425, 429, 5xx and broken answers. A request that times out is sent twice at most, since
-            the server may charge for each.
-        requests_per_minute: at most so many, over all episodes; no limit for None.
-        max_tokens_field: what the server calls the limit of a reply.
-        extra: further fields of the request's body; null leaves one out that would be sent.
+        key_from: the environment variable that holds the API key. If it is not set, no key is sent;
+            local servers need none.
+        api_version: Azure's API version; if it is set, the server is taken for Azure's.
+        timeout: seconds for one try, from the first byte sent to the last byte received.
+        connect: the part of ``timeout`` for the connection, seconds.
+        tries: the most tries of a request after a failure that may pass: no connection, 408, 409,
+            425, 429, 5xx and broken answers. A request that times out is tried twice at most, since
+            the server may charge for each try.
+        requests_per_minute: the limit over all episodes; None for no limit.
+        max_tokens_field: the server's name for the limit of a reply.
+        extra: further fields of the request body; null removes a field that would be sent.
     """
 
     base_url: str = ""
@@ -152,9 +152,9 @@ class Local(_Settings):
 
     Attributes:
         adapter: a directory with a LoRA adapter; "" for none.
-        dtype, device_map, attention: as ``from_pretrained`` takes them.
-        batch: how many episodes' turns are worked out together.
-        wait: seconds that a batch waits for more.
+        dtype, device_map, attention: arguments of ``from_pretrained``.
+        batch: the largest number of episodes whose turns are generated together.
+        wait: seconds that a batch waits for further requests.
     """
 
     adapter: str = ""
@@ -166,14 +166,13 @@ class Local(_Settings):
 
 
 class AgentSettings(_Settings):
-    """An agent that speaks.
+    """The settings of a model agent.
 
     Attributes:
-        sees: ``pictures``, or ``text`` for models without eyes: what is in view, in hand and within
-            reach, in words.
-        decide: how it says what it does: in ``tags``, by a ``tools`` call, or in ``json`` of a
-            stated schema.
-        seed: sent with each request, together with the episode's; not sent for None.
+        sees: ``pictures``; or ``text``, for text-only models: the objects in view, in hand and
+            within reach as text.
+        decide: the form of a decision: ``tags``, a ``tools`` call, or ``json`` with a schema.
+        seed: added to the episode's seed and sent with each request; None sends no seed.
     """
 
     sees: Literal["pictures", "text"] = "pictures"
@@ -190,5 +189,5 @@ class AgentSettings(_Settings):
 
     @property
     def obs_mode(self) -> str:
-        """What it needs of the environment."""
+        """The observation mode that the agent needs of the environment."""
         return "rgb" if self.sees == "pictures" else "text"

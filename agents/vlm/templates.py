@@ -1,6 +1,6 @@
 """Prompts that are Jinja templates: ``configs/prompts``, or a directory like those.
 
-``configs/prompts/README.md`` says what templates there are and what they can use.
+``configs/prompts/README.md`` lists the templates and their variables.
 """
 
 from __future__ import annotations
@@ -13,7 +13,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from agents.vlm.prompt_set import IMAGE, MARK, THOUGHTS, Decide, Did, Now, Sees, unmarked
+from agents.vlm.prompt_set import (
+    IMAGE,
+    IMAGE_MARK,
+    THOUGHTS,
+    Decide,
+    LastAction,
+    Sees,
+    TurnContext,
+    without_marks,
+)
 from er_gym.tasks import verbs
 from er_gym.tasks.reading import parse_yaml, read_text
 from er_gym.tasks.suites import config_directory
@@ -25,14 +34,14 @@ if TYPE_CHECKING:
 _TEMPLATES = ("system.jinja", "first.jinja", "next.jinja", "feedback.jinja")
 _ACTIONS = "actions.yaml"
 _LARGEST = 1 << 16
-"""Bytes of a template."""
+"""The largest template, in bytes."""
 _LONGEST = 200_000
-"""Characters of a turn."""
+"""The longest turn, in characters."""
 
 
 @dataclass(frozen=True)
 class ActionRow:
-    """An action as templates list it: ``form`` is such as ``navigate to <object>``."""
+    """An action as templates list it; ``form`` is, for example, ``navigate to <object>``."""
 
     form: str
     meaning: str
@@ -40,11 +49,11 @@ class ActionRow:
 
 @dataclass(frozen=True, kw_only=True)
 class Templates:
-    """Words that are Jinja templates; a :class:`~agents.vlm.prompt_set.PromptSet`.
+    """Prompts from Jinja templates; a :class:`~agents.vlm.prompt_set.PromptSet`.
 
     Attributes:
-        files: the name of each template to its path.
-        actions: what can be done.
+        files: the path of each template, by name.
+        actions: the actions that prompts list.
     """
 
     name: str
@@ -59,13 +68,13 @@ class Templates:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
         return self._render("system.jinja", decide=decide, sees=sees)
 
-    def first(self, now: Now) -> str:
+    def first(self, turn: TurnContext) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
-        return self._render("first.jinja", pictures=int(now.sees == "pictures"), **vars(now))
+        return self._render("first.jinja", pictures=int(turn.sees == "pictures"), **vars(turn))
 
-    def next(self, now: Now, did: Did) -> str:
+    def next(self, turn: TurnContext, last_action: LastAction) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
-        return self._render("next.jinja", **vars(now), **vars(did))
+        return self._render("next.jinja", **vars(turn), **vars(last_action))
 
     def feedback(self, *, problem: str, decide: Decide) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
@@ -73,7 +82,7 @@ class Templates:
 
     def _render(self, template: str, *, pictures: int = 0, **variables: Any) -> str:
         given = {
-            name: unmarked(value) if isinstance(value, str) else value
+            name: without_marks(value) if isinstance(value, str) else value
             for name, value in variables.items()
         }
         self.environment.begin()
@@ -92,15 +101,15 @@ class Templates:
                 f"{self.files[template]}: makes a turn of {len(text):,} characters; "
                 f"{_LONGEST:,} are allowed"
             )
-        if text.count(MARK) != pictures:
+        if text.count(IMAGE_MARK) != pictures:
             raise ValueError(
-                f"{self.files[template]}: {IMAGE} comes {text.count(MARK)} times, but the "
+                f"{self.files[template]}: {IMAGE} comes {text.count(IMAGE_MARK)} times, but the "
                 f"pictures are {pictures}; write it once for each of {{{{ pictures }}}}"
             )
         return text
 
     def _place(self, error: Exception, template: str) -> str:
-        """The file, and the line where there is one, in which a template failed."""
+        """The file in which a template failed, with the line if it is known."""
         places = {str(path) for path in self.files.values()}
         lines = [
             f"{frame.filename}:{frame.lineno}"
@@ -111,7 +120,7 @@ class Templates:
 
 
 def directory_of(profile: str, language: str) -> Path:
-    """Where the templates of a profile are in a language."""
+    """The directory of a profile's templates in a language."""
     bundled = config_directory("prompts")
     profiles = sorted({file.parents[1].name for file in bundled.glob("*/*/system.jinja")})
     root = bundled / profile if profile in profiles else Path(profile)
@@ -130,7 +139,7 @@ def directory_of(profile: str, language: str) -> Path:
 
 
 def load_templates(directory: Path) -> Templates:
-    """Read the templates of a directory, and try each out."""
+    """Read the templates of a directory, and render each once as a check."""
     files = {file.name: file for file in sorted(directory.glob("*.jinja"))}
     missing = {*_TEMPLATES} - files.keys()
     if missing:
@@ -154,7 +163,8 @@ def load_templates(directory: Path) -> Templates:
 
 
 def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> BoundedEnvironment:
-    """Of templates that were read once: what is rendered is what the digest is of."""
+    """The environment of templates that were read once, so that the digest fits what is
+    rendered."""
     try:
         from jinja2 import FunctionLoader, StrictUndefined, TemplateSyntaxError
 
@@ -167,7 +177,7 @@ def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> Bound
     def source(name: str) -> tuple[str, str, None] | None:
         if name not in files:
             return None
-        return unmarked(sources[name]).replace(IMAGE, MARK), str(files[name]), None
+        return without_marks(sources[name]).replace(IMAGE, IMAGE_MARK), str(files[name]), None
 
     environment = BoundedEnvironment(
         loader=FunctionLoader(source),
@@ -183,15 +193,15 @@ def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> Bound
         except TemplateSyntaxError as error:
             problem = " ".join((error.message or "").split())
             raise ValueError(f"{file}:{error.lineno}: no template: {problem}") from None
-        except Exception as error:  # RecursionError, SyntaxError, OverflowError: of its nesting
+        except Exception as error:  # RecursionError, SyntaxError, OverflowError: nested too deeply
             problem = " ".join(str(error).split())[:200]
             raise ValueError(f"{file}: no template: {type(error).__name__}: {problem}") from None
     return environment
 
 
 def _rows(text: str, file: Path, language: str) -> tuple[ActionRow, ...]:
-    """The actions and what they mean, in the file's order; then the verbs of other packages that
-    the file does not explain, in their own words."""
+    """The actions and their meanings in the file's order, then the verbs of other packages that the
+    file does not explain."""
     meanings = parse_yaml(text, str(file))
     own = [verb.name for verb in verbs.OWN]
     added = {verb.name: _meaning(verb, language) for verb in verbs.ADDED}
@@ -199,26 +209,30 @@ def _rows(text: str, file: Path, language: str) -> tuple[ActionRow, ...]:
         known = ", ".join((*own, *added))
         raise ValueError(f"{file}: say what each of these means, and no other: {known}")
     return tuple(
-        ActionRow(f"{verb} <object>" if verb in verbs.OBJECT_VERBS else verb, unmarked(str(words)))
+        ActionRow(
+            f"{verb} <object>" if verb in verbs.OBJECT_VERBS else verb, without_marks(str(words))
+        )
         for verb, words in {**meanings, **(added | meanings)}.items()
     )
 
 
 def _meaning(verb: Verb, language: str) -> str:
-    """What prompts say that a verb means: in their language, else in English, else its name."""
+    """The meaning of an added verb: in the prompts' language, else in English, else its name."""
     stated = (verb.words[each].meaning for each in (language, "en") if each in verb.words)
     return next(filter(None, stated), f"{verb.name}{'' if verb.alone else ' an object'}.")
 
 
 def _try_out(templates: Templates) -> None:
-    """Render everything once, so that what is wrong shows before an episode is begun."""
+    """Render every template once, so that errors show before the first episode."""
     shown: dict[Sees, tuple[int, ...]] = {"pictures": (1, 4), "text": (0,)}
     for decide in get_args(Decide):
         templates.feedback(problem="It names no action.", decide=decide)
         for sees, numbers in shown.items():
             templates.system(decide=decide, sees=sees)
-            now = Now(task="Find a Mug.", decide=decide, sees=sees, max_steps=20)
-            templates.first(now)
+            turn = TurnContext(task="Find a Mug.", decide=decide, sees=sees, max_steps=20)
+            templates.first(turn)
             for pictures, success in itertools.product(numbers, (True, False)):
-                did = Did(action="navigate to Fridge", success=success, pictures=pictures)
-                templates.next(now, did)
+                last_action = LastAction(
+                    action="navigate to Fridge", success=success, pictures=pictures
+                )
+                templates.next(turn, last_action)

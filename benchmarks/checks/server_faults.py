@@ -31,7 +31,7 @@ from pathlib import Path
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply
 from agents.vlm.clients.budget import Budget
-from agents.vlm.clients.watch import Notice
+from agents.vlm.clients.supervisor import ServerEvent
 from agents.vlm.factory import AgentFactory
 from agents.vlm.settings import AgentSettings
 from benchmarks.checks.faulty_server import CASES, KEY, Case, FaultyServer
@@ -110,10 +110,10 @@ def _problems(case: Case, server: FaultyServer, directory: Path) -> Iterator[str
             "sampling": {"max_tokens": 100},
         }
     )
-    notices: list[Notice] = []
+    server_events: list[ServerEvent] = []
     began = time.monotonic()
     speaker = AgentFactory("openai:m", settings, directory, Budget(max_usd=1000))
-    speaker.watch.show = notices.append
+    speaker.supervisor.show = server_events.append
     client = speaker.client
     ends, told = [], []
     for seed in range(3):
@@ -139,12 +139,12 @@ def _problems(case: Case, server: FaultyServer, directory: Path) -> Iterator[str
         yield f"ended with {ends}, not with {sorted(case.ends)}: {told[-1]}"
     yield from _wrong_ledger(directory, server, ends.count("reply"))
     kept = _lines(directory / "server-events.jsonl")
-    events = [Notice.model_validate_json(line) for line in kept]
+    events = [ServerEvent.model_validate_json(line) for line in kept]
     failed = server.count - ends.count("reply")
     said = sum(each.event in ("retry", "failed", "stopped") for each in events)
     if said != failed:
         yield f"{failed} tries failed, and {said} were told: {[str(each) for each in events]}"
-    told += [str(each) for each in notices]
+    told += [str(each) for each in server_events]
     if any(KEY in each for each in told):
         yield f"the key is told: {next(each for each in told if KEY in each)}"
     for file in directory.rglob("*"):

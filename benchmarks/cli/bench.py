@@ -147,7 +147,7 @@ def bench(
     cannot be played is set aside and named; the others are played. The options from --agent-config
     on are for vision-language agents, such as openai:MODEL.
     """
-    from agents import RL
+    from agents import RL_PREFIX
     from benchmarks.cli.progress import Progress
     from benchmarks.scoring.report import load_run
     from benchmarks.scoring.tables import print_tables, tables
@@ -167,8 +167,8 @@ def bench(
         part = Shard.parse(shard) if shard is not None else None
         asked = _load_suite(suite, tasks_file, poses, protocol)
         vlm_run = _vlm_run(agent, vlm_options)
-        if trust and not agent.startswith(RL):
-            raise BadInput(f"--trust is for trained policies, {RL}RUN, not for {agent}")
+        if trust and not agent.startswith(RL_PREFIX):
+            raise BadInput(f"--trust is for trained policies, {RL_PREFIX}RUN, not for {agent}")
         env = _env_kwargs(
             asked, agent, seed, vlm_run, protocol, trust, backend=backend, instances=instances
         )
@@ -185,7 +185,7 @@ def bench(
             suite_digest=asked.digest,
             suite_size=len(fitted.tasks),
             agent=agent,
-            agent_settings=vlm_run.consequential if vlm_run else {},
+            agent_settings=vlm_run.comparable_settings if vlm_run else {},
             env=env,
             seed=seed,
             er_gym=__version__,
@@ -349,10 +349,10 @@ def _env_kwargs(
 
 def _vlm_run(agent: str, vlm_options: VLMOptions) -> VLMRun | None:
     """The run of a vision-language agent; None for other agents, which take none of its options."""
-    from agents.vlm.factory import speaks
+    from agents.vlm.factory import is_model_agent
     from benchmarks.cli.vlm_run import VLMRun
 
-    if speaks(agent):
+    if is_model_agent(agent):
         return VLMRun.of(agent, **vars(vlm_options))
     given = [name for name, value in vars(vlm_options).items() if value not in (None, ())]
     if given:

@@ -82,10 +82,10 @@ def serve(
     installed and there is a GPU, otherwise transformers; llama.cpp serves .gguf files. The server
     listens on 127.0.0.1 only, and ends when this command does.
     """
-    from agents.vlm.serving import Wanted, command_for, look_around
+    from agents.vlm.serving import ServeOptions, command_for, inspect_machine
 
     _must_be_there(model)
-    wanted = Wanted(
+    options = ServeOptions(
         port=_usable_port(port),
         engine=engine or "",
         name=name,
@@ -95,7 +95,7 @@ def serve(
         more=more,
     )
     with bad_input():
-        command = command_for(model, wanted, look_around(python))
+        command = command_for(model, options, inspect_machine(python))
     if dry_run:
         echo(_as_shell(command))
         return 0

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.vlm.clients.budget import Budget
-from agents.vlm.factory import AgentFactory, consequential, load_settings
+from agents.vlm.factory import AgentFactory, comparable_settings, load_settings
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.events import EventListener
@@ -62,9 +62,9 @@ class VLMRun:
         return VLMRun(name, settings, budget, concurrency or _CONCURRENCY)
 
     @property
-    def consequential(self) -> dict[str, Any]:
+    def comparable_settings(self) -> dict[str, Any]:
         """What decides what it says."""
-        return consequential(self.settings, load_prompts(self.settings.prompts).digest)
+        return comparable_settings(self.settings, load_prompts(self.settings.prompts).digest)
 
     @property
     def env(self) -> dict[str, Any]:
@@ -92,7 +92,7 @@ class VLMRun:
         a logger warns.
         """
         if say is not None:
-            factory.watch.show = say
+            factory.supervisor.show = say
         return run(
             directory,
             tasks,

@@ -27,7 +27,7 @@ from agents import NamedAgent, make_agent
 from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig, load_config
 from agents.rl.policy_observation import IMAGES
-from agents.rl.saved import FOREIGN, MODEL
+from agents.rl.model_file import MODEL, SB3_MODEL
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option, trust_option
 from benchmarks.cli.progress import Progress
@@ -70,7 +70,7 @@ class TrainedRun:
         Raises:
             ValueError: it is none, or its training is not at its end.
         """
-        if not any((path / name).exists() for name in (MODEL, FOREIGN)):
+        if not any((path / name).exists() for name in (MODEL, SB3_MODEL)):
             raise ValueError(f"{path} has no {MODEL}; give run directories of er-gym train-rl")
         trained = TrainedRun(path, load_config(path / "config.yaml"))
         if trained.steps < trained.config.total_steps:

@@ -21,10 +21,10 @@ from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
 
-from agents.rl.callbacks import Threads
+from agents.rl.callbacks import TorchThreads
 from agents.rl.config import PPO, TrainConfig, config_file, load_config
 from agents.rl.ppo import make
-from agents.rl.train import quick_arithmetic, vectorised
+from agents.rl.train import fast_arithmetic, make_vec_env
 
 
 @dataclass
@@ -79,14 +79,14 @@ def measure(model: OnPolicyAlgorithm, env: VecEnv, steps: int, threads: int) -> 
     model.policy.forward = choose  # type: ignore[method-assign]
     model.train = clock.around("learning", model.train)  # type: ignore[method-assign]
     with clock("all"):
-        model.learn(steps, callback=CallbackList([rates, Threads(threads)]))
+        model.learn(steps, callback=CallbackList([rates, TorchThreads(threads)]))
     return clock, rates
 
 
 def ours(config: TrainConfig, steps: int) -> tuple[Clock, Rates]:
     """MaskablePPO on an er-gym configuration."""
     assert isinstance(config.algorithm, PPO), config.algorithm.name
-    env = vectorised(config, config.env, config.seed)
+    env = make_vec_env(config, config.env, config.seed)
     try:
         return measure(make(config, config.algorithm, env), env, steps, config.threads)
     finally:
@@ -135,7 +135,7 @@ def main(config: str, steps: int, peer_steps: int, overrides: tuple[str, ...]) -
     asked = load_config(config_file(config), overrides)
     if not isinstance(asked.algorithm, PPO):
         raise click.BadParameter(f"{config} is of {asked.algorithm.name}; give one of ppo")
-    with quick_arithmetic():
+    with fast_arithmetic():
         show(config, *ours(asked, steps), steps)
         show("PPO on MiniGrid", *minigrid(asked, peer_steps), peer_steps)
 

@@ -51,26 +51,26 @@ def deeds_of(goals: Iterable[Goal]) -> Deeds:
     goals = list(goals)
     for goal in goals:
         if goal.kind == words.FIND and len(goals) == 1:
-            found.append((words.FIND, goal.thing))
+            found.append((words.FIND, goal.object_type))
         elif goal.kind == words.TAKE:
-            take(goal.thing)
+            take(goal.object_type)
         elif goal.kind == words.PUT:
-            put(goal.thing, goal.place)
+            put(goal.object_type, goal.target)
         elif goal.kind == words.TOGGLE:
-            found.append((verbs.TOGGLE, goal.thing))
+            found.append((verbs.TOGGLE, goal.object_type))
         elif goal.kind == words.SLICE:
-            take(goal.place)
-            found.append((verbs.SLICE, goal.thing))
+            take(goal.target)
+            found.append((verbs.SLICE, goal.object_type))
         elif goal.kind == words.WASH:
-            put(goal.thing, "SinkBasin")
+            put(goal.object_type, "SinkBasin")
             found += [] if water else [(verbs.TOGGLE, "Faucet")]
             water = True
-            take(goal.thing)
+            take(goal.object_type)
         elif goal.kind in MACHINES:
             machine, times = MACHINES[goal.kind]
-            put(goal.thing, machine)
+            put(goal.object_type, machine)
             found += [(verbs.TOGGLE, machine)] * times
-            take(goal.thing)
+            take(goal.object_type)
     return found
 
 

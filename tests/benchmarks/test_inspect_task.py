@@ -22,7 +22,7 @@ from inspect_ai.log import read_eval_log
 from inspect_ai.model import ModelAPI, ModelOutput, ModelUsage, get_model, modelapi
 
 from agents.scripted.oracle import OracleAgent
-from agents.vlm.parsing_words import DECISION
+from agents.vlm.parsing.vocabulary import DECISION
 from benchmarks.cli.errors import CRASHED
 from benchmarks.cli.inspect import inspect
 from benchmarks.inspect_task import EPISODE, er_gym

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium import spaces
 
 from agents.vlm.chat import Message, Reply
-from agents.vlm.clients.kinds import ModelClient
+from agents.vlm.clients.registry import ModelClientSpec
 from er_gym.envs.observations import Observation
 from er_gym.rollout.agent import Decision
 from er_gym.tasks import Suite, Task, load_suite
@@ -47,8 +47,8 @@ class Echo:
         """Nothing is held."""
 
 
-ECHO = ModelClient(
-    make=lambda model, settings, ledger, watch: Echo(model),
+ECHO = ModelClientSpec(
+    make=lambda model, settings, ledger, supervisor: Echo(model),
     opens="ACTION",
     help="says one action again and again",
 )

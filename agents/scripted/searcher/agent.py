@@ -1,4 +1,4 @@
-"""A scripted agent that is told nothing but the instruction: it reads, searches and acts."""
+"""A scripted agent that knows only the instruction: it parses it, searches and acts."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from collections.abc import Container, Generator, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
-from agents.scripted.searcher import instruction as words
-from agents.scripted.searcher import places
+from agents.scripted.searcher import instruction, search_priors
 from agents.scripted.searcher.instruction import Goal, understand
 from er_gym.envs.actions import Action
 from er_gym.rollout.agent import Decision
@@ -16,24 +15,24 @@ from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 
 _RESERVE = 1
-"""Steps kept for "end"."""
+"""Steps reserved for "end"."""
 _MOST_VISITS = 2
-"""How often one goes to a type for nothing before it is thought to be seen through, for each that
-a room usually has."""
+"""Fruitless visits to a receptacle type, per estimated receptacle in the room, before it counts as
+searched."""
 
-_STALE = 2
-"""So many containers in a row that are found open: all of their type have been opened."""
-Play: TypeAlias = Generator[Action, None, bool]
-"""Actions, one at a time; what it returns is whether it came to what it was for."""
+_ALL_OPENED = 2
+"""After this many open containers of a type in a row, all of that type count as opened."""
+Steps: TypeAlias = Generator[Action, None, bool]
+"""Yields actions one at a time and returns whether it reached its goal."""
 
 
 class _OutOfSteps(Exception):
-    """Nothing can be done any more but to end."""
+    """Only the step for "end" is left."""
 
 
 @dataclass
-class View:
-    """What ``info`` tells of what is perceived after a step."""
+class StepView:
+    """The parts of ``info`` that the searcher reads after a step."""
 
     sees: frozenset[str]
     holds: str
@@ -44,9 +43,9 @@ class View:
     left: int
 
     @staticmethod
-    def of(info: Mapping[str, Any]) -> View:
-        """Read it."""
-        return View(
+    def of(info: Mapping[str, Any]) -> StepView:
+        """Read ``info``."""
+        return StepView(
             sees=frozenset(info["visible"]),
             holds=info["held"],
             navigable=info["navigable"],
@@ -56,42 +55,42 @@ class View:
             left=info["max_steps"] - info["steps"] - _RESERVE,
         )
 
-    def may(self, verb: str, object_type: str) -> bool:
+    def is_legal(self, verb: str, object_type: str) -> bool:
         """Whether an action is legal."""
         return Action(verb, object_type) in self.legal
 
 
 @dataclass
 class Memory:
-    """What has been seen and done so far in an episode.
+    """What the searcher has seen and done so far in an episode.
 
     Attributes:
-        at: the type that it last went to.
-        visits: how often it went to a type.
-        sights: what was seen on arriving at a type, each time.
-        exhausted: types of which all there are have been seen.
-        found: thing to the receptacle types at which it was in view.
-        opened: container types that stand open, by its doing, to the phase in which it opened them.
-        phase: counts what it sets about, fetching and putting down.
-        stale: how many containers of a type in a row it found open.
+        at: the type that it last navigated to.
+        visits: the number of visits by type.
+        views_seen: by type, the distinct views on arrival.
+        exhausted: types whose objects have all been seen.
+        found: by object type, the receptacle types at which it was in view.
+        opened: by container type that it opened and left open, the phase in which it did so.
+        phase: counts fetches and put-downs.
+        found_open: by type, how many containers in a row were already open.
     """
 
     at: str = ""
     visits: Counter[str] = field(default_factory=Counter)
-    sights: dict[str, set[object]] = field(default_factory=dict)
+    views_seen: dict[str, set[object]] = field(default_factory=dict)
     exhausted: set[str] = field(default_factory=set)
     found: dict[str, set[str]] = field(default_factory=dict)
     opened: dict[str, int] = field(default_factory=dict)
     phase: int = 0
-    stale: Counter[str] = field(default_factory=Counter)
+    found_open: Counter[str] = field(default_factory=Counter)
 
 
 class SearcherAgent:
-    """Reads what to do, looks where things usually are, acts when what it wants is in reach.
+    """Parses the instruction, searches likely places, and acts once an object is within reach.
 
-    It knows what the instruction says and what the environment tells any agent: what it sees and
-    holds, where it may go, what is in reach and which actions are legal. It neither reads the
-    task's key actions nor its goal, nor which object an action was done to.
+    It uses the instruction and what the environment tells every agent: the visible and the held
+    objects, the navigable and the interactable types, and the legal actions. It does not read the
+    task's key actions or goal, nor which object an action affected.
     """
 
     obs_mode = "text"
@@ -100,19 +99,22 @@ class SearcherAgent:
         """Begin an episode: read the instruction."""
         self._goals = understand(task.instruction)
         self._memory = Memory()
-        self._in_order = [goal.kind for goal in self._goals] == [words.PUT, words.PUT]
+        self._two_transfers = [goal.kind for goal in self._goals] == [
+            instruction.PUT,
+            instruction.PUT,
+        ]
         self._thought = ""
-        self._tap = False  # whether it has turned on the water
+        self._water_runs = False  # whether it has turned on the faucet
         self._last: Action | None = None
         self._repeats = 0
-        self._play = self._episode()
+        self._steps = self._episode()
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """The next step of the plan, given what came of the last one."""
-        self._view = View.of(info)
-        self._note()
+        """The next action of the plan, given the result of the last one."""
+        self._view = StepView.of(info)
+        self._update_memory()
         try:
-            action = next(self._play)
+            action = next(self._steps)
         except (_OutOfSteps, StopIteration):
             action = Action(verbs.END)
         self._repeats = self._repeats + 1 if action == self._last else 1
@@ -121,17 +123,17 @@ class SearcherAgent:
 
     # -- remembering -----------------------------------------------------------------------------
 
-    def _note(self) -> None:
+    def _update_memory(self) -> None:
         view, memory, last = self._view, self._memory, self._last
         if last is not None and view.done:
             if last.verb == verbs.NAVIGATE:
                 memory.visits[last.object_type] += 1
                 memory.at = last.object_type
                 sight = (view.sees, view.reach, view.holds)
-                seen = memory.sights.setdefault(memory.at, set())
-                if sight in seen and not places.opens(memory.at):
+                seen = memory.views_seen.setdefault(memory.at, set())
+                if sight in seen and not search_priors.opens(memory.at):
                     memory.exhausted.add(memory.at)
-                memory.sights[memory.at].add(sight)
+                memory.views_seen[memory.at].add(sight)
             elif last.verb == verbs.OPEN:
                 memory.opened[last.object_type] = memory.phase
             elif last.verb == verbs.CLOSE:
@@ -142,15 +144,15 @@ class SearcherAgent:
 
     # -- the plan --------------------------------------------------------------------------------
 
-    def _episode(self) -> Play:
+    def _episode(self) -> Steps:
         goals = self._goals
         for number, goal in enumerate(goals):
             yield from _DO[goal.kind](self, goal, goals[number + 1 :])
         self._thought = "Everything is done." if goals else "I do not know what to do."
         return True
 
-    def _step(self, verb: str, object_type: str = "", thought: str = "") -> Play:
-        """Do one action; whether it was done."""
+    def _step(self, verb: str, object_type: str = "", thought: str = "") -> Steps:
+        """Take one action; returns whether it succeeded."""
         action = Action(verb, object_type)
         if self._view.left <= 0:
             raise _OutOfSteps
@@ -163,24 +165,27 @@ class SearcherAgent:
         yield action
         return self._view.done
 
-    def _may(self, verb: str, name: str) -> bool:
-        return self._view.may(verb, name)
+    def _is_legal(self, verb: str, name: str) -> bool:
+        return self._view.is_legal(verb, name)
 
     # -- searching -------------------------------------------------------------------------------
 
     def _ready(self, thing: str, verb: str) -> bool:
-        """Whether a thing is in reach, and the verb, if there is one, can be done to it."""
+        """Whether an object is within reach and, if a verb is given, the action is legal."""
         if not verb:
             return thing in self._view.reach
-        return self._may(verb, thing)
+        return self._is_legal(verb, thing)
 
-    def _reach(self, thing: str, verb: str = "", source: str = "") -> Play:
-        """Search until a thing is in reach and the verb can be done to it."""
+    def _reach(self, thing: str, verb: str = "", source: str = "") -> Steps:
+        """Search until an object is within reach and the action is legal."""
         memory = self._memory
         tried: Counter[str] = Counter()
         observed = bool(memory.visits)
         if source:
-            while tried[source] < places.usual_number(source) and source in self._view.navigable:
+            while (
+                tried[source] < search_priors.usual_number(source)
+                and source in self._view.navigable
+            ):
                 tried[source] += 1
                 if (yield from self._look_into(source, thing, verb)):
                     return True
@@ -193,7 +198,7 @@ class SearcherAgent:
                 tried[source] += 1
                 yield from self._look_into(source, thing, verb)
                 continue
-            target = self._best(thing, tried)
+            target = self._best_place(thing, tried)
             if not target:
                 if tried["observe"] < 2:
                     tried["observe"] += 1
@@ -206,39 +211,45 @@ class SearcherAgent:
             yield from self._visit(target, thing, verb)
         return True
 
-    def _visit(self, target: str, thing: str, verb: str) -> Play:
-        """Go somewhere and look, into what is closed there as well."""
+    def _visit(self, target: str, thing: str, verb: str) -> Steps:
+        """Navigate to a place and look, also into closed containers there."""
         there = yield from self._step(
             verbs.NAVIGATE, target, f"The {thing} may be at the {target}."
         )
         if not there or self._ready(thing, verb):
             return there
-        shut = [target] if places.opens(target) and places.has(thing, "pickupable") else []
-        if target == thing:  # it is not to be seen where one went for it: something hides it
-            shut = [name for name in sorted(self._view.reach) if places.opens(name)]
-        if places.opens(target):
-            stale = 0 if self._may(verbs.OPEN, target) else self._memory.stale[target] + 1
-            self._memory.stale[target] = stale
-            if stale >= _STALE:
+        shut = (
+            [target]
+            if search_priors.opens(target) and search_priors.has(thing, "pickupable")
+            else []
+        )
+        if target == thing:  # it is not in view at its own place: a container hides it
+            shut = [name for name in sorted(self._view.reach) if search_priors.opens(name)]
+        if search_priors.opens(target):
+            found_open = (
+                0 if self._is_legal(verbs.OPEN, target) else self._memory.found_open[target] + 1
+            )
+            self._memory.found_open[target] = found_open
+            if found_open >= _ALL_OPENED:
                 self._memory.exhausted.add(target)
         for name in shut:
-            if self._may(verbs.OPEN, name) and not self._ready(thing, verb):
+            if self._is_legal(verbs.OPEN, name) and not self._ready(thing, verb):
                 yield from self._step(verbs.OPEN, name, f"Is the {thing} in the {name}?")
         return True
 
-    def _look_into(self, source: str, thing: str, verb: str) -> Play:
-        """Go where the words say a thing is; one that is in reach before it opens is another."""
-        if not places.opens(source):
+    def _look_into(self, source: str, thing: str, verb: str) -> Steps:
+        """Navigate to the source and open it; an object in view before that is a different one."""
+        if not search_priors.opens(source):
             yield from self._visit(source, thing, verb)
             return self._ready(thing, verb)
         yield from self._step(verbs.NAVIGATE, source, f"The {thing} is said to be there.")
         before = thing in self._view.sees
-        if self._may(verbs.OPEN, source):
+        if self._is_legal(verbs.OPEN, source):
             yield from self._step(verbs.OPEN, source, f"Is the {thing} in the {source}?")
         return self._ready(thing, verb) and not before
 
-    def _best(self, thing: str, tried: Mapping[str, int]) -> str:
-        """The most promising place for its price, "" when there is none left."""
+    def _best_place(self, thing: str, tried: Mapping[str, int]) -> str:
+        """The navigable type with the highest score, "" if none is left."""
         scored = [
             (self._promise(thing, name, tried), name)
             for name in self._view.navigable
@@ -250,157 +261,160 @@ class SearcherAgent:
     def _promise(self, thing: str, place: str, tried: Mapping[str, int]) -> float:
         if place == thing:
             return 10.0 / (1 + tried.get(place, 0)) if tried.get(place, 0) < 3 else 0.0
-        if not places.has(thing, "pickupable"):
+        if not search_priors.has(thing, "pickupable"):
             return self._vantage(thing, place, tried)
-        if not places.has(place, "receptacle"):
+        if not search_priors.has(place, "receptacle"):
             return 0.001 if not tried.get(place) else 0.0
         times = tried.get(place, 0)
-        number = places.usual_number(place)
+        number = search_priors.usual_number(place)
         if times >= number * _MOST_VISITS:
             return 0.0
-        worth = places.likelihood(thing, place)
+        worth = search_priors.likelihood(thing, place)
         if place in self._memory.found.get(thing, ()) and times == 0:
             worth += 0.7
         elif place in self._memory.exhausted:
             worth *= 0.05
         elif max(self._memory.visits[place], times) >= number:
             worth *= 0.1
-        return worth / (2.0 if places.opens(place) else 1.0)
+        return worth / (2.0 if search_priors.opens(place) else 1.0)
 
     def _vantage(self, thing: str, place: str, tried: Mapping[str, int]) -> float:
-        """The promise of a place from where one may see what stands somewhere by itself."""
-        if tried.get(place, 0) >= places.usual_number(place):
+        """The score of a place as a viewpoint for an object that is not pickupable."""
+        if tried.get(place, 0) >= search_priors.usual_number(place):
             return 0.0
         in_view = place in self._memory.found.get(thing, ())
         return (1.0 if in_view else 0.3) / (1 + self._memory.visits[place])
 
     # -- doing -----------------------------------------------------------------------------------
 
-    def _find(self, goal: Goal, later: Iterable[Goal]) -> Play:
-        return (yield from self._reach(goal.thing, source=goal.source))
+    def _find(self, goal: Goal, later: Iterable[Goal]) -> Steps:
+        return (yield from self._reach(goal.object_type, source=goal.source))
 
-    def _take(self, goal: Goal, later: Iterable[Goal] = ()) -> Play:
-        """Take a thing, and close what it was in."""
-        thing = goal.thing
+    def _take(self, goal: Goal, later: Iterable[Goal] = ()) -> Steps:
+        """Pick up an object and close its container."""
+        thing = goal.object_type
         self._memory.phase += 1
         for _ in range(3):
             if self._view.holds == thing:
                 return True
             yield from self._empty_hand()
             yield from self._reach(thing, verbs.PICKUP, goal.source)
-            if self._in_order and self._opened_before(self._memory.at):
+            if self._two_transfers and self._opened_before(self._memory.at):
                 yield from self._reopen(self._memory.at)
             if (yield from self._step(verbs.PICKUP, thing, f"There is the {thing}.")):
                 yield from self._close_up()
         return self._view.holds == thing
 
-    def _close_up(self) -> Play:
-        """Close what is open here."""
+    def _close_up(self) -> Steps:
+        """Close the containers within reach that it opened."""
         for name in list(self._memory.opened):
-            if self._may(verbs.CLOSE, name):
+            if self._is_legal(verbs.CLOSE, name):
                 yield from self._step(verbs.CLOSE, name, f"The {name} is to be closed again.")
         return True
 
-    def _empty_hand(self) -> Play:
-        """Lay down what is in the hand, where one is."""
+    def _empty_hand(self) -> Steps:
+        """Put the held object into a receptacle within reach."""
         if self._view.holds:
             for name in sorted(self._view.reach):
-                if self._may(verbs.PUT, name) and self._view.holds:
+                if self._is_legal(verbs.PUT, name) and self._view.holds:
                     yield from self._step(verbs.PUT, name, "I need my hand free.")
         return True
 
-    def _put(self, goal: Goal, later: Iterable[Goal] = ()) -> Play:
-        """Take a thing to a place and put it there."""
+    def _put(self, goal: Goal, later: Iterable[Goal] = ()) -> Steps:
+        """Fetch an object and put it into its target."""
         yield from self._take(goal)
-        yield from self._put_into(goal.thing, goal.place)
-        nxt = next(iter(later), None)
-        if nxt is not None and not self._may(verbs.PICKUP, nxt.thing):
+        yield from self._put_into(goal.object_type, goal.target)
+        next_goal = next(iter(later), None)
+        if next_goal is not None and not self._is_legal(verbs.PICKUP, next_goal.object_type):
             yield from self._close_up()
         return True
 
-    def _put_into(self, thing: str, place: str) -> Play:
-        """Go to a place with what is in the hand, open it if need be, and put it there."""
+    def _put_into(self, thing: str, place: str) -> Steps:
+        """Carry the held object to a receptacle, open it if needed, and put the object there."""
         self._memory.phase += 1
         for _ in range(4):
             if not self._view.holds:
                 break
             yield from self._go_and_open(place)
-            if self._may(verbs.PUT, place):
+            if self._is_legal(verbs.PUT, place):
                 yield from self._step(verbs.PUT, place, f"Here the {thing} belongs.")
         return not self._view.holds
 
-    def _go_and_open(self, place: str) -> Play:
+    def _go_and_open(self, place: str) -> Steps:
         if place in self._view.navigable:
             yield from self._step(verbs.NAVIGATE, place, f"I go to the {place}.")
         if place not in self._view.reach:
             yield from self._reach(place)
-        if self._in_order and self._opened_before(place):
+        if self._two_transfers and self._opened_before(place):
             yield from self._reopen(place)
-        if self._may(verbs.OPEN, place) and not self._may(verbs.PUT, place):
+        if self._is_legal(verbs.OPEN, place) and not self._is_legal(verbs.PUT, place):
             yield from self._step(verbs.OPEN, place, f"The {place} is closed.")
         return True
 
     def _opened_before(self, place: str) -> bool:
-        """Whether a container stands open from when it was opened for something else."""
+        """Whether a container was left open in an earlier phase."""
         return self._memory.opened.get(place, self._memory.phase) < self._memory.phase
 
-    def _reopen(self, place: str) -> Play:
-        """Of two transfers, what is opened counts only in its turn."""
-        if self._may(verbs.CLOSE, place):
+    def _reopen(self, place: str) -> Steps:
+        """Close and open a container again: in a task of two transfers, opening counts only in
+        order."""
+        if self._is_legal(verbs.CLOSE, place):
             yield from self._step(verbs.CLOSE, place, f"The {place} was open before its turn.")
             yield from self._step(verbs.OPEN, place)
         return True
 
-    def _toggle(self, goal: Goal, later: Iterable[Goal] = ()) -> Play:
-        yield from self._reach(goal.thing, verbs.TOGGLE, goal.source)
-        yield from self._step(verbs.TOGGLE, goal.thing, f"I switch the {goal.thing}.")
+    def _toggle(self, goal: Goal, later: Iterable[Goal] = ()) -> Steps:
+        yield from self._reach(goal.object_type, verbs.TOGGLE, goal.source)
+        yield from self._step(verbs.TOGGLE, goal.object_type, f"I switch the {goal.object_type}.")
         return True
 
-    def _open(self, goal: Goal, later: Iterable[Goal] = ()) -> Play:
-        verb = verbs.OPEN if goal.kind == words.OPEN else verbs.CLOSE
-        yield from self._reach(goal.thing, verb, goal.source)
-        return (yield from self._step(verb, goal.thing))
+    def _open(self, goal: Goal, later: Iterable[Goal] = ()) -> Steps:
+        verb = verbs.OPEN if goal.kind == instruction.OPEN else verbs.CLOSE
+        yield from self._reach(goal.object_type, verb, goal.source)
+        return (yield from self._step(verb, goal.object_type))
 
-    def _process(self, goal: Goal, later: Iterable[Goal] = ()) -> Play:
-        """Put a thing where something is done to it, do it, and take it up again."""
-        thing = goal.thing
+    def _process(self, goal: Goal, later: Iterable[Goal] = ()) -> Steps:
+        """Put an object into an appliance, run it, and pick the object up again."""
+        thing = goal.object_type
         place, switch, times = _PROCESSES[goal.kind]
         yield from self._take(goal)
         yield from self._put_into(thing, place)
-        if goal.kind in (words.HEAT, words.CHILL) and self._may(verbs.CLOSE, place):
+        if goal.kind in (instruction.HEAT, instruction.CHILL) and self._is_legal(
+            verbs.CLOSE, place
+        ):
             yield from self._step(verbs.CLOSE, place, "It works when it is closed.")
-        if switch and not (switch == "Faucet" and self._tap):
+        if switch and not (switch == "Faucet" and self._water_runs):
             for _ in range(times):
                 yield from self._reach(switch, verbs.TOGGLE)
                 yield from self._step(verbs.TOGGLE, switch, f"I switch the {switch}.")
-            self._tap = switch == "Faucet" or self._tap
-        if self._may(verbs.OPEN, place) and not self._may(verbs.PICKUP, thing):
+            self._water_runs = switch == "Faucet" or self._water_runs
+        if self._is_legal(verbs.OPEN, place) and not self._is_legal(verbs.PICKUP, thing):
             yield from self._step(verbs.OPEN, place)
-        yield from self._take(Goal(words.TAKE, thing))
+        yield from self._take(Goal(instruction.TAKE, thing))
         return True
 
-    def _slice(self, goal: Goal, later: Iterable[Goal] = ()) -> Play:
-        knife = goal.place or "Knife"
-        yield from self._take(Goal(words.TAKE, knife))
-        yield from self._reach(goal.thing, verbs.SLICE)
-        yield from self._step(verbs.SLICE, goal.thing)
+    def _slice(self, goal: Goal, later: Iterable[Goal] = ()) -> Steps:
+        knife = goal.target or "Knife"
+        yield from self._take(Goal(instruction.TAKE, knife))
+        yield from self._reach(goal.object_type, verbs.SLICE)
+        yield from self._step(verbs.SLICE, goal.object_type)
         return True
 
 
 _PROCESSES = {
-    words.WASH: ("SinkBasin", "Faucet", 1),
-    words.BREW: ("CoffeeMachine", "CoffeeMachine", 1),
-    words.HEAT: ("Microwave", "Microwave", 2),
-    words.CHILL: ("Fridge", "", 0),
-    words.TOAST: ("Toaster", "Toaster", 1),
+    instruction.WASH: ("SinkBasin", "Faucet", 1),
+    instruction.BREW: ("CoffeeMachine", "CoffeeMachine", 1),
+    instruction.HEAT: ("Microwave", "Microwave", 2),
+    instruction.CHILL: ("Fridge", "", 0),
+    instruction.TOAST: ("Toaster", "Toaster", 1),
 }
 _DO = {
-    words.FIND: SearcherAgent._find,
-    words.TAKE: SearcherAgent._take,
-    words.PUT: SearcherAgent._put,
-    words.TOGGLE: SearcherAgent._toggle,
-    words.OPEN: SearcherAgent._open,
-    words.CLOSE: SearcherAgent._open,
-    words.SLICE: SearcherAgent._slice,
+    instruction.FIND: SearcherAgent._find,
+    instruction.TAKE: SearcherAgent._take,
+    instruction.PUT: SearcherAgent._put,
+    instruction.TOGGLE: SearcherAgent._toggle,
+    instruction.OPEN: SearcherAgent._open,
+    instruction.CLOSE: SearcherAgent._open,
+    instruction.SLICE: SearcherAgent._slice,
     **dict.fromkeys(_PROCESSES, SearcherAgent._process),
 }

@@ -1,8 +1,8 @@
-"""What an instruction asks for, read from its words: a table of verbs, and what they go with.
+"""Parses an instruction into goals with a table of verbs.
 
-The words are read once, from left to right. A verb waits for the thing that it is done to, which
-comes behind it ("put the Mug …"), as a pronoun ("… and put it …"), or, in the passive, before it
-("the Mug should be put …"). The rest is tidying: finding a thing to take it is taking it.
+The words are read once, from left to right. The object of a verb comes after it ("put the Mug …"),
+as a pronoun ("… and put it …"), or, in the passive, before it ("the Mug should be put …").
+Redundant goals are then merged: finding an object in order to take it is one goal, taking it.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ OPEN, CLOSE = "open", "close"
 
 @dataclass(frozen=True)
 class Goal:
-    """One thing to do.
+    """One goal of an instruction.
 
     Attributes:
         kind: :data:`FIND`, :data:`TAKE` and so on.
-        thing: the object type that it is done to.
-        place: where it goes, or the knife it is sliced with; "" where there is none.
-        source: the receptacle type that the words say it is in, "" if they do not.
+        object_type: the type of the object.
+        target: the receptacle type to put it into, or the knife to slice it with; "" for none.
+        source: the receptacle type that the instruction says holds the object; "" if it names none.
     """
 
     kind: str
-    thing: str
-    place: str = ""
+    object_type: str
+    target: str = ""
     source: str = ""
 
 
@@ -78,7 +78,7 @@ _BE = frozenset({"be", "is", "are", "get", "gets", "being", "been"})
 _ADJECTIVES = frozenset({"closed", "clean", "open", "hot", "cold", "warm", "shut"})
 _ACTION = {TAKE: verbs.PICKUP, PUT: verbs.PICKUP, TOGGLE: verbs.TOGGLE, SLICE: verbs.SLICE,
            OPEN: verbs.OPEN, CLOSE: verbs.CLOSE}  # fmt: skip
-"""What must be possible with the thing of a verb; with that of others, to pick it up."""
+"""The action that an object must allow for a verb; for verbs not listed, picking it up."""
 
 
 def _spelling(name: str) -> str:
@@ -109,7 +109,7 @@ _TOKEN = re.compile(
 
 
 def _tokens(instruction: str) -> list[tuple[str, str]]:
-    """Each word in lower case, with the object type that it names or ""."""
+    """The words in lower case, each with the object type that it names, or ""."""
     found = []
     for match in _TOKEN.finditer(instruction):
         name = _NAMES.get(match.lastgroup or "", "")
@@ -118,17 +118,17 @@ def _tokens(instruction: str) -> list[tuple[str, str]]:
 
 
 class _Reader:
-    """Reads the words, one after the other."""
+    """Reads the words one after the other and collects goals."""
 
     def __init__(self, instruction: str) -> None:
         self.words = _tokens(instruction)
         self.goals: list[Goal] = []
-        self.said: list[str] = []  # types, as they were mentioned
+        self.said: list[str] = []  # object types in the order of mention
         self.verb = ""
         self.theme = ""
         self.source: dict[str, str] = {}
-        self.goes_there = False  # "go to", "see to": what comes is no place to put a thing
-        self.of_last = False  # "that is": what comes says where the last thing is
+        self.goes_there = False  # "go to", "see to": the next type is not a target of "put"
+        self.of_last = False  # "that is": what follows says where the last object is
 
     def read(self) -> list[Goal]:
         position = 0
@@ -148,10 +148,10 @@ class _Reader:
             position += 1
         return self._in_order()
 
-    # -- looking about ---------------------------------------------------------------------------
+    # -- neighbouring words ----------------------------------------------------------------------
 
     def _before(self, position: int) -> str:
-        """The word before, articles and what describes a thing aside."""
+        """The word before, without articles and adjectives."""
         named = bool(self.words[position][1])
         while position > 0:
             position -= 1
@@ -190,7 +190,7 @@ class _Reader:
             self.source.setdefault(self.theme, name)
         elif before == "with" and self.verb == SLICE:
             if self.goals and self.goals[-1].kind == SLICE:
-                self.goals[-1] = replace(self.goals[-1], place=name)
+                self.goals[-1] = replace(self.goals[-1], target=name)
         elif before == "from":
             return
         else:
@@ -204,7 +204,7 @@ class _Reader:
             self.verb == TOGGLE
             and before == "on"
             and not self.of_last
-            and not (switched and self.goals[-1].thing == self.said[-1])
+            and not (switched and self.goals[-1].object_type == self.said[-1])
         )
 
     def _where(self, place: str, before: str) -> None:
@@ -215,7 +215,7 @@ class _Reader:
         if self.of_last or (self.verb in (FIND, TAKE) and before in _IN):
             self.source[self.theme] = place
             self.goals = [
-                replace(goal, source=place) if goal.thing == self.theme else goal
+                replace(goal, source=place) if goal.object_type == self.theme else goal
                 for goal in self.goals
             ]
         elif self.verb in ("", PUT, TAKE, FIND):
@@ -223,7 +223,7 @@ class _Reader:
             self.goals.append(Goal(PUT, self.theme, place, source))
 
     def _pronoun(self, before: str) -> None:
-        """ "it": what was spoken of and can be meant; "into it": where the last thing goes."""
+        """ "it": the last object that fits the verb; "into it": the target of the last object."""
         if self.verb == BREW or (before in _TO and self.verb == PUT):
             others = [name for name in reversed(self.said) if name != self.theme or not before]
             if self.verb == BREW and self.said:
@@ -247,14 +247,14 @@ class _Reader:
         return applies(_ACTION.get(self.verb, verbs.PICKUP), name)
 
     def _do(self, name: str) -> None:
-        """The verb is done to a thing; putting waits for the place."""
+        """Apply the verb to an object; "put" waits for its target."""
         if self.verb and self.verb not in (PUT, FIND) and not self._can(name):
             return
         self.theme = name
         if self.verb not in ("", PUT):
             self.goals.append(Goal(self.verb, name, "", self.source.get(name, "")))
 
-    # -- tidying ---------------------------------------------------------------------------------
+    # -- merging goals ---------------------------------------------------------------------------
 
     def _in_order(self) -> list[Goal]:
         if not self.goals and self.theme:
@@ -263,29 +263,29 @@ class _Reader:
 
 
 def tidied(goals: Iterable[Goal]) -> list[Goal]:
-    """Goals less those that others include, each as often as it was asked for."""
+    """Goals without those that others include; repeated goals are kept."""
     kept: list[Goal] = []
     for goal in goals:
         last = kept[-1] if kept else None
         if last is not None:
-            if goal.kind == FIND and goal.thing == last.thing:
+            if goal.kind == FIND and goal.object_type == last.object_type:
                 continue
-            same = goal.thing == last.thing
+            same = goal.object_type == last.object_type
             if same and last.kind in (FIND, TAKE) and goal.kind not in (OPEN, CLOSE):
                 kept[-1] = goal if goal.source else replace(goal, source=last.source)
                 continue
-            if goal == last or (same and goal.kind == last.kind and goal.place == last.place):
+            if goal == last or (same and goal.kind == last.kind and goal.target == last.target):
                 continue
             if same and goal.kind == TAKE and last.kind not in (FIND, PUT):
                 continue
-            if goal.kind == TOGGLE and last.kind == HEAT and goal.thing == "Microwave":
+            if goal.kind == TOGGLE and last.kind == HEAT and goal.object_type == "Microwave":
                 continue
         kept.append(goal)
     return kept
 
 
 def _first_things_first(instruction: str) -> str:
-    """ "Before you do B, do A" and "do B after doing A" with A and B in the order of doing."""
+    """ "Before you do B, do A" rewritten as "Do A. Then do B"."""
     return re.sub(
         r"(?:^|(?<=[.!?]\s))(?:before|prior to)\s+([^.?!,]+),\s*([^.?!]+)([.?!])",
         r"\2. Then \1\3",
@@ -296,7 +296,7 @@ def _first_things_first(instruction: str) -> str:
 
 @lru_cache(maxsize=4096)
 def understand(instruction: str) -> tuple[Goal, ...]:
-    """What an instruction asks for, in the order in which it is to be done; () for nonsense."""
+    """The goals of an instruction in the order in which they are to be done; () if it has none."""
     text = re.sub(r"'s\b", "", _first_things_first(instruction.strip()))
     text = re.sub(
         r"([^.?!,;]+?),?\s+after\s+(?:having\s+)?((?!that|this)\w+ing\s[^.?!,;]+)",

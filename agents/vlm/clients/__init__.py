@@ -1,1 +1,1 @@
-"""Who gives a model's turns: servers, this process, scripts; and what is put around them."""
+"""Model clients (servers, local models, scripts) and the wrappers around them."""

@@ -1,7 +1,7 @@
-"""Many threads ask, one works: what waits at the same time is done together.
+"""Batches jobs from many threads and runs each batch in one thread.
 
-A model takes hardly longer over eight conversations than over one, and can only be used by one
-thread at a time.
+A model takes hardly longer for eight conversations than for one, and only one thread at a time can
+use it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _CLOSED = "the model has been closed"
 
 @dataclass(frozen=True)
 class _Asked(Generic[Job, Result]):
-    """A job, and where its result is waited for."""
+    """A job and the future of its result."""
 
     job: Job
     answer: Future[Result] = field(default_factory=Future)
@@ -34,24 +34,25 @@ class _Asked(Generic[Job, Result]):
 
 @dataclass(frozen=True)
 class _Failure:
-    """How a batch failed. Not the exception: its traceback holds on to the batch's memory."""
+    """How a batch failed. It does not hold the exception, whose traceback would keep the batch's
+    memory alive."""
 
     kind: type[Exception]
     message: str
 
 
 class Batcher(Generic[Job, Result]):
-    """Does jobs that come from many threads together, in one thread of its own.
+    """Runs jobs from many threads in batches, in one thread of its own.
 
-    Where a batch fails, its jobs are tried one by one, so that only those fail that are at fault;
-    where it does not fit into memory it is halved, and no larger one is tried afterwards.
+    If a batch fails, its jobs are run one by one, so that only the faulty jobs fail. If a batch
+    does not fit into memory, it is halved, and no larger batch is tried afterwards.
 
     Args:
-        run: does some jobs together and returns a result for each, in order. Raises MemoryError
-            where they are too many, CannotGoOn where no job will ever succeed again, and anything
-            else where one of them is at fault. Always called from the same thread.
-        size: so many jobs at once, at most.
-        wait: seconds that a job waits for others to join it.
+        run: runs some jobs together and returns their results in order. It raises MemoryError if
+            there are too many jobs, CannotGoOn if no job can succeed any more, and any other
+            exception if a job is faulty. It is always called from the same thread.
+        size: the largest batch.
+        wait: seconds that a job waits for others.
     """
 
     def __init__(
@@ -66,11 +67,11 @@ class Batcher(Generic[Job, Result]):
         self._thread.start()
 
     def do(self, job: Job) -> Result:
-        """Wait until a job has been done, and return its result.
+        """Run a job with the next batch and return its result.
 
         Raises:
-            ModelError: it failed.
-            CannotGoOn: so will all others, or :meth:`close` has been called.
+            ModelError: the job failed.
+            CannotGoOn: no job can succeed any more, or :meth:`close` was called.
         """
         asked: _Asked[Job, Result] = _Asked(job)
         try:
@@ -79,12 +80,12 @@ class Batcher(Generic[Job, Result]):
                     raise CannotGoOn(_CLOSED)
                 self._waiting.put(asked)
             return asked.answer.result()
-        except BaseException:  # Ctrl-C above all: nobody waits for it any longer
+        except BaseException:  # Ctrl-C, for example: nobody waits for the result any longer
             asked.answer.cancel()
             raise
 
     def close(self) -> None:
-        """End the thread once ``run`` returns; whoever waits gets CannotGoOn."""
+        """End the thread once ``run`` returns; waiting callers get CannotGoOn."""
         with self._lock:
             self._closed = True
             self._waiting.put(None)  # wakes the thread
@@ -98,7 +99,7 @@ class Batcher(Generic[Job, Result]):
             while not self._closed:
                 batch = self._gathered()
                 self._answer([each for each in batch if each.answer.set_running_or_notify_cancel()])
-        finally:  # closed; or run has raised what is no Exception, and nobody may wait for ever
+        finally:  # closed, or run raised a BaseException: no caller may wait for ever
             with self._lock:
                 self._closed = True
             while not self._waiting.empty():

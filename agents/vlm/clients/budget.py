@@ -1,4 +1,4 @@
-"""What replies cost: written down, added up, and stopped in time."""
+"""The ledger of a run: records what replies cost and stops the run at its budget."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from agents.vlm.chat import Message, Reply, Usage
-from agents.vlm.clients.watch import AGAIN, Watch
+from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
 from agents.vlm.settings import Prices
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.json_lines import JsonLines
 
 if TYPE_CHECKING:
-    from agents.vlm.clients.reply_cache import Identified
+    from agents.vlm.clients.reply_cache import CacheableClient
 
 
 @dataclass(frozen=True)
 class Budget:
-    """What may be spent; no limit for None.
+    """The limits of a run; None for no limit.
 
     Attributes:
-        max_usd: US dollars, by the prices that the settings state.
-        max_tokens: of prompts and completions, also those that the server remembered.
-        max_minutes: of this process.
+        max_usd: US dollars, by the prices of the settings.
+        max_tokens: prompt and completion tokens, cached ones included.
+        max_minutes: the running time of this process.
 
     Raises:
-        ValueError: one is not a positive, finite number.
+        ValueError: a limit is not a positive, finite number.
     """
 
     max_usd: float | None = None
@@ -54,7 +54,7 @@ class Budget:
 
 @dataclass(frozen=True)
 class Spent:
-    """What has been spent: tokens, US dollars, and for how many answers."""
+    """The sum of a ledger: tokens, US dollars, and the number of answers."""
 
     usage: Usage = field(default_factory=Usage)
     cost: float = 0.0
@@ -66,17 +66,17 @@ _Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class Entry(BaseModel):
-    """A line of a ledger: an answer that was paid for.
+    """A line of the ledger: an answer that was paid for.
 
     Attributes:
-        time: when it came, ISO 8601 in UTC.
-        model: which answered.
+        time: when the answer came, ISO 8601 in UTC.
+        model: the model that answered.
         seed: of the episode.
         prompt, completion, cached, reasoning, estimated: tokens, as
             :class:`agents.vlm.chat.Usage` has them.
         cost: US dollars.
         seconds: how long it took.
-        rejected: why it was no reply; "" for one that was.
+        rejected: why the answer was not a valid reply; "" for a valid one.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -97,7 +97,7 @@ class Entry(BaseModel):
     def of(
         usage: Usage, *, model: str, seed: int, cost: float, seconds: float, rejected: str = ""
     ) -> Entry:
-        """An entry of now."""
+        """An entry with the current time."""
         return Entry(
             time=datetime.now(timezone.utc).isoformat(timespec="milliseconds"),
             model=model,
@@ -114,21 +114,21 @@ class Entry(BaseModel):
 
 
 class Ledger:
-    """What has been spent, and whether more may be.
+    """Adds up what a run spends and checks it against the budget.
 
-    The file is what counts: whatever stands in it has been spent, by an earlier process too, or by
-    another that writes to the same file now. A limit is looked at before each try of a request, so
-    that at most the tries under way go beyond it. What a server charges where it never began to
-    answer is not known, and not in it.
+    The file is authoritative: every entry counts, also those of earlier processes and of other
+    processes that write to it now. The limits are checked before each try of a request, so only
+    tries under way can exceed them. A charge for a request that the server never began to answer is
+    unknown and not included.
 
-    Without :meth:`open` it remembers what this process spends.
+    Without :meth:`open` the ledger counts this process alone.
 
     Args:
-        budget: what may be spent.
-        prices: which costs are worked out by.
+        budget: the limits.
+        prices: the prices for the costs.
 
     Raises:
-        ValueError: dollars are limited and no prices are known.
+        ValueError: the budget limits dollars, and there are no prices.
     """
 
     def __init__(self, budget: Budget, prices: Prices) -> None:
@@ -143,30 +143,30 @@ class Ledger:
         self._lines: JsonLines | None = None
 
     def open(self, path: Path) -> None:
-        """Keep it in a file.
+        """Keep the ledger in a file.
 
         Args:
-            path: JSON lines, :class:`Entry` each; made if it is not there.
+            path: JSON lines, one :class:`Entry` each; the file is created if it does not exist.
 
         Raises:
-            ValueError: it is a link.
-            OSError: it cannot be written.
+            ValueError: the path is a link.
+            OSError: the file cannot be written.
         """
         self._lines = JsonLines(path)
 
     @property
     def spent(self) -> Spent:
-        """What stands in the ledger; once it is closed, what stood in it then."""
+        """The sum of all entries; after :meth:`close`, the sum at that time."""
         with self._lock:
             for line in self._lines.new() if self._lines is not None else ():
                 try:
                     self._spent = _with(self._spent, Entry.model_validate_json(line))
                 except ValidationError:
-                    continue  # a half-written line says nothing
+                    continue  # a half-written line
             return self._spent
 
     def check(self) -> None:
-        """Raise CannotGoOn where nothing more may be spent."""
+        """Raise CannotGoOn if the budget is spent."""
         budget, spent = self._budget, self.spent
         most = "at most " if spent.usage.estimated else ""
         if budget.max_usd is not None and spent.cost >= budget.max_usd:
@@ -181,10 +181,10 @@ class Ledger:
             )
 
     def enter(self, entry: Entry) -> None:
-        """Write down what an answer cost.
+        """Add an entry.
 
         Raises:
-            CannotGoOn: it cannot be written.
+            CannotGoOn: the file cannot be written.
         """
         if self._lines is None:
             with self._lock:
@@ -205,21 +205,23 @@ class Ledger:
             self._lines.close()
 
 
-class Metered:
-    """Keeps the ledger for a client that does not: one entry a reply.
+class MeteredClient:
+    """Wraps a client that keeps no ledger itself, and adds one entry per reply.
 
     Args:
-        client: is asked.
-        ledger: of the run.
-        watch: of the run.
+        client: the client to wrap.
+        ledger: the run's ledger.
+        supervisor: the run's request supervisor.
     """
 
-    def __init__(self, client: Identified, ledger: Ledger, watch: Watch) -> None:
-        self._client, self._ledger, self._watch = client, ledger, watch
+    def __init__(
+        self, client: CacheableClient, ledger: Ledger, supervisor: RequestSupervisor
+    ) -> None:
+        self._client, self._ledger, self._supervisor = client, ledger, supervisor
 
     @property
     def identity(self) -> str:
-        """The other client's."""
+        """The wrapped client's identity."""
         return self._client.identity
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
@@ -228,10 +230,10 @@ class Metered:
         Raises:
             CannotGoOn: the budget is spent, or the ledger cannot be written.
         """
-        self._watch.request(seed).left()
+        self._supervisor.request(seed).left()
         self._ledger.check()
         reply = self._client.reply(messages, seed)
-        if not reply.kept:
+        if not reply.from_cache:
             self._ledger.enter(
                 Entry.of(
                     reply.usage,
@@ -244,12 +246,12 @@ class Metered:
         return reply
 
     def close(self) -> None:
-        """Close the other client."""
+        """Close the wrapped client."""
         self._client.close()
 
 
 def _why(spent: Spent) -> str:
-    """Why it may be less."""
+    """The note that the sum holds upper bounds; "" if it does not."""
     why = " (where the server's count is missing or cannot be true, upper bounds stand for it)"
     return why if spent.usage.estimated else ""
 

@@ -1,4 +1,4 @@
-"""A model's directory, read with transformers: the model, its tokenizer, its eyes, its format."""
+"""Loads a model with transformers: its weights, tokenizer, image processor and chat template."""
 
 from __future__ import annotations
 
@@ -17,44 +17,44 @@ from agents.vlm.settings import AgentSettings, Local
 
 _MODEL_FILES = {".json", ".jinja", ".txt", ".model", ".safetensors", ".bin"}
 _LONGEST_WORDS = 300  # characters of a library's, in an error
-_NAMES_OF_2024 = {
+_OLD_WEIGHT_NAMES = {
     r"^visual\.": "model.visual.",
     r"^model\.(?!language_model\.|visual\.)": "model.language_model.",
 }
-"""What adapters for Qwen2-VL and Qwen2.5-VL call the weights, if trained with transformers 4.51 or
-older, and what these are called since. For whole models transformers knows that itself."""
+"""The weight names in adapters for Qwen2-VL and Qwen2.5-VL that were trained with transformers 4.51
+or older, and today's names. For whole models transformers converts them itself."""
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A model that can be talked to.
+    """A loaded model with what it needs to chat.
 
     Attributes:
-        model: generates, in evaluation mode; its ``generation_config`` is what the settings say.
-        tokenizer: of its words.
-        eyes: its image processor, which makes patches of pictures; None where it sees none.
-        template: of a conversation; None for the tokenizer's own.
-        ends: the tokens that end a reply.
-        identity: all that decides what it says, as JSON.
+        model: in evaluation mode; its ``generation_config`` follows the settings.
+        tokenizer: the model's tokenizer.
+        image_processor: turns pictures into patches; None for a text-only agent.
+        template: the chat template; None for the tokenizer's own.
+        end_tokens: the token ids that end a reply.
+        identity: everything that its replies depend on, as JSON.
     """
 
     model: Any
     tokenizer: Any
-    eyes: Any
+    image_processor: Any
     template: str | None
-    ends: frozenset[int]
+    end_tokens: frozenset[int]
     identity: str
 
 
 def load(path: str, settings: AgentSettings) -> Checkpoint:
-    """Load a model, from a directory without any network.
+    """Load a model; a local directory needs no network.
 
     Args:
         path: a directory that ``save_pretrained`` wrote, or a model's name on the Hugging Face hub.
         settings: of the agent.
 
     Raises:
-        ValueError: there is no such model or adapter, it is broken, or does not fit the settings.
+        ValueError: the model or adapter does not exist, is broken, or does not fit the settings.
     """
     local, sees = settings.local, settings.sees == "pictures"
     is_here = Path(path).is_dir()
@@ -64,32 +64,33 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
             "Hugging Face hub"
         )
     where = {"local_files_only": is_here}
-    with _plainly(f"{path} cannot be loaded"):
+    with _errors_in_one_line(f"{path} cannot be loaded"):
         config = transformers.AutoConfig.from_pretrained(path, **where)
         tokenizer = transformers.AutoTokenizer.from_pretrained(path, **where)
-        # Some have a template that knows of pictures beside their tokenizer's; where it comes in
-        # several kinds, the tokenizer knows which is meant for talking.
+        # Some processors have their own template with pictures. If it comes in several variants,
+        # the tokenizer's own template is the one for chat.
         template = ProcessorMixin.get_processor_dict(path, **where)[0].get("chat_template")
         template = template if isinstance(template, str) else None
-    has_eyes = getattr(config, "vision_config", None) is not None
-    if sees and not has_eyes:
+    has_vision = getattr(config, "vision_config", None) is not None
+    if sees and not has_vision:
         raise ValueError(f"{path} has no eyes; let the agent's setting sees be text")
     if not (template or tokenizer.chat_template):
         raise ValueError(f"{path} has no chat template, so that it cannot be talked to")
-    with _plainly(f"{path} cannot be loaded"):
-        # By Pillow: a whole AutoProcessor wants torchvision, for the sake of videos.
-        eyes = (
+    with _errors_in_one_line(f"{path} cannot be loaded"):
+        # With Pillow: a whole AutoProcessor needs torchvision, for videos only.
+        image_processor = (
             transformers.AutoImageProcessor.from_pretrained(path, backend="pil", **where)
             if sees
             else None
         )
-    if sees and not (hasattr(eyes, "merge_size") and hasattr(config, "image_token_id")):
+    if sees and not (hasattr(image_processor, "merge_size") and hasattr(config, "image_token_id")):
         raise ValueError(
-            f"{path} does not see as Qwen's models do ({type(eyes).__name__}); let a server run it"
+            f"{path} does not see as Qwen's models do ({type(image_processor).__name__}); "
+            "let a server run it"
         )
-    with _plainly(f"{path} cannot be loaded"):
-        model = _model(path, has_eyes, local, where)
-    ends, pad = _ends(model, tokenizer), tokenizer.pad_token_id
+    with _errors_in_one_line(f"{path} cannot be loaded"):
+        model = _model(path, has_vision, local, where)
+    ends, pad = _end_tokens(model, tokenizer), tokenizer.pad_token_id
     model.generation_config = transformers.GenerationConfig(
         do_sample=False,
         max_new_tokens=settings.sampling.max_tokens,
@@ -100,17 +101,19 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
     if local.adapter:
         model = _adapted(model, local.adapter)
     identity = _identity(path, settings, model)
-    return Checkpoint(model.eval(), tokenizer, eyes, template, ends, identity)
+    return Checkpoint(model.eval(), tokenizer, image_processor, template, ends, identity)
 
 
 def one_line(error: Exception) -> str:
-    """What a library's error says, in one line that is not too long."""
+    """A library's error in one line of limited length."""
     return f"{type(error).__name__}: {' '.join(str(error).split())}"[:_LONGEST_WORDS]
 
 
-def _model(path: str, has_eyes: bool, local: Local, where: dict[str, bool]) -> Any:
+def _model(path: str, has_vision: bool, local: Local, where: dict[str, bool]) -> Any:
     maker = (
-        transformers.AutoModelForImageTextToText if has_eyes else transformers.AutoModelForCausalLM
+        transformers.AutoModelForImageTextToText
+        if has_vision
+        else transformers.AutoModelForCausalLM
     )
     loaded: Any = maker.from_pretrained(
         path,
@@ -121,12 +124,12 @@ def _model(path: str, has_eyes: bool, local: Local, where: dict[str, bool]) -> A
         **where,
     )
     model, found = loaded  # a pair, for output_loading_info
-    if missing := sorted(found["missing_keys"]):  # transformers would make random ones, and go on
+    if missing := sorted(found["missing_keys"]):  # transformers would fill them with random values
         raise ValueError(f"{len(missing)} of its weights are not there, such as {missing[0]}")
     return model
 
 
-def _ends(model: Any, tokenizer: Any) -> frozenset[int]:
+def _end_tokens(model: Any, tokenizer: Any) -> frozenset[int]:
     theirs = model.generation_config.eos_token_id
     ends = {*(theirs if isinstance(theirs, list) else [theirs]), tokenizer.eos_token_id}
     return frozenset(ends - {None})
@@ -141,15 +144,19 @@ def _adapted(model: Any, adapter: str) -> Any:
         raise ValueError(
             f"local.adapter {adapter} is no adapter; give a directory with adapter_config.json"
         )
-    with _plainly(f"local.adapter {adapter} does not fit the model"), warnings.catch_warnings():
-        # peft only warns of an adapter that lacks some of what it says it has.
+    with (
+        _errors_in_one_line(f"local.adapter {adapter} does not fit the model"),
+        warnings.catch_warnings(),
+    ):
+        # peft only warns about an adapter that lacks some of its weights.
         warnings.filterwarnings("error", message="Found missing adapter keys")
-        names = _NAMES_OF_2024 if model.config.model_type in ("qwen2_vl", "qwen2_5_vl") else None
+        names = _OLD_WEIGHT_NAMES if model.config.model_type in ("qwen2_vl", "qwen2_5_vl") else None
         return peft.PeftModel.from_pretrained(model, adapter, key_mapping=names)
 
 
 def _identity(path: str, settings: AgentSettings, model: Any) -> str:
-    """See :class:`Checkpoint`. Files count by size and time: to read them would take long."""
+    """See :class:`Checkpoint`. Size and time stand for a file's content, since hashing takes
+    long."""
     what = {
         "client": "transformers",
         "model": _files(path) or [[path, getattr(model.config, "_commit_hash", None)]],
@@ -170,7 +177,7 @@ def _identity(path: str, settings: AgentSettings, model: Any) -> str:
 
 
 def _files(path: str) -> list[list[Any]]:
-    """Name, size and time of what a model or an adapter is read from."""
+    """Name, size and modification time of the files of a model or an adapter."""
     directory = Path(path)
     if not directory.is_dir():
         return []
@@ -180,8 +187,9 @@ def _files(path: str) -> list[list[Any]]:
 
 
 @contextmanager
-def _plainly(what: str) -> Iterator[None]:
-    """Whatever a broken checkpoint makes the libraries raise becomes a ValueError of one line."""
+def _errors_in_one_line(what: str) -> Iterator[None]:
+    """Turn any error that a broken checkpoint causes in the libraries into a ValueError of one
+    line."""
     try:
         yield
     except Exception as error:

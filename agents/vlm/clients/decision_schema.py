@@ -1,4 +1,4 @@
-"""The form of a decision where it is not said in tags: a tool call, or JSON of a stated schema."""
+"""The request fields for decisions outside of tags: a tool call, or JSON with a schema."""
 
 from __future__ import annotations
 
@@ -57,4 +57,4 @@ REQUEST_FIELDS: Mapping[str, Mapping[str, Any]] = {
     },
 }
 """By ``AgentSettings.decide``: the fields of a request that ask for it, in OpenAI's terms. Thoughts
-come first, so that they are had before the action is chosen."""
+come first, so that the model writes them before it chooses the action."""

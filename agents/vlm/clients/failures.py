@@ -1,4 +1,4 @@
-"""What went wrong with a try, and what follows: another try, the next episode, or the run's end."""
+"""Classifies a failed try: another try follows, the episode fails, or the run ends."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from email.utils import parsedate_to_datetime
 import httpx2
 import openai
 
-from agents.vlm.clients.wire import server_words
+from agents.vlm.clients.chat_completions import error_text
 
 _MAY_PASS = frozenset({408, 409, 425, 429})  # and all from 500 on
 _REFUSED: Mapping[int, str] = {
@@ -22,10 +22,10 @@ _REFUSED: Mapping[int, str] = {
     403: "the server does not let the key of {key_from} do this",
     404: "the server has no such model, or nothing at all at this address",
 }
-"""What is answered to whatever is asked."""
+"""Statuses that every request would get."""
 _MALFORMED = frozenset({400, 405, 415, 422})
-"""What is answered to a request that is wrong in itself, such as a parameter that is not known; or
-to a single conversation."""
+"""Statuses for a request that is invalid, for example with an unknown parameter; or for a single
+conversation."""
 _ABOUT_ONE_CONVERSATION = re.compile(
     r"context.{0,20}(length|size|window)|too long|longer than|too many (tokens|images)"
     r"|content.(filter|policy|management)|moderation",
@@ -39,29 +39,29 @@ class Failure:
     """How a try failed.
 
     Attributes:
-        words: what happened, as the server or the connection says it.
-        passes: whether another try may do better.
-        ends: what to say where no request will ever do better; otherwise "".
-        late: whether the time was over.
-        unreached: whether there is no sign that a server is there: this try has had no answer, nor
-            has any before.
-        pause: seconds that the server asks to wait; None if it does not.
+        message: what happened, as the server or the connection says it.
+        retryable: whether another try may succeed.
+        fatal: why no later request can succeed; "" if one can.
+        timed_out: whether the time limit was reached.
+        no_server: whether no server seems to be there: neither this try nor any before it got an
+            answer.
+        retry_after: seconds that the server asks to wait; None if it does not ask.
     """
 
-    words: str
-    passes: bool = False
-    ends: str = ""
-    late: bool = False
-    unreached: bool = False
-    pause: float | None = None
+    message: str
+    retryable: bool = False
+    fatal: str = ""
+    timed_out: bool = False
+    no_server: bool = False
+    retry_after: float | None = None
 
 
 def failure_of(error: openai.OpenAIError, *, key_from: str, answered: bool) -> Failure:
-    """What an error of the SDK means.
+    """Classify an error of the OpenAI SDK.
 
     Args:
-        error: of one try.
-        key_from: where the key is from.
+        error: the error of one try.
+        key_from: the environment variable of the key.
         answered: whether the server has given a reply before.
     """
     if isinstance(error, openai.APIStatusError):
@@ -72,32 +72,32 @@ def failure_of(error: openai.OpenAIError, *, key_from: str, answered: bool) -> F
         return Failure(words)
     late = isinstance(cause, httpx2.ReadTimeout)
     alone = late or isinstance(cause, (httpx2.ConnectError, httpx2.ConnectTimeout))
-    return Failure(words, passes=True, late=late, unreached=alone and not answered)
+    return Failure(words, retryable=True, timed_out=late, no_server=alone and not answered)
 
 
 def _of_status(error: openai.APIStatusError, key_from: str, answered: bool) -> Failure:
     status, headers = error.status_code, error.response.headers
-    said = server_words(error.response.content)
+    said = error_text(error.response.content)
     words = f"{status}, {said}"
     if 300 <= status < 400:
         place = headers.get("location") or "nowhere"
         ends = f"requests are not sent on to {place}; if the server is there, give its base_url"
-        return Failure(words, ends=ends)
+        return Failure(words, fatal=ends)
     if _NO_MONEY in (error.code, error.type):
-        return Failure(words, ends="there is no money left for this key")
+        return Failure(words, fatal="there is no money left for this key")
     if status in _REFUSED:
-        return Failure(words, ends=_REFUSED[status].format(key_from=key_from))
+        return Failure(words, fatal=_REFUSED[status].format(key_from=key_from))
     about_this = _ABOUT_ONE_CONVERSATION.search(f"{error.code} {said}")
     if status in _MALFORMED and not answered and not about_this:
-        return Failure(words, ends="no request like this will do better")
+        return Failure(words, fatal="no request like this will do better")
     passes = status in _MAY_PASS or status >= 500
     asked_to = headers.get("x-should-retry") != "false"
-    return Failure(words, passes=passes and asked_to, pause=asked_pause(headers))
+    return Failure(words, retryable=passes and asked_to, retry_after=requested_pause(headers))
 
 
-def asked_pause(headers: httpx2.Headers) -> float | None:
-    """The seconds that a server asks to wait, infinity among them; None if it does not ask, or asks
-    for what is no time to come."""
+def requested_pause(headers: httpx2.Headers) -> float | None:
+    """The seconds that a server asks to wait, possibly infinite; None without a valid future
+    time."""
     text = headers.get("retry-after", "")
     for name, scale in (("retry-after-ms", 0.001), ("retry-after", 1.0)):
         try:

@@ -1,8 +1,8 @@
-"""A model that transformers runs in this process: Qwen2-VL, Qwen2.5-VL, Qwen3-VL and what is tuned
-from them; for agents that see text alone, any language model with a chat template.
+"""Runs a model with transformers in this process: Qwen2-VL, Qwen2.5-VL, Qwen3-VL and fine-tuned
+variants; for text-only agents, any language model with a chat template.
 
-The conversation is worked through anew for each reply: nothing that the model computed for an
-earlier turn is kept. A server that remembers (vLLM, SGLang) is faster over long episodes.
+Each reply processes the whole conversation again, without a cache between turns. A server with
+prefix caching (vLLM, SGLang) is faster for long episodes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from PIL import Image
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients.batching import Batcher
 from agents.vlm.clients.checkpoint import load, one_line
-from agents.vlm.clients.watch import AGAIN, Watch
+from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.agent import CannotGoOn
 
@@ -34,15 +34,15 @@ _CLOSED = "the model has been closed"
 
 
 @dataclass(frozen=True)
-class _Row:
-    """A conversation as the model takes it.
+class _EncodedPrompt:
+    """A conversation as input of the model.
 
     Attributes:
-        ids: of its tokens; a picture is as many as the model sees of it.
+        ids: token ids; a picture takes as many as it has merged patches.
         pixels: (patches of all pictures, values of a patch); None without pictures.
         grids: (pictures, 3): patches in time, height and width.
-        seed: of what is drawn for it.
-        thinking: whether the model is in the middle of a thought where it begins.
+        seed: the seed for sampling the reply.
+        thinking: whether the prompt ends inside a thought.
     """
 
     ids: list[int]
@@ -53,54 +53,70 @@ class _Row:
 
 
 class LocalClient:
-    """Replies with what a model says that is loaded here.
+    """Generates replies with a model in this process.
 
-    Conversations that wait at the same time are worked out together, ``settings.local.batch`` of
-    them; that changes nothing in what is said, up to the arithmetic's rounding: each is masked from
-    the others and draws from a seed of its own. Pictures are resized by the rule of qwen-vl-utils,
-    within ``settings.pictures``, so that each takes as many tokens as that package says.
+    Up to ``settings.local.batch`` waiting conversations are generated together. Batching does not
+    change a reply beyond rounding: each conversation is masked from the others and sampled with its
+    own seed. Pictures are resized by the rule of qwen-vl-utils within ``settings.pictures``, so
+    each takes as many tokens as that package says.
 
-    How words are chosen is what ``settings.sampling`` says; of the model's own generation_config,
-    its repetition penalty holds as well, as it does with servers.
+    ``settings.sampling`` controls sampling. Of the model's own generation_config only the
+    repetition penalty applies, as with servers.
 
     Args:
         path: a directory that ``save_pretrained`` wrote, which needs no network; or a model's name
             on the Hugging Face hub.
-        settings: of the agent.
-        watch: of the run, whose minutes end a reply that is being worked out; by default there is
-            no limit.
+        settings: the agent's settings.
+        supervisor: the run's request supervisor; a reply stops when its minutes are over. By
+            default there is no limit.
 
     Attributes:
-        identity: all that decides what it says, as JSON.
+        identity: everything that the replies depend on, as JSON.
 
     Raises:
-        ValueError: there is no such model or adapter, it cannot be loaded, or does not fit the
+        ValueError: the model or adapter does not exist, cannot be loaded, or does not fit the
             settings.
     """
 
-    def __init__(self, path: str, settings: AgentSettings, watch: Watch | None = None) -> None:
+    def __init__(
+        self, path: str, settings: AgentSettings, supervisor: RequestSupervisor | None = None
+    ) -> None:
         if settings.decide == "tools":
             raise ValueError(
                 "decide: tools needs a server; a model in this process takes tags or json"
             )
-        self._name, self._settings, self._watch = path, settings, watch or Watch()
+        self._name, self._settings, self._supervisor = (
+            path,
+            settings,
+            supervisor or RequestSupervisor(),
+        )
         loaded = load(path, settings)
         self.identity = loaded.identity
-        self._model, self._ends = loaded.model, loaded.ends
-        self._tokenizer, self._template, self._eyes = loaded.tokenizer, loaded.template, loaded.eyes
+        self._model, self._end_tokens = loaded.model, loaded.end_tokens
+        self._tokenizer, self._template, self._image_processor = (
+            loaded.tokenizer,
+            loaded.template,
+            loaded.image_processor,
+        )
         config = self._model.config
-        self._place = getattr(config, "image_token_id", None)  # the token where a picture goes
-        self._longest = getattr(config.get_text_config(), "max_position_embeddings", sys.maxsize)
-        self._words = threading.Lock()  # a tokenizer is for one thread at a time
+        self._image_token = getattr(
+            config, "image_token_id", None
+        )  # the token where a picture goes
+        self._context_length = getattr(
+            config.get_text_config(), "max_position_embeddings", sys.maxsize
+        )
+        self._tokenizer_lock = threading.Lock()  # a tokenizer is not thread-safe
         self._closing = threading.Event()
         local = settings.local
-        self._batcher: Batcher[_Row, Reply] = Batcher(self._replies, local.batch, local.wait)
+        self._batcher: Batcher[_EncodedPrompt, Reply] = Batcher(
+            self._replies, local.batch, local.wait
+        )
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
-        """What the model says next.
+        """The model's next turn.
 
-        At a temperature above 0, the seed, ``settings.seed`` and the number of messages decide what
-        is drawn; without ``settings.seed`` every draw is another.
+        At a temperature above 0, the seed, ``settings.seed`` and the number of messages determine
+        the sampling; without ``settings.seed`` each reply is sampled anew.
 
         Raises:
             ModelError: the conversation is too long for the model or for the memory, or a picture
@@ -115,32 +131,32 @@ class LocalClient:
         return replace(reply, seconds=time.monotonic() - start)
 
     def close(self) -> None:
-        """Stop at the next word, and let go of the model; whoever waits gets CannotGoOn."""
+        """Stop at the next token and release the model; waiting callers get CannotGoOn."""
         self._closing.set()
         self._batcher.close()
         self._model = None
 
-    # -- a conversation becomes numbers, in the thread of whoever asks ---------------------------
+    # -- conversation to tokens, in the caller's thread ------------------------------------------
 
-    def _row(self, messages: Sequence[Message], seed: int) -> _Row:
+    def _row(self, messages: Sequence[Message], seed: int) -> _EncodedPrompt:
         text = self._prompt(messages)
         ids = self._ids(text)
         pixels = grids = None
         pictures = [part for each in messages for part in each.parts if isinstance(part, Picture)]
         if pictures:
-            pixels, grids = self._seen(pictures)
-        ids = self._with_room(ids, grids)
+            pixels, grids = self._patches(pictures)
+        ids = self._with_image_tokens(ids, grids)
         most = self._settings.sampling.max_tokens
-        if len(ids) + most > self._longest:
+        if len(ids) + most > self._context_length:
             raise ModelError(
                 f"the conversation has {len(ids)} tokens, which with sampling.max_tokens {most} is "
-                f"more than the {self._longest} of {self._name}; let pictures.keep be fewer"
+                f"more than the {self._context_length} of {self._name}; let pictures.keep be fewer"
             )
         thinking = text.rstrip().endswith(_THINK)
-        return _Row(ids, pixels, grids, self._seed(seed, len(messages)), thinking)
+        return _EncodedPrompt(ids, pixels, grids, self._seed(seed, len(messages)), thinking)
 
     def _prompt(self, messages: Sequence[Message]) -> str:
-        """The conversation in the model's format, up to where it is to speak."""
+        """The conversation in the model's chat format, up to the model's turn."""
         effort = self._settings.reasoning.effort
         thinks = {"enable_thinking": effort != "none"} if effort else {}
         try:
@@ -161,22 +177,22 @@ class LocalClient:
     def _turn(self, message: Message) -> dict[str, Any]:
         parts = list(message.parts)
         if message.reasoning and self._settings.reasoning.in_history:
-            # In the words: templates differ in how they would have it apart, and most know nothing
-            # of it. Those that leave earlier thoughts out find them here too.
+            # In the text: templates differ in how they take thoughts separately, and most do not
+            # take them at all. Templates that drop earlier thoughts find them here too.
             parts.insert(0, f"{_THINK}\n{message.reasoning}\n{_THOUGHT}\n")
         if any(isinstance(part, Picture) for part in parts):
             return {"role": message.role, "content": [_part(part) for part in parts]}
         return {"role": message.role, "content": "\n".join(map(str, parts))}
 
-    def _seen(self, pictures: Sequence[Picture]) -> tuple[torch.Tensor, torch.Tensor]:
-        if self._eyes is None:
+    def _patches(self, pictures: Sequence[Picture]) -> tuple[torch.Tensor, torch.Tensor]:
+        if self._image_processor is None:
             raise CannotGoOn(
                 f"{self._name} was loaded without eyes, since the agent's setting sees is text, "
                 "and is shown a picture"
             )
         bounds = self._settings.pictures
         try:
-            seen = self._eyes(
+            seen = self._image_processor(
                 [Image.open(BytesIO(each.data)).convert("RGB") for each in pictures],
                 size={"shortest_edge": bounds.min_pixels, "longest_edge": bounds.max_pixels},
                 return_tensors="pt",
@@ -185,63 +201,69 @@ class LocalClient:
             raise ModelError(f"a picture cannot be seen: {one_line(error)}") from None
         return seen["pixel_values"], seen["image_grid_thw"]
 
-    def _with_room(self, ids: Sequence[int], grids: torch.Tensor | None) -> list[int]:
-        """The tokens, with that of each picture as often as the model sees patches of it."""
+    def _with_image_tokens(self, ids: Sequence[int], grids: torch.Tensor | None) -> list[int]:
+        """The tokens, with each picture's token repeated once per merged patch."""
         counts: list[int] = []
         if grids is not None:
-            counts = (grids.prod(dim=1) // self._eyes.merge_size**2).tolist()
-        if ids.count(self._place) != len(counts):
+            counts = (grids.prod(dim=1) // self._image_processor.merge_size**2).tolist()
+        if ids.count(self._image_token) != len(counts):
             raise ModelError(
-                f"the conversation has {len(counts)} pictures and {ids.count(self._place)} places "
-                "for them; no words of it may be the model's own marks"
+                f"the conversation has {len(counts)} pictures and "
+                f"{ids.count(self._image_token)} places for them; "
+                "no words of it may be the model's own marks"
             )
         left = iter(counts)
-        return [one for each in ids for one in [each] * (next(left) if each == self._place else 1)]
+        return [
+            one for each in ids for one in [each] * (next(left) if each == self._image_token else 1)
+        ]
 
     def _seed(self, episode: int, messages: int) -> int:
-        """Of one reply. Were it the episode's, each turn would be drawn by the same numbers."""
+        """The seed of one reply. With the episode's seed, all turns would use the same random
+        numbers."""
         if self._settings.seed is None:
             return secrets.randbits(63)
         text = f"{self._settings.seed} {episode} {messages}"
         return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
 
-    # -- numbers become replies, in the batcher's thread -----------------------------------------
+    # -- tokens to replies, in the batcher's thread ----------------------------------------------
 
-    def _replies(self, rows: Sequence[_Row]) -> list[Reply]:
+    def _replies(self, rows: Sequence[_EncodedPrompt]) -> list[Reply]:
         try:
-            spoken = self._spoken(rows)
+            generated = self._generate(rows)
         except RuntimeError as error:
-            raise _plainer(error, rows) from None
+            raise _explained(error, rows) from None
         if self._closing.is_set():
             raise CannotGoOn(_CLOSED)
-        if self._watch.over:
+        if self._supervisor.over:
             raise CannotGoOn(f"the minutes are over; {AGAIN}")
-        return [self._reply(row, said) for row, said in zip(rows, spoken, strict=True)]
+        return [self._reply(row, said) for row, said in zip(rows, generated, strict=True)]
 
-    def _spoken(self, rows: Sequence[_Row]) -> list[list[int]]:
-        """The tokens that the model adds to each row, up to its end or to the limit."""
+    def _generate(self, rows: Sequence[_EncodedPrompt]) -> list[list[int]]:
+        """The tokens that the model generates for each row, up to an end token or the limit."""
         longest = max(len(row.ids) for row in rows)
         gaps = [longest - len(row.ids) for row in rows]
-        # Filled on the left, with any token: it is masked out.
+        # Padded on the left with any token, since padding is masked out.
         filled = [row.ids[:1] * gap + row.ids for row, gap in zip(rows, gaps, strict=True)]
         ids = torch.tensor(filled)  # (rows, longest)
         inputs = {
             "input_ids": ids,
             "attention_mask": torch.tensor([[0] * gap + [1] * (longest - gap) for gap in gaps]),
         }
-        if self._place is not None and any(row.pixels is not None for row in rows):
+        if self._image_token is not None and any(row.pixels is not None for row in rows):
             inputs |= {
                 "pixel_values": torch.cat([row.pixels for row in rows if row.pixels is not None]),
                 "image_grid_thw": torch.cat([row.grids for row in rows if row.grids is not None]),
-                "mm_token_type_ids": ids.eq(self._place).int(),
+                "mm_token_type_ids": ids.eq(self._image_token).int(),
             }
         sampling = self._settings.sampling
         choices = []
         if sampling.temperature > 0:
-            choices = [_Draw(sampling.temperature, sampling.top_p, [row.seed for row in rows])]
+            choices = [
+                _SeededSampling(sampling.temperature, sampling.top_p, [row.seed for row in rows])
+            ]
 
         def closing(input_ids: torch.Tensor, scores: Any, **more: Any) -> torch.Tensor:
-            ends = self._closing.is_set() or self._watch.over
+            ends = self._closing.is_set() or self._supervisor.over
             return torch.full((len(rows),), ends, device=input_ids.device)
 
         device = self._model.device
@@ -254,12 +276,12 @@ class LocalClient:
         return [self._until_end(each) for each in out[:, longest:].tolist()]
 
     def _until_end(self, said: list[int]) -> list[int]:
-        """Without what stands where a row is done and others are not."""
-        ends = (place for place, each in enumerate(said, start=1) if each in self._ends)
+        """The tokens up to the end token; padding follows in rows that end early."""
+        ends = (place for place, each in enumerate(said, start=1) if each in self._end_tokens)
         return said[: next(ends, None)]
 
-    def _reply(self, row: _Row, said: Sequence[int]) -> Reply:
-        with self._words:
+    def _reply(self, row: _EncodedPrompt, said: Sequence[int]) -> Reply:
+        with self._tokenizer_lock:
             text = self._tokenizer.decode(
                 said, skip_special_tokens=True, clean_up_tokenization_spaces=False
             )
@@ -272,23 +294,23 @@ class LocalClient:
                 completion=len(said),
                 reasoning=min(len(said), len(self._ids(thought))) if thought else 0,
             ),
-            finish="stop" if said[-1] in self._ends else "length",
+            finish="stop" if said[-1] in self._end_tokens else "length",
             model=self._name,
         )
 
     def _ids(self, text: str) -> list[int]:
-        with self._words:
+        with self._tokenizer_lock:
             ids: list[int] = self._tokenizer(text, add_special_tokens=False)["input_ids"]
         return ids
 
 
-class _Draw:
-    """Draws the next token of each row by the row's own seed, whoever else is in the batch.
+class _SeededSampling:
+    """Samples the next token of each row with the row's own seed, independent of the batch.
 
-    ``generate`` would draw all rows from one source of numbers, so that what is said depended on
-    which conversations happened to wait at the same time. Here each row's logits get noise of its
-    own, such that the largest is any token with just the probability that they give it (Gumbel's
-    trick); ``generate`` then takes the largest.
+    ``generate`` would sample all rows with one generator, so a reply would depend on the other
+    conversations in the batch. Here each row's logits get Gumbel noise from the row's own
+    generator: the largest sum is then a sample from the distribution (the Gumbel-max trick), and
+    ``generate`` takes the largest.
     """
 
     def __init__(self, temperature: float, top_p: float, seeds: Sequence[int]) -> None:
@@ -302,7 +324,7 @@ class _Draw:
         scores = scores / self._temperature
         if self._likeliest is not None:
             scores = self._likeliest(input_ids, scores)
-        if not self._sources:  # only now is it known which device the words come from
+        if not self._sources:  # the device is known only now
             self._sources = [torch.Generator(scores.device).manual_seed(s) for s in self._seeds]
         noise = torch.empty_like(scores)
         for row, source in zip(noise, self._sources, strict=True):
@@ -315,7 +337,7 @@ def _part(part: str | Picture) -> dict[str, str]:
 
 
 def _without_thought(text: str, thinking: bool) -> tuple[str, str]:
-    """What was thought, and what was said; ``thinking`` where the first word is thought already."""
+    """The thought and the reply; ``thinking`` says that the text begins inside a thought."""
     thought, found, words = text.partition(_THOUGHT)
     begun = thought.lstrip().startswith(_THINK)
     if not (found or begun or thinking):
@@ -323,8 +345,8 @@ def _without_thought(text: str, thinking: bool) -> tuple[str, str]:
     return thought.strip().removeprefix(_THINK).strip(), words.lstrip()
 
 
-def _plainer(error: RuntimeError, rows: Sequence[_Row]) -> Exception:
-    """What torch raises, as the batcher knows it."""
+def _explained(error: RuntimeError, rows: Sequence[_EncodedPrompt]) -> Exception:
+    """Torch's error as the exception that the batcher expects."""
     if isinstance(error, torch.cuda.OutOfMemoryError) or "DefaultCPUAllocator" in str(error):
         tokens = max(len(row.ids) for row in rows)
         return MemoryError(

@@ -17,21 +17,21 @@ import openai
 
 from agents.vlm.chat import Message, Reply
 from agents.vlm.clients.budget import Budget, Entry, Ledger
-from agents.vlm.clients.decision_schema import REQUEST_FIELDS
-from agents.vlm.clients.failures import Failure, failure_of
-from agents.vlm.clients.redaction import DiscreetLogs, Secrets
-from agents.vlm.clients.tokens import Asked
-from agents.vlm.clients.transport import Pace, WholeAnswers
-from agents.vlm.clients.watch import AGAIN, Request, Watch, duration
-from agents.vlm.clients.wire import (
-    billed,
+from agents.vlm.clients.chat_completions import (
+    billed_usage,
     cost_of,
-    in_letters,
-    read_bill,
+    picture_bytes,
+    read_billing,
     read_completion,
     reply_of,
     request_body,
 )
+from agents.vlm.clients.decision_schema import REQUEST_FIELDS
+from agents.vlm.clients.failures import Failure, failure_of
+from agents.vlm.clients.redaction import RedactingLogFilter, Secrets
+from agents.vlm.clients.supervisor import AGAIN, Request, RequestSupervisor, duration
+from agents.vlm.clients.tokens import RequestSize
+from agents.vlm.clients.transport import BoundedTransport, RateLimiter
 from agents.vlm.settings import AgentSettings, Server
 from er_gym.rollout.agent import CannotGoOn
 
@@ -50,28 +50,28 @@ _LATE_TRIES = 2
 
 
 class OpenAIClient:
-    """Asks a server. One serves all threads.
+    """Asks a server over HTTP. All threads share one client.
 
-    What may pass is tried again, ``settings.server.tries`` times in all, each try
-    ``settings.server.timeout`` seconds at most from first to last byte: no connection, 408, 409,
-    425, 429, 5xx, and answers that are cut off or empty. Between tries it waits as long as the
-    server asks, or half a second, a second, two … Each failed try is told to ``watch``. An answer
-    of status 2xx is entered in the ledger before it is judged.
+    Failures that may pass are tried again, up to ``settings.server.tries`` tries in all: no
+    connection, 408, 409, 425, 429, 5xx, and answers that are cut off or empty. Each try takes at
+    most ``settings.server.timeout`` seconds from first to last byte. Between tries the client waits
+    as long as the server asks, or half a second, one second, two … Each failed try is reported to
+    ``supervisor``. An answer with status 2xx is entered in the ledger before it is checked.
 
     Args:
-        model: its name, as the server knows it; on Azure, the deployment's.
-        settings: of the agent.
-        ledger: of the run; by default nothing is written down and nothing limited.
-        watch: of the run; by default without limit.
+        model: the model's name on the server; on Azure, the deployment's name.
+        settings: the agent's settings.
+        ledger: the run's ledger; by default nothing is recorded or limited.
+        supervisor: the run's request supervisor; by default without limit.
 
     Attributes:
-        prices: what its replies' costs are worked out by.
-        identity: all but the conversation and the episode that a reply depends on, as JSON. A
-            server on another port is the same server.
+        prices: the prices for the cost of replies.
+        identity: everything that a reply depends on besides conversation and episode, as JSON. The
+            server's port does not count.
 
     Raises:
-        ValueError: the server's address does not fit.
-        CannotGoOn: there is no key, and the server is known to want one.
+        ValueError: the server's address is invalid.
+        CannotGoOn: there is no key, and the server is known to need one.
     """
 
     def __init__(
@@ -79,35 +79,35 @@ class OpenAIClient:
         model: str,
         settings: AgentSettings,
         ledger: Ledger | None = None,
-        watch: Watch | None = None,
+        supervisor: RequestSupervisor | None = None,
     ) -> None:
         self._model, self.prices = model, settings.prices
         self._settings = settings
         self._ledger = ledger or Ledger(Budget(), settings.prices)
-        self._watch = watch or Watch()
+        self._supervisor = supervisor or RequestSupervisor()
         server = settings.server
         url = _address(server)
-        # As it may be shown: without user, password and query.
+        # For messages: without user, password and query.
         self._where = f"{url.scheme}://{url.netloc.decode()}{url.path}".rstrip("/")
         self._key = _key(server, url)
         self._secrets = Secrets(self._key, str(url))
-        self._logs = DiscreetLogs(self._secrets)
+        self._logs = RedactingLogFilter(self._secrets)
         self._fields = _fixed_fields(model, settings)
         self._answered = False
         place = f"{url.scheme}://{url.host}{url.path}".rstrip("/")
         self.identity = json.dumps(
             {"server": place, "fields": self._fields, "seed": settings.seed}, sort_keys=True
         )
-        self._pace = Pace(server.requests_per_minute)
-        self._transport = WholeAnswers(url, server.timeout, server.connect)
+        self._rate_limiter = RateLimiter(server.requests_per_minute)
+        self._transport = BoundedTransport(url, server.timeout, server.connect)
         plain = url.copy_with(query=None, fragment=None)
         options: dict[str, Any] = {
-            # The SDK wants one; without a key the header is left out of every request.
+            # The SDK needs a value; without a key the header is removed from every request.
             "api_key": self._key or "none",
-            "max_retries": 0,  # its waits cannot be told, nor ended
+            "max_retries": 0,  # its waits can be neither reported nor ended
             "timeout": server.timeout,
             "default_headers": {"Accept-Encoding": "identity"},
-            # Where a server sends requests on to may be another's, and would get the pictures.
+            # A redirect may lead to another party, which would get the pictures.
             "http_client": openai.DefaultHttpxClient(
                 transport=self._transport, follow_redirects=False
             ),
@@ -125,32 +125,32 @@ class OpenAIClient:
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
         """The next turn, as :class:`agents.vlm.chat.Client` has it."""
         body = self._body(messages, seed)
-        asked = Asked.of(body, messages, in_letters(messages), self._fields)
-        request = self._watch.request(seed)
+        request_size = RequestSize.of(body, messages, picture_bytes(messages), self._fields)
+        request = self._supervisor.request(seed)
         request.of = self._settings.server.tries
         late = 0
         for request.attempt in itertools.count(1):
             self._check(request)
-            answer = self._try(body, asked, request)
+            answer = self._try(body, request_size, request)
             if isinstance(answer, Reply):
                 self._answered = True
                 request.answered()
                 return replace(answer, seconds=time.monotonic() - request.began)
             what = self._line(answer)
-            if answer.ends:
-                raise self._watch.stop(self._with_tries(what, request))
-            late += answer.late
-            if not answer.passes or request.attempt == request.of or late == _LATE_TRIES:
+            if answer.fatal:
+                raise self._supervisor.stop(self._with_tries(what, request))
+            late += answer.timed_out
+            if not answer.retryable or request.attempt == request.of or late == _LATE_TRIES:
                 what = self._with_tries(what, request)
-                if answer.unreached:
-                    raise self._watch.stop(f"{what}; {_SEE_TO_IT}, and {AGAIN}")
+                if answer.no_server:
+                    raise self._supervisor.stop(f"{what}; {_SEE_TO_IT}, and {AGAIN}")
                 raise request.gave_up(what)
             self._pause(answer, what, request)
         raise AssertionError("unreachable")
 
     def close(self) -> None:
-        """Close all connections. Whoever still waits gets a ModelError."""
-        self._watch.close()
+        """Close all connections. Waiting callers get a ModelError."""
+        self._supervisor.close()
         self._sdk.close()
         self._logs.close()
 
@@ -163,20 +163,20 @@ class OpenAIClient:
     # -- one try -----------------------------------------------------------------------------------
 
     def _check(self, request: Request) -> None:
-        """Wait for one's turn; CannotGoOn where there is none."""
-        self._pace.wait(request)
+        """Wait for the rate limit and check the budget; raises CannotGoOn if it is spent."""
+        self._rate_limiter.wait(request)
         try:
             self._ledger.check()
         except CannotGoOn as error:
-            # The others' answers are under way, and paid for; but nobody tries again.
-            self._watch.stop(str(error), waits_for_answers=True)
+            # Answers under way are paid for and awaited; no thread tries again.
+            self._supervisor.stop(str(error), waits_for_answers=True)
             raise
 
-    def _try(self, body: bytes, asked: Asked, request: Request) -> Reply | Failure:
-        """A reply, or why there is none. It is not raised, so that no exception that may hold the
-        key is the context of another."""
+    def _try(self, body: bytes, request_size: RequestSize, request: Request) -> Reply | Failure:
+        """A reply or a failure. A failure is returned, not raised: an exception that may hold the
+        key must not become the context of another."""
         began = time.monotonic()
-        self._transport.serve(request)
+        self._transport.begin_try(request)
         answer: httpx2.Response | openai.OpenAIError
         try:
             answer = self._sdk.post(
@@ -189,34 +189,35 @@ class OpenAIClient:
             answer = error
         except BaseException:  # the run ends, or Ctrl-C
             if request.answering:
-                self._enter(b"", asked, None, "the run has ended", request, began)
+                self._enter(b"", request_size, None, "the run has ended", request, began)
             raise
         if isinstance(answer, openai.OpenAIError):
             failure = failure_of(
                 answer, key_from=self._settings.server.key_from, answered=self._answered
             )
             if request.answering:
-                self._enter(b"", asked, None, failure.words, request, began)
+                self._enter(b"", request_size, None, failure.message, request, began)
             return failure
         try:
             said, rejected = reply_of(read_completion(answer.content)), ""
         except ValueError as error:
             said, rejected = None, str(error)
-        reply = self._enter(answer.content, asked, said, rejected, request, began)
-        return reply or Failure(rejected, passes=True)
+        reply = self._enter(answer.content, request_size, said, rejected, request, began)
+        return reply or Failure(rejected, retryable=True)
 
     def _enter(
         self,
         body: bytes,
-        asked: Asked,
+        request_size: RequestSize,
         said: Reply | None,
         rejected: str,
         request: Request,
         began: float,
     ) -> Reply | None:
-        """Enter what an answer cost, reply or not; the reply with that, and without secrets."""
-        model, usage = billed(read_bill(body), asked, said)
-        cost, model = cost_of(usage, self.prices), self._secrets.strike(model)
+        """Enter an answer's cost in the ledger; return the reply with its cost and without
+        secrets."""
+        model, usage = billed_usage(read_billing(body), request_size, said)
+        cost, model = cost_of(usage, self.prices), self._secrets.redact(model)
         self._ledger.enter(
             Entry.of(
                 usage,
@@ -229,13 +230,13 @@ class OpenAIClient:
         )
         if said is None:
             return None
-        strike = self._secrets.strike
+        redact = self._secrets.redact
         return replace(
             said,
-            text=strike(said.text),
-            reasoning=strike(said.reasoning),
-            call=strike(said.call),
-            finish=strike(said.finish),
+            text=redact(said.text),
+            reasoning=redact(said.reasoning),
+            call=redact(said.call),
+            finish=redact(said.finish),
             model=model,
             usage=usage,
             cost=cost,
@@ -244,35 +245,37 @@ class OpenAIClient:
     # -- between tries -----------------------------------------------------------------------------
 
     def _pause(self, failure: Failure, what: str, request: Request) -> None:
-        """Say what went wrong, and wait; CannotGoOn where that would be too long."""
+        """Report the failure and wait; raises CannotGoOn if the wait would be too long."""
         growing = min(_LONGEST_PAUSE, _FIRST_PAUSE * 2.0 ** min(request.attempt - 1, 10))
-        pause = failure.pause or growing * random.uniform(0.75, 1.0)
+        pause = failure.retry_after or growing * random.uniform(0.75, 1.0)
         left = request.left()
         if pause > left:
-            raise self._watch.stop(
+            raise self._supervisor.stop(
                 f"{what}; the server asks to wait {duration(pause)}, and {duration(left)} of "
                 f"--max-minutes are left; {AGAIN}"
-                if failure.pause
+                if failure.retry_after
                 else f"{what}; the minutes of --max-minutes are over; {AGAIN}"
             )
         if pause > _LONGEST_ASKED and math.isinf(left):
-            raise self._watch.stop(
+            raise self._supervisor.stop(
                 f"{what}; the server asks to wait {duration(pause)}: {AGAIN} after that, or give "
                 "--max-minutes of more, and it is waited for"
             )
-        of = min(request.of, request.attempt + 1) if failure.late else request.of
+        of = min(request.of, request.attempt + 1) if failure.timed_out else request.of
         request.retry(what, pause, of)
         request.wait(pause)
 
     def _line(self, failure: Failure) -> str:
-        """One line that says who and what; never the key."""
-        words = self._plain(failure.words)
-        ends = f"; {self._plain(failure.ends)}" if failure.ends else ""
+        """One line with model, address and failure, without the key."""
+        words = self._plain(failure.message)
+        ends = f"; {self._plain(failure.fatal)}" if failure.fatal else ""
         return f"{self._model} at {self._where}: {words}{ends}"
 
     def _plain(self, words: str) -> str:
         """Short, printable, in one line and without secrets."""
-        words = self._secrets.strike(words)  # whole, so before anything is cut off
+        words = self._secrets.redact(
+            words
+        )  # before the text is cut, so that no part of a secret stays
         words = " ".join("".join(c if c.isprintable() else " " for c in words).split())
         return words if len(words) <= _LONGEST_WORDS else words[:_LONGEST_WORDS] + "…"
 
@@ -302,7 +305,7 @@ def _address(server: Server) -> httpx2.URL:
 
 
 def _key(server: Server, url: httpx2.URL) -> str:
-    """The key; "" if there is none and the server may do without."""
+    """The API key; "" if there is none and the server may not need one."""
     key = os.environ.get(server.key_from, "").strip()
     if not (key.isascii() and key.isprintable()):
         raise CannotGoOn(f"{server.key_from} holds characters that are in no key; set it anew")
@@ -318,7 +321,7 @@ def _key(server: Server, url: httpx2.URL) -> str:
 def _fixed_fields(model: str, settings: AgentSettings) -> dict[str, Any]:
     """All fields of a request but the messages and the seed.
 
-    ``extra`` overrules them, and a null in it leaves one out: some models take no temperature.
+    ``extra`` overrides them, and a null in it removes a field: some models accept no temperature.
     """
     sampling, server = settings.sampling, settings.server
     effort = settings.reasoning.effort

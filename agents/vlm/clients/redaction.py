@@ -1,7 +1,7 @@
-"""Strikes a user's secrets out of what a server says: a key, a password, what a URL's query holds.
+"""Removes secrets from server output: an API key, a password, the values of a URL's query.
 
-A server may repeat the key in an error, in a header or in a good reply. Whatever comes from it goes
-through here before it is kept, shown or raised.
+A server may repeat the key in an error, a header or a reply. Its output is redacted before it is
+stored, shown or raised.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import re
 from typing import Any
 from urllib.parse import parse_qsl, quote, unquote, urlsplit
 
-STRUCK = "***"
+REDACTED = "***"
 LONG = 8
-"""Characters. What is shorter is part of too many words to be struck out wherever it stands."""
+"""Characters. A shorter secret occurs in too many words to be redacted everywhere."""
 LOGS = (
     "httpcore2.connection",
     "httpcore2.http11",
@@ -22,19 +22,19 @@ LOGS = (
     "httpx2",
     "openai._base_client",
 )
-"""The loggers of the packages that carry requests; some write down the headers of answers."""
+"""The loggers of the HTTP packages; some log the headers of answers."""
 _LONG_VALUE = 12  # characters of a query's value: api-version=2024-10-21 is no secret
 
 
 class Secrets:
-    """What must not be repeated.
+    """The secrets of a server's settings.
 
-    A key shorter than :data:`LONG`, such as ``none`` or ``x``, is struck out only where it follows
-    a word such as ``Bearer`` or ``api_key``.
+    A key shorter than :data:`LONG`, such as ``none`` or ``x``, is redacted only after a word such
+    as ``Bearer`` or ``api_key``.
 
     Args:
-        key: of the server; "" for none.
-        url: of the server; its password and the long values of its query are secrets.
+        key: the server's API key; "" for none.
+        url: the server's address; its password and the long values of its query are secrets.
     """
 
     def __init__(self, key: str, url: str = "") -> None:
@@ -46,7 +46,7 @@ class Secrets:
             password, values = "", []
         long = {each for each in (key, password) if len(each) >= LONG}.union(values)
         short = {each for each in (key, password) if 0 < len(each) < LONG}
-        # As they are, in JSON and in a URL; the longest first, since one may be part of another.
+        # As plain text, in JSON and in a URL; longest first, since one may contain another.
         forms = {form for each in long for form in (each, json.dumps(each)[1:-1], quote(each, ""))}
         patterns = [re.escape(form) for form in sorted(forms, key=len, reverse=True)]
         told = r"((?:bearer|basic|key|token|authorization|password)(?: provided)?\W{1,6})"
@@ -54,27 +54,27 @@ class Secrets:
         self._anywhere = re.compile("|".join(patterns)) if patterns else None
         self._after = re.compile(rf"(?i:{told})(?:{after})(?!\w)") if after else None
 
-    def strike(self, text: str) -> str:
-        """The text without them."""
+    def redact(self, text: str) -> str:
+        """The text without the secrets."""
         if self._anywhere is not None:
-            text = self._anywhere.sub(STRUCK, text)
+            text = self._anywhere.sub(REDACTED, text)
         if self._after is not None:
-            text = self._after.sub(rf"\g<1>{STRUCK}", text)
+            text = self._after.sub(rf"\g<1>{REDACTED}", text)
         return text
 
-    def strike_all(self, value: Any) -> Any:
-        """A JSON value without them in any of its strings, names of fields included."""
+    def redact_all(self, value: Any) -> Any:
+        """A JSON value without the secrets in any string, field names included."""
         if isinstance(value, str):
-            return self.strike(value)
+            return self.redact(value)
         if isinstance(value, dict):
-            return {self.strike_all(name): self.strike_all(each) for name, each in value.items()}
+            return {self.redact_all(name): self.redact_all(each) for name, each in value.items()}
         if isinstance(value, (list, tuple)):
-            return [self.strike_all(each) for each in value]
+            return [self.redact_all(each) for each in value]
         return value
 
 
-class DiscreetLogs:
-    """Strikes secrets out of what the packages that carry requests log, until it is closed."""
+class RedactingLogFilter:
+    """Removes secrets from the log records of the HTTP packages until it is closed."""
 
     def __init__(self, secrets: Secrets) -> None:
         self._secrets = secrets
@@ -82,14 +82,14 @@ class DiscreetLogs:
             logging.getLogger(name).addFilter(self)
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Let a record pass, without secrets."""
+        """Remove the secrets from a record; every record passes."""
         said = record.getMessage()
-        plain = self._secrets.strike(said)
+        plain = self._secrets.redact(said)
         if plain != said:
             record.msg, record.args = plain, ()
         return True
 
     def close(self) -> None:
-        """Let them log as they like."""
+        """Remove the filter from the loggers."""
         for name in LOGS:
             logging.getLogger(name).removeFilter(self)

@@ -1,4 +1,4 @@
-"""Replies kept on disk: what has been asked once is not asked, nor paid for, again."""
+"""Caches replies on disk, so that no request is sent and paid for twice."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ _REPLY = TypeAdapter(Reply)
 T = TypeVar("T")
 
 
-class Identified(Client, Protocol):
-    """A client that says what its replies depend on, beside the conversation."""
+class CacheableClient(Client, Protocol):
+    """A client that states what its replies depend on besides the conversation."""
 
     @property
     def identity(self) -> str:
-        """Model, server, parameters: the same text for what replies alike."""
+        """Model, server and parameters as text; clients with equal texts reply alike."""
 
 
-class Kept:
-    """Asks another client only what has not been asked before.
+class ReplyCache:
+    """Wraps a client and answers repeated requests from disk.
 
-    Where nothing is kept in the directory yet it is made. Several threads and processes may share
-    it. If one is killed, the others and those that come after find all that was kept before. A
-    damaged file is set aside with a warning, and replies are kept anew.
+    The directory is created if it does not exist. Several threads and processes may share it. If a
+    process is killed, the replies stored before remain readable. A damaged cache is moved aside
+    with a warning, and a new one is begun.
 
     Args:
-        client: is asked the rest.
-        directory: where replies are kept.
+        client: answers the requests that are not in the cache.
+        directory: holds the cache.
 
     Raises:
-        ValueError: nothing can be kept in the directory.
+        ValueError: the directory cannot be used.
     """
 
-    def __init__(self, client: Identified, directory: Path) -> None:
+    def __init__(self, client: CacheableClient, directory: Path) -> None:
         self._client, self._directory = client, directory
         self._lock = threading.Lock()
         try:
@@ -65,28 +65,30 @@ class Kept:
 
     @property
     def identity(self) -> str:
-        """The other client's."""
+        """The wrapped client's identity."""
         return self._client.identity
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
-        """The next turn; usage and cost of a kept one are what they once were."""
+        """The next turn; a cached reply has its original usage and cost."""
         began = time.monotonic()
         key = key_of(self.identity, messages, seed)
         found = self._guarded(lambda cache: _read(cache, key))
         if found is not None:
-            return replace(found, kept=True, seconds=time.monotonic() - began)
+            return replace(found, from_cache=True, seconds=time.monotonic() - began)
         reply = self._client.reply(messages, seed)
-        text = json.dumps(asdict(reply))
+        fields = asdict(reply)
+        del fields["from_cache"]  # says how a reply was had, not what it is
+        text = json.dumps(fields)
         self._guarded(lambda cache: cache.set(key, text))
         return reply
 
     def close(self) -> None:
-        """Close the files and the other client."""
+        """Close the cache and the wrapped client."""
         self._cache.close()
         self._client.close()
 
     def _guarded(self, do: Callable[[Any], T]) -> T | None:
-        """Use the cache; None where it does not work, which is no reason to lose a reply."""
+        """Use the cache; None if it fails, since a failing cache must not lose a reply."""
         cache = self._cache
         try:
             return do(cache)
@@ -107,7 +109,7 @@ class Kept:
 
 
 def key_of(identity: str, messages: Sequence[Message], seed: int) -> str:
-    """sha256, in hex, of all that a reply depends on."""
+    """sha256, in hex, of everything that a reply depends on."""
     said = [
         [message.role, [_essence(part) for part in message.parts], message.reasoning]
         for message in messages
@@ -120,24 +122,24 @@ def _essence(part: str | Picture) -> str | list[str]:
 
 
 class _Texts(diskcache.Disk):
-    """Reads texts only. Otherwise it would unpickle, and so run, what others put into the file."""
+    """Reads texts only. The default would unpickle values, which runs code from the file."""
 
     def fetch(self, mode: int, filename: str | None, value: Any, read: bool) -> Any:
-        """A value; a missing file, which counts as none kept, in place of a pickled one."""
+        """A value; a pickled one raises FileNotFoundError, which counts as not cached."""
         if mode == diskcache.core.MODE_PICKLE:
             raise FileNotFoundError("no text")
         return super().fetch(mode, filename, value, read)
 
 
 def _open(directory: Path) -> Any:
-    # Nothing is ever dropped. Mapped memory is fast, but kills the process if the file is cut off.
+    # No eviction. Memory mapping is fast, but a truncated file would kill the process.
     return diskcache.Cache(
         str(directory), disk=_Texts, eviction_policy="none", cull_limit=0, sqlite_mmap_size=0
     )
 
 
 def _anew(directory: Path, error: Exception) -> Any:
-    """Set a damaged cache aside, and open an empty one in its place."""
+    """Move a damaged cache aside and open an empty one in its place."""
     number = 1
     while (aside := directory.with_name(f"{directory.name}.damaged-{number}")).exists():
         number += 1
@@ -150,5 +152,5 @@ def _read(cache: Any, key: str) -> Reply | None:
     try:
         text = cache.get(key)
         return None if text is None else _REPLY.validate_json(text)
-    except ValueError:  # a file of a value that is cut off
+    except ValueError:  # a truncated value
         return None

@@ -1,4 +1,4 @@
-"""Clients without a model: one that says what a function says, one that says it all again."""
+"""Clients without a model: one calls a function, one replays recorded conversations."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _log = logging.getLogger(__name__)
 
 
 class ScriptedClient:
-    """Replies with what a function makes of the conversation: a text, or a whole reply.
+    """Replies with the result of a function: a text or a whole reply.
 
     Args:
-        say: called with the messages; from many threads at once, as clients are.
+        say: called with the messages, from many threads at once.
     """
 
     identity = '{"client":"scripted"}'
@@ -33,7 +33,7 @@ class ScriptedClient:
         self._say = say
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
-        """What the function says."""
+        """The function's result."""
         said = self._say(messages)
         return said if isinstance(said, Reply) else Reply(said, model="scripted")
 
@@ -44,15 +44,15 @@ class ScriptedClient:
 class RecordedClient:
     """Replays the conversations of a run directory.
 
-    A turn is recognised by all that was said before it and by the pictures that came with the last
-    message, so that the environment has to show what it showed then.
+    A turn is recognised by all texts before it and by the pictures of the last message, so the
+    environment must show the same pictures as then.
 
     Args:
-        run: the run directory; or a single conversation's file.
+        run: the run directory, or the file of one conversation.
 
     Raises:
-        ValueError: there are no conversations in it, or none that can be read. Files that are none
-            of the run's (broken, copied, of another agent) are left out, with a warning each.
+        ValueError: the run has no readable conversation. Files that do not belong to the run
+            (broken, copied, of another agent) are skipped with a warning each.
     """
 
     def __init__(self, run: Path) -> None:
@@ -78,10 +78,10 @@ class RecordedClient:
         self.identity = f'{{"recorded":"{hashlib.sha256(everything.encode()).hexdigest()}"}}'
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
-        """What was said then.
+        """The recorded reply.
 
         Raises:
-            ModelError: nothing was said to this.
+            ModelError: the recording has no reply to this conversation.
         """
         turns = [_Turn.of(message.role, message.parts) for message in messages]
         reply = self._replies.get(_key(turns))
@@ -97,8 +97,8 @@ class RecordedClient:
 
 
 class _Turn(NamedTuple):
-    """A message as it is recognised: ``seen`` has digests for pictures, ``said`` the texts alone,
-    since a picture that is no longer sent has not been said."""
+    """The key of a message: ``seen`` has the texts and the digests of pictures; ``said`` has the
+    texts alone, since later requests may leave out a picture."""
 
     role: str
     seen: tuple[str, ...]
@@ -119,7 +119,7 @@ def _key(turns: Iterable[_Turn]) -> str:
 
 
 def _agent_of(run: Path) -> str:
-    """The agent of a run directory, "" where it does not tell."""
+    """The agent of a run directory, "" if it is not stated."""
     try:
         told = json.loads(read_bytes(run / "run.json"))
     except (TaskFileError, ValueError):
@@ -129,7 +129,7 @@ def _agent_of(run: Path) -> str:
 
 
 def _read(file: Path, agent: str | None) -> ConversationRecord:
-    """A conversation of a run of that agent's; None where it was named by itself."""
+    """Read a conversation; ``agent`` is the run's agent, None for a file outside of a run."""
     try:
         kept = ConversationRecord.model_validate_json(read_bytes(file))
     except (TaskFileError, ValidationError) as error:
@@ -160,7 +160,7 @@ def _replies(kept: ConversationRecord) -> Mapping[str, Reply]:
             cost=each.cost,
             finish=each.finish,
             model=each.model,
-            kept=True,
+            from_cache=True,
         )
         for each in kept.rounds
     }

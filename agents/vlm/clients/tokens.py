@@ -1,8 +1,8 @@
-"""How many tokens a request took: as its server says, where that can be true, or at most.
+"""Token counts of a request: the server's counts if they are plausible, otherwise upper bounds.
 
-A budget holds only if nothing is counted too low. Where a server does not count, or its count is
-impossible, the count is an upper bound: a token stands for at least one byte of text in every
-tokenizer in use, whatever the script, and a picture for no more than with the dearest model known.
+A budget holds only if no count is too low. If a server reports no count, or an impossible one, an
+upper bound replaces it: in every tokenizer in use a token covers at least one byte of text, and a
+picture takes no more tokens than with the most expensive model known.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from typing import Annotated, Any
 from pydantic import Field, WrapValidator
 
 from agents.vlm.chat import Message, Picture, Usage
-from agents.vlm.clients.lenient import OrNone, Wire
+from agents.vlm.clients.tolerant_model import OrNone, TolerantModel
 
 _WRONG = -1
 _TEMPLATE = 512
-"""Tokens that a server's chat template may add: its system prompt, marks, words about tools."""
+"""Tokens that a server's chat template may add: a system prompt, markers, tool descriptions."""
 _MARKS = 16  # tokens around a reply
 _BYTES_OF_A_TOKEN = 64
-"""More than a token stands for on average in any text: a count below this cannot be true."""
+"""More bytes than a token covers on average in any text: a lower count cannot be true."""
 _PROVIDERS_OWN = 50_000
-"""Tokens; a prompt that a provider puts before ours may be long, but not longer."""
+"""The longest prompt, in tokens, that a provider may put before ours."""
 _BEYOND_LIMIT = 16
-"""Some servers do not hold a reasoning model to ``max_tokens``; none exceeds it so many times."""
+"""Some servers let a reasoning model exceed ``max_tokens``, but never by this factor."""
 _UNLIMITED = 131_072  # tokens of a reply, where no limit is sent
 
 
 def picture_at_most(width: int, height: int) -> int:
-    """Tokens of a picture: what gpt-4o-mini takes, 2,833 and 5,667 for each square of 512 pixels.
+    """An upper bound for a picture's tokens: gpt-4o-mini's 2,833 plus 5,667 per 512-pixel square.
 
     Open models take fewer: 256 to 1,601 for each of 4 to 12 squares (InternVL, Llama 3.2), or one
     for each 14×14 pixels or more (Pixtral, Qwen).
@@ -40,14 +40,15 @@ def picture_at_most(width: int, height: int) -> int:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What a request holds, as far as its tokens depend on it.
+class RequestSize:
+    """The size of a request, for bounds on its tokens.
 
     Attributes:
-        text: bytes of its JSON without the pictures. JSON's marks are more than a template's.
-        pictures: tokens of all pictures, at most.
-        max_tokens: of the reply; None where no limit is sent.
-        thinks: whether the reply may have tokens that are not shown.
+        text: bytes of its JSON without the pictures. JSON's punctuation outweighs a template's
+            markers.
+        pictures: an upper bound for the tokens of all pictures.
+        max_tokens: the limit of the reply; None if none is sent.
+        thinks: whether the reply may have hidden tokens.
     """
 
     text: int
@@ -57,14 +58,14 @@ class Asked:
 
     @staticmethod
     def of(
-        body: bytes, messages: Sequence[Message], in_letters: int, fields: Mapping[str, Any]
-    ) -> Asked:
-        """Of a request's body, in which the pictures of ``messages`` take ``in_letters`` bytes."""
+        body: bytes, messages: Sequence[Message], picture_bytes: int, fields: Mapping[str, Any]
+    ) -> RequestSize:
+        """The size of a request whose pictures take ``picture_bytes`` bytes of the body."""
         shown = [part for each in messages for part in each.parts if isinstance(part, Picture)]
         limits = (fields.get("max_tokens"), fields.get("max_completion_tokens"))
         known = [each for each in limits if type(each) is int and each > 0]
-        return Asked(
-            text=len(body) - in_letters,
+        return RequestSize(
+            text=len(body) - picture_bytes,
             pictures=sum(picture_at_most(each.width, each.height) for each in shown),
             max_tokens=min(known, default=None),
             thinks=fields.get("reasoning_effort", "none") != "none",
@@ -72,7 +73,7 @@ class Asked:
 
     @property
     def prompt_at_most(self) -> int:
-        """Tokens of the prompt."""
+        """An upper bound for the tokens of the prompt."""
         return self.text + self.pictures + _TEMPLATE
 
 
@@ -90,13 +91,13 @@ _Whole = Annotated[int, Field(strict=True, ge=0, le=2**53)]
 _Count = Annotated[_Whole | None, WrapValidator(_or_wrong)]
 
 
-class _Details(Wire):
+class _Details(TolerantModel):
     cached_tokens: _Count = None
     reasoning_tokens: _Count = None
 
 
-class Claimed(Wire):
-    """A server's count; -1 stands for a value that is no count."""
+class ReportedUsage(TolerantModel):
+    """The counts that a server reports; -1 stands for an invalid value."""
 
     prompt_tokens: _Count = None
     completion_tokens: _Count = None
@@ -104,48 +105,52 @@ class Claimed(Wire):
     completion_tokens_details: OrNone[_Details] = None
 
 
-def usage_of(claimed: Claimed | None, asked: Asked, said: int | None, cut: bool = False) -> Usage:
-    """The tokens of a request and its reply, never too few.
+def usage_of(
+    reported: ReportedUsage | None, request_size: RequestSize, said: int | None, cut: bool = False
+) -> Usage:
+    """The token counts of a request and its reply, never too low.
 
     Args:
-        claimed: the server's count, if there is one.
-        asked: the request.
-        said: bytes of the reply's words, thoughts and call; None where it cannot be read.
+        reported: the server's count, if there is one.
+        request_size: the request.
+        said: bytes of the reply's text, thoughts and call; None if it cannot be read.
         cut: whether the reply ended at the limit.
     """
-    claimed = claimed or Claimed()
+    reported = reported or ReportedUsage()
     estimated = False
-    prompt = claimed.prompt_tokens
-    if prompt is None or not _possible_prompt(prompt, asked):
-        prompt, estimated = asked.prompt_at_most, True
-    cached = (claimed.prompt_tokens_details or _Details()).cached_tokens or 0
+    prompt = reported.prompt_tokens
+    if prompt is None or not _possible_prompt(prompt, request_size):
+        prompt, estimated = request_size.prompt_at_most, True
+    cached = (reported.prompt_tokens_details or _Details()).cached_tokens or 0
     if not 0 <= cached <= prompt:
         cached, estimated = 0, True
-    completion = claimed.completion_tokens
-    if completion is None or not _possible_completion(completion, asked, said):
-        completion, estimated = _completion_at_most(asked, said, cut), True
-    reasoning = (claimed.completion_tokens_details or _Details()).reasoning_tokens or 0
-    if not _possible_completion(reasoning, asked, 0):
+    completion = reported.completion_tokens
+    if completion is None or not _possible_completion(completion, request_size, said):
+        completion, estimated = _completion_at_most(request_size, said, cut), True
+    reasoning = (reported.completion_tokens_details or _Details()).reasoning_tokens or 0
+    if not _possible_completion(reasoning, request_size, 0):
         reasoning, estimated = 0, True
     if reasoning > completion:  # some servers count thoughts beside the words, not among them
         completion, estimated = completion + reasoning, True
     return Usage(prompt, completion, cached, reasoning, estimated)
 
 
-def _possible_prompt(count: int, asked: Asked) -> bool:
-    least = max(1, asked.text // _BYTES_OF_A_TOKEN)
-    return least <= count <= 2 * asked.prompt_at_most + _PROVIDERS_OWN
+def _possible_prompt(count: int, request_size: RequestSize) -> bool:
+    least = max(1, request_size.text // _BYTES_OF_A_TOKEN)
+    return least <= count <= 2 * request_size.prompt_at_most + _PROVIDERS_OWN
 
 
-def _possible_completion(count: int, asked: Asked, said: int | None) -> bool:
+def _possible_completion(count: int, request_size: RequestSize, said: int | None) -> bool:
     said = said or 0
     least = 0 if not said else max(1, said // _BYTES_OF_A_TOKEN)
-    limit = _UNLIMITED if asked.max_tokens is None else _BEYOND_LIMIT * asked.max_tokens
+    limit = (
+        _UNLIMITED if request_size.max_tokens is None else _BEYOND_LIMIT * request_size.max_tokens
+    )
     return least <= count <= max(limit, said + _MARKS)
 
 
-def _completion_at_most(asked: Asked, said: int | None, cut: bool) -> int:
-    limit = asked.max_tokens or 0
+def _completion_at_most(request_size: RequestSize, said: int | None, cut: bool) -> int:
+    limit = request_size.max_tokens or 0
     if said is None:
         return limit or _UNLIMITED
-    return max(said + _MARKS, limit if cut or asked.thinks else 0)
+    return max(said + _MARKS, limit if cut or request_size.thinks else 0)

@@ -1,7 +1,8 @@
-"""What carries the OpenAI SDK's requests: a whole answer in time, or an error of the connection.
+"""The HTTP transport of the OpenAI SDK: a whole answer within the time limit, or an error.
 
-Each call is one try. The SDK's own time limits are of single waits, so that bytes that drip have no
-end; here the whole try has one. Answers are bounded, after they are decompressed too.
+Each call is one try. The SDK's own time limits apply to single reads, so a slow trickle of bytes
+never times out; here the limit applies to the whole try. The size of answers is limited, also after
+decompression.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ import httpcore2
 import httpx2
 from openai import OpenAIError
 
-from agents.vlm.clients.watch import Request
+from agents.vlm.clients.supervisor import Request
 
 LARGEST_ANSWER = 20_000_000
-"""Bytes; what is longer is no reply."""
+"""The largest answer in bytes."""
 _AT_ONCE = 262_144  # bytes written between two looks at the clock
 _LOOK = 0.5  # seconds of waiting between two looks at the run
 
@@ -34,18 +35,18 @@ _KNOWN_TO_THE_SDK: Mapping[type[Exception], type[httpx2.TransportError]] = {
     httpcore2.ProtocolError: httpx2.RemoteProtocolError,
     httpcore2.ProxyError: httpx2.ProxyError,
 }
-"""The errors of connections, special ones first, and what the SDK takes them for."""
+"""Connection errors, special ones first, and the errors that the SDK handles."""
 
 
 class AnswerTooLong(OpenAIError):
-    """An answer without end."""
+    """An answer exceeds :data:`LARGEST_ANSWER`."""
 
 
-class Pace:
-    """Spreads requests evenly, over all threads of the process.
+class RateLimiter:
+    """Spaces requests evenly over all threads of the process.
 
     Args:
-        per_minute: at most so many; None for no limit.
+        per_minute: the most requests per minute; None for no limit.
     """
 
     def __init__(self, per_minute: int | None) -> None:
@@ -54,51 +55,51 @@ class Pace:
         self._lock = threading.Lock()
 
     def wait(self, request: Request) -> None:
-        """Wait for one's turn; raises as :meth:`~agents.vlm.clients.watch.Request.wait`."""
+        """Wait for the next free slot; raises as ``Request.wait`` does."""
         with self._lock:
             turn = max(time.monotonic(), self._next)
             self._next = turn + self._gap
         request.wait(max(0.0, turn - time.monotonic()))
 
 
-class WholeAnswers(httpx2.BaseTransport):
+class BoundedTransport(httpx2.BaseTransport):
     """A transport for one server.
 
     Args:
-        url: of the server; says whether one of the environment's proxies is in between. Its query
+        url: the server's address; it decides which of the environment's proxies is used. Its query
             is sent with each request.
-        timeout: seconds for a try, from the first byte sent to the last received.
-        connect: seconds of these for a connection.
+        timeout: seconds for a try, from the first byte sent to the last byte received.
+        connect: the part of ``timeout`` for the connection, seconds.
     """
 
     def __init__(self, url: httpx2.URL, timeout: float, connect: float) -> None:
-        self._clock = _Clock()
+        self._deadline = _TryDeadline()
         self._timeout, self._query = timeout, url.query
         self._pool = httpcore2.ConnectionPool(
             ssl_context=httpx2.create_ssl_context() if url.scheme == "https" else None,
             proxy=_proxy_for(str(url)),
             max_connections=None,
             keepalive_expiry=5.0,
-            network_backend=_TimedBackend(self._clock, connect),
+            network_backend=_TimedBackend(self._deadline, connect),
         )
 
-    def serve(self, request: Request) -> None:
-        """What this thread sends next is a try of this request."""
-        self._clock.request = request
+    def begin_try(self, request: Request) -> None:
+        """Count what this thread sends next as a try of this request."""
+        self._deadline.request = request
 
     def handle_request(self, request: httpx2.Request) -> httpx2.Response:
         """Send a request and read the answer to its end.
 
         Raises:
-            httpx2.TransportError: there is none, or it is broken.
-            AnswerTooLong: it has no end.
+            httpx2.TransportError: there is no answer, or it is broken.
+            AnswerTooLong: the answer is too long.
             CannotGoOn: the run ends meanwhile.
         """
-        self._clock.start(self._timeout)
+        self._deadline.start(self._timeout)
         try:
             return self._whole(request)
         except httpcore2.TimeoutException as error:
-            self._clock.request.left(answering=True)  # it may be the run's end that came first
+            self._deadline.request.left(answering=True)  # it may be the run's end that came first
             if isinstance(error, _NoConnection):
                 raise httpx2.ConnectTimeout(str(error), request=request) from None
             late = f"no whole answer within {self._timeout:g} s"
@@ -126,7 +127,7 @@ class WholeAnswers(httpx2.BaseTransport):
                 extensions=request.extensions,
             )
         )
-        self._clock.request.answering = 200 <= answer.status < 300
+        self._deadline.request.answering = 200 <= answer.status < 300
         try:
             parts, size = [], 0
             for part in answer.iter_stream():
@@ -146,7 +147,7 @@ class WholeAnswers(httpx2.BaseTransport):
 
 
 def _decompressed(content: bytes, encoding: str, request: httpx2.Request) -> bytes:
-    """An answer that was compressed although none was asked for; never longer than is allowed."""
+    """Decompress an answer, up to the size limit; servers may compress without being asked."""
     encoding = encoding.strip().lower()
     if encoding in ("", "identity"):
         return content
@@ -171,7 +172,7 @@ def _too_long() -> AnswerTooLong:
 
 
 def _proxy_for(url: str) -> httpcore2.Proxy | None:
-    """The environment's proxy for a URL, as ``HTTPS_PROXY``, ``NO_PROXY`` and their like say."""
+    """The proxy for a URL, from ``HTTPS_PROXY``, ``NO_PROXY`` and related variables."""
     place = urlsplit(url)
     known = getproxies()
     proxy = known.get(place.scheme) or known.get("all")
@@ -191,8 +192,8 @@ def _without_user(netloc: str) -> str:
 # -- time ------------------------------------------------------------------------------------------
 
 
-class _Clock(threading.local):
-    """How much time a try has left; a request is one thread's from beginning to end."""
+class _TryDeadline(threading.local):
+    """The time that a try has left; one thread handles a request from start to end."""
 
     request: Request
     _end = _began = 0.0
@@ -209,7 +210,7 @@ class _Clock(threading.local):
         return left
 
     def look(self) -> None:
-        """Say that one still waits; raises what ends the run."""
+        """Report that the request still waits; raises the error that ends the run."""
         self.request.left(answering=True)
         waited, most = time.monotonic() - self._began, self._end - self._began
         self.request.still_waiting(
@@ -218,22 +219,22 @@ class _Clock(threading.local):
 
 
 class _TimedStream(httpcore2.NetworkStream):
-    """A connection on which no wait goes beyond the time that is left."""
+    """A connection whose reads and writes end with the try's time."""
 
-    def __init__(self, inner: httpcore2.NetworkStream, clock: _Clock) -> None:
-        self._inner, self._clock = inner, clock
+    def __init__(self, inner: httpcore2.NetworkStream, clock: _TryDeadline) -> None:
+        self._inner, self._deadline = inner, clock
 
     def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
         while True:
-            left = self._clock.left()
+            left = self._deadline.left()
             try:
                 return self._inner.read(max_bytes, min(left, _LOOK))
             except httpcore2.ReadTimeout:
-                self._clock.look()
+                self._deadline.look()
 
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
         for start in range(0, len(buffer), _AT_ONCE):
-            self._inner.write(buffer[start : start + _AT_ONCE], self._clock.left())
+            self._inner.write(buffer[start : start + _AT_ONCE], self._deadline.left())
 
     def start_tls(
         self,
@@ -241,8 +242,10 @@ class _TimedStream(httpcore2.NetworkStream):
         server_hostname: str | None = None,
         timeout: float | None = None,
     ) -> httpcore2.NetworkStream:
-        left = self._clock.left()
-        return _TimedStream(self._inner.start_tls(ssl_context, server_hostname, left), self._clock)
+        left = self._deadline.left()
+        return _TimedStream(
+            self._inner.start_tls(ssl_context, server_hostname, left), self._deadline
+        )
 
     def get_extra_info(self, info: str) -> Any:
         return self._inner.get_extra_info(info)
@@ -252,14 +255,14 @@ class _TimedStream(httpcore2.NetworkStream):
 
 
 class _NoConnection(httpcore2.ConnectTimeout):
-    """There is no connection, and there is time left."""
+    """The connection failed before the try's time was over."""
 
 
 class _TimedBackend(httpcore2.NetworkBackend):
-    """Makes such connections."""
+    """Opens connections with a time limit."""
 
-    def __init__(self, clock: _Clock, connect: float) -> None:
-        self._inner, self._clock, self._connect = httpcore2.SyncBackend(), clock, connect
+    def __init__(self, clock: _TryDeadline, connect: float) -> None:
+        self._inner, self._deadline, self._connect = httpcore2.SyncBackend(), clock, connect
 
     def connect_tcp(
         self,
@@ -269,7 +272,7 @@ class _TimedBackend(httpcore2.NetworkBackend):
         local_address: str | None = None,
         socket_options: Iterable[httpcore2.SOCKET_OPTION] | None = None,
     ) -> httpcore2.NetworkStream:
-        left = self._clock.left()
+        left = self._deadline.left()
         try:
             stream = self._inner.connect_tcp(
                 host, port, min(left, self._connect), local_address, socket_options
@@ -278,4 +281,4 @@ class _TimedBackend(httpcore2.NetworkBackend):
             if left <= self._connect:
                 raise
             raise _NoConnection(f"no connection within {self._connect:g} s") from None
-        return _TimedStream(stream, self._clock)
+        return _TimedStream(stream, self._deadline)

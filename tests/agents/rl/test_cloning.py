@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import agents.rl.demonstrations
-from agents.rl.cloning import clone, watch
+from agents.rl.cloning import clone_behaviour, collect_demonstrations
 from agents.rl.config import TrainConfig, WarmStart
 from agents.rl.demonstrations import demonstrate
 from agents.rl.envs import make_env
-from agents.rl.train import FAMILIES, train, vectorised
+from agents.rl.train import ALGORITHMS, make_vec_env, train
 from er_gym.envs.actions import INDEX, Action
 from er_gym.rollout.agent import Decision
 
@@ -34,7 +34,7 @@ def test_demonstrations_are_what_the_learner_would_have_seen(
         }
     )
     how = WarmStart(teacher=teacher, episodes=6)
-    seen = watch(config, how, seed=1)
+    seen = collect_demonstrations(config, how, seed=1)
     assert seen.episodes == 6
     assert 0 < seen.successes <= 6
     assert seen.obs["state"].shape == (
@@ -51,11 +51,11 @@ def test_demonstrations_are_what_the_learner_would_have_seen(
 def test_a_policy_comes_to_do_what_the_teacher_did(make_config: Make) -> None:
     config = make_config()
     how = WarmStart(teacher="oracle", episodes=20, epochs=150, batch_size=32, learning_rate=3e-3)
-    seen = watch(config, how, seed=0)
-    env = vectorised(config, config.env, 0)
+    seen = collect_demonstrations(config, how, seed=0)
+    env = make_vec_env(config, config.env, 0)
     try:
-        model = FAMILIES["ppo"].make(config, config.algorithm, env)
-        agreed = clone(model, seen, how, seed=0)
+        model = ALGORITHMS["ppo"].make(config, config.algorithm, env)
+        agreed = clone_behaviour(model, seen, how, seed=0)
     finally:
         env.close()
     assert agreed > 0.8  # of about 60 actions that are legal each time
@@ -123,4 +123,4 @@ def test_a_step_left_out_counts_in_the_returns_before_it(
 def test_a_teacher_that_shows_nothing_is_one_clear_error(make_config: Make) -> None:
     config = make_config(env={"episodes": "mini", "types": ["single_pickup"], "max_steps": 1})
     with pytest.raises(ValueError, match=r"oracle showed nothing to learn in 2 episodes \(0 succ"):
-        watch(config, WarmStart(teacher="oracle", episodes=2), seed=0)
+        collect_demonstrations(config, WarmStart(teacher="oracle", episodes=2), seed=0)

@@ -19,16 +19,16 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
 from agents.rl import dqn
 from agents.rl.agent import RLAgent
-from agents.rl.config import Episodes, Network, TrainConfig, Vectorised
+from agents.rl.config import EnvConfig, Network, TrainConfig, VecEnvConfig
 from agents.rl.envs import make_env
-from agents.rl.saved import save
-from agents.rl.train import FAMILIES, load_last, prepare
+from agents.rl.model_file import save
+from agents.rl.train import ALGORITHMS, load_last_checkpoint, prepare_run
 from er_gym.envs.actions import INDEX
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks.suites import load_suite
 
 ENVS = 2
-EPISODES = Episodes(episodes="mini", types=("single_pickup",))
+EPISODES = EnvConfig(episodes="mini", types=("single_pickup",))
 NAMES = pytest.mark.parametrize("name", ["dqn", "qrdqn"])
 
 
@@ -46,14 +46,14 @@ def configured(name: str, **settings: Any) -> TrainConfig:
         algorithm={"name": name, "quantiles": 5, "target_update_interval": 20, **few, **settings},
         total_steps=1000,
         env=EPISODES,
-        vec=Vectorised(envs=ENVS, workers=1),
+        vec=VecEnvConfig(envs=ENVS, workers=1),
         network=Network(width=8, kind=4),
     )
 
 
 def learner(env: VecEnv, name: str, **settings: Any) -> Any:
     config = configured(name, **settings)
-    model = FAMILIES[name].make(config, config.algorithm, env)
+    model = ALGORITHMS[name].make(config, config.algorithm, env)
     env.seed(0)
     return model
 
@@ -149,9 +149,9 @@ def test_learning_stays_finite(env: VecEnv, name: str) -> None:
 def test_what_is_loaded_acts_alike(env: VecEnv, name: str, tmp_path: Path) -> None:
     model = learner(env, name)
     model.learn(60, log_interval=None)
-    prepare(configured(name), tmp_path)
+    prepare_run(configured(name), tmp_path)
     save(model, tmp_path)
-    loaded = load_last(tmp_path)
+    loaded = load_last_checkpoint(tmp_path)
     rows = slice(0, model.replay_buffer.pos)
     obs = {key: value[rows, 0] for key, value in model.replay_buffer.observations.items()}
     one, other = (each.predict(obs, deterministic=True)[0] for each in (model, loaded))
@@ -162,9 +162,9 @@ def test_what_is_loaded_acts_alike(env: VecEnv, name: str, tmp_path: Path) -> No
 def test_a_continued_run_fills_its_buffer_before_it_learns(env: VecEnv, tmp_path: Path) -> None:
     model = learner(env, "qrdqn")
     model.learn(80, log_interval=None)
-    prepare(configured("qrdqn"), tmp_path)
+    prepare_run(configured("qrdqn"), tmp_path)
     save(model, tmp_path)
-    loaded = load_last(tmp_path)
+    loaded = load_last_checkpoint(tmp_path)
     loaded.set_env(env)
     updates = loaded._n_updates
     assert updates > 0
@@ -205,7 +205,7 @@ def test_the_evaluation_of_maskable_learners_plays_it(env: VecEnv, name: str) ->
 
 @NAMES
 def test_the_agent_plays_it(env: VecEnv, name: str, tmp_path: Path) -> None:
-    prepare(configured(name), tmp_path)
+    prepare_run(configured(name), tmp_path)
     save(learner(env, name), tmp_path)
     agent = RLAgent(tmp_path)
     task = load_suite("mini").tasks[0]

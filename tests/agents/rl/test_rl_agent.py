@@ -14,9 +14,9 @@ from gymnasium import spaces
 
 from agents import make_agent
 from agents.rl.agent import RLAgent
-from agents.rl.config import Episodes, TrainConfig
+from agents.rl.config import EnvConfig, TrainConfig
 from agents.rl.network import TypeNetwork
-from agents.rl.policy_observation import Perception
+from agents.rl.policy_observation import PolicyObservation
 from agents.rl.train import train
 from benchmarks.cli.main import cli
 from er_gym.envs.actions import INDEX
@@ -100,17 +100,17 @@ def turned(space: spaces.Dict) -> spaces.Dict:
 
 
 def test_pictures_are_made_small_and_stacked() -> None:
-    options = Episodes(obs_mode="rgb+state", width=32, height=18, frames=2, instruction="hashed")
-    perception = Perception(options, with_mask=True)
+    options = EnvConfig(obs_mode="rgb+state", width=32, height=18, frames=2, instruction="hashed")
+    policy_observation = PolicyObservation(options, with_mask=True)
     env = EmbodiedEnv((), obs_mode="rgb+state", width=64, height=36)
     obs, info = env.reset(options={"task": MINI[0]})
-    first = perception.begin(obs, info, MINI[0].instruction)
-    assert first in perception.space
+    first = policy_observation.reset(obs, info, MINI[0].instruction)
+    assert first in policy_observation.space
     assert (first["rgb"][..., :3] == first["rgb"][..., 3:]).all()
     action = f"navigate to {info['navigable'][0]}"
     obs, _, _, _, info = env.step(action)
-    second = perception.see(obs, info)
-    assert second in perception.space
+    second = policy_observation.observe(obs, info)
+    assert second in policy_observation.space
     assert (second["rgb"][..., :3] == first["rgb"][..., 3:]).all()
     assert (second["instruction"] == first["instruction"]).all()
     assert np.abs(second["rgb"][..., 3:].mean() - obs["rgb"].mean()) < 2

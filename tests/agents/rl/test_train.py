@@ -18,8 +18,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 from agents.configs import dump
 from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig
-from agents.rl.saved import MODEL
-from agents.rl.train import RunConflict, load_last, train
+from agents.rl.model_file import MODEL
+from agents.rl.train import RunConflict, load_last_checkpoint, train
 
 Make = Callable[..., TrainConfig]
 ROOT = Path(__file__).resolve().parents[3]
@@ -125,7 +125,7 @@ def test_ctrl_c_loses_no_more_than_a_rollout(make_config: Make, tmp_path: Path) 
     config = make_config(total_steps=1024)
     with pytest.raises(KeyboardInterrupt):
         train(config, run, more=(Interrupt(700),))
-    model = load_last(run)
+    model = load_last_checkpoint(run)
     assert model is not None
     assert model.num_timesteps == 512
     assert train(config, run).num_timesteps == 1024
@@ -136,7 +136,7 @@ def test_a_damaged_model_is_one_clear_error(make_config: Make, tmp_path: Path) -
     train(make_config(), run)
     (run / MODEL).write_bytes(b"PK")
     with pytest.raises(ValueError, match=r"model.npz cannot be read as a model"):
-        load_last(run)
+        load_last_checkpoint(run)
 
 
 def test_a_curriculum_takes_the_types_in_turn(make_config: Make, tmp_path: Path) -> None:
@@ -182,7 +182,7 @@ def test_it_learns_from_pictures_and_the_sentence(make_config: Make, tmp_path: P
     model = train(config, run)
     assert model.observation_space["rgb"].shape == (6, 27, 48)  # SB3 has channels first
     assert model.observation_space["instruction"].shape == (64,)
-    again = load_last(run)
+    again = load_last_checkpoint(run)
     assert all((a == b).all() for a, b in zip(weights(model), weights(again), strict=True))
 
 
@@ -204,12 +204,12 @@ def test_sigkill_and_the_same_command_again(make_config: Make, tmp_path: Path) -
     time.sleep(np.random.default_rng().uniform(0, 1.0))
     first.send_signal(signal.SIGKILL)
     first.wait()
-    killed = load_last(run)
+    killed = load_last_checkpoint(run)
     assert killed is not None
     assert killed.num_timesteps % 256 == 0
     again = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
     assert again.returncode == 0, again.stderr
-    done = load_last(run)
+    done = load_last_checkpoint(run)
     assert done is not None
     assert done.num_timesteps == 4096  # 4,000 asked for, in rollouts of 256
     assert "4,096 steps" in again.stdout

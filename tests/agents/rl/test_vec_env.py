@@ -12,8 +12,8 @@ import pytest
 from sb3_contrib.common.maskable.utils import get_action_masks, is_masking_supported
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
-from agents.rl.config import Episodes
-from agents.rl.envs import for_evaluation, make_env
+from agents.rl.config import EnvConfig
+from agents.rl.envs import evaluation_config, make_env
 from agents.rl.vec_env import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS
 from er_gym.envs.solver import Solver
@@ -21,7 +21,7 @@ from er_gym.tasks import load_suite
 from er_gym.tasks.splits import TRAINING_SCENES
 from er_gym.tasks.types import BY_NAME
 
-OPTIONS = Episodes(episodes="mini", types=("single_pickup", "single_toggle"))
+OPTIONS = EnvConfig(episodes="mini", types=("single_pickup", "single_toggle"))
 PICKUP = next(task for task in load_suite("mini").tasks if task.type.name == "single_pickup")
 
 
@@ -120,7 +120,7 @@ def test_goals_come_from_the_live_generator_too() -> None:
 
 def test_success_is_worth_a_bonus_in_training_and_none_in_evaluation() -> None:
     returns = []
-    for options in (OPTIONS, for_evaluation(OPTIONS, "mini")):
+    for options in (OPTIONS, evaluation_config(OPTIONS, "mini")):
         env = make_env(options)
         _, info = env.reset(options={"task": PICKUP})
         solver, total, done = Solver(), 0.0, False

@@ -19,8 +19,8 @@ import pytest
 from naughty_server import MODEL, NaughtyServer
 
 from agents.vlm.chat import Message, Reply, Usage
-from agents.vlm.clients.budget import Budget, Entry, Ledger, Metered, Spent
-from agents.vlm.clients.watch import Watch
+from agents.vlm.clients.budget import Budget, Entry, Ledger, MeteredClient, Spent
+from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.settings import AgentSettings, Prices
 from er_gym.rollout.agent import CannotGoOn
 
@@ -51,7 +51,7 @@ class Costly:
 class Purse:
     """A client, and the ledger that it is metered by."""
 
-    client: Metered
+    client: MeteredClient
     ledger: Ledger
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
@@ -69,7 +69,7 @@ class Purse:
 def purse(client: Costly, budget: Budget, path: Path) -> Purse:
     ledger = Ledger(budget, client.prices)
     ledger.open(path)
-    return Purse(Metered(client, ledger, Watch(budget.max_minutes)), ledger)
+    return Purse(MeteredClient(client, ledger, RequestSupervisor(budget.max_minutes)), ledger)
 
 
 Make = Callable[..., Purse]
@@ -116,7 +116,7 @@ def test_a_line_for_each_reply(make: Make, ledger: Path) -> None:
 def test_a_kept_reply_is_not_paid_for(make: Make) -> None:
     class Remembering(Costly):
         def reply(self, messages: Sequence[Message], seed: int) -> Reply:
-            return replace(super().reply(messages, seed), kept=True, cost=0.0)
+            return replace(super().reply(messages, seed), from_cache=True, cost=0.0)
 
     metered = make(Remembering())
     metered.reply(HELLO, seed=0)
@@ -264,7 +264,7 @@ def test_all_together(
     pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
     pytest.importorskip("diskcache", reason="needs pip install 'er-gym[vlm]'")
     from agents.vlm.clients.openai_server import OpenAIClient
-    from agents.vlm.clients.reply_cache import Kept
+    from agents.vlm.clients.reply_cache import ReplyCache
 
     key = "sk-test-4f1c9e0b7a2d"
     monkeypatch.setenv("OUR_TEST_KEY", key)
@@ -276,7 +276,7 @@ def test_all_together(
     def play() -> tuple[list[Reply], Spent]:
         ledger = Ledger(Budget(max_usd=100.0), settings.prices)
         ledger.open(tmp_path / "spending.jsonl")
-        kept = Kept(OpenAIClient(MODEL, settings, ledger), tmp_path / "replies")
+        kept = ReplyCache(OpenAIClient(MODEL, settings, ledger), tmp_path / "replies")
         with ThreadPoolExecutor(8) as pool:
             replies = list(pool.map(lambda seed: kept.reply(HELLO, seed), range(80)))
         kept.close()
@@ -297,7 +297,7 @@ def test_all_together(
     second, still = play()
     assert naughty.count == 84
     assert still == spent
-    assert all(reply.kept for reply in second)
+    assert all(reply.from_cache for reply in second)
     assert [reply.text for reply in second] == [reply.text for reply in first]
 
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
@@ -309,8 +309,8 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from agents.vlm.chat import Message, Reply, Usage
-from agents.vlm.clients.budget import Budget, Ledger, Metered
-from agents.vlm.clients.watch import Watch
+from agents.vlm.clients.budget import Budget, Ledger, MeteredClient
+from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.settings import Prices
 
 class Saying:
@@ -319,7 +319,7 @@ class Saying:
 
 ledger = Ledger(Budget(max_tokens=1_000_000), Prices())
 ledger.open(Path(sys.argv[1]))
-metered = Metered(Saying(), ledger, Watch())
+metered = MeteredClient(Saying(), ledger, RequestSupervisor())
 while True:
     metered.reply((Message("user", ("hello",)),), 0)
     print(flush=True)

@@ -16,7 +16,7 @@ from agents import configs, make_agent
 from agents.vlm.agent import VLMAgent
 from agents.vlm.chat import Message
 from agents.vlm.clients.budget import Budget
-from agents.vlm.factory import AgentFactory, consequential, load_settings, speaks
+from agents.vlm.factory import AgentFactory, comparable_settings, is_model_agent, load_settings
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.run_directory import REPLIES, SPENDING
 
@@ -54,16 +54,16 @@ def test_a_missing_file_is_told() -> None:
     [("openai:m", True), ("hf:a/b", True), ("openai:", False), ("oracle", False), ("rl:x", False)],
 )
 def test_who_speaks(name: str, answer: bool) -> None:
-    assert speaks(name) is answer
+    assert is_model_agent(name) is answer
 
 
 def test_what_makes_two_runs_differ() -> None:
     one = AgentSettings()
     elsewhere = load_settings(None, ("server.base_url=http://127.0.0.1:1/v1", "local.batch=3"))
     warmer = load_settings(None, ("sampling.temperature=0.5",))
-    assert consequential(one, "d") == consequential(elsewhere, "d")
-    assert consequential(one, "d") != consequential(warmer, "d")
-    assert consequential(one, "d") != consequential(one, "e")
+    assert comparable_settings(one, "d") == comparable_settings(elsewhere, "d")
+    assert comparable_settings(one, "d") != comparable_settings(warmer, "d")
+    assert comparable_settings(one, "d") != comparable_settings(one, "e")
 
 
 def test_replies_are_kept_and_counted_in_the_run_directory(tmp_path: Path) -> None:
@@ -72,7 +72,7 @@ def test_replies_are_kept_and_counted_in_the_run_directory(tmp_path: Path) -> No
         for kept in (False, True):
             speaker = AgentFactory("openai:naughty-1", settings, tmp_path, Budget(max_usd=1))
             reply = speaker.client.reply(HELLO, 0)
-            assert (reply.text, reply.kept) == ("Good day.", kept)
+            assert (reply.text, reply.from_cache) == ("Good day.", kept)
             assert "tokens in 1 replies, $" in str(speaker.cost)
             speaker.close()
         assert server.count == 1

@@ -25,8 +25,8 @@ from PIL import Image
 from tiny_qwen import make_tiny_qwen
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply
-from agents.vlm.clients.local import LocalClient, _Draw, _without_thought
-from agents.vlm.clients.watch import Watch
+from agents.vlm.clients.local import LocalClient, _SeededSampling, _without_thought
+from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.agent import CannotGoOn
 
@@ -132,13 +132,13 @@ def at_once(client: LocalClient, talks: Sequence[Conversation]) -> list[Reply]:
 def recorded(client: LocalClient) -> list[list[list[int]]]:
     """The tokens of every batch from now on."""
     batches: list[list[list[int]]] = []
-    run = client._spoken
+    run = client._generate
 
-    def spoken(rows: Any) -> list[list[int]]:
+    def generated(rows: Any) -> list[list[int]]:
         batches.append(run(rows))
         return batches[-1]
 
-    client._spoken = spoken  # type: ignore[method-assign]
+    client._generate = generated  # type: ignore[method-assign]
     return batches
 
 
@@ -182,8 +182,8 @@ def test_a_picture_takes_the_tokens_that_qwen_vl_utils_says(
         usage = model.reply([user("Look", shown)], 0).usage
         assert usage.prompt == without + marks + tokens, (width, height)
         # Not only as many: what is seen is the same, pixel by pixel.
-        seen = model._eyes([fetched], do_resize=False, return_tensors="pt")
-        pixels, grids = model._seen([shown])
+        seen = model._image_processor([fetched], do_resize=False, return_tensors="pt")
+        pixels, grids = model._patches([shown])
         assert torch.equal(pixels, seen["pixel_values"])
         assert grids.prod() // 4 == tokens
 
@@ -328,7 +328,7 @@ def test_seeds(client: Clients) -> None:
 def test_words_are_drawn_as_likely_as_they_are(top_p: float, odds: list[float]) -> None:
     count = 20_000
     scores = torch.tensor([0.5, 0.25, 0.15, 0.1]).log().mul(2).repeat(count, 1)
-    draw = _Draw(2.0, top_p, range(count))
+    draw = _SeededSampling(2.0, top_p, range(count))
     drawn = draw(torch.zeros(count, 1, dtype=torch.long), scores).argmax(dim=1)
     shares = drawn.bincount(minlength=4) / count
     assert shares.tolist() == pytest.approx(odds, abs=0.012)
@@ -585,7 +585,7 @@ def test_a_device_that_fails_ends_the_run(client: Clients, monkeypatch: pytest.M
 
 def test_closing_stops_it_in_the_middle_of_a_reply(client: Clients) -> None:
     model = client(sampling={"max_tokens": 16_000})  # a minute of words
-    model._model.generation_config.eos_token_id, model._ends = None, frozenset()
+    model._model.generation_config.eos_token_id, model._end_tokens = None, frozenset()
     batches = recorded(model)
     begun, generate = threading.Event(), model._model.generate
 
@@ -607,8 +607,8 @@ def test_closing_stops_it_in_the_middle_of_a_reply(client: Clients) -> None:
 
 def test_the_minutes_stop_it_in_the_middle_of_a_reply(client: Clients) -> None:
     model = client(sampling={"max_tokens": 16_000})  # a minute of words
-    model._model.generation_config.eos_token_id, model._ends = None, frozenset()
-    model._watch = Watch(max_minutes=0.5 / 60)
+    model._model.generation_config.eos_token_id, model._end_tokens = None, frozenset()
+    model._supervisor = RequestSupervisor(max_minutes=0.5 / 60)
     batches = recorded(model)
     with pytest.raises(CannotGoOn, match="the minutes are over; run the same command again"):
         model.reply([user("Hello")], 0)

@@ -176,7 +176,7 @@ def test_no_name_is_taken_for_a_misspelling_of_another(monkeypatch: pytest.Monke
     for name, types in names.items():
         own = {key(other) for other, theirs in names.items() if {*theirs} & {*types}}
         monkeypatch.setattr(matching, "_MISSPELLABLE", [each for each in keys if each not in own])
-        assert matching._spelt_alike(key(name), 86.0, ()) == ("", 0.0), name
+        assert matching._fuzzy_match(key(name), 86.0, ()) == ("", 0.0), name
 
 
 def test_the_threshold_is_the_settings() -> None:
@@ -318,7 +318,7 @@ def test_the_same_from_many_threads_and_in_whatever_company(by_meaning: Matcher)
     together = by_meaning.match_many(names)
     with ThreadPoolExecutor(8) as pool:
         assert list(pool.map(by_meaning.match, names * 4)) == together * 4
-    by_meaning._meanings._vectors.clear()  # type: ignore[union-attr]
+    by_meaning._embeddings._vectors.clear()  # type: ignore[union-attr]
     assert [by_meaning.match(name) for name in reversed(names)] == together[::-1]
 
 

@@ -27,12 +27,12 @@ pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
 import openai
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
-from agents.vlm.clients import watch, wire
+from agents.vlm.clients import chat_completions, supervisor
 from agents.vlm.clients.budget import Budget, Ledger
 from agents.vlm.clients.openai_server import OpenAIClient
-from agents.vlm.clients.tokens import Asked, picture_at_most, usage_of
-from agents.vlm.clients.transport import LARGEST_ANSWER, Pace
-from agents.vlm.clients.watch import Watch
+from agents.vlm.clients.supervisor import RequestSupervisor
+from agents.vlm.clients.tokens import RequestSize, picture_at_most, usage_of
+from agents.vlm.clients.transport import LARGEST_ANSWER, RateLimiter
 from agents.vlm.settings import AgentSettings, Prices, Server
 from er_gym.rollout.agent import CannotGoOn
 
@@ -123,7 +123,7 @@ def test_what_the_sdk_itself_would_send_means_the_same(naughty: NaughtyServer) -
     with openai.OpenAI(base_url=naughty.url, api_key=KEY) as sdk:
         sdk.chat.completions.create(model=MODEL, messages=GOLDEN)
     assert naughty.seen[0].json["messages"] == GOLDEN
-    assert json.loads(wire.request_body({"model": MODEL}, CONVERSATION, False)) == (
+    assert json.loads(chat_completions.request_body({"model": MODEL}, CONVERSATION, False)) == (
         naughty.seen[0].json
     )
 
@@ -138,14 +138,14 @@ def test_a_picture_is_put_into_letters_once_and_forgotten_with_its_conversation(
     picture = Picture(os.urandom(1000), "image/jpeg", 28, 28)
     message = Message("user", (picture,))
     gc.collect()
-    before = len(wire._ENCODED)
-    first = wire.request_body({"model": "m"}, [message, message], False)
-    assert wire.request_body({"model": "m"}, [message, message], False) == first
-    assert len(wire._ENCODED) == before + 1
-    assert wire._part(picture) is wire._part(picture)
+    before = len(chat_completions._ENCODED)
+    first = chat_completions.request_body({"model": "m"}, [message, message], False)
+    assert chat_completions.request_body({"model": "m"}, [message, message], False) == first
+    assert len(chat_completions._ENCODED) == before + 1
+    assert chat_completions._part(picture) is chat_completions._part(picture)
     del picture, message
     gc.collect()
-    assert len(wire._ENCODED) == before
+    assert len(chat_completions._ENCODED) == before
 
 
 @pytest.mark.parametrize(
@@ -270,7 +270,7 @@ def test_a_message_becomes_a_reply(
     naughty.then(Raw(completion(message)))
     reply = make(naughty.url).reply(HELLO, seed=0)
     assert (reply.text, reply.reasoning, reply.call) == (text, reasoning, call)
-    assert (reply.finish, reply.model, reply.kept) == ("stop", MODEL, False)
+    assert (reply.finish, reply.model, reply.from_cache) == ("stop", MODEL, False)
     assert reply.seconds > 0
 
 
@@ -352,8 +352,10 @@ def test_an_estimate_is_from_above_in_any_script(text: str) -> None:
     """No tokenizer makes more tokens of a text than it has bytes; so many letters are more."""
     picture = Picture(b"jpeg", "image/jpeg", 784, 420)
     messages = (Message("user", (text, picture)),)
-    body = wire.request_body({"model": "m", "max_tokens": 9}, messages, False)
-    asked = Asked.of(body, messages, wire.in_letters(messages), {"max_tokens": 9})
+    body = chat_completions.request_body({"model": "m", "max_tokens": 9}, messages, False)
+    asked = RequestSize.of(
+        body, messages, chat_completions.picture_bytes(messages), {"max_tokens": 9}
+    )
     assert len(text.encode()) + picture_at_most(784, 420) <= asked.prompt_at_most
     assert asked.prompt_at_most < 6 * len(text.encode()) + picture_at_most(784, 420) + 700
     assert picture_at_most(784, 420) > 1105  # GPT-4o's; Qwen takes 420
@@ -602,7 +604,7 @@ def test_requests_are_spread(naughty: NaughtyServer, make: Make) -> None:
 
 
 def test_who_waits_for_a_turn_is_let_go() -> None:
-    pace, run = Pace(1), Watch()
+    pace, run = RateLimiter(1), RequestSupervisor()
     pace.wait(run.request(0))
     raised: list[BaseException] = []
 
@@ -762,7 +764,7 @@ def test_a_server_that_refuses_again_and_again_stops_the_run(
 def test_those_who_wait_are_let_go_when_the_run_stops(
     make: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(watch, "_GRACE", 0.2)
+    monkeypatch.setattr(supervisor, "_GRACE", 0.2)
     with NaughtyServer(script=["429", "stall", "401"], retry_after="60") as server:
         client = make(server.url, timeout=60)
         began = time.monotonic()

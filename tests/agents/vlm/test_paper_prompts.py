@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from agents.vlm.paper_prompts import ENOUGH, DerivedPrompts
-from agents.vlm.prompt_set import MARK, Did, Now
+from agents.vlm.prompt_set import IMAGE_MARK, LastAction, TurnContext
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import Prompts
 
@@ -90,8 +90,8 @@ def read(tmp_path: Path) -> Reader:
 
 def first(prompts: DerivedPrompts, task: str) -> str:
     """The first turn with its picture as files write it."""
-    text = prompts.first(Now(task=task, decide="tags", sees="pictures", max_steps=20))
-    return text.replace(MARK, "<image>")
+    text = prompts.first(TurnContext(task=task, decide="tags", sees="pictures", max_steps=20))
+    return text.replace(IMAGE_MARK, "<image>")
 
 
 def later(
@@ -104,15 +104,15 @@ def later(
 ) -> str:
     """The turn after an action, which failed if there is feedback."""
     text = prompts.next(
-        Now(task=task, decide="tags", sees="pictures"),
-        Did(
+        TurnContext(task=task, decide="tags", sees="pictures"),
+        LastAction(
             action=action,
             success=not feedback,
             feedback=feedback or f"Done: {action}.",
             pictures=pictures,
         ),
     )
-    return text.replace(MARK, "<image>")
+    return text.replace(IMAGE_MARK, "<image>")
 
 
 # -- what is read --------------------------------------------------------------------------------
@@ -394,8 +394,8 @@ def test_a_task_may_say_anything(read: Reader) -> None:
     samples = [conversation(first_turn(task.replace("<image>", "picture"))) for task in odd]
     prompts = read(samples)
     for task in odd:
-        expected = f"{MARK}The robot sees this. It is asked: {task}\nWhat will the robot do?"
-        assert prompts.first(Now(task=task, decide="tags", sees="pictures")) == expected
+        expected = f"{IMAGE_MARK}The robot sees this. It is asked: {task}\nWhat will the robot do?"
+        assert prompts.first(TurnContext(task=task, decide="tags", sees="pictures")) == expected
     for action in ("navigate to Fridge", "observe", "toggle {{ x }}"):
         assert later(prompts, action, task=odd[0]) == later_turn(action)
 

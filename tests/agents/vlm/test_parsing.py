@@ -7,9 +7,10 @@ import time
 
 import pytest
 
-from agents.vlm.parsing import LONGEST, Parsed, Thought, parse
-from agents.vlm.parsing_rules import RULES
-from agents.vlm.parsing_words import THOUGHT_TAGS, VERBS
+from agents.vlm.parsing import ParsedReply, Thought, parse
+from agents.vlm.parsing.reply import LONGEST
+from agents.vlm.parsing.rules import RULES
+from agents.vlm.parsing.vocabulary import THOUGHT_TAGS, VERBS
 from er_gym.envs.actions import parse as action_of
 from er_gym.tasks import verbs
 
@@ -28,17 +29,17 @@ SEEN = (Thought("Observation", "I see a Fridge."), Thought("Planning", "I go the
 
 
 def test_the_normal_form() -> None:
-    assert parse(NORMAL) == Parsed("navigate to", "Fridge", SEEN)
+    assert parse(NORMAL) == ParsedReply("navigate to", "Fridge", SEEN)
 
 
 @pytest.mark.parametrize("verb", [*verbs.OBJECT_VERBS, *verbs.BARE_VERBS])
 def test_every_verb_is_clean(verb: str) -> None:
     name = "CounterTop" if verb in verbs.OBJECT_VERBS else ""
-    assert parse(tagged(f"{verb} {name}".strip())) == Parsed(verb, name)
+    assert parse(tagged(f"{verb} {name}".strip())) == ParsedReply(verb, name)
 
 
 def test_space_and_the_case_of_a_verb_do_not_matter() -> None:
-    assert parse(tagged("\n Navigate  to\tFridge \n")) == Parsed("navigate to", "Fridge")
+    assert parse(tagged("\n Navigate  to\tFridge \n")) == ParsedReply("navigate to", "Fridge")
 
 
 @pytest.mark.parametrize(
@@ -59,7 +60,7 @@ def test_space_and_the_case_of_a_verb_do_not_matter() -> None:
 )
 def test_names_of_thoughts(tag: str, kind: str) -> None:
     parsed = parse(f"<{tag}> So it is. </{tag}>" + tagged("end"))
-    assert parsed == Parsed("end", thoughts=(Thought(kind, "So it is."),))
+    assert parsed == ParsedReply("end", thoughts=(Thought(kind, "So it is."),))
 
 
 def test_thoughts_keep_their_order_also_behind_the_decision() -> None:
@@ -77,7 +78,7 @@ def test_text_outside_of_tags_is_a_thought_where_no_tag_holds_one() -> None:
 def test_what_is_weighed_in_think_is_not_decided() -> None:
     weighed = f"First {tagged('open Fridge')}? <Planning>No.</Planning>"
     parsed = parse(f"<think>{weighed}</think>{tagged('close Fridge')}")
-    assert parsed == Parsed("close", "Fridge", (Thought("Thinking", weighed),))
+    assert parsed == ParsedReply("close", "Fridge", (Thought("Thinking", weighed),))
 
 
 @pytest.mark.parametrize(
@@ -93,12 +94,12 @@ def test_what_is_weighed_in_think_is_not_decided() -> None:
     ],
 )
 def test_tool_calls(call: str, verb: str, name: str) -> None:
-    assert parse("", call) == Parsed(verb, name)
+    assert parse("", call) == ParsedReply(verb, name)
 
 
 def test_a_call_counts_before_the_text_and_may_have_thoughts() -> None:
     call = '{"observation": "A Mug，\\u518d.", "action": "pickup", "object": "Mug"}'
-    assert parse("I take it. " + tagged("end"), call) == Parsed(
+    assert parse("I take it. " + tagged("end"), call) == ParsedReply(
         "pickup", "Mug", (Thought("Observation", "A Mug，再."),)
     )
     assert parse("I take it.", '{"action": "end"}').thoughts == (Thought("Thinking", "I take it."),)
@@ -107,7 +108,7 @@ def test_a_call_counts_before_the_text_and_may_have_thoughts() -> None:
 def test_json_is_the_normal_form_where_it_is_asked_for() -> None:
     text = '{"thoughts": "It is closed.", "action": "open", "object": "Fridge"}\n'
     thoughts = (Thought("Thinking", "It is closed."),)
-    assert parse(text, decide="json") == Parsed("open", "Fridge", thoughts)
+    assert parse(text, decide="json") == ParsedReply("open", "Fridge", thoughts)
     assert parse(text).rules == ("json",)
     assert parse("Well: " + text, decide="json").rules == ("json",)
     assert parse(text[:-2], decide="json").rules == ("json",)
@@ -456,7 +457,7 @@ def test_every_way_to_say_a_verb(phrase: str) -> None:
 @pytest.mark.parametrize("verb", verbs.OBJECT_VERBS)
 @pytest.mark.parametrize("name", ["CounterTop", "credit card", "Fridge|+00.97|-01.00", "信用卡"])
 def test_names_stay_as_they_are_written(verb: str, name: str) -> None:
-    assert parse(tagged(f"{verb} {name}")) == Parsed(verb, name)
+    assert parse(tagged(f"{verb} {name}")) == ParsedReply(verb, name)
     assert parse(tagged(f"{verb} the {name}.")).name == name
 
 
@@ -475,7 +476,7 @@ def test_tags_and_kinds_agree() -> None:
 
 @pytest.mark.parametrize("text", ["", "  \n\t"])
 def test_empty_replies(text: str) -> None:
-    assert parse(text) == Parsed(
+    assert parse(text) == ParsedReply(
         problem="The reply is empty. Decide on one action, such as 'navigate to Fridge'."
     )
 
@@ -509,7 +510,7 @@ def test_a_refusal_is_kept_as_a_thought() -> None:
      "end table", "opening Fridge", "look for the Mug", "drop Mug", "Fridge", "init"],
 )  # fmt: skip
 def test_unknown_verbs_list_those_there_are(said: str) -> None:
-    assert parse(tagged(said)) == Parsed(
+    assert parse(tagged(said)) == ParsedReply(
         problem=f"'{said}' is no action. With an object, there are: navigate to, pickup, put in, "
         "open, close, toggle, slice; without: observe, move forward, end. Write one, such as "
         "'navigate to Fridge'."

@@ -12,7 +12,16 @@ from pathlib import Path
 import pytest
 
 from agents.vlm.chat import Picture
-from agents.vlm.prompt_set import MARK, THOUGHTS, Decide, Did, Now, PromptSet, Sees, parts_of
+from agents.vlm.prompt_set import (
+    IMAGE_MARK,
+    THOUGHTS,
+    Decide,
+    LastAction,
+    PromptSet,
+    Sees,
+    TurnContext,
+    interleave_pictures,
+)
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import Prompts
 from er_gym.tasks import verbs
@@ -52,12 +61,12 @@ def written(profile: Path, template: str, text: str) -> PromptSet:
 def said(prompts: PromptSet, decide: Decide, sees: Sees) -> list[str]:
     """Everything that a set says."""
     scene, pictures = ("You see: Fridge.", 0) if sees == "text" else ("", 1)
-    now = Now(task=TASK, decide=decide, sees=sees, scene_text=scene, steps=1, max_steps=30)
-    first = prompts.first(now)
+    turn = TurnContext(task=TASK, decide=decide, sees=sees, scene_text=scene, steps=1, max_steps=30)
+    first = prompts.first(turn)
     turns = [
         prompts.next(
-            replace(now, steps=7, max_steps=max_steps),
-            Did(
+            replace(turn, steps=7, max_steps=max_steps),
+            LastAction(
                 action=action,
                 success=success,
                 feedback="You cannot.",
@@ -78,7 +87,7 @@ def said(prompts: PromptSet, decide: Decide, sees: Sees) -> list[str]:
 @pytest.mark.parametrize(("decide", "sees"), WAYS)
 def test_everything_can_be_said(prompts: PromptSet, decide: Decide, sees: Sees) -> None:
     texts = said(prompts, decide, sees)
-    marks = [text.count(MARK) for text in texts]
+    marks = [text.count(IMAGE_MARK) for text in texts]
     assert marks == [0, 1, 1, 1, 1, 1, 4, 4, 4, 4, 0] if sees == "pictures" else not any(marks)
     for text in texts:
         assert text == text.strip()
@@ -111,7 +120,7 @@ def test_how_to_reply(prompts: PromptSet) -> None:
 
 
 def test_every_action_is_explained(prompts: PromptSet) -> None:
-    text = prompts.first(Now(task=TASK, decide="tags", sees="pictures"))
+    text = prompts.first(TurnContext(task=TASK, decide="tags", sees="pictures"))
     lines = text.splitlines()
     for verb in ALL_VERBS:
         form = f"- {verb} <object>" if verb in verbs.OBJECT_VERBS else f"- {verb}"
@@ -121,10 +130,10 @@ def test_every_action_is_explained(prompts: PromptSet) -> None:
 
 def test_what_came_of_an_action(prompts: PromptSet) -> None:
     def turn(success: bool) -> str:
-        now = Now(task=TASK, decide="tags", sees="pictures", steps=7, max_steps=30)
+        turn = TurnContext(task=TASK, decide="tags", sees="pictures", steps=7, max_steps=30)
         feedback = "It is open already."
         return prompts.next(
-            now, Did(action="open Fridge", success=success, feedback=feedback, pictures=1)
+            turn, LastAction(action="open Fridge", success=success, feedback=feedback, pictures=1)
         )
 
     for success in (True, False):
@@ -136,8 +145,8 @@ def test_what_came_of_an_action(prompts: PromptSet) -> None:
 
 def test_words_instead_of_pictures(prompts: PromptSet) -> None:
     scene = "Task: Find it.\nStep 3 of 9.\nYou see: Fridge."
-    now = Now(task=TASK, decide="tags", sees="text", scene_text=scene)
-    first, later = prompts.first(now), prompts.next(now, Did(action="open Fridge"))
+    turn = TurnContext(task=TASK, decide="tags", sees="text", scene_text=scene)
+    first, later = prompts.first(turn), prompts.next(turn, LastAction(action="open Fridge"))
     assert scene in first
     assert scene in later
 
@@ -185,26 +194,33 @@ def test_the_variables_that_are_documented_exist(mine: Path) -> None:
 
 
 def test_pictures_take_the_places_of_marks() -> None:
-    assert parts_of(f"a {MARK} b {MARK}", [ONE, TWO]) == ("a ", ONE, " b ", TWO)
-    assert parts_of(f"{MARK}{MARK}\nb", [ONE, TWO]) == (ONE, TWO, "\nb")
-    assert parts_of("no picture", []) == ("no picture",)
-    assert parts_of("", []) == ()
+    assert interleave_pictures(f"a {IMAGE_MARK} b {IMAGE_MARK}", [ONE, TWO]) == (
+        "a ",
+        ONE,
+        " b ",
+        TWO,
+    )
+    assert interleave_pictures(f"{IMAGE_MARK}{IMAGE_MARK}\nb", [ONE, TWO]) == (ONE, TWO, "\nb")
+    assert interleave_pictures("no picture", []) == ("no picture",)
+    assert interleave_pictures("", []) == ()
 
 
-@pytest.mark.parametrize(("text", "pictures"), [(MARK, 0), (MARK, 2), ("", 1)])
+@pytest.mark.parametrize(("text", "pictures"), [(IMAGE_MARK, 0), (IMAGE_MARK, 2), ("", 1)])
 def test_marks_without_pictures(text: str, pictures: int) -> None:
     with pytest.raises(ValueError, match=rf"has {len(text)} places for {pictures} pictures"):
-        parts_of(text, [ONE] * pictures)
+        interleave_pictures(text, [ONE] * pictures)
 
 
-@pytest.mark.parametrize("odd", ["<image>", MARK, "{{ task }}", "{% for %}", "<image><image>"])
+@pytest.mark.parametrize(
+    "odd", ["<image>", IMAGE_MARK, "{{ task }}", "{% for %}", "<image><image>"]
+)
 def test_a_task_may_say_anything(prompts: PromptSet, odd: str) -> None:
     task = f"Find the {odd} Mug."
-    now = Now(task=task, decide="tags", sees="pictures")
-    for text in (prompts.first(now), prompts.next(now, Did(action="end", pictures=1))):
-        parts = parts_of(text, [ONE])
+    turn = TurnContext(task=task, decide="tags", sees="pictures")
+    for text in (prompts.first(turn), prompts.next(turn, LastAction(action="end", pictures=1))):
+        parts = interleave_pictures(text, [ONE])
         assert parts.count(ONE) == 1
-        assert f"Find the {odd.replace(MARK, '')} Mug." in "".join(
+        assert f"Find the {odd.replace(IMAGE_MARK, '')} Mug." in "".join(
             part for part in parts if isinstance(part, str)
         )
 

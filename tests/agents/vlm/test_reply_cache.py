@@ -20,7 +20,7 @@ pytest.importorskip("diskcache", reason="needs pip install 'er-gym[vlm]'")
 import diskcache
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
-from agents.vlm.clients.reply_cache import Kept, key_of
+from agents.vlm.clients.reply_cache import ReplyCache, key_of
 from er_gym.rollout.agent import CannotGoOn
 
 HELLO = (Message("user", ("hello", Picture(b"one", "image/jpeg", 28, 28))),)
@@ -56,7 +56,7 @@ class Counting:
         self.closed = True
 
 
-Make = Callable[..., Kept]
+Make = Callable[..., ReplyCache]
 
 
 @pytest.fixture
@@ -64,8 +64,8 @@ def make(tmp_path: Path) -> Iterator[Make]:
     """Opens the replies of the test's directory around a client."""
     made = []
 
-    def kept(client: Counting) -> Kept:
-        made.append(Kept(client, tmp_path / "run" / "replies"))
+    def kept(client: Counting) -> ReplyCache:
+        made.append(ReplyCache(client, tmp_path / "run" / "replies"))
         return made[-1]
 
     yield kept
@@ -76,10 +76,10 @@ def make(tmp_path: Path) -> Iterator[Make]:
 def test_what_was_asked_once_is_not_asked_again(make: Make) -> None:
     client = Counting()
     first = make(client).reply(HELLO, seed=1)
-    assert (first.kept, first.cost) == (False, 0.5)
+    assert (first.from_cache, first.cost) == (False, 0.5)
     again = make(client).reply(HELLO, seed=1)  # as after a restart
     assert client.asked == 1
-    assert (again.kept, again.cost) == (True, 0.5)
+    assert (again.from_cache, again.cost) == (True, 0.5)
     assert again.seconds < first.seconds
     for field in ("text", "reasoning", "call", "usage", "finish", "model"):
         assert getattr(again, field) == getattr(first, field)
@@ -104,9 +104,9 @@ def test_another_conversation_is_another_question(other: tuple[Message, ...]) ->
 def test_another_episode_or_client_is_asked(make: Make) -> None:
     client, other = Counting(), Counting(identity="other")
     kept = make(client)
-    assert not kept.reply(HELLO, seed=1).kept
-    assert not kept.reply(HELLO, seed=2).kept
-    assert not make(other).reply(HELLO, seed=1).kept
+    assert not kept.reply(HELLO, seed=1).from_cache
+    assert not kept.reply(HELLO, seed=2).from_cache
+    assert not make(other).reply(HELLO, seed=1).from_cache
     assert (client.asked, other.asked) == (2, 1)
 
 
@@ -115,8 +115,8 @@ def test_errors_are_not_kept(make: Make, error: Exception) -> None:
     kept = make(Counting(errors=[error]))
     with pytest.raises(type(error)):
         kept.reply(HELLO, seed=1)
-    assert not kept.reply(HELLO, seed=1).kept
-    assert kept.reply(HELLO, seed=1).kept
+    assert not kept.reply(HELLO, seed=1).from_cache
+    assert kept.reply(HELLO, seed=1).from_cache
 
 
 def test_many_threads(make: Make) -> None:
@@ -126,7 +126,7 @@ def test_many_threads(make: Make) -> None:
         first = list(pool.map(lambda seed: kept.reply(HELLO, seed), range(100)))
         again = list(pool.map(lambda seed: kept.reply(HELLO, seed), range(100)))
     assert client.asked == 100
-    assert all(reply.kept for reply in again)
+    assert all(reply.from_cache for reply in again)
     assert [reply.text for reply in first] == [reply.text for reply in again]
 
 
@@ -135,7 +135,7 @@ def test_nothing_is_dropped_to_save_room(make: Make, tmp_path: Path) -> None:
         kept = make(Counting())
         for _ in range(2):
             replies = [kept.reply(HELLO, seed) for seed in range(50)]
-        assert all(reply.kept for reply in replies)
+        assert all(reply.from_cache for reply in replies)
 
 
 def test_closing_closes_the_client(make: Make) -> None:
@@ -150,14 +150,14 @@ PROGRAM = """
 import itertools, sys
 from pathlib import Path
 from agents.vlm.chat import Message, Reply
-from agents.vlm.clients.reply_cache import Kept
+from agents.vlm.clients.reply_cache import ReplyCache
 
 class Saying:
     identity = "counting"
     def reply(self, messages, seed):
         return Reply(f"from the process: {seed}" + 50_000 * (seed % 2) * "x")
 
-kept = Kept(Saying(), Path(sys.argv[1]))
+kept = ReplyCache(Saying(), Path(sys.argv[1]))
 for seed in itertools.count():
     kept.reply((Message("user", ("hello",)),), seed)
     print(seed, flush=True)
@@ -179,10 +179,10 @@ def test_a_killed_process_leaves_what_it_kept(make: Make, tmp_path: Path, reposi
     question = (Message("user", ("hello",)),)
     for client in (mine, make(Counting())):
         replies = [client.reply(question, seed) for seed in seen]
-        assert all(reply.kept for reply in replies)
+        assert all(reply.from_cache for reply in replies)
         assert all(reply.text.startswith("from the process: ") for reply in replies)
-    assert not mine.reply(question, seed=10**6).kept
-    assert mine.reply(question, seed=10**6).kept
+    assert not mine.reply(question, seed=10**6).from_cache
+    assert mine.reply(question, seed=10**6).from_cache
 
 
 # -- damage --------------------------------------------------------------------------------------
@@ -239,7 +239,7 @@ def test_a_damaged_value_is_asked_again(
     kept.reply(HELLO, seed=0)
     (value,) = (tmp_path / "run" / "replies").rglob("*.val")
     damage(value)
-    assert not kept.reply(HELLO, seed=0).kept
+    assert not kept.reply(HELLO, seed=0).from_cache
     assert kept.reply(HELLO, seed=0).text.startswith("reply 2")
 
 
@@ -258,12 +258,12 @@ def test_nothing_is_unpickled(make: Make, tmp_path: Path) -> None:
     with diskcache.Cache(str(tmp_path / "run" / "replies")) as cache:
         cache.set(key, Bomb(tmp_path / "boom"))
         kept = make(Counting())
-        assert not kept.reply(HELLO, seed=0).kept
+        assert not kept.reply(HELLO, seed=0).from_cache
         assert not (tmp_path / "boom").exists()
-    assert kept.reply(HELLO, seed=0).kept
+    assert kept.reply(HELLO, seed=0).from_cache
 
 
 def test_a_directory_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "replies").write_text("")
     with pytest.raises(ValueError, match=r"replies cannot be kept in .*choose another --out"):
-        Kept(Counting(), tmp_path / "replies")
+        ReplyCache(Counting(), tmp_path / "replies")

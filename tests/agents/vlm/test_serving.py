@@ -18,7 +18,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from agents.vlm.serving import ENGINES, Command, Machine, Wanted, command_for, look_around
+from agents.vlm.serving import ENGINES, Command, Machine, ServeOptions, command_for, inspect_machine
 from benchmarks.cli import serve as cli_serve
 from benchmarks.cli.serve import ENGINE_CHOICES, run_server, serve
 from benchmarks.cli.server_process import LINES, ServerError, ServerProcess
@@ -35,7 +35,7 @@ COMMANDS = [
     (
         "GPUs and vLLM",
         QWEN,
-        Wanted(8000),
+        ServeOptions(8000),
         FULL,
         "py -m vllm.entrypoints.cli.main serve Qwen/Qwen2.5-VL-7B-Instruct --host 127.0.0.1 "
         "--port 8000 --served-model-name Qwen/Qwen2.5-VL-7B-Instruct --max-model-len 32768 "
@@ -46,7 +46,7 @@ COMMANDS = [
     (
         "all that can be wanted of vLLM",
         "runs/sft",
-        Wanted(1, name="mine", pictures=9, context=4096, gpus=1, more=("--dtype", "half")),
+        ServeOptions(1, name="mine", pictures=9, context=4096, gpus=1, more=("--dtype", "half")),
         FULL,
         "py -m vllm.entrypoints.cli.main serve runs/sft --host 127.0.0.1 --port 1 "
         "--served-model-name mine --max-model-len 4096 --tensor-parallel-size 1 "
@@ -57,7 +57,7 @@ COMMANDS = [
     (
         "no GPU",
         QWEN,
-        Wanted(8000),
+        ServeOptions(8000),
         Machine("py", EVERYTHING, gpus=0),
         "py -m transformers.cli.transformers serve Qwen/Qwen2.5-VL-7B-Instruct --host 127.0.0.1 "
         "--port 8000",
@@ -65,7 +65,7 @@ COMMANDS = [
     (
         "a GPU, but no vLLM",
         QWEN,
-        Wanted(8000),
+        ServeOptions(8000),
         Machine("py", EVERYTHING - {"vllm"}, gpus=1),
         "py -m transformers.cli.transformers serve Qwen/Qwen2.5-VL-7B-Instruct --host 127.0.0.1 "
         "--port 8000",
@@ -73,7 +73,7 @@ COMMANDS = [
     (
         "a GGUF file, whatever there is",
         "models/gemma.Q4.gguf",
-        Wanted(8001),
+        ServeOptions(8001),
         FULL,
         "py -m llama_cpp.server --model models/gemma.Q4.gguf --model_alias gemma.Q4 "
         "--host 127.0.0.1 --port 8001 --n_ctx 8192 --n_gpu_layers -1 --logits_all false",
@@ -81,7 +81,7 @@ COMMANDS = [
     (
         "a GGUF file on a processor",
         "gemma.GGUF",
-        Wanted(8001, name="gemma", context=2048),
+        ServeOptions(8001, name="gemma", context=2048),
         Machine("py", EVERYTHING, gpus=0),
         "py -m llama_cpp.server --model gemma.GGUF --model_alias gemma --host 127.0.0.1 "
         "--port 8001 --n_ctx 2048 --n_gpu_layers 0 --logits_all false",
@@ -89,7 +89,7 @@ COMMANDS = [
     (
         "GPUs that are not asked for",
         QWEN,
-        Wanted(8000, gpus=0),
+        ServeOptions(8000, gpus=0),
         FULL,
         "py -m transformers.cli.transformers serve Qwen/Qwen2.5-VL-7B-Instruct --host 127.0.0.1 "
         "--port 8000",
@@ -97,7 +97,7 @@ COMMANDS = [
     (
         "an engine that is asked for",
         QWEN,
-        Wanted(8000, engine="transformers"),
+        ServeOptions(8000, engine="transformers"),
         FULL,
         "py -m transformers.cli.transformers serve Qwen/Qwen2.5-VL-7B-Instruct --host 127.0.0.1 "
         "--port 8000",
@@ -106,58 +106,58 @@ COMMANDS = [
 
 
 @pytest.mark.parametrize(
-    ("model", "wanted", "machine", "argv"),
+    ("model", "options", "machine", "argv"),
     [case[1:] for case in COMMANDS],
     ids=[case[0] for case in COMMANDS],
 )
-def test_command(model, wanted, machine, argv):
-    assert command_for(model, wanted, machine).argv == tuple(shlex.split(argv))
+def test_command(model, options, machine, argv):
+    assert command_for(model, options, machine).argv == tuple(shlex.split(argv))
 
 
 REFUSALS = [
-    (QWEN, Wanted(1, engine="vllm"), BARE, ["vllm", "py -m pip install vllm"]),
-    ("x.gguf", Wanted(1), BARE, ["lacks llama_cpp:", "'llama-cpp-python[server]'"]),
+    (QWEN, ServeOptions(1, engine="vllm"), BARE, ["vllm", "py -m pip install vllm"]),
+    ("x.gguf", ServeOptions(1), BARE, ["lacks llama_cpp:", "'llama-cpp-python[server]'"]),
     (
         QWEN,
-        Wanted(1),
+        ServeOptions(1),
         Machine("py", frozenset({"transformers", "torch", "openai"}), 0),
         ["lacks fastapi, uvicorn:", "'transformers[serving]"],
     ),
-    (QWEN, Wanted(1, engine="ollama"), FULL, ["'ollama'", "vllm, transformers, llama_cpp"]),
-    (QWEN, Wanted(1, name="mine"), BARE, ["the name 'mine'", "leave it out"]),
-    (QWEN, Wanted(1, context=10), BARE, ["the context 10"]),
+    (QWEN, ServeOptions(1, engine="ollama"), FULL, ["'ollama'", "vllm, transformers, llama_cpp"]),
+    (QWEN, ServeOptions(1, name="mine"), BARE, ["the name 'mine'", "leave it out"]),
+    (QWEN, ServeOptions(1, context=10), BARE, ["the context 10"]),
 ]
 
 
-@pytest.mark.parametrize(("model", "wanted", "machine", "says"), REFUSALS)
-def test_what_cannot_be_served_is_refused_in_a_line(model, wanted, machine, says):
+@pytest.mark.parametrize(("model", "options", "machine", "says"), REFUSALS)
+def test_what_cannot_be_served_is_refused_in_a_line(model, options, machine, says):
     with pytest.raises(ValueError, match=r"^[^\n]+$") as refused:
-        command_for(model, wanted, machine)
+        command_for(model, options, machine)
     for part in says:
         assert part in str(refused.value)
 
 
 def test_where_and_as_what_a_model_is_served():
-    command = command_for("models/gemma.Q4.gguf", Wanted(8001), FULL)
+    command = command_for("models/gemma.Q4.gguf", ServeOptions(8001), FULL)
     assert command.name == "gemma.Q4"
     assert command.base_url == "http://127.0.0.1:8001/v1"
     assert command.ready_url == "http://127.0.0.1:8001/v1/models"
     assert command.environment == {"HOST": "127.0.0.1", "PORT": "8001"}
-    assert command_for(QWEN, Wanted(1), FULL).name == QWEN
-    assert command_for(QWEN, Wanted(1, name="q"), FULL).name == "q"
+    assert command_for(QWEN, ServeOptions(1), FULL).name == QWEN
+    assert command_for(QWEN, ServeOptions(1, name="q"), FULL).name == "q"
 
 
 @pytest.mark.parametrize(
-    ("model", "wanted", "options"),
+    ("model", "options", "bench_options"),
     [
-        (QWEN, Wanted(1), ""),
-        (QWEN, Wanted(1, engine="transformers"), "--concurrency 1"),
-        ("x.gguf", Wanted(1), "--concurrency 1 --agent-config text"),
-        ("x.gguf", Wanted(1, more=("--clip_model_path", "y.gguf")), "--concurrency 1"),
+        (QWEN, ServeOptions(1), ""),
+        (QWEN, ServeOptions(1, engine="transformers"), "--concurrency 1"),
+        ("x.gguf", ServeOptions(1), "--concurrency 1 --agent-config text"),
+        ("x.gguf", ServeOptions(1, more=("--clip_model_path", "y.gguf")), "--concurrency 1"),
     ],
 )
-def test_how_to_play_with_it(model, wanted, options):
-    assert command_for(model, wanted, FULL).bench_options == tuple(options.split())
+def test_how_to_play_with_it(model, options, bench_options):
+    assert command_for(model, options, FULL).bench_options == tuple(bench_options.split())
 
 
 def test_the_command_line_offers_the_engines_that_there_are():
@@ -174,14 +174,14 @@ def executable(path: Path, text: str) -> Path:
 
 
 def test_packages_are_those_of_the_python_that_is_named():
-    found = look_around(sys.executable, {"PATH": os.defpath})
+    found = inspect_machine(sys.executable, {"PATH": os.defpath})
     assert {"transformers", "torch"} <= found.packages <= EVERYTHING
     assert found.python == sys.executable
 
 
 def test_something_else_than_a_python(tmp_path):
     with pytest.raises(ValueError, match="nothing/python does not run"):
-        look_around(str(tmp_path / "nothing/python"))
+        inspect_machine(str(tmp_path / "nothing/python"))
 
 
 @pytest.mark.parametrize(
@@ -193,12 +193,12 @@ def test_gpus_are_counted_less_those_hidden(tmp_path, visible, count):
     environment = {"PATH": str(tmp_path)}
     if visible is not None:
         environment["CUDA_VISIBLE_DEVICES"] = visible
-    assert look_around(sys.executable, environment).gpus == count
+    assert inspect_machine(sys.executable, environment).gpus == count
 
 
 def test_a_driver_that_fails_is_no_gpu(tmp_path):
     executable(tmp_path / "nvidia-smi", "raise SystemExit(9)")
-    assert look_around(sys.executable, {"PATH": str(tmp_path)}).gpus == 0
+    assert inspect_machine(sys.executable, {"PATH": str(tmp_path)}).gpus == 0
 
 
 # -- processes -----------------------------------------------------------------------------------
@@ -359,7 +359,7 @@ def test_a_server_that_does_not_heed_signals_is_killed(stand_in):
 
 def test_dry_run_only_says_what_it_would_do(tmp_path, monkeypatch):
     (tmp_path / "a b.gguf").touch()
-    monkeypatch.setattr("agents.vlm.serving.look_around", lambda python: FULL)
+    monkeypatch.setattr("agents.vlm.serving.inspect_machine", lambda python: FULL)
     monkeypatch.chdir(tmp_path)
     result = CliRunner().invoke(
         serve, ["a b.gguf", "--port", "0", "--dry-run", "--", "--chat_format", "gemma"]

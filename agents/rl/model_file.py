@@ -1,12 +1,12 @@
-"""A learner in a file: arrays and JSON, nothing that is run when it is read.
+"""Saves a learner as arrays and JSON; reading the file runs no code.
 
 ``model.npz`` is NumPy's archive of arrays, read without pickle: ``policy/…`` (the weights),
 ``optimizer/N/…`` (what Adam remembers of the N-th of them) and ``about``, JSON in UTF-8 (which
-algorithm, what it sees, how far it has come). What else a learner is, its hyper-parameters and the
-shape of its network, ``config.yaml`` beside it says.
+algorithm, what it sees, how far it has come). ``config.yaml`` beside it holds the rest: the
+hyper-parameters and the shape of the network.
 
-Stable-Baselines3's own files, ``model.zip`` of runs of before among them, hold pickled objects.
-Reading one runs whatever code its maker put there, so that takes an explicit ``trust``.
+Files of Stable-Baselines3, such as the ``model.zip`` of older runs, hold pickled objects. Reading
+one runs the code in it, so it needs an explicit ``trust``.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 from er_gym.writing import write_atomic
 
 MODEL = "model.npz"
-FOREIGN = "model.zip"
-"""What Stable-Baselines3 writes, and what runs of er-gym 0.1.0 hold."""
+SB3_MODEL = "model.zip"
+"""The model file of Stable-Baselines3, which runs of er-gym 0.1.0 hold."""
 _FORMAT = 1
 _ABOUT = "about"
 _COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_n_calls", "exploration_rate")
-"""How far a learner has come; not every algorithm has all of them."""
+"""The progress counters of a learner; not every algorithm has all of them."""
 _HEADER = 4096
-"""Bytes that an array's header may take in the archive."""
+"""The largest header of an array in the archive, in bytes."""
 _LONGEST_ABOUT = 1_000_000
 
 Arrays = dict[str, NDArray[Any]]
 
 
 class UntrustedModel(ValueError):
-    """A file that can run code when it is read; the message says how to read it all the same."""
+    """Reading the file can run code; the message says how to allow it."""
 
 
-def untrusted(file: Path) -> UntrustedModel:
-    """The refusal of one of Stable-Baselines3's files."""
+def untrusted_model(file: Path) -> UntrustedModel:
+    """The error for a file of Stable-Baselines3 without ``trust``."""
     return UntrustedModel(
         f"{file} is a file of Stable-Baselines3, and reading it runs whatever code is in it: "
         "if you know who made it, give --trust (in Python: trust=True); "
@@ -61,7 +61,7 @@ def untrusted(file: Path) -> UntrustedModel:
 
 
 def save(model: BaseAlgorithm, run: Path) -> None:
-    """Write the model so that whatever is found under its name is whole."""
+    """Write the model; the file is replaced as a whole."""
     about = np.frombuffer(json.dumps(_about(model)).encode(), np.uint8)
     archive = io.BytesIO()
     np.savez(archive, **{_ABOUT: about}, **_arrays(model))
@@ -69,7 +69,7 @@ def save(model: BaseAlgorithm, run: Path) -> None:
 
 
 def _arrays(model: BaseAlgorithm) -> Arrays:
-    """By name in the archive: the weights, and what the optimizer remembers."""
+    """By name in the archive: the weights and the optimizer's state."""
     found = {f"policy/{name}": value for name, value in model.policy.state_dict().items()}
     for number, entries in model.policy.optimizer.state_dict()["state"].items():
         found |= {f"optimizer/{number}/{name}": value for name, value in entries.items()}
@@ -101,10 +101,10 @@ def _shapes(space: spaces.Space[Any]) -> dict[str, list[int]]:
 
 
 def restore(file: Path, model: BaseAlgorithm) -> None:
-    """Give a learner that has learnt nothing yet the weights of a file, and how far it had come.
+    """Load weights, optimizer state and progress of a file into an untrained learner.
 
     Raises:
-        ValueError: the file is damaged, or is that of another learner.
+        ValueError: the file is damaged or belongs to another learner.
     """
     try:
         with zipfile.ZipFile(file) as archive:
@@ -140,7 +140,7 @@ def _check(about: Mapping[str, Any], model: BaseAlgorithm) -> None:
 
 
 def _array(archive: zipfile.ZipFile, name: str, most: int) -> NDArray[Any]:
-    """An array of at most so many bytes."""
+    """Read an array of at most ``most`` bytes."""
     entry = archive.getinfo(f"{name}.npy")
     if entry.file_size > most + _HEADER:
         raise ValueError(f"{name} is larger than it can be")
@@ -159,7 +159,7 @@ def _tensor(archive: zipfile.ZipFile, name: str, like: torch.Tensor) -> torch.Te
 
 
 def _optimizer(archive: zipfile.ZipFile, model: BaseAlgorithm) -> dict[str, Any]:
-    """The optimizer's state; what is remembered of a weight is a number or has its shape."""
+    """The optimizer's state; each entry is a scalar or has its weight's shape."""
     state: dict[int, dict[str, torch.Tensor]] = {}
     weights = [each for group in model.policy.optimizer.param_groups for each in group["params"]]
     number = torch.zeros(())
@@ -174,16 +174,16 @@ def _optimizer(archive: zipfile.ZipFile, model: BaseAlgorithm) -> dict[str, Any]
     return {"state": state, "param_groups": model.policy.optimizer.state_dict()["param_groups"]}
 
 
-# -- where no environment is needed --------------------------------------------------------------
+# -- learners without environments ---------------------------------------------------------------
 
 
-class _Nothing(gymnasium.Env[Any, Any]):
-    """Has spaces, and cannot be played."""
+class _UnplayableEnv(gymnasium.Env[Any, Any]):
+    """Has spaces but cannot be played."""
 
     def __init__(self, sees: spaces.Space[Any], actions: spaces.Discrete) -> None:
         self.observation_space, self.action_space = sees, actions
 
 
-def nothing(sees: spaces.Space[Any], actions: int, count: int) -> VecEnv:
-    """In place of environments, to make a learner with that only plays, or gets them later."""
-    return DummyVecEnv([lambda: _Nothing(sees, spaces.Discrete(actions))] * count)
+def placeholder_env(sees: spaces.Space[Any], actions: int, count: int) -> VecEnv:
+    """Placeholder environments for a learner that only plays, or gets its environments later."""
+    return DummyVecEnv([lambda: _UnplayableEnv(sees, spaces.Discrete(actions))] * count)

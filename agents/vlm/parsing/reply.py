@@ -1,13 +1,13 @@
-"""What a model writes, read as a decision and the thoughts before it.
+"""Reads a model's reply as a decision and the thoughts before it.
 
 The normal form is ``<Observation>…</Observation><Planning>…</Planning><DecisionMaking>navigate to
-Fridge</DecisionMaking>``; or, where it is asked for, a tool call or a JSON object. Models differ
-from it in many ways; those that are understood are listed in
-:data:`agents.vlm.parsing_rules.RULES`, and a reply tells which it needed. Nothing is guessed beyond
-them: any other reply has a problem, in words for the model.
+Fridge</DecisionMaking>``; or, if the settings ask for it, a tool call or a JSON object. Models
+deviate from it in many ways. :data:`agents.vlm.parsing.rules.RULES` lists the deviations that are
+understood, and the result names the rules that a reply needed. The parser guesses nothing beyond
+these rules: for any other reply it returns a problem, worded for the model.
 
-Where a reply decides more than once, the last decision counts, because models weigh before they
-choose; where one decision has several actions, the first, because they are done in order.
+If a reply decides several times, the last decision counts, because models weigh options before they
+choose. If one decision has several actions, the first counts, because actions are done in order.
 """
 
 from __future__ import annotations
@@ -17,40 +17,40 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from agents.vlm.parsing_decision import (
+from agents.vlm.parsing.decision import (
     FENCE,
     MOST,
-    Words,
+    ParsedAction,
     find_fields,
     read_decision,
     read_fields,
 )
-from agents.vlm.parsing_json import Found
-from agents.vlm.parsing_rules import RULES, label
-from agents.vlm.parsing_tags import Layout, TaggedDecision, Thought, take_apart
-from agents.vlm.parsing_words import THOUGHT_TAGS
+from agents.vlm.parsing.json_objects import JsonObject
+from agents.vlm.parsing.rules import RULES, label
+from agents.vlm.parsing.tags import TaggedDecision, TaggedReply, Thought, split_at_tags
+from agents.vlm.parsing.vocabulary import THOUGHT_TAGS
 from er_gym.tasks import verbs
 
 LONGEST = 200_000
-"""Characters of a reply that are read, from its end."""
+"""Only this many characters at the end of a reply are read."""
 _LONGEST_BARE, _LONGEST_BARE_LINE = 8, 120
-"""Words and characters of an action that stands in no tags and after no label."""
+"""The most words and characters of an action without tags and label."""
 _LONGEST_LABELLED = 1_000
 _LONGEST_QUOTE = 60
 _EXAMPLE = f"'{verbs.NAVIGATE} Fridge'"
 
 
 @dataclass(frozen=True)
-class Parsed:
-    """A reply, read.
+class ParsedReply:
+    """A parsed reply.
 
     Attributes:
-        verb: canonical, see :mod:`er_gym.tasks.verbs`; "" where there is a problem.
-        name: what the model calls the object, as it wrote it; "" for a bare verb.
-        thoughts: in order. Text outside of tags is a thought where no tags hold any.
-        rules: names of the tolerances that were needed, of
-            :data:`~agents.vlm.parsing_rules.RULES`, in its order.
-        problem: what is wrong and what to write instead; "" where there is a verb.
+        verb: a canonical verb, see :mod:`er_gym.tasks.verbs`; "" if there is a problem.
+        name: the model's name for the object, as written; "" for a verb without an object.
+        thoughts: in order. Text outside of tags counts as a thought if no tags hold any.
+        rules: the names of the rules that were needed, in the order of
+            :data:`~agents.vlm.parsing.rules.RULES`.
+        problem: what is wrong and what to write instead; "" if there is a verb.
     """
 
     verb: str = ""
@@ -60,23 +60,25 @@ class Parsed:
     problem: str = ""
 
 
-def parse(text: str, call: str = "", decide: Literal["tags", "tools", "json"] = "tags") -> Parsed:
-    """Read a reply. Whatever it is, nothing is raised.
+def parse(
+    text: str, call: str = "", decide: Literal["tags", "tools", "json"] = "tags"
+) -> ParsedReply:
+    """Parse a reply. No reply raises an error.
 
     Args:
-        text: of the reply.
-        call: the arguments of a tool call, as JSON; "" where there is none. It counts before what
-            the text says.
-        decide: what the model was asked for. For ``json``, a text that is a JSON object needs no
-            rule; all else is understood alike.
+        text: the reply's text.
+        call: the arguments of a tool call as JSON; "" without a call. It takes precedence over the
+            text.
+        decide: the form that the model was asked for. With ``json``, a text that is a JSON object
+            needs no rule; nothing else depends on it.
     """
-    layout = take_apart(text[-LONGEST:])
+    layout = split_at_tags(text[-LONGEST:])
     if len(text) > LONGEST:
         layout.rules.append("long")
     chosen = _chosen(layout, call[-LONGEST:])
     if chosen is None:
         problem = "has no decision" if text.strip() else "is empty"
-        return Parsed(
+        return ParsedReply(
             thoughts=layout.all_thoughts(layout.outside),
             rules=_in_order(layout.rules),
             problem=f"The reply {problem}. Decide on one action, such as {_EXAMPLE}.",
@@ -86,7 +88,7 @@ def parse(text: str, call: str = "", decide: Literal["tags", "tools", "json"] = 
     if _is_json(call) if call.strip() else decide == "json" and _is_json(text):
         rules = [rule for rule in rules if rule != "json"]
     problem = _problem(words, chosen.said)
-    return Parsed(
+    return ParsedReply(
         verb="" if problem else words.verb,
         name="" if problem else words.name,
         thoughts=layout.all_thoughts(chosen.before, chosen.thoughts),
@@ -100,8 +102,8 @@ def _in_order(rules: Iterable[str]) -> tuple[str, ...]:
     return tuple(rule.name for rule in RULES if rule.name in needed)
 
 
-def _problem(words: Words, said: str) -> str:
-    """What to tell the model of a decision that cannot be done; "" if it can."""
+def _problem(words: ParsedAction, said: str) -> str:
+    """The feedback for an unusable decision; "" for a usable one."""
     if not words.verb:
         said = " ".join(said[: 4 * _LONGEST_QUOTE].split())
         quote = said if len(said) <= _LONGEST_QUOTE else said[: _LONGEST_QUOTE - 1] + "…"
@@ -115,29 +117,29 @@ def _problem(words: Words, said: str) -> str:
     return ""
 
 
-# -- where the decision is -------------------------------------------------------------------------
+# -- finding the decision --------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class _Chosen:
-    """A decision.
+    """The decision that counts.
 
     Attributes:
-        words: what it says.
-        said: the same as it was written.
-        before: the text outside of tags that was written first.
-        rules: that were needed to find it.
-        thoughts: that came with it.
+        words: its action.
+        said: its text as written.
+        before: the text outside of tags that precedes it.
+        rules: the rules that were needed to find it.
+        thoughts: the thoughts given with it.
     """
 
-    words: Words
+    words: ParsedAction
     said: str
     before: Iterable[str] = ()
     rules: tuple[str, ...] = ()
     thoughts: tuple[Thought, ...] = ()
 
 
-def _chosen(layout: Layout, call: str) -> _Chosen | None:
+def _chosen(layout: TaggedReply, call: str) -> _Chosen | None:
     """The decision of a reply, readable or not."""
     if call.strip():
         return _from_call(call, layout)
@@ -154,7 +156,7 @@ def _chosen(layout: Layout, call: str) -> _Chosen | None:
     return outside
 
 
-def _from_call(call: str, layout: Layout) -> _Chosen:
+def _from_call(call: str, layout: TaggedReply) -> _Chosen:
     found = find_fields(call)
     thoughts = _thoughts_in(found) if found else ()
     return _Chosen(read_decision(call), call, layout.outside, thoughts=thoughts)
@@ -175,8 +177,8 @@ def _from_tags(decisions: Sequence[TaggedDecision], outside: Sequence[str]) -> _
 
 
 def _from_outside(pieces: Sequence[str]) -> _Chosen | None:
-    """From text without tags: the first way that finds an action, else the first that finds more
-    than nothing."""
+    """Search text without tags: the first reader that finds an action counts, else the first that
+    finds anything."""
     text = "\n".join(pieces)
     first = None
     for way in (_json_in, _labelled_in, _bare_in):
@@ -202,8 +204,8 @@ def _json_in(text: str) -> _Chosen | None:
     )
 
 
-def _thoughts_in(found: Found) -> tuple[Thought, ...]:
-    """Fields of a JSON object that are named as thoughts are."""
+def _thoughts_in(found: JsonObject) -> tuple[Thought, ...]:
+    """The fields of a JSON object that are named like thoughts."""
     return tuple(
         Thought(THOUGHT_TAGS[name], text)
         for name, text in found.fields.items()
@@ -224,13 +226,13 @@ def _labelled_in(text: str) -> _Chosen | None:
 
 
 def _bare_in(text: str) -> _Chosen | None:
-    """The first of the lines at the end that are actions and nothing else."""
+    """The first of the final lines that consist of an action alone."""
     lines = [line for line in text.splitlines() if line.strip()]
     rules = ["no tags"]
     if any(line.lstrip().startswith(FENCE) for line in lines):
         lines = [line for line in lines if not line.lstrip().startswith(FENCE)]
         rules.append("code fence")
-    actions: list[Words] = []
+    actions: list[ParsedAction] = []
     for line in lines[: -1 - MOST : -1]:
         if len(line) > _LONGEST_BARE_LINE or len(line.split()) > _LONGEST_BARE:
             break

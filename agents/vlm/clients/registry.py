@@ -1,4 +1,4 @@
-"""The clients that give a model's replies, by the name that an agent's begins with.
+"""The registry of model clients, by the prefix of an agent's name.
 
 An agent ``openai:MODEL`` is the VLM agent with the client ``openai``. A client is a row of
 :data:`CLIENTS`; other packages add rows with an entry point in the group ``er_gym.model_clients``,
@@ -16,90 +16,99 @@ from er_gym.plugins import PluginError, Registry, is_dotted
 
 if TYPE_CHECKING:
     from agents.vlm.clients.budget import Ledger
-    from agents.vlm.clients.reply_cache import Identified
-    from agents.vlm.clients.watch import Watch
+    from agents.vlm.clients.reply_cache import CacheableClient
+    from agents.vlm.clients.supervisor import RequestSupervisor
     from agents.vlm.settings import AgentSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelClient:
-    """A way to have a model's replies.
+class ModelClientSpec:
+    """A kind of model client.
 
     Attributes:
-        make: makes the client, given what follows the name, the agent's settings, and the run's
-            ledger and watch. A client has ``reply`` and ``close`` (:class:`agents.vlm.chat.Client`)
+        make: makes the client from the text after the prefix, the agent's settings, and the run's
+            ledger and supervisor. A client has ``reply`` and ``close``
+            (:class:`agents.vlm.chat.Client`)
             and ``identity``, a text that is the same for clients that reply alike.
-        opens: what follows the name, for messages: ``"MODEL"``.
-        help: what it is, in a few words.
+        opens: what follows the prefix, for messages: ``"MODEL"``.
+        help: a short description.
         install: what to install when a package is missing.
         priced: whether a reply costs what the settings' ``prices`` state.
         keeps_ledger: whether the client checks the budget and writes the ledger itself.
     """
 
-    make: Callable[[str, AgentSettings, Ledger, Watch], Identified]
+    make: Callable[[str, AgentSettings, Ledger, RequestSupervisor], CacheableClient]
     opens: str
     help: str
     install: str = "er-gym[vlm]"
     priced: bool = False
     keeps_ledger: bool = False
 
-    def open(self, what: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
-        """The client, whose replies are written into a run's ledger."""
-        client = self.make(what, settings, ledger, watch)
+    def open(
+        self, what: str, settings: AgentSettings, ledger: Ledger, supervisor: RequestSupervisor
+    ) -> CacheableClient:
+        """Make the client; its replies are entered into the run's ledger."""
+        client = self.make(what, settings, ledger, supervisor)
         if self.keeps_ledger:
             return client
-        from agents.vlm.clients.budget import Metered
+        from agents.vlm.clients.budget import MeteredClient
 
-        return Metered(client, ledger, watch)
+        return MeteredClient(client, ledger, supervisor)
 
 
-def _openai(model: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+def _openai(
+    model: str, settings: AgentSettings, ledger: Ledger, supervisor: RequestSupervisor
+) -> CacheableClient:
     from agents.vlm.clients.openai_server import OpenAIClient
 
-    return OpenAIClient(model, settings, ledger, watch)
+    return OpenAIClient(model, settings, ledger, supervisor)
 
 
-def _local(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+def _local(
+    path: str, settings: AgentSettings, ledger: Ledger, supervisor: RequestSupervisor
+) -> CacheableClient:
     from agents.vlm.clients.local import LocalClient
 
-    return LocalClient(path, settings, watch)
+    return LocalClient(path, settings, supervisor)
 
 
-def _recorded(path: str, settings: AgentSettings, ledger: Ledger, watch: Watch) -> Identified:
+def _recorded(
+    path: str, settings: AgentSettings, ledger: Ledger, supervisor: RequestSupervisor
+) -> CacheableClient:
     from agents.vlm.clients.scripted import RecordedClient
 
     return RecordedClient(Path(path))
 
 
-CLIENTS: Registry[ModelClient] = Registry(
+CLIENTS: Registry[ModelClientSpec] = Registry(
     kind="model client",
     group="er_gym.model_clients",
     own={
-        "openai": ModelClient(
+        "openai": ModelClientSpec(
             opens="MODEL",
             help="a model on an OpenAI-compatible server",
             make=_openai,
             priced=True,
             keeps_ledger=True,
         ),
-        "hf": ModelClient(
+        "hf": ModelClientSpec(
             opens="PATH",
             help="a transformers model in this process",
             make=_local,
             install="er-gym[local]",
         ),
-        "recorded": ModelClient(
+        "recorded": ModelClientSpec(
             opens="RUN", help="what a model said in an earlier run", make=_recorded
         ),
     },
-    expected=f"an {__name__}.ModelClient",
-    fits=lambda row: isinstance(row, ModelClient),
+    expected=f"an {__name__}.ModelClientSpec",
+    fits=lambda row: isinstance(row, ModelClientSpec),
 )
-"""By name."""
+"""Model clients by name."""
 
 
 def _split(name: str) -> tuple[str, str]:
-    """The client's name and what it opens; ("", "") where the name is no client's."""
+    """The client's name and what it opens; ("", "") if the name belongs to no client."""
     client, colon, opened = name.partition(":")
     if colon and client not in CLIENTS.names() and is_dotted(client + ":" + opened.split(":")[0]):
         attribute, colon, opened = opened.partition(":")
@@ -108,24 +117,24 @@ def _split(name: str) -> tuple[str, str]:
     return (client, opened) if opened and client in CLIENTS.names() else ("", "")
 
 
-def speaks(name: str) -> bool:
+def is_model_agent(name: str) -> bool:
     """Whether an agent of this name gets its replies from a model client: ``openai:MODEL``."""
     return bool(_split(name)[0])
 
 
-def client_named(name: str) -> tuple[ModelClient, str]:
-    """The client of an agent, and what it is to open.
+def resolve_client(name: str) -> tuple[ModelClientSpec, str]:
+    """The client of an agent's name, and what the client opens.
 
     Raises:
-        PluginError: the name is no client's, or the client cannot be loaded.
+        PluginError: the name belongs to no client, or the client cannot be loaded.
     """
     client, opened = _split(name)
     if not client:
-        raise PluginError(f"{name!r} is no agent of a model; give {ways_to_name()}")
+        raise PluginError(f"{name!r} is no agent of a model; give {agent_name_forms()}")
     return CLIENTS.get(client), opened
 
 
-def ways_to_name() -> str:
-    """How agents of models are named, for messages."""
+def agent_name_forms() -> str:
+    """The forms of model agents' names, for messages."""
     *most, last = (f"{name}:{row.opens}" for name, row in CLIENTS.own.items())
     return f"{', '.join(most)} or {last}"

@@ -19,8 +19,8 @@ from click.testing import CliRunner
 from agents import make_agent
 from agents.rl.agent import RLAgent
 from agents.rl.config import TrainConfig
-from agents.rl.saved import FOREIGN, MODEL, UntrustedModel
-from agents.rl.train import CONFIG, load_last, train
+from agents.rl.model_file import MODEL, SB3_MODEL, UntrustedModel
+from agents.rl.train import CONFIG, load_last_checkpoint, train
 from benchmarks.cli.main import cli
 
 Make = Callable[..., TrainConfig]
@@ -53,13 +53,13 @@ class Writes:
 def hostile(copied: Path) -> tuple[Path, Path]:
     """A run directory with a model of Stable-Baselines3 that writes a file, and that file."""
     written = copied / "written"
-    load_last(copied).save(copied / FOREIGN)
-    with zipfile.ZipFile(copied / FOREIGN) as archive:
+    load_last_checkpoint(copied).save(copied / SB3_MODEL)
+    with zipfile.ZipFile(copied / SB3_MODEL) as archive:
         parts = {name: archive.read(name) for name in archive.namelist()}
     data = json.loads(parts["data"])
     code = base64.b64encode(pickle.dumps(Writes(written))).decode()
     data["policy_class"] = {":type:": "x", ":serialized:": code}
-    with zipfile.ZipFile(copied / FOREIGN, "w") as archive:
+    with zipfile.ZipFile(copied / SB3_MODEL, "w") as archive:
         for name, content in {**parts, "data": json.dumps(data).encode()}.items():
             archive.writestr(name, content)
     (copied / MODEL).unlink()
@@ -70,14 +70,14 @@ def test_a_zip_that_runs_code_is_refused_and_does_not_run(hostile: tuple[Path, P
     path, written = hostile
     for refused in (
         lambda: make_agent(f"rl:{path}"),
-        lambda: RLAgent(path / FOREIGN),
-        lambda: load_last(path),
+        lambda: RLAgent(path / SB3_MODEL),
+        lambda: load_last_checkpoint(path),
     ):
         with pytest.raises(UntrustedModel, match=r"runs whatever code is in it.*give --trust"):
             refused()
     assert not written.exists()
     with pytest.raises(ValueError, match="cannot be read as a model"):
-        load_last(path, trust=True)
+        load_last_checkpoint(path, trust=True)
     assert written.exists()  # so this test tests what it says
 
 
@@ -100,15 +100,15 @@ def test_the_commands_refuse_it_in_one_line(hostile: tuple[Path, Path], tmp_path
 def test_a_run_of_before_is_read_with_trust_and_then_needs_none(
     copied: Path, make_config: Make, tmp_path: Path
 ) -> None:
-    before = load_last(copied)
-    before.save(copied / FOREIGN)
+    before = load_last_checkpoint(copied)
+    before.save(copied / SB3_MODEL)
     (copied / MODEL).unlink()
     command = ["bench", "--suite", "mini", "--limit", "1", "--agent", f"rl:{copied}"]
     command += ["--instances", "explore", "--out", str(tmp_path / "out"), "--trust"]
     result = CliRunner().invoke(cli, command)
     assert result.exit_code == 0, result.output
     train(make_config(total_steps=64, **SMALL), copied, trust=True)  # all its steps are done
-    assert load_last(copied).num_timesteps == 64
+    assert load_last_checkpoint(copied).num_timesteps == 64
 
 
 def test_trust_is_for_trained_policies() -> None:
@@ -118,7 +118,7 @@ def test_trust_is_for_trained_policies() -> None:
 
 
 def test_a_run_goes_on_from_all_that_it_was(run: Path) -> None:
-    one, other = load_last(run), load_last(run)
+    one, other = load_last_checkpoint(run), load_last_checkpoint(run)
     for model in (one, other):
         assert (model.num_timesteps, model._n_updates) == (64, 2)
         assert model.policy.optimizer.state_dict()["state"][0]["step"] > 0
@@ -159,7 +159,7 @@ def test_a_changed_file_is_one_clear_error(
 ) -> None:
     np.savez(copied / MODEL, **{**arrays(copied), **changed(copied)})
     with pytest.raises(ValueError, match=rf"{MODEL} cannot be read as a model: .*{message}"):
-        load_last(copied)
+        load_last_checkpoint(copied)
     assert not (copied / "written").exists()
 
 
@@ -167,7 +167,7 @@ def test_a_pickle_under_the_name_of_ours_is_refused(copied: Path) -> None:
     for content in (pickle.dumps(Writes(copied / "written")), b"", b"PK", _npy(pickled(copied))):
         (copied / MODEL).write_bytes(content)
         with pytest.raises(ValueError, match="cannot be read as a model"):
-            load_last(copied)
+            load_last_checkpoint(copied)
     assert not (copied / "written").exists()
 
 

@@ -1,4 +1,4 @@
-"""The ways in which a reply may differ from the normal form and be understood."""
+"""The deviations from the normal form of a reply that the parser accepts."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Rule:
-    """A way in which a reply may differ from the normal form and be understood.
+    """A deviation from the normal form that the parser accepts.
 
     Attributes:
-        name: as :class:`~agents.vlm.parsing.Parsed` lists it.
-        about: what is let pass.
-        rewrite: makes a line of a decision more normal, if that is all it takes; applied in the
-            order of :data:`RULES`, and needed if it changes something.
+        name: as :class:`~agents.vlm.parsing.ParsedReply` lists it.
+        about: what is accepted.
+        rewrite: normalises a line of a decision, for rules that need nothing else. Rewrites are
+            applied in the order of :data:`RULES`; a rule counts as needed if its rewrite changes
+            the line.
     """
 
     name: str
@@ -39,19 +40,19 @@ _LEAD_IN = re.compile(
     re.IGNORECASE,
 )
 _MARKS = re.compile(
-    # What ends a turn, a tag or half of one; LaTeX's box; what stands around words.
+    # End-of-turn tokens, closing tags or parts of them, LaTeX's box, quotes and brackets.
     r"<\|[^<>|]{1,30}\|>|</\w{0,30}(?:>|$)|\\(?:boxed|text)(?!\w)"
     r"|[\[\]{}<>*`\"“”「」『』《》【】]+|(?<!\w)['‘’]|['‘’](?!\w)"
 )
 
 
 def label(line: str) -> re.Match[str] | None:
-    """What stands before an action in a line such as ``**Action:** open Fridge``."""
+    """Match the label before an action in a line such as ``**Action:** open Fridge``."""
     return _LABEL.match(line)
 
 
 def _off_the_front(pattern: re.Pattern[str]) -> Callable[[str], str]:
-    """Takes off what matches at a line's beginning, unless nothing would be left."""
+    """A rewrite that removes a match at a line's beginning, unless nothing would be left."""
 
     def rewrite(line: str) -> str:
         found = pattern.match(line)
@@ -90,4 +91,4 @@ RULES: tuple[Rule, ...] = (
     Rule("clause", "more is said behind the name: Egg from Fridge, Fridge (it is closed)"),
     Rule("words after", "words behind a verb that needs none: observe the room"),
 )
-"""Every tolerance there is."""
+"""All rules."""

@@ -1,4 +1,4 @@
-"""What pydantic models of servers' answers share: a wrong field does not spoil the others."""
+"""The base of pydantic models of server answers: one invalid field does not reject the others."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, WrapValidator
 
 
-class Wire(BaseModel):
-    """Servers leave out fields, send null for them, and add their own."""
+class TolerantModel(BaseModel):
+    """Accepts that servers omit fields, send null for them, and add their own."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
@@ -22,4 +22,4 @@ def _or_none(value: object, check: Any) -> Any:
 
 T = TypeVar("T")
 OrNone = Annotated[T | None, WrapValidator(_or_none)]
-"""A field that is None where what was sent does not fit."""
+"""A field that becomes None if the value sent is invalid."""

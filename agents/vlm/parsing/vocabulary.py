@@ -1,4 +1,4 @@
-"""The words by which replies are read: tags, verbs, fields, and what stands around a name."""
+"""The vocabulary for reading replies: tags, verbs, JSON fields, and words around a name."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from er_gym.tasks import verbs
 
 DECISION = "DecisionMaking"
-"""The tag that an action stands in."""
+"""The tag that holds the action."""
 THINK = "think"
-"""The tag of reasoning models: decisions that are weighed in it are not made."""
+"""The tag of reasoning models: decisions inside it are only considered."""
 TOOL_CALL = "toolcall"
 
 THOUGHT_TAGS: Mapping[str, str] = {
@@ -24,7 +24,7 @@ THOUGHT_TAGS: Mapping[str, str] = {
     }.items()
     for name in names.split()
 }
-"""How a tag or a field is called, as :func:`plain` has it, to the kind of thought."""
+"""The kind of thought by the name of a tag or field, as :func:`normalized` gives it."""
 
 DECISION_TAGS = frozenset(
     {
@@ -44,17 +44,17 @@ PLACE_FIELDS = (
     "receptacle", "container", "destination", "place", "location", "where", "target",
     "targetobject",
 )  # fmt: skip
-"""Fields that hold what something is put in, rather than what is put; the first that does."""
+"""Fields that hold the receptacle rather than the object; the first that is set counts."""
 OBJECT_FIELDS = (
     "objecttype", "object", "objectid", "objectname", "target", "targetobject", "item", "thing",
     "name", "argument", "arguments", "args", "arg", "parameter", "input", "物体", "对象", "目标",
 )  # fmt: skip
 
 VERBS: Mapping[str, str] = {phrase: verb.name for verb in verbs.table() for phrase in verb.said}
-"""Every way of saying a verb, in lower case with single spaces, to the verb."""
+"""The verb by each phrase for it, in lower case with single spaces."""
 ALONE = frozenset(phrase for phrase, verb in VERBS.items() if verb == verbs.END) | {"look"}
-"""Phrases that mean their verb only if nothing but :data:`FILLER` follows: who would "stop the
-Microwave" does not want the episode to end."""
+"""Phrases that mean their verb only if nothing but :data:`FILLER` follows: "stop the Microwave"
+does not end the episode."""
 FILLER = frozenset(
     {
         "the", "this", "my", "our", "a", "task", "tasks", "episode", "mission", "search", "job",
@@ -74,20 +74,21 @@ CLAUSE = re.compile(
     r"|[,;:(){}<>\[\]、。]|\.\s|\s[-–—]\s|[里上中](?:面|边)?$|(?<=[^\x00-\x7f])内$",
     re.IGNORECASE,
 )
-"""Where a name ends and more is said: ``Egg from the Fridge``, ``Fridge, which is closed``."""
+"""Marks the end of a name and the start of a clause: ``Egg from the Fridge``, ``Fridge, which is
+closed``."""
 NO_NAME = frozenset(
     {
         "it", "them", "this", "that", "one", "there", "object", "objects", "something", "nothing",
         "none", "null", "the", "a", "an",
     }
 )  # fmt: skip
-"""What stands where a name should and names nothing."""
+"""Words in place of a name that name no object."""
 EDGES = " \t\r\n.,;:!?\"'`*_~=()[]{}<>-。、…“”‘’"
-"""What may stand around a name."""
+"""Characters that may surround a name."""
 
 _NOT_IN_WORDS = re.compile(r"[\W_]+")
 
 
-def plain(name: str) -> str:
+def normalized(name: str) -> str:
     """A tag's or field's name without case, spaces, hyphens and underscores."""
     return _NOT_IN_WORDS.sub("", name).casefold()

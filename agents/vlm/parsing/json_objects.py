@@ -1,4 +1,4 @@
-"""JSON as models write it: with single quotes, commas too many, or no end."""
+"""Reads JSON as models write it: with single quotes, extra commas, or no end."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from agents.vlm.parsing_words import plain
+from agents.vlm.parsing.vocabulary import normalized
 
 _DOUBLE, _SINGLE = r'"([^"\\]*(?:\\.[^"\\]*)*)"?', r"'([^'\\]*(?:\\.[^'\\]*)*)'?"
 _PAIR = re.compile(
@@ -17,25 +17,25 @@ _PAIR = re.compile(
 )
 _OPENS = re.compile(r"\{|\[\s{0,20}\{")
 _INSIDE = re.compile(r'[{}\[\]]|"[^"\\]*(?:\\.[^"\\]*)*"?', re.DOTALL)
-"""Braces, and strings, in which braces are only letters."""
+"""Braces, and strings, whose braces do not count."""
 _DEEPER = {"{": 1, "[": 1, "}": -1, "]": -1}
 
 
 @dataclass(frozen=True)
-class Found:
+class JsonObject:
     """An object found in a text: where it begins, and its fields, by plain name."""
 
     start: int
     fields: Mapping[str, str]
 
 
-def objects_in(text: str, most: int) -> list[Found]:
-    """The last objects of a text, and lists of objects, each list as one; in order."""
-    return [Found(start, fields_in(text[start:end])) for start, end in _spans(text)[-most:]]
+def objects_in(text: str, most: int) -> list[JsonObject]:
+    """The last ``most`` objects of a text in order; a list of objects counts as one."""
+    return [JsonObject(start, fields_in(text[start:end])) for start, end in _spans(text)[-most:]]
 
 
 def _spans(text: str) -> list[tuple[int, int]]:
-    """Where they begin and end; the last may lack its end."""
+    """The start and end of each object; the last may lack its closing brace."""
     spans: list[tuple[int, int]] = []
     at = 0
     while opened := _OPENS.search(text, at):
@@ -50,9 +50,9 @@ def _spans(text: str) -> list[tuple[int, int]]:
 
 
 def fields_in(text: str) -> dict[str, str]:
-    """The fields of an object that are words, at whatever depth; of one name, the first.
+    """The string fields of an object at any depth; for equal names, the first counts.
 
-    They are read pair by pair, so that it does not matter whether the whole is well formed.
+    Fields are read pair by pair, so the object need not be valid JSON.
     """
     fields: dict[str, str] = {}
     for pair in _PAIR.finditer(text):
@@ -60,7 +60,7 @@ def fields_in(text: str) -> dict[str, str]:
         value = _unescaped(double) if double is not None else single if single is not None else bare
         if double is not None and value.lstrip().startswith("{"):
             fields = {**fields_in(value), **fields}  # arguments as JSON inside of JSON
-        fields.setdefault(plain(pair[1] or pair[2]), value.strip())
+        fields.setdefault(normalized(pair[1] or pair[2]), value.strip())
     return fields
 
 

@@ -1,4 +1,4 @@
-"""A chat completion over the wire: a conversation becomes bytes, bytes become a reply."""
+"""OpenAI's chat completion format: encodes a conversation as a request and decodes a reply."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from weakref import WeakKeyDictionary
 from pydantic import Field, ValidationError
 
 from agents.vlm.chat import Message, Picture, Reply, Usage
-from agents.vlm.clients.lenient import OrNone, Wire
-from agents.vlm.clients.tokens import Asked, Claimed, usage_of
+from agents.vlm.clients.tokens import ReportedUsage, RequestSize, usage_of
+from agents.vlm.clients.tolerant_model import OrNone, TolerantModel
 from agents.vlm.settings import Prices
 
 _LONGEST_WORD = 200  # characters of a model's name, or of why it stopped
 _LONGEST_ERROR = 100_000  # bytes of an error that are read
 
-# A conversation is sent again with every turn: each picture is put into letters once, and
-# forgotten when the conversation is.
+# Each turn sends the whole conversation again: a picture is base64-encoded once and freed together
+# with the conversation.
 _ENCODED: WeakKeyDictionary[Picture, bytes] = WeakKeyDictionary()
 
 
-# -- what is sent ----------------------------------------------------------------------------------
+# -- requests --------------------------------------------------------------------------------------
 
 
-def in_letters(messages: Sequence[Message]) -> int:
-    """How many bytes of a request the pictures of a conversation take."""
+def picture_bytes(messages: Sequence[Message]) -> int:
+    """The bytes that a conversation's pictures take in a request."""
     return sum(
         len(_picture(part)) for each in messages for part in each.parts if isinstance(part, Picture)
     )
@@ -36,15 +36,15 @@ def in_letters(messages: Sequence[Message]) -> int:
 def request_body(
     fields: Mapping[str, Any], messages: Sequence[Message], with_reasoning: bool
 ) -> bytes:
-    """A request as JSON; the same bytes for the same request.
+    """A request as JSON; equal requests give equal bytes.
 
-    It is put together from ready pieces: the SDK's typed way takes ten times as long over a
+    It is joined from encoded parts: the SDK's typed request takes ten times as long for a
     conversation with 20 pictures.
 
     Args:
-        fields: all but the messages; at least one.
+        fields: all fields but the messages; at least one.
         messages: the conversation.
-        with_reasoning: whether earlier thoughts are given back.
+        with_reasoning: whether earlier thoughts are sent back.
     """
     head = json.dumps(fields).encode()[:-1]
     turns = b",".join(_message(message, with_reasoning) for message in messages)
@@ -82,67 +82,67 @@ def _picture(picture: Picture) -> bytes:
     return done
 
 
-# -- what comes back -------------------------------------------------------------------------------
+# -- answers ---------------------------------------------------------------------------------------
 
 
-class _Function(Wire):
+class _Function(TolerantModel):
     arguments: OrNone[str] = None
 
 
-class _Call(Wire):
+class _ToolCall(TolerantModel):
     function: OrNone[_Function] = None
 
 
-class _Said(Wire):
+class _AssistantMessage(TolerantModel):
     content: str | None = None
     refusal: OrNone[str] = None
     reasoning_content: OrNone[str] = None  # vLLM, SGLang, DeepSeek
     reasoning: OrNone[str] = None  # Ollama, OpenRouter, later vLLM
-    tool_calls: OrNone[tuple[_Call, ...]] = None
+    tool_calls: OrNone[tuple[_ToolCall, ...]] = None
 
 
-class _Choice(Wire):
-    message: _Said
+class _Choice(TolerantModel):
+    message: _AssistantMessage
     finish_reason: OrNone[str] = None
 
 
-class Completion(Wire):
-    """What a server answers, as far as we read it."""
+class Completion(TolerantModel):
+    """The fields of a server's answer that er-gym reads."""
 
     choices: tuple[_Choice, ...] = Field(min_length=1)
 
 
-class Bill(Wire):
-    """What an answer says of its costs; it may be no reply otherwise."""
+class Billing(TolerantModel):
+    """The billing fields of an answer, which an invalid reply may have too."""
 
     model: OrNone[str] = None
-    usage: OrNone[Claimed] = None
+    usage: OrNone[ReportedUsage] = None
 
 
 def read_completion(body: bytes) -> Completion:
-    """The answer in a body.
+    """Parse the body of an answer.
 
     Raises:
-        ValueError: it is not JSON, or there is no choice in it; the message is one line.
+        ValueError: the body is not JSON or has no choice; the message is one line.
     """
     try:
         return Completion.model_validate_json(body)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(map(str, first["loc"])) or "the body"
-        raise ValueError(f"{where}: {first['msg']}; it says: {server_words(body)}") from None
+        raise ValueError(f"{where}: {first['msg']}; it says: {error_text(body)}") from None
 
 
-def read_bill(body: bytes) -> Bill:
-    """What a body says of its costs: nothing, where it is not JSON."""
+def read_billing(body: bytes) -> Billing:
+    """The billing fields of a body; empty if it is not JSON."""
     try:
-        return Bill.model_validate_json(body)
+        return Billing.model_validate_json(body)
     except ValidationError:
-        return Bill()
+        return Billing()
 
 
 def reply_of(completion: Completion) -> Reply:
-    """The reply that an answer holds. A refusal is one too: its words are the text."""
+    """The reply of an answer. A refusal counts as a reply with its words as text."""
     choice = completion.choices[0]
     said = choice.message
     thought, text = _without_thoughts(said.content or said.refusal or "")
@@ -155,26 +155,28 @@ def reply_of(completion: Completion) -> Reply:
     )
 
 
-def billed(bill: Bill, asked: Asked, reply: Reply | None) -> tuple[str, Usage]:
-    """Which model answered, and the tokens that are paid for, never too few.
+def billed_usage(
+    bill: Billing, request_size: RequestSize, reply: Reply | None
+) -> tuple[str, Usage]:
+    """The model that answered, and the billed tokens, never too low.
 
     Args:
-        bill: what the answer says of it.
-        asked: the request.
-        reply: what was answered; None if that is no reply.
+        bill: the billing fields of the answer.
+        request_size: the size of the request.
+        reply: the reply; None if the answer has no valid one.
     """
     said, cut = None, False
     if reply is not None:
         said = sum(len(each.encode()) for each in (reply.text, reply.reasoning, reply.call))
         cut = reply.finish == "length"
-    return (bill.model or "")[:_LONGEST_WORD], usage_of(bill.usage, asked, said, cut)
+    return (bill.model or "")[:_LONGEST_WORD], usage_of(bill.usage, request_size, said, cut)
 
 
 def _without_thoughts(text: str) -> tuple[str, str]:
-    """The thoughts that a text begins with, and the rest.
+    """The thoughts at the beginning of a text, and the rest.
 
-    The opening tag may be missing, since some templates put it into the prompt; so may the closing
-    one, if the thoughts were cut off.
+    The opening tag may be missing, since some templates put it into the prompt. The closing tag may
+    be missing if the thoughts were cut off.
     """
     before, closed, after = text.partition("</think>")
     opened = before.lstrip().startswith("<think>")
@@ -184,16 +186,16 @@ def _without_thoughts(text: str) -> tuple[str, str]:
 
 
 def cost_of(usage: Usage, prices: Prices) -> float:
-    """US dollars. Tokens thought are among those of the completion, tokens remembered among those
-    of the prompt."""
+    """The cost in US dollars. Reasoning tokens are part of the completion, cached tokens of the
+    prompt."""
     remembered = prices.prompt if prices.cached_prompt is None else prices.cached_prompt
     fresh = usage.prompt - usage.cached
     paid = fresh * prices.prompt + usage.cached * remembered + usage.completion * prices.completion
     return paid / 1_000_000
 
 
-def server_words(body: bytes) -> str:
-    """What a server says in the body of an error, in one line."""
+def error_text(body: bytes) -> str:
+    """The error message in the body of an answer, in one line."""
     try:
         said = json.loads(body if len(body) <= _LONGEST_ERROR else "")
     except (ValueError, RecursionError):

@@ -1,7 +1,7 @@
-"""How long a run waits for its server, and what it tells meanwhile.
+"""Supervises the requests of a run: its time limit, its events, and its end.
 
-All requests of a run share a :class:`Watch`: its minutes, what happens to its requests, and its end
-where the server refuses one request after another.
+All requests of a run share a :class:`RequestSupervisor`. It limits the run's minutes, reports what
+happens to requests, and stops the run if the server refuses one request after another.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ from er_gym.rollout.agent import CannotGoOn
 
 AGAIN = "run the same command again to continue"
 REFUSED = 3
-"""So many different requests refused, with no reply between them, end the run."""
+"""The run ends after this many refused requests with no reply between them."""
 _QUIET = 15.0
-"""Seconds without news after which a waiting request says so."""
+"""Seconds without an event after which a waiting request reports itself."""
 _GRACE = 5.0
-"""Seconds that an answer under way still has once the server is given up."""
+"""Seconds that an answer under way still has after the run has stopped."""
 _LONGEST_WAIT = 3600.0  # seconds of one wait; threads cannot wait for an infinite time
 
 _log = logging.getLogger(__name__)
 
 
-class Notice(BaseModel):
-    """Something that a user waits for, or that went wrong; a line of ``server-events.jsonl``.
+class ServerEvent(BaseModel):
+    """A delay or a failure of the server; a line of ``server-events.jsonl``.
 
     Attributes:
         time: ISO 8601 in UTC.
         event: ``retry``: a try failed, and another follows after ``wait`` seconds; ``waiting``: no
-            answer yet; ``failed``: a request was given up; ``stopped``: the run was.
+            answer yet; ``failed``: a request was given up; ``stopped``: the run was stopped.
         what: what happened, in one line.
-        seed: of the episode; None for the run.
-        attempt, of: which try of how many.
-        wait: seconds.
+        seed: the episode's seed; None for the whole run.
+        attempt, of: the number of the try, and the most tries.
+        wait: seconds until the next try.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -63,24 +63,24 @@ class Notice(BaseModel):
         return f"{self.what}{place}{then}"
 
 
-Listener = Callable[[Notice], None]
+Listener = Callable[[ServerEvent], None]
 
 
-class Watch:
-    """The time of a run, and its news. One serves all threads.
+class RequestSupervisor:
+    """Supervises the requests of a run. All threads share one supervisor.
 
     Args:
-        max_minutes: of the run, counted from now; None for no limit.
+        max_minutes: the run's time limit, counted from now; None for no limit.
 
     Attributes:
-        show: is called with each notice that people should see, from the thread that it is about;
+        show: is called with each event that the user should see, from the thread concerned;
             by default the module's logger warns.
-        keep: is called with every notice.
+        log_event: is called with every event.
     """
 
     def __init__(self, max_minutes: float | None = None) -> None:
         self.show: Listener = _warn
-        self.keep: Listener = lambda notice: None
+        self.log_event: Listener = lambda server_event: None
         self._minutes = max_minutes
         self._ends = math.inf if max_minutes is None else time.monotonic() + 60 * max_minutes
         self._changed = threading.Condition()
@@ -99,34 +99,34 @@ class Watch:
 
     @property
     def over(self) -> bool:
-        """Whether the minutes are."""
+        """Whether the time limit is reached."""
         return time.monotonic() >= self._ends
 
     def stop(self, why: str, *, waits_for_answers: bool = False) -> CannotGoOn:
         """End all requests that have begun.
 
         Args:
-            why: in one line.
-            waits_for_answers: whether answers that are under way are still waited for, since they
-                are paid for. Otherwise they have five seconds.
+            why: the reason, in one line.
+            waits_for_answers: whether to wait for answers under way, since they are paid for.
+                Otherwise they have five seconds.
 
         Returns:
-            What to raise.
+            The exception to raise.
         """
         with self._changed:
             self._stopped = (time.monotonic(), why, waits_for_answers)
             self._forget_refusals()
             self._changed.notify_all()
-        self.tell("stopped", why)
+        self.emit("stopped", why)
         return CannotGoOn(why)
 
     def close(self) -> None:
-        """Let no request wait any longer; it gets a ModelError."""
+        """End every wait; waiting requests get a ModelError."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
-    def tell(
+    def emit(
         self,
         event: Literal["retry", "waiting", "failed", "stopped"],
         what: str,
@@ -135,21 +135,21 @@ class Watch:
         of: int = 0,
         wait: float = 0.0,
     ) -> None:
-        """Tell those who listen; for the arguments see :class:`Notice`."""
+        """Report an event; for the arguments see :class:`ServerEvent`."""
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
-        notice = Notice(
+        server_event = ServerEvent(
             time=now, event=event, what=what, seed=seed, attempt=attempt, of=of, wait=wait
         )
         self._last_news = time.monotonic()
-        self.keep(notice)
-        if event != "stopped":  # what is raised says so
-            with contextlib.suppress(OSError, ValueError):  # nobody reads what is shown
-                self.show(notice)
+        self.log_event(server_event)
+        if event != "stopped":  # the exception says so
+            with contextlib.suppress(OSError, ValueError):  # the terminal is closed
+                self.show(server_event)
 
     # -- for requests ------------------------------------------------------------------------------
 
     def _left(self, request: Request, answering: bool) -> float:
-        """Seconds; raises what ends the request."""
+        """The seconds left; raises the error that ends the request."""
         now = time.monotonic()
         if self._closed:
             raise ModelError("the client has been closed")
@@ -170,7 +170,7 @@ class Watch:
         self._left(request, False)
 
     def _is_quiet(self) -> bool:
-        """Whether nothing has been heard for long; only one of those who wait hears that."""
+        """Whether there was no event for long; True for one of the waiting threads only."""
         with self._changed:
             now = time.monotonic()
             if now - self._last_news < self._quiet:
@@ -182,7 +182,7 @@ class Watch:
         with self._changed:
             self._forget_refusals()
             self._last_reply = self._last_news = time.monotonic()
-            # A server that always takes long is no news.
+            # A server that always takes long is not reported.
             self._quiet = max(_QUIET, 2 * seconds)
 
     def _forget_refusals(self) -> None:
@@ -190,18 +190,18 @@ class Watch:
         self._given_up = 0
 
     def _failed(self, request: Request) -> None:
-        """A try of a request has."""
+        """A try of a request failed."""
         with self._changed:
             request.failing_since = min(request.failing_since, time.monotonic())
             self._refused.add(request.number)
 
     def _gave_up(self, request: Request) -> int:
-        """How many different requests the server has refused in a row, at the end of one of them; 0
-        where that may be the fault of this one. CannotGoOn where the run has stopped meanwhile."""
+        """How many requests in a row the server has refused; 0 if the fault may lie with this
+        request alone. Raises CannotGoOn if the run has stopped meanwhile."""
         with self._changed:
             self._left(request, False)
             self._given_up += 1
-            # Nobody has had a reply all the while.
+            # No request got a reply in the meantime.
             dead = self._last_reply < request.failing_since and len(self._refused) >= REFUSED
             return len(self._refused) if dead or self._given_up >= REFUSED else 0
 
@@ -210,74 +210,74 @@ class Request:
     """A request from its first try to its reply; it belongs to one thread.
 
     Attributes:
-        number: among those of the watch.
-        seed: of the episode.
-        began: monotonic seconds; ``failing_since``: of the first failed try.
-        answering: whether the try that is under way has been accepted: there is a status of 2xx.
-        attempt: which try is under way; ``of``: how many there are at most.
+        number: counts the supervisor's requests.
+        seed: the episode's seed.
+        began: monotonic seconds; ``failing_since``: the time of the first failed try.
+        answering: whether the server has accepted the current try with a status of 2xx.
+        attempt: the number of the current try; ``of``: the most tries.
     """
 
-    def __init__(self, watch: Watch, number: int, seed: int) -> None:
+    def __init__(self, supervisor: RequestSupervisor, number: int, seed: int) -> None:
         self.number, self.seed = number, seed
         self.began = time.monotonic()
         self.failing_since = math.inf
         self.answering = False
         self.attempt = self.of = 0
-        self._watch = watch
+        self._supervisor = supervisor
 
     def left(self, *, answering: bool = False) -> float:
-        """Seconds until the run's minutes are over.
+        """The seconds until the run's time limit.
 
         Args:
-            answering: whether an answer is waited for.
+            answering: whether an answer is under way.
 
         Raises:
-            CannotGoOn: they are over, or the run has stopped.
+            CannotGoOn: the limit is reached, or the run has stopped.
             ModelError: the client has been closed.
         """
-        return self._watch._left(self, answering)
+        return self._supervisor._left(self, answering)
 
     def wait(self, seconds: float) -> None:
-        """Wait, unless the run ends meanwhile; raises as :meth:`left`."""
-        self._watch._wait(self, seconds)
+        """Wait; raises as :meth:`left` if the run ends meanwhile."""
+        self._supervisor._wait(self, seconds)
 
     def still_waiting(self, what: str, seconds: float) -> None:
-        """Say that an answer has not come for so long, if nothing else has been said for long."""
-        if self._watch._is_quiet():
-            self._watch.tell("waiting", what, self.seed, self.attempt, self.of, seconds)
+        """Report that the answer is still missing, if there was no other event for long."""
+        if self._supervisor._is_quiet():
+            self._supervisor.emit("waiting", what, self.seed, self.attempt, self.of, seconds)
 
     def retry(self, what: str, wait: float, of: int) -> None:
-        """Say that a try failed, and that another of ``of`` follows."""
-        self._watch._failed(self)
-        self._watch.tell("retry", what, self.seed, self.attempt, of, wait)
+        """Report that a try failed and that another of ``of`` follows."""
+        self._supervisor._failed(self)
+        self._supervisor.emit("retry", what, self.seed, self.attempt, of, wait)
 
     def answered(self) -> None:
-        """There is a reply."""
-        self._watch._answered(time.monotonic() - self.began)
+        """Report a reply."""
+        self._supervisor._answered(time.monotonic() - self.began)
 
     def gave_up(self, what: str) -> ModelError | CannotGoOn:
-        """What to raise where no further try follows.
+        """The exception to raise after the last try.
 
-        The run stops where the server has refused several different requests in a row; otherwise
-        something may be wrong with this one alone.
+        The run stops if the server has refused several requests in a row; otherwise the fault may
+        lie with this request alone.
         """
-        self._watch._failed(self)
+        self._supervisor._failed(self)
         try:
-            refused = self._watch._gave_up(self)
+            refused = self._supervisor._gave_up(self)
         except CannotGoOn as error:
-            self._watch.tell("stopped", what, self.seed)
+            self._supervisor.emit("stopped", what, self.seed)
             return error
         if refused:
-            return self._watch.stop(
+            return self._supervisor.stop(
                 f"the server has refused {refused} requests in a row, the last with: {what}; see "
                 f"to it, and {AGAIN}"
             )
-        self._watch.tell("failed", what, self.seed)
+        self._supervisor.emit("failed", what, self.seed)
         return ModelError(what)
 
 
 def duration(seconds: float) -> str:
-    """Seconds as people say them: ``0.5 s``, ``90 s``, ``10 min``, ``5 h``."""
+    """A duration for people: ``0.5 s``, ``90 s``, ``10 min``, ``5 h``."""
     if math.isinf(seconds):
         return "for ever"
     if seconds < 120:
@@ -285,5 +285,5 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.0f} h"
 
 
-def _warn(notice: Notice) -> None:
-    _log.warning("%s", notice)
+def _warn(server_event: ServerEvent) -> None:
+    _log.warning("%s", server_event)

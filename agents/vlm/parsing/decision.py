@@ -1,4 +1,4 @@
-"""From the words of a decision to a verb and a name."""
+"""Reads a verb and an object's name from the text of a decision."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from agents.vlm.parsing_json import Found, fields_in, objects_in
-from agents.vlm.parsing_rules import RULES
-from agents.vlm.parsing_words import (
+from agents.vlm.parsing.json_objects import JsonObject, fields_in, objects_in
+from agents.vlm.parsing.rules import RULES
+from agents.vlm.parsing.vocabulary import (
     ALONE,
     ARTICLE,
     CLAUSE,
@@ -20,24 +20,24 @@ from agents.vlm.parsing_words import (
     PLACE_FIELDS,
     VERB_FIELDS,
     VERBS,
-    plain,
+    normalized,
 )
 from er_gym.tasks import verbs
 
 FENCE = "```"
 MOST = 20
-"""How many lines, or objects, are tried."""
+"""The most lines, or JSON objects, that are tried."""
 _LONGEST_LINE = 300
 
 
 @dataclass(frozen=True)
-class Words:
-    """What a decision says.
+class ParsedAction:
+    """The action of a decision.
 
     Attributes:
-        verb: canonical; "" where there is none.
-        name: of the object; "" where there is none.
-        rules: that were needed to see it.
+        verb: a canonical verb; "" for none.
+        name: the object's name as written; "" for none.
+        rules: the rules that were needed to read it.
     """
 
     verb: str
@@ -48,11 +48,11 @@ class Words:
 # -- a line ----------------------------------------------------------------------------------------
 
 _REWRITES = tuple((rule.name, rule.rewrite) for rule in RULES if rule.rewrite)
-_BY_PLAIN = {plain(phrase): phrase for phrase in VERBS}
+_BY_PLAIN = {normalized(phrase): phrase for phrase in VERBS}
 
 
 def _any_of(phrases: list[str]) -> str:
-    """A pattern for phrases however their words are joined, the longest first."""
+    """A pattern for phrases with their words joined in any way, longest phrase first."""
     longest_first = sorted(phrases, key=len, reverse=True)
     return "|".join(phrase.replace(" ", r"[\s_-]{0,3}") for phrase in longest_first)
 
@@ -60,7 +60,7 @@ def _any_of(phrases: list[str]) -> str:
 _OURS = _any_of([phrase for phrase in VERBS if phrase.isascii()])
 _THEIRS = _any_of([phrase for phrase in VERBS if not phrase.isascii()])
 _VERB = re.compile(
-    # Behind Latin letters a word has to end, or the next to begin with a capital.
+    # After Latin letters the word must end, or a capital must begin the next.
     rf"\s*(?:((?i:{_OURS}))(?:(?![A-Za-z0-9])|(?<=[a-z])(?=[A-Z]))|({_THEIRS}))"
 )
 _PUT = re.compile(
@@ -100,38 +100,38 @@ _PARTED: tuple[tuple[str, str, re.Pattern[str]], ...] = (
         if verb in verbs.OBJECT_VERBS and not phrase.isascii()
     ),
 )
-"""Verbs whose words stand around a name: the rule, the verb, and what they look like."""
+"""Verbs whose words surround a name: the rule, the verb, and the pattern."""
 _CALL = re.compile(r"\s*([A-Za-z][A-Za-z_ -]{0,40})\((.*?)\)?\W*$")
 _NAMED = re.compile(r"\s*(\w+)\s?=\s?")
 
 
-def read_line(line: str) -> Words:
-    """A verb and a name from a line; no verb where it is no action."""
+def read_line(line: str) -> ParsedAction:
+    """Read a verb and a name from a line; no verb if the line is not an action."""
     narrow = unicodedata.normalize("NFKC", line[:_LONGEST_LINE])
     needed = [] if narrow == line[:_LONGEST_LINE] else ["full width"]
     line = " ".join(narrow.split())
     if words := _called(line):
-        return Words(words.verb, words.name, (*needed, *words.rules))
+        return ParsedAction(words.verb, words.name, (*needed, *words.rules))
     for name, rewrite in _REWRITES:
         changed = rewrite(line)
         if changed != line:
             needed.append(name)
             line = changed
     words = _called(line) or _parted(line) or _said(line)
-    return Words(words.verb, words.name, (*needed, *words.rules))
+    return ParsedAction(words.verb, words.name, (*needed, *words.rules))
 
 
-def _called(line: str) -> Words | None:
+def _called(line: str) -> ParsedAction | None:
     """``navigate_to("Fridge")``, ``act(action="open", object="Fridge")``."""
     call = _CALL.match(line)
     if call is None:
         return None
-    phrase = _BY_PLAIN.get(plain(call[1]), "")
+    phrase = _BY_PLAIN.get(normalized(call[1]), "")
     if "=" in call[2] and call[1].isidentifier():
         fields = fields_in(_NAMED.sub(r" \1: ", call[2]))
         words = read_fields({**fields, VERB_FIELDS[0]: phrase})
         if words.name or words.verb in verbs.BARE_VERBS:
-            return Words(words.verb, words.name, ("call form", *words.rules))
+            return ParsedAction(words.verb, words.name, ("call form", *words.rules))
     if not phrase:
         return None
     # Without names: what is put comes before what it is put in.
@@ -140,44 +140,44 @@ def _called(line: str) -> Words | None:
     name, rules = clean_name(given[-1 if verb == verbs.PUT else 0]) if given else ("", ())
     if verb in verbs.BARE_VERBS:
         name, rules = "", ("words after",) if name else ()
-    return Words(verb, name, ("call form", *(rule for rule in rules if rule != "marks")))
+    return ParsedAction(verb, name, ("call form", *(rule for rule in rules if rule != "marks")))
 
 
-def _parted(line: str) -> Words | None:
+def _parted(line: str) -> ParsedAction | None:
     spaced = line.replace("_", " ")  # of the same length, so that names can be had as written
     for rule, verb, pattern in _PARTED:
         if found := pattern.match(spaced):
             name, more = clean_name(line[slice(*found.span("name"))])
             if f"{spaced} ".casefold().startswith("put in ") and not found["what"].strip():
                 rule = "" if spaced == line else "verb spelling"
-            return Words(verb, name, (*filter(None, [rule]), *more))
+            return ParsedAction(verb, name, (*filter(None, [rule]), *more))
     return None
 
 
-def _said(line: str) -> Words:
+def _said(line: str) -> ParsedAction:
     """A verb, then the name."""
     found = _VERB.match(line)
     if found is None:
-        return Words("")
+        return ParsedAction("")
     said, rest = found[0].strip(), line[found.end() :]
-    phrase = _BY_PLAIN[plain(said)]
+    phrase = _BY_PLAIN[normalized(said)]
     verb = VERBS[phrase]
     rules: tuple[str, ...] = ()
     if " ".join(said.casefold().split()) != verb:
-        spelt = plain(verb).startswith(plain(said))  # "put" and "navigate" are cut short
+        spelt = normalized(verb).startswith(normalized(said))  # "put" and "navigate" are cut short
         rules = ("verb spelling" if spelt else "verb synonym",)
     if verb in verbs.BARE_VERBS:
-        after = [plain(word) for word in rest.split() if plain(word)]
+        after = [normalized(word) for word in rest.split() if normalized(word)]
         if phrase in ALONE and not FILLER.issuperset(after):
-            return Words("")
+            return ParsedAction("")
         more = ("words after",) if after else ("marks",) if rest.strip() else ()
-        return Words(verb, rules=(*rules, *more))
+        return ParsedAction(verb, rules=(*rules, *more))
     name, needed = clean_name(rest)
-    return Words(verb, name, (*rules, *needed))
+    return ParsedAction(verb, name, (*rules, *needed))
 
 
 def clean_name(text: str) -> tuple[str, tuple[str, ...]]:
-    """A name without what stands around it, and the rules that this took."""
+    """A name without surrounding marks, article and clause, and the rules that this needed."""
     name = text.strip(EDGES)
     rules = ["marks"] if name != text.strip() else []
     if found := ARTICLE.match(name):
@@ -197,7 +197,7 @@ _NEXT_ACTION = re.compile(
 
 
 def _unfenced(text: str) -> str:
-    """What is in the last code fence that has anything in it; the text itself where none has."""
+    """The content of the last code fence that is not empty; the text itself if there is none."""
     inside = [
         # A word alone in the first line says which language it is.
         re.sub(r"\A(?:\w{1,12}\n|json\b|text\b)", "", block.lstrip(" ")).strip()
@@ -206,33 +206,34 @@ def _unfenced(text: str) -> str:
     return next((block for block in reversed(inside) if block), text.replace(FENCE, "").strip())
 
 
-def read_decision(text: str) -> Words:
-    """A verb and a name from what a decision's tag holds; no verb where it is no action."""
+def read_decision(text: str) -> ParsedAction:
+    """Read a verb and a name from the text of a decision; no verb if it is not an action."""
     needed: tuple[str, ...] = ()
     if FENCE in text:
         needed, text = ("code fence",), _unfenced(text)
     if found := find_fields(text):
         words = read_fields(found.fields)
-        return Words(words.verb, words.name, (*needed, "json", *words.rules))
+        return ParsedAction(words.verb, words.name, (*needed, "json", *words.rules))
     lines = [line for line in _NEXT_ACTION.split(text) if line.strip(EDGES)]
     for line in lines[:MOST]:
         words = read_line(line)
         if words.verb:
             more = ("several actions",) if len(lines) > 1 else ()
-            return Words(words.verb, words.name, (*needed, *more, *words.rules))
-    return Words("", rules=needed)
+            return ParsedAction(words.verb, words.name, (*needed, *more, *words.rules))
+    return ParsedAction("", rules=needed)
 
 
-def find_fields(text: str) -> Found | None:
-    """The last JSON object, or list of objects, that has an action, or at least a field for one."""
+def find_fields(text: str) -> JsonObject | None:
+    """The last JSON object or list of objects with an action, else the last with a field for
+    one."""
     found = objects_in(text, MOST)
     found = [each for each in found if not each.fields.keys().isdisjoint(VERB_FIELDS)]
     read = (each for each in reversed(found) if read_fields(each.fields).verb)
     return next(read, found[-1] if found else None)
 
 
-def read_fields(fields: Mapping[str, str]) -> Words:
-    """A verb and a name from the fields of a JSON object."""
+def read_fields(fields: Mapping[str, str]) -> ParsedAction:
+    """Read a verb and a name from the fields of a JSON object."""
     for field in VERB_FIELDS:
         words = read_line(fields.get(field, ""))
         if not words.verb:
@@ -243,8 +244,8 @@ def read_fields(fields: Mapping[str, str]) -> Words:
         names = (clean_name(fields.get(name, "")) for name in order if name != field)
         name, rules = next((found for found in names if found[0]), ("", ()))
         if words.verb in verbs.BARE_VERBS:
-            return Words(words.verb, "", (*words.rules, *(("words after",) if name else ())))
+            return ParsedAction(words.verb, "", (*words.rules, *(("words after",) if name else ())))
         if words.name:
             return words
-        return Words(words.verb, name, (*words.rules, *rules))
-    return Words("")
+        return ParsedAction(words.verb, name, (*words.rules, *rules))
+    return ParsedAction("")

@@ -1,4 +1,4 @@
-"""Where things may be: how likely a receptacle type holds one, and what it costs to look."""
+"""Priors for the search: how likely a receptacle type holds an object, and the cost of looking."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ _USUAL = {
     "Sofa": 1, "ArmChair": 2, "Chair": 2, "Desk": 1, "TowelHolder": 2, "HandTowelHolder": 2,
     "CoffeeTable": 1, "DiningTable": 1, "Dresser": 1, "Stool": 2, "ShelvingUnit": 1,
 }  # fmt: skip
-"""How many of a type a room has, at a guess; of others, one."""
+"""The estimated number of receptacles of a type in a room; one for other types."""
 _ROOMY = {
     "CounterTop": 1.5, "DiningTable": 1.5, "Desk": 1.5, "Bed": 1.2, "Sofa": 1.2, "SideTable": 1.2,
     "CoffeeTable": 1.2, "Fridge": 1.2, "TVStand": 1.0, "Dresser": 1.0, "Sink": 0.8,
     "SinkBasin": 0.8, "StoveBurner": 0.6, "CoffeeMachine": 0.4, "Toaster": 0.4, "Microwave": 0.8,
     "Safe": 0.9, "Cabinet": 0.75, "Drawer": 0.7,
 }  # fmt: skip
-"""How much more often than elsewhere things lie in one of a type."""
+"""How much more often than average objects lie in a receptacle of a type."""
 _FOREIGN = 0.08
-"""The same of receptacles that AI2-THOR would not let one put the thing into."""
+"""The factor for receptacles that AI2-THOR does not allow for the object."""
 _LIDS = frozenset({"Toilet"})
-"""What opens, but has on its lid what one can see."""
+"""Openable receptacles whose objects lie on the lid, in view."""
 MOBILE = frozenset(
     name for name, kind in OBJECT_TYPES.items() if {"receptacle", "pickupable"} <= kind.properties
 )
-"""Receptacles that one can carry: bowls, boxes."""
+"""Receptacles that can be picked up: bowls, boxes."""
 
 
 def has(object_type: str, prop: str) -> bool:
-    """Whether things of a type have an AI2-THOR property, in some scene."""
+    """Whether objects of a type have an AI2-THOR property in some scene."""
     kind = OBJECT_TYPES.get(object_type)
     return kind is not None and prop in kind.properties
 
 
 def usual_number(object_type: str) -> int:
-    """How many things of a type a room has, at a guess."""
+    """The estimated number of objects of a type in a room."""
     return _USUAL.get(object_type, 1)
 
 
 def opens(object_type: str) -> bool:
-    """Whether one has to open it to see what is in it."""
+    """Whether a receptacle type must be opened to see its content."""
     return (
         has(object_type, "openable")
         and has(object_type, "receptacle")
@@ -51,9 +51,10 @@ def opens(object_type: str) -> bool:
 
 @lru_cache(maxsize=4096)
 def likelihood(thing: str, receptacle: str) -> float:
-    """How likely a receptacle of a type is to hold a thing; only to be compared."""
+    """A score for how likely a receptacle type holds an object type; only its order has a
+    meaning."""
     taken_by = placement_table().get(thing, frozenset())
     if receptacle in taken_by:
         return _ROOMY.get(receptacle, 1.0)
-    # A thing that lies in a bowl is where the bowl is; Sink and basin are one place.
+    # An object in a bowl is where the bowl is; Sink and SinkBasin are one place.
     return _FOREIGN * _ROOMY.get(receptacle, 1.0)

@@ -1,4 +1,4 @@
-"""A reply taken apart at its tags: thoughts, decisions, and what is outside of them."""
+"""Splits a reply at its tags into thoughts, decisions and the text outside of tags."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from agents.vlm.parsing_words import (
+from agents.vlm.parsing.vocabulary import (
     CALL_TAGS,
     DECISION,
     DECISION_TAGS,
     THINK,
     THOUGHT_TAGS,
-    plain,
+    normalized,
 )
 
 
 @dataclass(frozen=True)
 class Thought:
-    """A part of a reply that decides nothing; ``kind`` is one of the values of
-    :data:`~agents.vlm.parsing_words.THOUGHT_TAGS`."""
+    """A thought of a reply; ``kind`` is one of the values of
+    :data:`~agents.vlm.parsing.vocabulary.THOUGHT_TAGS`."""
 
     kind: str
     text: str
@@ -31,7 +31,7 @@ _TAG = re.compile(r"[<＜]\s{0,3}([/／\\]?)\s{0,3}([^\W\d_][\w -]{0,30})\s{0,3}
 
 @dataclass(frozen=True)
 class _Tag:
-    """A tag that means something; ``kind`` is a thought's, or ``DECISION``."""
+    """A known tag; ``kind`` is a kind of thought, or ``DECISION``."""
 
     start: int
     end: int
@@ -43,12 +43,12 @@ class _Tag:
 
 @dataclass(frozen=True)
 class TaggedDecision:
-    """What a decision's tag holds.
+    """The content of a decision tag.
 
     Attributes:
         body: the text.
-        before: how many pieces of text outside of tags come before it.
-        rules: that the tag needs.
+        before: the number of pieces of text outside of tags before it.
+        rules: the rules that the tag needs.
     """
 
     body: str
@@ -57,15 +57,15 @@ class TaggedDecision:
 
 
 @dataclass
-class Layout:
-    """A reply, taken apart.
+class TaggedReply:
+    """A reply, split at its tags.
 
     Attributes:
-        thoughts: in tags.
-        decisions: in tags; ``weighed``: those inside of ``<think>``.
-        outside: the text that is in no tags, in pieces.
-        last_open: what follows a last tag that has no end.
-        rules: needed for all this.
+        thoughts: the thoughts in tags.
+        decisions: the decisions in tags; ``weighed``: those inside of ``<think>``.
+        outside: the pieces of text outside of tags.
+        last_open: the text after a last tag without an end tag.
+        rules: the rules that the split needed.
     """
 
     thoughts: list[Thought] = field(default_factory=list)
@@ -78,7 +78,7 @@ class Layout:
     def all_thoughts(
         self, before: Iterable[str], more: tuple[Thought, ...] = ()
     ) -> tuple[Thought, ...]:
-        """Those in tags and ``more``; where there are none, what was said before the decision."""
+        """The thoughts in tags and ``more``; without any, the text before the decision."""
         if self.thoughts or more:
             return (*self.thoughts, *more)
         said = "\n".join(before).strip()
@@ -88,7 +88,7 @@ class Layout:
 def _tags(text: str) -> list[_Tag]:
     tags = []
     for found in _TAG.finditer(text):
-        name = plain(found[2])
+        name = normalized(found[2])
         kind = DECISION if name in DECISION_TAGS | CALL_TAGS else THOUGHT_TAGS.get(name, "")
         if kind:
             closes = bool(found[1])
@@ -96,11 +96,11 @@ def _tags(text: str) -> list[_Tag]:
     return tags
 
 
-def take_apart(text: str) -> Layout:
-    """Take a reply apart at its tags. Linear in the length of the text."""
+def split_at_tags(text: str) -> TaggedReply:
+    """Split a reply at its tags, in time linear in its length."""
     tags = _tags(text)
     ends_of_thinking = [n for n, tag in enumerate(tags) if tag.closes and tag.name == THINK]
-    layout = Layout()
+    layout = TaggedReply()
     at = number = 0
     while number < len(tags):
         tag = tags[number]
@@ -110,7 +110,7 @@ def take_apart(text: str) -> Layout:
             continue
         layout.outside.append(text[at : tag.start])
         number += 1
-        if tag.name == THINK:  # whatever tags are inside, as far as it has an end
+        if tag.name == THINK:  # skip the tags inside, if it has an end
             later = bisect_left(ends_of_thinking, number)
             number = ends_of_thinking[later] if later < len(ends_of_thinking) else number
         end = tags[number] if number < len(tags) else None
@@ -126,8 +126,8 @@ def take_apart(text: str) -> Layout:
     return layout
 
 
-def _add(layout: Layout, tag: _Tag, end: _Tag | None, body: str) -> None:
-    """Add what stands behind a tag; ``end`` is its end tag."""
+def _add(layout: TaggedReply, tag: _Tag, end: _Tag | None, body: str) -> None:
+    """Add the text after a tag; ``end`` is its end tag."""
     if not body.strip():
         return
     rules = [] if end else ["no end tag"]
@@ -135,7 +135,7 @@ def _add(layout: Layout, tag: _Tag, end: _Tag | None, body: str) -> None:
         layout.rules += rules
         layout.thoughts.append(Thought(tag.kind, body.strip()))
         if tag.name == THINK and end:
-            layout.weighed += take_apart(body).decisions
+            layout.weighed += split_at_tags(body).decisions
         return
     if tag.name in CALL_TAGS:
         rules.append("tool call")
@@ -144,8 +144,8 @@ def _add(layout: Layout, tag: _Tag, end: _Tag | None, body: str) -> None:
     layout.decisions.append(TaggedDecision(body, len(layout.outside), tuple(rules)))
 
 
-def _end_without_start(layout: Layout, tag: _Tag, body: str) -> None:
-    """Add what stands before an end tag, back to the tag before it."""
+def _end_without_start(layout: TaggedReply, tag: _Tag, body: str) -> None:
+    """Add the text between an end tag without a start tag and the tag before it."""
     if not body.strip():
         return
     if tag.kind == DECISION:
@@ -156,7 +156,7 @@ def _end_without_start(layout: Layout, tag: _Tag, body: str) -> None:
         layout.decisions.append(TaggedDecision(last, len(layout.outside), rules))
         return
     layout.rules.append("no start tag")
-    if tag.name == THINK:  # the chat template has said <think>: all so far is thinking
+    if tag.name == THINK:  # the chat template wrote <think>: everything so far is thinking
         body = "\n".join((*layout.outside, body))
         layout.outside.clear()
         layout.weighed += layout.decisions
