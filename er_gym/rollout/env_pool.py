@@ -287,7 +287,9 @@ def _serve(pipes: Mapping[int, Connection], env: Mapping[str, Any], serving: Any
                 try:
                     request = pipe.recv_bytes()
                     serving.value = slot
-                    pipe.send_bytes(_answer(slot_envs[slot], request))
+                    answer = _answer(slot_envs[slot], request)
+                    serving.value = _NO_SLOT  # first: an answered slot is not to blame
+                    pipe.send_bytes(answer)
                 except (EOFError, OSError):
                     del open_pipes[slot]
                 serving.value = _NO_SLOT
