@@ -91,7 +91,7 @@ def test_a_model_client_replies(name: str, tmp_path: Path) -> None:
     agent = speaker.agent(0)
     agent.reset(info["task"], obs, info)
     assert str(agent.act(obs, info).action) == "open Fridge"
-    assert "1 replies" in speaker.spent
+    assert "1 replies" in str(speaker.cost)
     speaker.close()
     env.close()
 
