@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from inspect import signature
+from typing import Any
 
 from agents.scripted.oracle import OracleAgent
 from agents.scripted.random import RandomAgent
@@ -68,7 +69,7 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
             f"agent {name!r} cannot be made ({reason(error)}); it is called with seed= if it takes "
             "that, else without arguments"
         ) from error
-    parts = {"obs_mode": str, "reset": Callable, "act": Callable}
+    parts: dict[str, Any] = {"obs_mode": str, "reset": Callable, "act": Callable}
     lacking = [
         part for part, kind in parts.items() if not isinstance(getattr(agent, part, None), kind)
     ]

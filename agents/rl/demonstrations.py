@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -61,14 +61,15 @@ def demonstrate(
     for _ in range(episodes):
         agent = make_agent(teacher)
         obs, info = env.reset()
+        last: Mapping[str, Any] = info
         agent.reset(info["task"], info["seen"], info)
         steps = []
         for each in transitions(env, agent, obs, info, seen="seen"):
             mask, action = each.info_before["action_mask"], understand(each.decision.action)[0]
             steps.append(_Step(each.before, mask, action, each.reward))
-            info = each.info
-        successes += info["success"]
-        if info["success"] or not successes_only:
+            last = each.info
+        successes += last["success"]
+        if last["success"] or not successes_only:
             kept.append(_of(env, steps, gamma))
     return replace(concatenate(kept), episodes=episodes, successes=successes)
 
@@ -94,7 +95,7 @@ class _Step(NamedTuple):
     reward: float
 
     @property
-    def index(self) -> int:
+    def action_index(self) -> int:
         """The index of the action; -1 for an action outside of the action space."""
         return -1 if self.action is None else INDEX.get(self.action, -1)
 
@@ -106,9 +107,11 @@ def _of(env: gymnasium.Env[Obs, Any], steps: Sequence[_Step], gamma: float) -> D
     ahead = 0.0
     for number in reversed(range(len(steps))):
         returns[number] = ahead = steps[number].reward + gamma * ahead
-    rows = [n for n, step in enumerate(steps) if step.index >= 0 and step.mask[step.index]]
-    unread = sum(step.index < 0 for step in steps)
-    space = env.observation_space
+    rows = [
+        n for n, step in enumerate(steps) if step.action_index >= 0 and step.mask[step.action_index]
+    ]
+    unread = sum(step.action_index < 0 for step in steps)
+    space: Any = env.observation_space
     assert isinstance(space, spaces.Dict)
     return Demonstrations(
         obs={
@@ -116,7 +119,7 @@ def _of(env: gymnasium.Env[Obs, Any], steps: Sequence[_Step], gamma: float) -> D
             for key, box in space.spaces.items()
         },
         masks=np.array([steps[n].mask for n in rows], np.int8).reshape(-1, len(ACTIONS)),
-        actions=np.array([steps[n].index for n in rows], np.intp),
+        actions=np.array([steps[n].action_index for n in rows], np.intp),
         returns=returns[rows] if rows else returns[:0],
         episodes=0,
         successes=0,

@@ -115,7 +115,8 @@ def restore(file: Path, model: BaseAlgorithm) -> None:
                 name: _tensor(archive, f"policy/{name}", value) for name, value in weights.items()
             }
             optimizer = _optimizer(archive, model)
-        model.set_parameters({"policy": policy, "policy.optimizer": optimizer}, device="cpu")
+        found: dict[str, Any] = {"policy": policy, "policy.optimizer": optimizer}
+        model.set_parameters(found, device="cpu")
         for name in _COUNTERS:
             if hasattr(model, name):
                 setattr(model, name, type(getattr(model, name))(about["counters"][name]))

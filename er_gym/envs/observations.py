@@ -296,12 +296,14 @@ def _text(situation: Situation) -> str:
 
 
 FAR = 40.0
-"""The greatest ``depth``, metres: what is farther, and where there is nothing, has this value. The
-embedded ``situation.perception`` draws as far as this."""
+"""The greatest ``depth``, metres; surfaces farther away, and pixels without any, have this value. The
+embedded engine draws as far as this."""
 
 
 def _depth(situation: Situation) -> NDArray[np.float32]:
-    return np.clip(situation.perception.depth, 0.0, FAR, dtype=np.float32)  # a copy
+    depth = situation.perception.depth
+    assert depth is not None  # the row asks for it
+    return np.asarray(np.clip(depth, 0.0, FAR, dtype=np.float32))  # a copy
 
 
 def _instance(situation: Situation) -> NDArray[np.int32]:
@@ -310,6 +312,7 @@ def _instance(situation: Situation) -> NDArray[np.int32]:
 
 def _instance_ids(situation: Situation) -> dict[str, Any]:
     perception = situation.perception
+    assert perception.instances is not None  # the row asks for them
     ids = [""] * (len(perception.objects) + 1)
     for number in np.unique(perception.instances).tolist():
         if number:
@@ -365,7 +368,7 @@ OBSERVATIONS: Registry[Observation] = Registry(
         "rgb": Observation(
             lambda width, height: spaces.Box(0, 255, (height, width, 3), np.uint8),
             # A copy: after an illegal action the perception is that of the step before.
-            lambda situation: np.array(situation.perception.picture),
+            lambda situation: np.array(situation.picture),
             needs=("frame",),
         ),
         "depth": Observation(

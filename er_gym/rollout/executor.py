@@ -122,7 +122,7 @@ class Executor(Protocol):
         """
 
 
-def unbegun_episode(task: Task, manifest: LostJob, error: str) -> EpisodeRecord:
+def unbegun_episode(task: Task, manifest: Manifest, error: str) -> EpisodeRecord:
     """The record of an episode that crashed before its environment could tell the step limit."""
     return record_episode(
         task,

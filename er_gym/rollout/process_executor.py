@@ -40,8 +40,10 @@ def play_in_processes(
         for task, result in results:
             if isinstance(result, _Stop):
                 raise CannotGoOn(result.message)
-            lost = isinstance(result, LostJob)
-            played = PlayedEpisode(lost_episode(task, result, manifest)) if lost else result
+            if isinstance(result, LostJob):
+                played = PlayedEpisode(lost_episode(task, result, manifest))
+            else:
+                played = result
             sink.save(played)
             sink.ended(played)
 

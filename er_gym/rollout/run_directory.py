@@ -283,7 +283,7 @@ class RunDirectory:
             raise ValueError(f"a copy: it holds the episode of {episode.task_id!r:.80}, as {name}")
         manifest = self.manifest
         if episode.run:
-            told = [("run", episode.run, manifest.digest)]
+            told: list[tuple[str, str | int, str | int]] = [("run", episode.run, manifest.digest)]
         else:  # written before episodes told of their run
             seed = episode_seed(manifest.seed, episode.task_id)
             told = [("agent", episode.agent, manifest.agent), ("seed", episode.seed, seed)]

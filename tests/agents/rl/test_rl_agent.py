@@ -71,11 +71,11 @@ def test_a_run_that_is_not_there(tmp_path: Path) -> None:
 
 
 def test_depths_are_made_small_and_stacked() -> None:
-    options = Episodes(obs_mode="rgb+depth+state", width=32, height=18, frames=2)
+    options = EnvConfig(obs_mode="rgb+depth+state", width=32, height=18, frames=2)
     env = EmbodiedEnv((), obs_mode=options.obs_mode, width=64, height=36)
     obs, info = env.reset(options={"task": MINI[0]})
-    perception = Perception(options)
-    made = perception.begin(obs, info, MINI[0].instruction)
+    perception = PolicyObservation(options)
+    made = perception.reset(obs, info, MINI[0].instruction)
     assert made in perception.space
     assert made["depth"].shape == (18, 32, 2)
     near = obs["depth"][:2, :2].mean()  # four pixels become one
