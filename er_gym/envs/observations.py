@@ -296,7 +296,7 @@ def _text(situation: Situation) -> str:
 
 
 FAR = 40.0
-"""The greatest ``depth``, metres; surfaces farther away, and pixels without any, have this value. The
+"""The greatest ``depth``, metres: the value of farther surfaces, and of pixels without one. The
 embedded engine draws as far as this."""
 
 
