@@ -52,6 +52,7 @@ USED_OTHERWISE = {
     "mypy": "a command",
     "opencv-python-headless": "ai2thor imports its cv2",
     "pytest-cov": "an option of pytest",
+    "pytest-xdist": "an option of pytest",
     "qwen-vl-utils": "a test imports it where it is installed",
     "ruff": "a command",
     "sentence-transformers": "imported by its name, late",

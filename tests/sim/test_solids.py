@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support import in_one_test
 
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.settings import Settings
@@ -21,7 +22,7 @@ from er_gym.thor import OBJECT_TYPES
 TYPES = sorted({kind for name in SCENE_NAMES for kind in load_scene(name).types})
 
 
-@pytest.mark.parametrize("kind", TYPES)
+@in_one_test("kind", TYPES)
 @pytest.mark.parametrize("size", [(1.2, 0.8, 0.6), (0.3, 2.0, 0.3), (0.1, 0.02, 0.05)])
 def test_parts_are_boxes_inside_the_thing(kind, size):
     for surface in (None, 0.4 * size[1]):

@@ -8,6 +8,7 @@ from math import hypot, sqrt, tan
 
 import numpy as np
 import pytest
+from support import in_one_test
 
 from benchmarks.checks.comparisons.reachable import pieces
 from er_gym.sim.agent import Agent
@@ -51,7 +52,7 @@ def distance_to_walkable(points, recorded):
     return nearest
 
 
-@pytest.mark.parametrize("scene", SCENE_NAMES)
+@in_one_test("scene", SCENE_NAMES)
 def test_one_can_stand_where_the_record_says(enter, scene):
     enter(scene)  # which has to be possible
     found = {tuple(place) for place in standing_places(scene, 0.25).tolist()}
@@ -60,7 +61,7 @@ def test_one_can_stand_where_the_record_says(enter, scene):
     assert len(found) < 2 * len(recorded)
 
 
-@pytest.mark.parametrize("scene", SCENE_NAMES)
+@in_one_test("scene", SCENE_NAMES)
 def test_a_finer_grid_goes_on_a_little_beyond_the_record(enter, scene):
     """What was joined stays joined, and much of what is 0.1 m from the record can be stood on.
 

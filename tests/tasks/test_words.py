@@ -3,6 +3,7 @@ from __future__ import annotations
 import re
 
 import pytest
+from support import in_one_test
 
 from er_gym.tasks.generate import templates
 from er_gym.tasks.generate.templates import STYLES, in_order
@@ -21,6 +22,7 @@ WORDINGS = {
     name: getattr(templates, name) for name in ("FIND", "PICK_UP", "TOGGLE", "MOVE", "MOVE_TWO")
 }
 EVERY = [(name, template) for name, rows in WORDINGS.items() for template in rows]
+"""Each template with the name of the wording that it belongs to."""
 FIRST = {
     "FIND": "Find the {object} in the {room}.",
     "PICK_UP": "Pick up the {object} in the {room}.",
@@ -91,10 +93,8 @@ def test_a_wording_has_many_templates_all_different(wording: str) -> None:
 
 
 @pytest.mark.parametrize("case", SUBJECTS)
-@pytest.mark.parametrize(("wording", "template"), EVERY)
-def test_a_filled_template_is_an_english_instruction(
-    wording: str, template: str, case: str
-) -> None:
+@in_one_test("template", [template for _, template in EVERY])
+def test_a_filled_template_is_an_english_instruction(template: str, case: str) -> None:
     text = fill(template, case)
     assert re.fullmatch(r"[A-Z].*[.?]", text)
     assert not re.search(r"[{}]|\s\s|\s[,.;:?]|^\s|\s$", text)
@@ -105,8 +105,9 @@ def test_a_filled_template_is_an_english_instruction(
 
 
 @pytest.mark.parametrize("case", SUBJECTS)
-@pytest.mark.parametrize(("wording", "template"), EVERY)
-def test_a_filled_template_names_everything(wording: str, template: str, case: str) -> None:
+@in_one_test("row", EVERY)
+def test_a_filled_template_names_everything(row: tuple[str, str], case: str) -> None:
+    wording, template = row
     text = fill(template, case)
     assert SUBJECTS[case]["object"] in text
     assert ("in the Fridge" in text) == (wording in ("MOVE", "MOVE_TWO"))
@@ -116,8 +117,8 @@ def test_a_filled_template_names_everything(wording: str, template: str, case: s
         assert "on the Shelf" in text
 
 
-@pytest.mark.parametrize(("wording", "template"), EVERY)
-def test_pronouns_and_verbs_agree_with_the_subject(wording: str, template: str) -> None:
+@in_one_test("template", [template for _, template in EVERY])
+def test_pronouns_and_verbs_agree_with_the_subject(template: str) -> None:
     words = {"room": "kitchen", "way": "on", "place": "in the Box", "second_place": "on the Bed"}
     one, many = subject("Apple"), subject("Boots")
     singular = template.format_map({**words, **one, **second(one)})
@@ -127,13 +128,13 @@ def test_pronouns_and_verbs_agree_with_the_subject(wording: str, template: str) 
     assert not re.search(r"(?<!see to )\bit\b|Boots (is|has|goes)\b|is the Boots", plural)
 
 
-@pytest.mark.parametrize("template", WORDINGS["FIND"])
+@in_one_test("template", WORDINGS["FIND"])
 def test_a_search_does_not_ask_to_take_the_thing(template: str) -> None:
     taking = r"\b(pick|take|get|grab|fetch|bring|hold|held|carry|give|lift|hand)\b"
     assert not re.search(taking, template, re.IGNORECASE)
 
 
-@pytest.mark.parametrize("template", WORDINGS["PICK_UP"])
+@in_one_test("template", WORDINGS["PICK_UP"])
 def test_a_pickup_says_that_the_thing_is_to_be_held(template: str) -> None:
     held = r"[Pp]ick(ed|ing)? (up|\{it\} up)|hand\b|\b[Hh]old(ing)?\b|\bheld\b"
     assert re.search(held, template)
@@ -147,7 +148,7 @@ def test_no_particle_is_torn_from_its_verb_by_a_long_name(field: str, follows: s
         assert not re.search(re.escape(field) + follows, template)
 
 
-@pytest.mark.parametrize("template", WORDINGS["MOVE_TWO"])
+@in_one_test("template", WORDINGS["MOVE_TWO"])
 def test_two_transfers_are_in_plain_order(template: str) -> None:
     order = r"\b([Ff]irst|then|after|afterwards|order|[Bb]efore|[Oo]nce|[Ww]hen|[Nn]ext|[Ss]tep)\b"
     assert re.search(order, template)
@@ -166,7 +167,7 @@ CLAUSES = (
 
 
 @pytest.mark.parametrize("count", range(1, 7))
-@pytest.mark.parametrize("style", range(STYLES))
+@in_one_test("style", range(STYLES))
 def test_joined_clauses_stand_verbatim_in_their_order(style: int, count: int) -> None:
     clauses = CLAUSES[:count]
     text = in_order(clauses, style)
@@ -180,7 +181,7 @@ def test_joined_clauses_stand_verbatim_in_their_order(style: int, count: int) ->
     assert not re.search(r"[{}]|\s\s|\s[,.;:?]|[,.;:?]{2}|[.?] [a-z]", text)
 
 
-@pytest.mark.parametrize("style", range(STYLES))
+@in_one_test("style", range(STYLES))
 def test_one_clause_alone_has_no_order(style: int) -> None:
     text = in_order(["slice the Bread"], style)
     assert not re.search(r"\b(first|then|next|step|finally|begin)\b", text, re.IGNORECASE)

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from support import NO_MODELS
+from support import NO_MODELS, in_one_test
 
 from agents.vlm import matching
 from agents.vlm.matching import Match, Matcher
@@ -71,7 +71,7 @@ def test_every_name_is_found(
 # -- looked up -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", OBJECT_TYPES)
+@in_one_test("name", OBJECT_TYPES)
 def test_types_by_their_own_names(name: str) -> None:
     words = "".join(f" {letter}" if letter.isupper() else letter for letter in name).strip()
     if name not in ("CD", "TVStand"):

@@ -6,6 +6,7 @@ import random
 import time
 
 import pytest
+from support import in_one_test
 
 from agents.vlm.parsing import ParsedReply, Thought, parse
 from agents.vlm.parsing.reply import LONGEST
@@ -441,7 +442,7 @@ def test_thoughts_before_decisions_of_all_kinds() -> None:
 # -- verbs and names -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("phrase", VERBS)
+@in_one_test("phrase", VERBS)
 def test_every_way_to_say_a_verb(phrase: str) -> None:
     verb = VERBS[phrase]
     assert verb in (*verbs.OBJECT_VERBS, *verbs.BARE_VERBS)
@@ -454,7 +455,7 @@ def test_every_way_to_say_a_verb(phrase: str) -> None:
             assert (parsed.verb, parsed.name) == (verb, name)
 
 
-@pytest.mark.parametrize("verb", verbs.OBJECT_VERBS)
+@in_one_test("verb", verbs.OBJECT_VERBS)
 @pytest.mark.parametrize("name", ["CounterTop", "credit card", "Fridge|+00.97|-01.00", "信用卡"])
 def test_names_stay_as_they_are_written(verb: str, name: str) -> None:
     assert parse(tagged(f"{verb} {name}")) == ParsedReply(verb, name)
@@ -522,7 +523,7 @@ def test_what_is_no_action_is_quoted_in_a_line_and_not_at_length() -> None:
     assert problem.startswith(f"'{'dance ' * 9}dance…' is no action.")
 
 
-@pytest.mark.parametrize("verb", verbs.OBJECT_VERBS)
+@in_one_test("verb", verbs.OBJECT_VERBS)
 @pytest.mark.parametrize("name", ["", "it", "<object>", "the", "."])
 def test_verbs_that_lack_their_object(verb: str, name: str) -> None:
     parsed = parse(tagged(f"{verb} {name}"))

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import in_one_test
 
 from er_gym.sim.agent import AGENT_HEIGHT, Agent
 from er_gym.sim.render.camera import Camera
@@ -37,7 +38,7 @@ def boxes(world: World, i: int) -> dict[str, Patch]:
     return mesh.patches()
 
 
-@pytest.mark.parametrize("name", SCENE_NAMES)
+@in_one_test("name", SCENE_NAMES)
 def test_one_can_stand_where_one_can_stand(name: str) -> None:
     plan, places = floor_plan(name), load_scene(name).reachable
     assert all(plan.contains(place) for place in places)
@@ -48,7 +49,7 @@ def test_one_can_stand_where_one_can_stand(name: str) -> None:
         assert (away[away > 0] > 0.2).all()
 
 
-@pytest.mark.parametrize("name", SCENE_NAMES)
+@in_one_test("name", SCENE_NAMES)
 def test_walls_are_around_the_room_and_face_it(name: str) -> None:
     plan = floor_plan(name)
     for wall in plan.walls:
@@ -61,7 +62,7 @@ def test_walls_are_around_the_room_and_face_it(name: str) -> None:
     assert around >= 2 * (np.ptp(plan.xs) + np.ptp(plan.zs)) - 1e-6
 
 
-@pytest.mark.parametrize("name", SCENE_NAMES)
+@in_one_test("name", SCENE_NAMES)
 def test_things_within_reach_are_in_the_room(name: str) -> None:
     scene, plan = load_scene(name), floor_plan(name)
     low, high = scene.aabb_center - scene.aabb_size / 2, scene.aabb_center + scene.aabb_size / 2

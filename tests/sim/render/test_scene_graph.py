@@ -10,6 +10,7 @@ from hashlib import sha256
 
 import numpy as np
 import pytest
+from support import in_one_test
 
 from er_gym.sim.actions import perform
 from er_gym.sim.agent import Agent
@@ -91,7 +92,7 @@ def _looks(kind: str) -> list[Appearance]:
     return [replace(look, **off) for look in found.values()]  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("kind", sorted(OBJECT_TYPES.keys() - UNSEEN))
+@in_one_test("kind", sorted(OBJECT_TYPES.keys() - UNSEEN))
 def test_shapes_are_well_formed_in_every_state(kind: str) -> None:
     for plain in _looks(kind):
         for look in (
@@ -111,7 +112,7 @@ def test_shapes_are_well_formed_in_every_state(kind: str) -> None:
             assert sum(len(patch.triangles) for patch in patches.values()) < 2500
 
 
-@pytest.mark.parametrize("kind", sorted(SHAPES))
+@in_one_test("kind", sorted(SHAPES))
 def test_shapes_fill_the_size_that_they_are_given(kind: str) -> None:
     for look in _looks(kind):
         points = np.concatenate([patch.vertices for patch in build(look).values()])
