@@ -178,7 +178,7 @@ def _package(entry: metadata.EntryPoint) -> str:
     return entry.dist.name if entry.dist else "unknown"
 
 
-def reason(error: Exception) -> str:
+def reason(error: BaseException) -> str:
     """What was raised, in one line."""
     first_line = (str(error).strip().splitlines() or [""])[0]
     return f"{type(error).__name__}: {first_line}"

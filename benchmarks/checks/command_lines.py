@@ -32,12 +32,14 @@ from typing import NoReturn
 import benchmarks.cli.vlm_run  # noqa: F401  # imported once, not in each fork
 from benchmarks.checks.bad_commands import Line, lines
 from benchmarks.checks.bad_files import make
-from benchmarks.cli import main as cli
+from benchmarks.cli.main import main as er_gym
 
 _AT_ONCE = 2
 _REAL_EVERY = 10
 _SECONDS, _CPU_SECONDS = 120.0, 20.0
 """That a line may take on a busy machine, and of a processor; most take a tenth of one."""
+_GRACE = 5.0
+"""Seconds that a command's helpers, such as multiprocessing's, have to follow it."""
 _MEGABYTES = 500
 _LINES, _CHARACTERS = 3, 2_500
 """That stderr may have."""
@@ -100,8 +102,25 @@ def _taken_port() -> Iterator[int]:
 
 def _ends(chosen: Sequence[Line], top: Path, port: int) -> Iterator[_Ended]:
     """Run all, a few at once."""
-    waiting = list(enumerate(chosen))[::-1]
     running: dict[int, tuple[Line, Path, float]] = {}
+    try:
+        yield from _ends_of(list(enumerate(chosen))[::-1], running, top, port)
+    finally:  # Ctrl-C too
+        for pid in running:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
+            for member in _session(pid):
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(member, signal.SIGKILL)
+
+
+def _ends_of(
+    waiting: list[tuple[int, Line]],
+    running: dict[int, tuple[Line, Path, float]],
+    top: Path,
+    port: int,
+) -> Iterator[_Ended]:
     while waiting or running:
         while waiting and len(running) < _AT_ONCE:
             number, line = waiting.pop()
@@ -125,12 +144,34 @@ def _ends(chosen: Sequence[Line], top: Path, port: int) -> Iterator[_Ended]:
             if done:
                 del running[pid]
                 code = os.waitstatus_to_exitcode(status)
-                left = False
-                with contextlib.suppress(ProcessLookupError):
-                    os.killpg(pid, signal.SIGKILL)
-                    left = True
+                left = _left_behind(pid)
                 cpu = used.ru_utime + used.ru_stime
                 yield _Ended(line, folder, code, seconds, cpu, used.ru_maxrss >> 10, left)
+
+
+def _left_behind(pid: int) -> bool:
+    """End what is left of a command's session; whether it did not end by itself."""
+    end = time.monotonic() + _GRACE
+    while members := _session(pid):
+        if time.monotonic() > end:
+            for member in members:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(member, signal.SIGKILL)
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def _session(leader: int) -> list[int]:
+    """The processes of a session that run, the dead that nobody has fetched left out."""
+    found = []
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            pid, _, rest = file.read_text().partition(" (")
+            state, _, _, session, *_ = rest.rpartition(") ")[2].split()
+            if int(session) == leader and state not in "ZX":
+                found.append(int(pid))
+    return found
 
 
 def _run(line: Line, folder: Path, port: int, real: bool) -> NoReturn:
@@ -163,7 +204,7 @@ def _run(line: Line, folder: Path, port: int, real: bool) -> NoReturn:
             os.execv(sys.executable, [sys.executable, "-m", "benchmarks.cli", *words])
         sys.path.insert(0, str(folder / "files"))
         try:
-            cli.main(words)
+            er_gym(words)
         except SystemExit as ended:
             code = ended.code if isinstance(ended.code, int) else 1
     except BaseException:  # as a process of its own would end

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import signal
+import threading
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
 from benchmarks.cli.terminal import echo
 
 _LONGEST = 2_000  # characters of a complaint
+_MOST_LINES = 10  # about tasks of a suite
 
 if TYPE_CHECKING:
     from er_gym.tasks.errors import SetAside, Taken
@@ -36,6 +39,24 @@ def bad_input(*more: type[Exception]) -> Iterator[None]:
         raise BadInput(str(error)) from error
 
 
+@contextlib.contextmanager
+def interrupted_by_sigterm() -> Iterator[None]:
+    """Take SIGTERM, with which schedulers end jobs, for Ctrl-C: what has been done is kept, and a
+    start that has done nothing leaves nothing."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _interrupt(signum: int, frame: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
 def complain(message: str) -> None:
     """Say something in one line on stderr."""
     text = " ".join(message.split())
@@ -45,10 +66,13 @@ def complain(message: str) -> None:
 
 
 def tell_left_out(suite: str, set_aside: Iterable[SetAside], taken: Iterable[Taken] = ()) -> None:
-    """Say which of a suite's tasks are left out, and what is taken for what the scenes lack."""
+    """Say which of a suite's tasks are left out, and what is taken for what the scenes lack: a line
+    each, as long as there are not too many."""
     from er_gym.tasks.errors import told_once
 
-    for line in told_once(taken):
-        complain(f"{suite}: {line}")
-    for one in set_aside:
-        complain(f"{suite}: set aside: {one}")
+    aside = [f"set aside: {one}" for one in set_aside]
+    for lines, what in ((told_once(taken), "objects taken for others"), (aside, "tasks set aside")):
+        for line in lines[:_MOST_LINES]:
+            complain(f"{suite}: {line}")
+        if len(lines) > _MOST_LINES:
+            complain(f"{suite}: and {len(lines) - _MOST_LINES:,} more {what}")

@@ -19,6 +19,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from er_gym.rollout.json_lines import JsonLines
+from er_gym.rollout.records import Words
 
 EVENTS = "events.jsonl"
 """The file's name in a run directory."""
@@ -70,7 +71,7 @@ class Reply(_Event):
     kind: Literal["reply"] = "reply"
     task_id: str
     step: int
-    model: str = ""
+    model: Words = ""
     seconds: float = 0.0
     prompt_tokens: int = 0
     completion_tokens: int = 0
@@ -90,10 +91,10 @@ class StepDone(_Event):
     task_id: str
     step: int
     verb: str
-    object_type: str = ""
+    object_type: Words = ""
     success: bool
     reward: float
-    thought: str = ""
+    thought: Words = ""
 
 
 class EpisodeEnded(_Event):
@@ -113,7 +114,7 @@ class EpisodeEnded(_Event):
     total_reward: float
     steps: int
     seconds: float
-    error: str = ""
+    error: Words = ""
 
 
 class Cost(_Event):
@@ -147,7 +148,7 @@ class RunEnded(_Event):
     kind: Literal["run_ended"] = "run_ended"
     played: int
     crashed: int
-    stopped: str = ""
+    stopped: Words = ""
 
 
 Event: TypeAlias = RunBegun | EpisodeBegun | Reply | StepDone | EpisodeEnded | Cost | RunEnded

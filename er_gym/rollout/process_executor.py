@@ -14,6 +14,7 @@ from er_gym.rollout.agent import CannotGoOn, MakeAgent
 from er_gym.rollout.events import EventLog
 from er_gym.rollout.executor import Played, Sink, Size, lost_episode
 from er_gym.rollout.play import episode_seed, one_line, play_episode
+from er_gym.rollout.processes import Terminated
 from er_gym.rollout.records import record_episode
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.worker_pool import Lost, do_jobs
@@ -89,7 +90,9 @@ class EpisodeWorker:
             agent = self._make_agent(task, seed)
         except CannotGoOn as stop:
             return _Stop(str(stop))
-        except Exception as error:  # as in play_episode, one must not end the run
+        except Terminated:
+            raise
+        except (Exception, SystemExit) as error:  # as in play_episode, one must not end the run
             return Played(
                 record_episode(
                     task,

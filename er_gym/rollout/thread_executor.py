@@ -153,7 +153,7 @@ class _Threads:
             player = _Stoppable(agent, self.stopping)
         except CannotGoOn:
             raise
-        except Exception as error:  # as in play_episode, one must not end the run
+        except (Exception, SystemExit) as error:  # as in play_episode, one must not end the run
             return None, record_episode(
                 task,
                 agent=manifest.agent,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Generic, TypeVar
 
-from er_gym.rollout.processes import CONTEXT, end_processes, start_process
+from er_gym.rollout.processes import CONTEXT, Terminated, end_processes, start_process
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -146,7 +146,9 @@ def _serve(connection: Connection, make: Callable[[], Callable[[Job], Result]]) 
     """The worker process: do what comes through the pipe until it is closed."""
     try:
         do = make()
-    except Exception as error:  # whatever it is, the parent must hear of it
+    except Terminated:
+        raise
+    except (Exception, SystemExit) as error:  # whatever it is, the parent must hear of it
         connection.send(_SetupFailed(f"{type(error).__name__}: {error}"))
         return
     try:
