@@ -185,7 +185,7 @@ def _of_runs() -> Iterator[Line]:
         yield Line(("report", "../files/run-hostile", "--format", layout), frozenset({0}))
         yield Line(("report", "../files/run-odd", "--format", layout), frozenset({0}))
     yield Line(("report", "../files/run-hostile", "--misses", "--format", "csv"))
-    for name in ("run-hostile", "run-deep", "run-pipe", "run-zero", "good.json", "pipe.json"):
+    for name in ("run-odd", "run-deep", "run-pipe", "run-zero", "good.json", "pipe.json"):
         yield Line((*MINI, "--limit", "1", "--out", f"../files/{name}"))
 
 

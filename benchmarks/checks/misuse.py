@@ -31,6 +31,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import FlattenObservation, RecordEpisodeStatistics, TimeLimit
 
 import er_gym  # noqa: F401  (registers the environments)
+from benchmarks.checks.tally import Tally
 from er_gym.envs.actions import ACTIONS, INDEX, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.errors import ResetNeeded
@@ -56,7 +57,7 @@ class Try(NamedTuple):
     says: str = ""
 
 
-def main(words: Sequence[str]) -> int:
+def check(words: Sequence[str] = ()) -> Tally:
     """Try all, and print what falls short."""
     warnings.simplefilter("ignore")
     began = time.monotonic()
@@ -69,8 +70,14 @@ def main(words: Sequence[str]) -> int:
                 if problem:
                     short += 1
                     print(f"{each.name}: {problem}", flush=True)
-    print(f"{count} misuses in {time.monotonic() - began:.0f} s; {short} fall short")
-    return 1 if short else 0
+    return Tally("misuses", count, short, time.monotonic() - began)
+
+
+def main(words: Sequence[str]) -> int:
+    """Try all, and print what falls short, and how much."""
+    tally = check(words)
+    print(tally)
+    return int(tally.short > 0)
 
 
 def _problem(each: Try) -> str:
