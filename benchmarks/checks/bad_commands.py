@@ -108,6 +108,7 @@ _AGENTS = (
     "rl:../files/pipe.json", "recorded:nowhere", "recorded:../files/run-words",
     "recorded:../files/pipe.json", "recorded:../files/deep.json", "recorded:../files/zero.json",
     "hf:/nowhere", HOSTILE, f"rl:{HOSTILE}", f"recorded:{HOSTILE}", "[/]", "[red]", "x" * 5000,
+    "openai:m\udc80", "recorded:\ud800",
 )  # fmt: skip
 
 
@@ -224,6 +225,10 @@ def _contradictions() -> Iterator[Line]:
         ("tasks", "convert", good, "nowhere/new.jsonl"), ("tasks", "convert", good, "."),
         ("tasks", "convert", "../files", "new.jsonl"),
         ("tasks", "convert", good, f"{HOSTILE}/new.jsonl"),
+        ("tasks", "show", "mini", "\udc80"), ("report", "\udc80"), (*MINI, "--task-ids", "\udc80"),
+        (*SPEAKS, "--set", "seed=\udc80"), (*SPEAKS, "--base-url", "http://\udc80"),
+        ("inspect", "--model", "nobody/x"), ("inspect", "--model", HOSTILE),
+        ("inspect", "--model", "mockllm/model", "--model-base-url", "http://[::1"),
         (*TRAIN, "--out", "/dev/null/x"), (*TRAIN, "--out", "../files/notes.md"),
         ("train-rl", "--config", HOSTILE), ("train-rl", "--config", "single_search", "--set"),
     ):  # fmt: skip

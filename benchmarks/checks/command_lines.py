@@ -26,7 +26,7 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
@@ -65,11 +65,16 @@ def check(words: Sequence[str], *, at_least: int | None = None) -> Tally:
     if at_least is not None:
         chosen = _choice(chosen, at_least)
     began, short = time.monotonic(), 0
-    with tempfile.TemporaryDirectory() as directory, _taken_port() as port:
+    with (
+        tempfile.TemporaryDirectory() as directory,
+        _taken_port() as port,
+        contextlib.ExitStack() as stack,
+    ):
         top = Path(directory)
         make(top / "files")
         before = _state(top / "files")
-        for ended in _ends(chosen, top, port):
+        ends = stack.enter_context(contextlib.closing(_ends(chosen, top, port)))
+        for ended in ends:
             problems = [*_problems(ended)]
             now = _state(top / "files")
             if now != before:
@@ -125,7 +130,7 @@ def _taken_port() -> Iterator[int]:
         yield listening.getsockname()[1]
 
 
-def _ends(chosen: Sequence[Line], top: Path, port: int) -> Iterator[_Ended]:
+def _ends(chosen: Sequence[Line], top: Path, port: int) -> Generator[_Ended, None, None]:
     """Run all, a few at once."""
     running: dict[int, tuple[Line, Path, float]] = {}
     try:

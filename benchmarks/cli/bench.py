@@ -22,6 +22,7 @@ from benchmarks.cli.errors import (
 )
 from benchmarks.cli.options import (
     Finite,
+    Words,
     agent_config_option,
     overrides_option,
     protocol_option,
@@ -63,7 +64,7 @@ class Spoken:
 _SPOKEN_OPTIONS = (
     agent_config_option,
     overrides_option("sampling.temperature=0.7"),
-    click.option("--base-url", metavar="URL", help="Where its server is."),
+    click.option("--base-url", type=Words(), metavar="URL", help="Where its server is."),
     click.option(
         "--prompts-from",
         type=_existing_file,
@@ -99,7 +100,10 @@ def _spoken_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--tasks-file", type=_existing_file, help="Tasks in the paper's file format.")
 @click.option("--poses", type=_existing_file, help="Exact poses, in the paper's file format.")
 @click.option(
-    "--agent", required=True, help="Who plays: oracle, random, searcher, rl:RUN, openai:MODEL …"
+    "--agent",
+    required=True,
+    type=Words(),
+    help="Who plays: oracle, random, searcher, rl:RUN, openai:MODEL …",
 )
 @click.option("--out", type=_directory, help="The run directory.  [default: runs/SUITE-AGENT]")
 @click.option("--workers", type=workers_type, default=1, show_default=True)

@@ -81,6 +81,19 @@ def split(*lists: str | None) -> list[str]:
     return [word.strip() for text in lists for word in (text or "").split(",") if word.strip()]
 
 
+class Words(click.ParamType):
+    """A text that UTF-8 can hold, as a record must; paths may be any bytes."""
+
+    name = "text"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> str:
+        try:
+            str(value).encode()
+        except UnicodeEncodeError:
+            self.fail(f"{value!a:.80} is not UTF-8 text; spell it in UTF-8", param, ctx)
+        return str(value)
+
+
 class Finite(click.FloatRange):
     """A number in a range, or any, but neither NaN nor infinite."""
 

@@ -2,14 +2,16 @@ from __future__ import annotations
 
 import json
 import os
+import sqlite3
+from contextlib import closing
 
 import pytest
 from pydantic import ValidationError
 
 from er_gym.locking import Locked
-from er_gym.rollout.records import EpisodeRecord
-from er_gym.rollout.run_directory import RunDirectory, RunDirectoryError, claimed
-from er_gym.writing import file_stem
+from er_gym.rollout.records import EpisodeRecord, StepRecord
+from er_gym.rollout.run_directory import REPLIES, RunDirectory, RunDirectoryError, claimed
+from er_gym.writing import file_stem, writable
 
 GOLDEN = """
 {"format": "er-gym/episode/1", "task_id": "t", "task_type": "single_search", "scene": "FloorPlan1",
@@ -275,3 +277,30 @@ def test_two_do_not_play_in_one_directory(store, manifest):
         claimed(store.path, manifest),
     ):
         pass
+
+
+def test_an_empty_folder_of_replies_is_nothing_to_keep(store, manifest):
+    """It is made before the first reply: a run killed then gives way to the corrected one."""
+    file = store.path / REPLIES / "cache.db"
+    file.parent.mkdir()
+    with closing(sqlite3.connect(file)) as database:
+        database.execute("CREATE TABLE Cache (key TEXT)")
+    other = manifest.model_copy(update={"agent": "openai:right"})
+    with claimed(store.path, other) as again:
+        assert again.manifest == other
+        file.parent.mkdir(exist_ok=True)
+        with closing(sqlite3.connect(file)) as database:
+            database.execute("CREATE TABLE Cache (key TEXT)")
+            database.execute("INSERT INTO Cache VALUES ('a reply')")
+            database.commit()
+    with pytest.raises(RunDirectoryError, match="its agent is"), claimed(store.path, manifest):
+        pass
+
+
+def test_half_a_character_of_an_agent_is_kept_as_its_escape(store, episode):
+    record = episode(("end",)).model_copy(update={"error": writable("half \ud800")})
+    store.write(record)
+    (kept,) = store.episodes()
+    assert kept.error == r"half \ud800"
+    step = StepRecord(verb="end", success=True, thought="\ud800", text="é\udc80")
+    assert (step.thought, step.text) == (r"\ud800", r"é\udc80")
