@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from er_gym.locking import Locked
 from er_gym.rollout.records import EpisodeRecord, StepRecord
 from er_gym.rollout.run_directory import REPLIES, RunDirectory, RunDirectoryError, claimed
-from er_gym.writing import file_stem, writable
+from er_gym.writing import file_stem
 
 GOLDEN = """
 {"format": "er-gym/episode/1", "task_id": "t", "task_type": "single_search", "scene": "FloorPlan1",
@@ -298,8 +298,8 @@ def test_an_empty_folder_of_replies_is_nothing_to_keep(store, manifest):
 
 
 def test_half_a_character_of_an_agent_is_kept_as_its_escape(store, episode):
-    record = episode(("end",)).model_copy(update={"error": writable("half \ud800")})
-    store.write(record)
+    record = episode(("end",), ("end",)).model_dump() | {"error": "half \ud800"}
+    store.write(EpisodeRecord.model_validate(record))
     (kept,) = store.episodes()
     assert kept.error == r"half \ud800"
     step = StepRecord(verb="end", success=True, thought="\ud800", text="é\udc80")
