@@ -413,7 +413,7 @@ def test_a_mistyped_model_or_url_leaves_nothing(er_gym, tmp_path, no_such_model,
     monkeypatch.setenv("OPENAI_API_KEY", "none")
     out = tmp_path / "run"
     ask = ("bench", "--suite", "mini", "--limit", "1", "--agent", "openai:m", "--out", out)
-    quick = ("--agent-config", "text", "--set", "server.tries=1")
+    quick = ("--agent-config", "text", "--set", "server.tries=1", "--concurrency", "1")
     code, shown, err = er_gym(*ask, *quick, "--base-url", no_such_model)
     assert (code, shown) == (3, ""), err
     assert "there is no model of that name" in err
