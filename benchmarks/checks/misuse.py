@@ -35,7 +35,7 @@ from benchmarks.checks.tally import Tally
 from er_gym.envs.actions import ACTIONS, INDEX, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.errors import ResetNeeded
-from er_gym.envs.generated_source import Live
+from er_gym.envs.generated_source import GeneratedSource
 from er_gym.envs.sources import TaskList
 from er_gym.envs.wrappers import InstructionEmbedding, KeyActionShaping
 from er_gym.tasks import load_suite
@@ -381,10 +381,18 @@ def copies() -> Iterator[Try]:
         yield Try(f"{copied.__name__} after the end", partial(copied(over).step, 0), ResetNeeded)
         live = partial(_copies_go_on, partial(_made, episode_source="generate"), copied, 0)
         yield Try(f"{copied.__name__} of the generator", live)
-        yield Try(f"{copied.__name__} of Live", lambda c=copied: c(Live()).close())
+        source = partial(_source_copied, copied)
+        yield Try(f"{copied.__name__} of GeneratedSource", source)
     unity = _begun()
     unity._backend = "unity"  # there is none here, and to refuse needs none
     yield Try("deepcopy of Unity's", partial(copy.deepcopy, unity), error.Error, "before reset()")
+
+
+def _source_copied(copied: Callable[[Any], Any]) -> None:
+    source = GeneratedSource(_made())
+    twin = copied(source)
+    source.close()
+    twin.close()
 
 
 # -- what is handed out --------------------------------------------------------------------------

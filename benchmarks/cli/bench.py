@@ -22,6 +22,7 @@ from benchmarks.cli.errors import (
 )
 from benchmarks.cli.options import (
     Finite,
+    Place,
     Words,
     agent_config_option,
     overrides_option,
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from er_gym.tasks.task import Task
 
 _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
-_directory = click.Path(file_okay=False, path_type=Path)
+_directory = Place(file_okay=False, path_type=Path)
 
 
 @dataclass(frozen=True)
