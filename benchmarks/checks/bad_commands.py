@@ -222,7 +222,7 @@ def _contradictions() -> Iterator[Line]:
         ("tasks", "verify", HOSTILE), ("tasks", "stats", "mini", "--out", "/dev/null/x"),
         ("tasks", "stats", HOSTILE), ("tasks", "convert", HOSTILE, "new.jsonl"),
         ("tasks", "convert", good, "new.txt"), ("tasks", "convert", good, "/dev/full/new.jsonl"),
-        ("tasks", "convert", good, "nowhere/new.jsonl"), ("tasks", "convert", good, "."),
+        ("tasks", "convert", good, "nowhere/new.jsonl"), ("train-rl", "--config", "/proc/kmsg"),
         ("tasks", "convert", "../files", "new.jsonl"), ("tasks", "convert", good, ""),
         ("tasks", "stats", good, "--out", ""), ("play", "--frames", ""), (*TRAIN, "--out", ""),
         ("tasks", "convert", good, f"{HOSTILE}/new.jsonl"),

@@ -314,7 +314,12 @@ def claimed(path: Path, manifest: Manifest) -> Iterator[RunDirectory]:
             if not any(map(_holds_something, (path / name for name in _LOST_WITH_IT))):
                 begun._withdraw()
         new = not (path / MANIFEST).exists()
-        store = RunDirectory.create(path, manifest)
+        try:
+            store = RunDirectory.create(path, manifest)
+        except OSError:  # a full disk
+            with contextlib.suppress(OSError):
+                (path / EPISODES).rmdir()
+            raise
         try:
             yield store
         except BaseException as error:  # Ctrl-C too

@@ -3,6 +3,8 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
+import subprocess
+import sys
 from contextlib import closing
 
 import pytest
@@ -304,3 +306,19 @@ def test_half_a_character_of_an_agent_is_kept_as_its_escape(store, episode):
     assert kept.error == r"half \ud800"
     step = StepRecord(verb="end", success=True, thought="\ud800", text="é\udc80")
     assert (step.thought, step.text) == (r"\ud800", r"é\udc80")
+
+
+def test_a_disk_that_is_full_at_the_start_leaves_nothing(tmp_path, manifest):
+    code = (
+        "import resource, signal, sys\n"
+        "from er_gym.rollout.run_directory import Manifest, claimed\n"
+        "from pathlib import Path\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (64, 64))\n"
+        "with claimed(Path(sys.argv[1]), Manifest.model_validate_json(sys.argv[2])): pass\n"
+    )
+    out = tmp_path / "run"
+    command = [sys.executable, "-c", code, out, manifest.model_dump_json()]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert "CannotWrite" in ended.stderr
+    assert not out.exists()
