@@ -419,7 +419,7 @@ def test_a_mistyped_model_or_url_leaves_nothing(er_gym, tmp_path, no_such_model,
     assert "there is no model of that name" in err
     assert "nothing is left in" in err
     assert not out.exists()
-    for url in ("nonsense", "ftp://x", "http://[::1"):
+    for url in ("nonsense", "ftp://x", "http://[::1", "http://x:99999/v1"):
         code, shown, err = er_gym(*ask, *quick, "--base-url", url)
         assert (code, shown) == (2, "")
         one_line(err)
