@@ -284,8 +284,9 @@ def _leavings(ended: _Ended) -> Iterator[str]:
             yield f"overwrote {name}"
     for name in ("home", "tmp"):
         rest = [path.name for path in (ended.folder / name).rglob("*") if path.is_file()]
-        if more := [each for each in rest if not each.startswith("fontlist-")]:  # matplotlib's
-            yield f"left {sorted(more)[:3]} in its {name} folder"
+        # matplotlib keeps a list of fonts.
+        if files_left := [each for each in rest if not each.startswith("fontlist-")]:
+            yield f"left {sorted(files_left)[:3]} in its {name} folder"
 
 
 def _state(folder: Path) -> set[tuple[str, int, int]]:
