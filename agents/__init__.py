@@ -64,7 +64,7 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
         return _construct(make, seed)
     try:
         agent = _construct(make, seed)
-    except Exception as error:  # another package's code can raise anything
+    except (Exception, SystemExit) as error:  # another package's code can raise anything
         raise PluginError(
             f"agent {name!r} cannot be made ({reason(error)}); it is called with seed= if it takes "
             "that, else without arguments"

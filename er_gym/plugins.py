@@ -81,7 +81,8 @@ class Registry(Generic[T]):
         near = get_close_matches(name, self.names(), n=3)
         hint = f" (did you mean {' or '.join(near)}?)" if near else ""
         ways = [", ".join(self.names()), "package.module:Name", self.others]
-        return f"unknown {self.kind} {name!r}{hint}; choose one of: {'; '.join(filter(None, ways))}"
+        there = "; ".join(filter(None, ways))
+        return f"unknown {self.kind} {name!r:.80}{hint}; choose one of: {there}"
 
     def _checked(self, found: object, name: str) -> T:
         if not self.fits(found):

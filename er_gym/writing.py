@@ -62,6 +62,11 @@ class ForeignFile(ValueError):
     """er-gym did not write the file at the path, so it does not replace it; nothing is changed."""
 
 
+def writable(text: str) -> str:
+    r"""A text as UTF-8 can hold it: half a character (a lone surrogate) becomes ``\ud800``."""
+    return text if text.isascii() else text.encode(errors="backslashreplace").decode()
+
+
 def file_stem(name: str) -> str:
     """A file name without suffix for any name.
 
@@ -71,7 +76,7 @@ def file_stem(name: str) -> str:
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", name)[:_LONGEST_STEM]
     if stem == name and not stem.startswith("."):
         return stem
-    return f"{stem.lstrip('.')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+    return f"{stem.lstrip('.')}-{hashlib.sha256(writable(name).encode()).hexdigest()[:8]}"
 
 
 def write_atomic(path: Path, data: str | bytes, *, mode: int | None = None) -> None:

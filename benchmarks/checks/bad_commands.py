@@ -108,6 +108,7 @@ _AGENTS = (
     "rl:../files/pipe.json", "recorded:nowhere", "recorded:../files/run-words",
     "recorded:../files/pipe.json", "recorded:../files/deep.json", "recorded:../files/zero.json",
     "hf:/nowhere", HOSTILE, f"rl:{HOSTILE}", f"recorded:{HOSTILE}", "[/]", "[red]", "x" * 5000,
+    "openai:m\udc80", "recorded:\ud800",
 )  # fmt: skip
 
 
@@ -185,7 +186,7 @@ def _of_runs() -> Iterator[Line]:
         yield Line(("report", "../files/run-hostile", "--format", layout), frozenset({0}))
         yield Line(("report", "../files/run-odd", "--format", layout), frozenset({0}))
     yield Line(("report", "../files/run-hostile", "--misses", "--format", "csv"))
-    for name in ("run-hostile", "run-deep", "run-pipe", "run-zero", "good.json", "pipe.json"):
+    for name in ("run-odd", "run-deep", "run-pipe", "run-zero", "good.json", "pipe.json"):
         yield Line((*MINI, "--limit", "1", "--out", f"../files/{name}"))
 
 
@@ -221,9 +222,14 @@ def _contradictions() -> Iterator[Line]:
         ("tasks", "verify", HOSTILE), ("tasks", "stats", "mini", "--out", "/dev/null/x"),
         ("tasks", "stats", HOSTILE), ("tasks", "convert", HOSTILE, "new.jsonl"),
         ("tasks", "convert", good, "new.txt"), ("tasks", "convert", good, "/dev/full/new.jsonl"),
-        ("tasks", "convert", good, "nowhere/new.jsonl"), ("tasks", "convert", good, "."),
-        ("tasks", "convert", "../files", "new.jsonl"),
+        ("tasks", "convert", good, "nowhere/new.jsonl"), ("train-rl", "--config", "/proc/kmsg"),
+        ("tasks", "convert", "../files", "new.jsonl"), ("tasks", "convert", good, ""),
+        ("tasks", "stats", good, "--out", ""), ("play", "--frames", ""), (*TRAIN, "--out", ""),
         ("tasks", "convert", good, f"{HOSTILE}/new.jsonl"),
+        ("tasks", "show", "mini", "\udc80"), ("report", "\udc80"), (*MINI, "--task-ids", "\udc80"),
+        (*SPEAKS, "--set", "seed=\udc80"), (*SPEAKS, "--base-url", "http://\udc80"),
+        ("inspect", "--model", "nobody/x"), ("inspect", "--model", HOSTILE),
+        ("inspect", "--model", "mockllm/model", "--model-base-url", "http://[::1"),
         (*TRAIN, "--out", "/dev/null/x"), (*TRAIN, "--out", "../files/notes.md"),
         ("train-rl", "--config", HOSTILE), ("train-rl", "--config", "single_search", "--set"),
     ):  # fmt: skip

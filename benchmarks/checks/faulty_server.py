@@ -225,6 +225,7 @@ CASES: list[Case] = [
     Case("sends half of it", body(_GOOD[: len(_GOOD) // 2]), _NONE),
     Case("sends it twice", body(_GOOD * 2), _NONE),
     Case("sends events", body(b"data: " + _GOOD + b"\n\ndata: [DONE]\n\n"), _NONE),
+    Case("says half a character", body(_GOOD.replace(b"end", rb"\ud800")), _NONE | _REPLY),
     Case("sends wrong UTF-8", body(_GOOD.replace(b"end", b"\xff\xfe")), _NONE),
     Case("sends UTF-16", body(_GOOD.decode().encode("utf-16")), _NONE),
     Case("nests deeply", body(b"[" * _DEEP + b"]" * _DEEP), _NONE),

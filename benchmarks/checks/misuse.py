@@ -31,10 +31,11 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import FlattenObservation, RecordEpisodeStatistics, TimeLimit
 
 import er_gym  # noqa: F401  (registers the environments)
+from benchmarks.checks.tally import Tally
 from er_gym.envs.actions import ACTIONS, INDEX, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.errors import ResetNeeded
-from er_gym.envs.generated_source import Live
+from er_gym.envs.generated_source import GeneratedSource
 from er_gym.envs.sources import TaskList
 from er_gym.envs.wrappers import InstructionEmbedding, KeyActionShaping
 from er_gym.tasks import load_suite
@@ -56,7 +57,7 @@ class Try(NamedTuple):
     says: str = ""
 
 
-def main(words: Sequence[str]) -> int:
+def check(words: Sequence[str] = ()) -> Tally:
     """Try all, and print what falls short."""
     warnings.simplefilter("ignore")
     began = time.monotonic()
@@ -69,8 +70,14 @@ def main(words: Sequence[str]) -> int:
                 if problem:
                     short += 1
                     print(f"{each.name}: {problem}", flush=True)
-    print(f"{count} misuses in {time.monotonic() - began:.0f} s; {short} fall short")
-    return 1 if short else 0
+    return Tally("misuses", count, short, time.monotonic() - began)
+
+
+def main(words: Sequence[str]) -> int:
+    """Try all, and print what falls short, and how much."""
+    tally = check(words)
+    print(tally)
+    return int(tally.short > 0)
 
 
 def _problem(each: Try) -> str:
@@ -374,10 +381,18 @@ def copies() -> Iterator[Try]:
         yield Try(f"{copied.__name__} after the end", partial(copied(over).step, 0), ResetNeeded)
         live = partial(_copies_go_on, partial(_made, episode_source="generate"), copied, 0)
         yield Try(f"{copied.__name__} of the generator", live)
-        yield Try(f"{copied.__name__} of Live", lambda c=copied: c(Live()).close())
+        source = partial(_source_copied, copied)
+        yield Try(f"{copied.__name__} of GeneratedSource", source)
     unity = _begun()
     unity._backend = "unity"  # there is none here, and to refuse needs none
     yield Try("deepcopy of Unity's", partial(copy.deepcopy, unity), error.Error, "before reset()")
+
+
+def _source_copied(copied: Callable[[Any], Any]) -> None:
+    source = GeneratedSource(_made())
+    twin = copied(source)
+    source.close()
+    twin.close()
 
 
 # -- what is handed out --------------------------------------------------------------------------

@@ -35,6 +35,7 @@ from agents.vlm.clients.supervisor import ServerEvent
 from agents.vlm.factory import AgentFactory
 from agents.vlm.settings import AgentSettings
 from benchmarks.checks.faulty_server import CASES, KEY, Case, FaultyServer
+from benchmarks.checks.tally import Tally
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.run_directory import SPENDING
 
@@ -49,28 +50,33 @@ _ASKED = (
 
 
 def main(words: Sequence[str]) -> int:
-    """Try all, and print what falls short."""
+    """Try all, and print what falls short, and how much."""
+    tally = check(words)
+    print(tally)
+    return int(tally.short > 0)
+
+
+def check(words: Sequence[str], *, with_runs: bool = True) -> Tally:
+    """Try all whose names hold the words, whole runs too, and print what falls short."""
     os.environ[_KEY_FROM] = KEY
     chosen = [case for case in CASES if all(word in case.name for word in words)]
     began = time.monotonic()
     short = 0
     with _logged() as log, ThreadPoolExecutor(_AT_ONCE) as pool:
         for case, problems in zip(chosen, pool.map(_try, chosen), strict=True):
+            short += bool(problems)
             for problem in problems:
-                short += 1
-                print(f"{case.name}: {problem}")
+                print(f"{case.name}: {problem}", flush=True)
     if KEY in log.getvalue():
         short += 1
         print("the key is in the logs")
-    runs = [run for run in RUNS if all(word in run.name for word in words)]
+    runs = [run for run in RUNS if with_runs and all(word in run.name for word in words)]
     with ThreadPoolExecutor(_RUNS_AT_ONCE) as pool:
         for run, problems in zip(runs, pool.map(_play, runs), strict=True):
+            short += bool(problems)
             for problem in problems:
-                short += 1
-                print(f"er-gym bench, {run.name}: {problem}")
-    seconds = time.monotonic() - began
-    print(f"{len(chosen)} faults and {len(runs)} runs in {seconds:.0f} s: {short} fall short")
-    return int(short > 0)
+                print(f"er-gym bench, {run.name}: {problem}", flush=True)
+    return Tally("server faults", len(chosen) + len(runs), short, time.monotonic() - began)
 
 
 @contextlib.contextmanager

@@ -22,6 +22,8 @@ from benchmarks.cli.errors import (
 )
 from benchmarks.cli.options import (
     Finite,
+    Place,
+    Words,
     agent_config_option,
     overrides_option,
     protocol_option,
@@ -43,7 +45,7 @@ if TYPE_CHECKING:
     from er_gym.tasks.task import Task
 
 _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
-_directory = click.Path(file_okay=False, path_type=Path)
+_directory = Place(file_okay=False, path_type=Path)
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class VLMOptions:
 _VLM_OPTIONS = (
     agent_config_option,
     overrides_option("sampling.temperature=0.7"),
-    click.option("--base-url", metavar="URL", help="The address of the model's server."),
+    click.option("--base-url", type=Words(), metavar="URL", help="The address of the model's server."),
     click.option(
         "--prompts-from",
         type=_existing_file,

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import signal
+import threading
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
 from benchmarks.cli.terminal import echo
 
 _LONGEST = 2_000  # characters of a line
+_MOST_LINES = 10  # about tasks of a suite
 
 if TYPE_CHECKING:
     from er_gym.tasks.errors import SetAsideTask, Substitution
@@ -35,6 +38,24 @@ def bad_input(*more: type[Exception]) -> Iterator[None]:
         raise BadInput(str(error)) from error
 
 
+@contextlib.contextmanager
+def interrupted_by_sigterm() -> Iterator[None]:
+    """Take SIGTERM, with which schedulers end jobs, for Ctrl-C: what has been done is kept, and a
+    start that has done nothing leaves nothing."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _interrupt(signum: int, frame: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
 def print_problem(message: str) -> None:
     """Print an error or a warning as one line on stderr."""
     text = " ".join(message.split())
@@ -49,7 +70,7 @@ def report_set_aside(
     """Print which tasks of a suite are set aside, and which objects stand for missing ones."""
     from er_gym.tasks.errors import describe_substitutions
 
-    for line in describe_substitutions(taken):
+    aside = [f"set aside: {one}" for one in describe_substitutions(taken), "objects taken for others"), (aside, "tasks set aside")):
         print_problem(f"{suite}: {line}")
-    for one in set_aside:
-        print_problem(f"{suite}: set aside: {one}")
+        if len(lines) > _MOST_LINES:
+        print_problem(f"{suite}: and {len(lines) - _MOST_LINES:,} more {what}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import agent_config_option, overrides_option, seed_option
+from benchmarks.cli.options import Words, agent_config_option, overrides_option, seed_option
 from benchmarks.cli.terminal import echo
 
 if TYPE_CHECKING:
@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 @click.command(name="inspect")
 @click.option("--suite", default="mini", show_default=True, help="`er-gym suites` lists them.")
 @click.option(
-    "--model", required=True, help="As Inspect names it: openai/gpt-4o, vllm/…, mockllm/model."
+    "--model",
+    required=True,
+    type=Words(),
+    help="As Inspect names it: openai/gpt-4o, vllm/…, mockllm/model.",
 )
 @click.option("--model-base-url", metavar="URL", help="Where the model's server is.")
 @agent_config_option

@@ -15,7 +15,10 @@ import click
 
 from benchmarks.cli.bench import bench
 from benchmarks.cli.doctor import doctor
-from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
+from benchmarks.cli.errors import (
+    INTERRUPTED,
+    BadInput,
+    bad_input, print_problem
 from benchmarks.cli.inspect import inspect
 from benchmarks.cli.options import scorer_option
 from benchmarks.cli.player import player
@@ -33,7 +36,8 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
     """Run the command and exit: 0; 2 for bad input; others as in ``benchmarks.cli.errors``."""
     use_any_encoding()
     try:
-        code = cli.main(args=args, prog_name="er-gym", standalone_mode=False)
+        with interrupted_by_sigterm():
+            code = cli.main(args=args, prog_name="er-gym", standalone_mode=False)
     except click.UsageError as error:
         help_command = f"{error.ctx.command_path if error.ctx else 'er-gym'} --help"
         print_problem(f"{error.format_message().rstrip('.')}; see {help_command}")

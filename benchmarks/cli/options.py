@@ -81,6 +81,28 @@ def split(*lists: str | None) -> list[str]:
     return [word.strip() for text in lists for word in (text or "").split(",") if word.strip()]
 
 
+class Place(click.Path):
+    """A path; an empty one, which click takes for the working directory, is refused."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        if not os.fspath(value):
+            self.fail("an empty name; give a path, '.' for the working directory", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class Words(click.ParamType):
+    """A text that UTF-8 can hold, as a record must; paths may be any bytes."""
+
+    name = "text"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> str:
+        try:
+            str(value).encode()
+        except UnicodeEncodeError:
+            self.fail(f"{value!a:.80} is not UTF-8 text; spell it in UTF-8", param, ctx)
+        return str(value)
+
+
 class Finite(click.FloatRange):
     """A number in a range, or any, but neither NaN nor infinite."""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import Finite, force_option, seed_option
+from benchmarks.cli.options import Finite, Place, force_option, seed_option
 from benchmarks.cli.terminal import echo
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ def _top_view(controller: Any) -> Any:
 @seed_option
 @click.option(
     "--frames", default=Path("frames"), show_default=True,
-    type=click.Path(file_okay=False, path_type=Path), help="Where each step's picture goes.",
+    type=Place(file_okay=False, path_type=Path), help="Where each step's picture goes.",
 )  # fmt: skip
 @force_option
 @click.option("--window/--no-window", default=None, help="Show it in a window.  [default: if any]")

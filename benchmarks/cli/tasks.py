@@ -10,7 +10,7 @@ import click
 
 from benchmarks.cli.errors import BadInput, bad_input, report_set_aside
 from benchmarks.cli.generate import generate
-from benchmarks.cli.options import force_option, split, workers_option
+from benchmarks.cli.options import Place, force_option, split, workers_option
 from benchmarks.cli.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
 @click.argument("suite", metavar="SUITE|FILE")
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=Place(file_okay=False, path_type=Path),
     help=("Draw the charts into this folder, as PNG."),
 )
 @force_option
@@ -154,7 +154,7 @@ def stats(suite: str, out: Path | None, force: bool) -> None:
 
 @tasks.command()
 @click.argument("suite", metavar="SUITE|FILE|FOLDER")
-@click.argument("out", metavar="FILE|FOLDER", type=click.Path(path_type=Path))
+@click.argument("out", metavar="FILE|FOLDER", type=Place(path_type=Path))
 @force_option
 def convert(suite: str, out: Path, force: bool) -> None:
     """Write tasks in another format, without loss; one that cannot be read is left out and named.

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import MOST_SEED, overrides_option, trust_option
+from benchmarks.cli.options import MOST_SEED, Place, overrides_option, trust_option
 from benchmarks.cli.terminal import echo
 
 
@@ -23,7 +23,7 @@ from benchmarks.cli.terminal import echo
 @click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the configuration's]")
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=Place(file_okay=False, path_type=Path),
     help="The run directory.  [default: runs/rl/CONFIG-SEED]",
 )
 @trust_option

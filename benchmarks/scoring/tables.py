@@ -214,11 +214,16 @@ def as_markdown(found: Sequence[Table]) -> str:
 def _markdown(table: Table) -> str:
     rules = ["---" if column < table.text_columns else "---:" for column in range(len(table.head))]
     lines = [
-        "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |"
+        "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in row) + " |"
         for row in (table.head, tuple(rules), *table.rows)
     ]
-    notes = [f"\n{note}" for note in table.notes]
-    return "\n".join([f"**{table.title}**\n", *(lines if table.rows else ()), *notes]) + "\n"
+    notes = [f"\n{' '.join(note.split())}" for note in table.notes]
+    return (
+        "\n".join(
+            [f"**{' '.join(table.title.split())}**\n", *(lines if table.rows else ()), *notes]
+        )
+        + "\n"
+    )
 
 
 def print_tables(found: Sequence[Table], console: Console) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections import defaultdict
 from collections.abc import Callable, Sequence
@@ -132,7 +133,8 @@ def make_source(source: Source, make_env: Callable[[], PlayableEnv]) -> EpisodeS
         path = Path(name).resolve()
         if name in suite_names():
             path = suite_file(name)
-        changed = path.stat().st_mtime_ns if path.is_file() else 0
+        # os.path's takes a name that is too long for one of no file.
+        changed = path.stat().st_mtime_ns if os.path.isfile(path) else 0
         found, remarks = _read(str(path) if is_file else name, is_file, changed)
         if remarks:
             warnings.warn(remarks, stacklevel=3)

@@ -23,6 +23,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from er_gym.rollout.json_lines import JsonLines
+from er_gym.rollout.records import Words
 
 EVENTS = "events.jsonl"
 """The file's name in a run directory."""
@@ -83,7 +84,7 @@ class Reply(_Event):
     kind: Literal["reply"] = "reply"
     task_id: str
     step: int
-    model: str = ""
+    model: Words = ""
     seconds: float = 0.0
     prompt_tokens: int = 0
     completion_tokens: int = 0
@@ -107,10 +108,10 @@ class StepDone(_Event):
     task_id: str
     step: int
     verb: str
-    object_type: str = ""
+    object_type: Words = ""
     success: bool
     reward: float
-    thought: str = ""
+    thought: Words = ""
 
 
 class EpisodeEnded(_Event):
@@ -133,7 +134,7 @@ class EpisodeEnded(_Event):
     total_reward: float
     steps: int
     seconds: float
-    error: str = ""
+    error: Words = ""
 
 
 class Cost(_Event):
@@ -169,7 +170,7 @@ class RunEnded(_Event):
     kind: Literal["run_ended"] = "run_ended"
     played: int
     crashed: int
-    stopped: str = ""
+    stopped: Words = ""
 
 
 Event: TypeAlias = RunBegun | EpisodeBegun | Reply | StepDone | EpisodeEnded | Cost | RunEnded

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from er_gym.rollout.agent import Agent, CannotGoOn, Decision
 from er_gym.rollout.events import EpisodeBegun, EventListener, Reply, StepDone, ignore_event
 from er_gym.rollout.loop import transitions
+from er_gym.rollout.processes import Terminated
 from er_gym.rollout.records import ERROR, EpisodeRecord, StepRecord, record_episode
 from er_gym.tasks.task import Task
 from er_gym.tasks.verbs import END, INIT
@@ -81,9 +82,9 @@ def play_episode(
             _emit_step(emit, task.id, len(steps) - 1, each.decision, steps[-1])
             if info.get("end_appended"):
                 steps.append(_appended(steps[-1]))
-    except CannotGoOn:
+    except (CannotGoOn, Terminated):
         raise
-    except Exception as caught:  # agents are anybody's code; one must not end the run
+    except (Exception, SystemExit) as caught:  # anybody's code must not end the run
         error = one_line(caught)
     return record_episode(
         task,

@@ -95,7 +95,9 @@ class EpisodeWorker:
             agent = self._make_agent(task, seed)
         except CannotGoOn as stop:
             return _Stop(str(stop))
-        except Exception as error:  # as in play_episode, one must not end the run
+        except Terminated:
+            raise
+        except (Exception, SystemExit) as error:  # as in play_episode, one must not end the run
             return PlayedEpisode(unbegun_episode(task, self._manifest, one_line(error)))
         try:
             record = play_episode(

@@ -12,7 +12,6 @@ import contextlib
 import multiprocessing
 import os
 import signal
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -23,6 +22,10 @@ CONTEXT = multiprocessing.get_context("spawn")
 """Processes are spawned, since a renderer or torch does not work in a forked process."""
 GRACE_SECONDS = 5.0
 """Seconds within which a process must end by itself; then it is killed."""
+
+
+class Terminated(SystemExit):
+    """SIGTERM has come: the process is to end, whatever is called in it."""
 
 
 def start_process(target: Callable[..., None], *args: Any) -> SpawnProcess:
@@ -73,7 +76,7 @@ def _run(target: Callable[..., None], args: tuple[Any, ...]) -> None:
 
 def _exit_cleanly(signum: int, frame: object) -> NoReturn:
     """Handle a signal by an exception, so that everything is closed first."""
-    sys.exit(128 + signum)
+    raise Terminated(128 + signum)
 
 
 def _follow_parent() -> None:

@@ -6,17 +6,21 @@ reader would misread takes a new ``format``.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from er_gym.tasks.judge import search_targets
 from er_gym.tasks.paper_records import odd_spellings
 from er_gym.tasks.task import Task
 from er_gym.tasks.verbs import INIT
+from er_gym.writing import writable
 
 ERROR = "error"
 """The verb recorded for a reply that named no known action."""
+
+Words: TypeAlias = Annotated[str, AfterValidator(writable)]
+"""What an agent, a model or an exception said: it may hold what UTF-8 does not."""
 
 
 class _Record(BaseModel):
@@ -63,15 +67,15 @@ class StepRecord(_Record):
     """
 
     verb: str
-    object_type: str = ""
+    object_type: Words = ""
     object_id: str = ""
     success: bool
-    feedback: str = ""
+    feedback: Words = ""
     navigable: list[str] = []
     interactable: list[str] = []
     reward: float = 0.0
-    thought: str = ""
-    text: str = ""
+    thought: Words = ""
+    text: Words = ""
     appended: bool = False
 
 
@@ -115,7 +119,7 @@ class EpisodeRecord(_Record):
     end_reason: str
     total_reward: float
     seconds: float
-    error: str = ""
+    error: Words = ""
     run: str = ""
 
     @property

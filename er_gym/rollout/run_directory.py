@@ -20,6 +20,7 @@ import contextlib
 import hashlib
 import json
 import shutil
+import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,9 +44,13 @@ CONVERSATIONS = "conversations"
 PICTURES = "pictures"
 SPENDING = "spending.jsonl"
 REPLIES = "replies"
+_DATABASE = "cache.db"
+"""diskcache's, in the folder of replies."""
 SERVER_EVENTS = "server-events.jsonl"
 _KEPT = (EPISODES, CONVERSATIONS, PICTURES, SPENDING, SERVER_EVENTS, REPLIES, EVENTS)
 """The files and folders of a run directory beside its manifest."""
+_LOST_WITH_IT = (EPISODES, SPENDING, REPLIES)
+"""What makes a run worth keeping."""
 
 
 class RunDirectoryError(ValueError):
@@ -309,10 +314,14 @@ def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirector
     with exclusive_use(path):
         if (path / MANIFEST).exists():
             begun = RunDirectory.open(path)
-            if not any(_holds_something(path / name) for name in (EPISODES, SPENDING, REPLIES)):
+            if not any(map(_holds_something, (path / name for name in _LOST_WITH_IT))):
                 begun._withdraw()
         new = not (path / MANIFEST).exists()
         run_directory = RunDirectory.create(path, manifest)
+        except OSError:  # a full disk
+            with contextlib.suppress(OSError):
+                (path / EPISODES).rmdir()
+            raise
         try:
             yield run_directory
         except BaseException as error:  # Ctrl-C too
@@ -332,10 +341,22 @@ def _first_problem(error: ValidationError) -> str:
 
 
 def _holds_something(path: Path) -> bool:
-    """Whether a file has content, or a folder files."""
+    """Whether a file has content, or a folder files; of replies, whether there is any."""
     if path.is_dir():
-        return any(path.iterdir())
+        there = any(path.iterdir())
+        return there and not (path.name == REPLIES and _has_no_rows(path / _DATABASE))
     return path.exists() and path.stat().st_size > 0
+
+
+def _has_no_rows(file: Path) -> bool:
+    """Whether the database of replies is empty, as it is until the first; False in doubt."""
+    try:
+        with contextlib.closing(
+            sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)
+        ) as database:
+            return database.execute("SELECT 1 FROM Cache LIMIT 1").fetchone() is None
+    except (sqlite3.Error, ValueError):
+        return False
 
 
 def _free_name(path: Path) -> Path:

@@ -162,7 +162,7 @@ class _ThreadedRun:
             player = _Stoppable(agent, self.stopping)
         except CannotGoOn:
             raise
-        except Exception as error:  # as in play_episode, one must not end the run
+        except (Exception, SystemExit) as error:  # as in play_episode, one must not end the run
             return None, unbegun_episode(task, manifest, one_line(error))
         record = play_episode(
             env,

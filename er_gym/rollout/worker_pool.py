@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Generic, TypeVar
 
-from er_gym.rollout.processes import CONTEXT, end_processes, start_process
+from er_gym.rollout.processes import CONTEXT, Terminated, end_processes, start_process
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -150,7 +150,9 @@ def _serve(connection: Connection, make: Callable[[], Callable[[Job], Result]]) 
     """Run the worker process: do the jobs from the pipe until it is closed."""
     try:
         do = make()
-    except Exception as error:  # the parent raises it
+    except Terminated:
+        raise
+    except (Exception, SystemExit) as error:  # the parent raises it
         connection.send(_SetupFailed(f"{type(error).__name__}: {error}"))
         return
     try:

@@ -96,6 +96,8 @@ def read_bytes(path: Path, most: int = LARGEST) -> bytes:
     with open_file(path) as file:
         try:
             data = file.read(most + 1)
+            if data is None:  # a file of the kernel's, which would be waited for
+                raise TaskFileError(f"{path}: nothing to read now; give a regular file")
             if path.suffix.lower() == ".gz" and len(data) <= most:
                 with gzip.GzipFile(fileobj=io.BytesIO(data)) as packed:
                     data = packed.read(most + 1)

@@ -82,3 +82,24 @@ def test_playing_what_is_not_there_is_one_line(capsys: pytest.CaptureFixture[str
         main(["play", "--task", "no-such-task", "--no-window"])
     assert ended.value.code == 2
     assert "no such task" in capsys.readouterr().err
+
+
+def test_pictures_of_others_are_replaced_with_force_only(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "000.png").write_bytes(b"mine")
+    mine = str(tmp_path / "000.png")
+    size = ("--width", "64", "--height", "64")
+    play = ("play", "--scene", "FloorPlan401", "--no-window", "--frames", str(tmp_path))
+    for command in (("render", "--scene", "FloorPlan401", "--out", mine, *size), play):
+        Path(mine).write_bytes(b"mine")
+        with pytest.raises(SystemExit) as ended:
+            main([*command])
+        error = capsys.readouterr().err
+        assert (ended.value.code, error.count("\n")) == (2, 1)
+        assert "er-gym did not write it" in error
+        assert [file.name for file in tmp_path.iterdir()] == ["000.png"]
+        assert Path(mine).read_bytes() == b"mine"
+        result = CliRunner().invoke(cli, [*command, "--force"], input="quit\n")
+        assert result.exit_code == 0, result.output
+        assert Path(mine).read_bytes().startswith(b"\x89PNG")

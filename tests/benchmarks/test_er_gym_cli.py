@@ -9,7 +9,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
@@ -384,3 +386,76 @@ def test_a_full_disk_is_told_in_one_line(tasks_file, tmp_path, er_gym, monkeypat
     assert (code, shown) == (2, "")
     assert "No space left on device; no episode was played, and nothing is left" in one_line(err)
     assert not out.exists()
+
+
+# -- starts that come to nothing -------------------------------------------------------------------
+
+
+class _NoSuchModel(BaseHTTPRequestHandler):
+    def do_POST(self) -> None:
+        body = b'{"error": {"message": "there is no model of that name"}}'
+        self.send_response(404)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, *_: object) -> None:
+        """Says nothing."""
+
+
+@pytest.fixture
+def no_such_model():
+    with ThreadingHTTPServer(("127.0.0.1", 0), _NoSuchModel) as server:
+        threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/v1"
+        server.shutdown()
+
+
+def test_a_mistyped_model_or_url_leaves_nothing(er_gym, tmp_path, no_such_model, monkeypatch):
+    monkeypatch.setenv("OPENAI_API_KEY", "none")
+    out = tmp_path / "run"
+    ask = ("bench", "--suite", "mini", "--limit", "1", "--agent", "openai:m", "--out", out)
+    quick = ("--agent-config", "text", "--set", "server.tries=1", "--concurrency", "1")
+    code, shown, err = er_gym(*ask, *quick, "--base-url", no_such_model)
+    assert (code, shown) == (3, ""), err
+    assert "there is no model of that name" in err
+    assert "nothing is left in" in err
+    assert not out.exists()
+    for url in ("nonsense", "ftp://x", "http://[::1", "http://x:99999/v1"):
+        code, shown, err = er_gym(*ask, *quick, "--base-url", url)
+        assert (code, shown) == (2, "")
+        one_line(err)
+        assert not out.exists()
+
+
+@pytest.mark.parametrize("content", ["", "{", "[" * 100_000, "[1, 2]", None])
+def test_conversations_that_are_none(er_gym, tmp_path, content):
+    file = tmp_path / "kept.json"
+    if content is None:
+        os.mkfifo(file)  # is not waited for
+    else:
+        file.write_text(content)
+    command = ("bench", "--suite", "mini", "--agent", f"recorded:{file}", "--out", tmp_path / "run")
+    code, shown, err = er_gym(*command)
+    assert (code, shown) == (2, "")
+    assert "kept.json" in one_line(err)
+    assert not (tmp_path / "run").exists()
+
+
+def test_an_agent_that_exits_is_one_line(er_gym, tmp_path, monkeypatch):
+    """Its constructor, or whatever else of it, ends no command in silence."""
+    (tmp_path / "exits_today.py").write_text(
+        "import sys\nclass Exits:\n    def __init__(self):\n        sys.exit(0)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    command = ("bench", "--suite", "mini", "--agent", "exits_today:Exits", "--out", tmp_path / "x")
+    code, shown, err = er_gym(*command)
+    assert (code, shown) == (2, "")
+    assert "exits_today:Exits" in one_line(err)
+    assert "SystemExit" in err
+
+
+def test_names_that_are_not_utf8(er_gym):
+    code, shown, err = er_gym("bench", "--suite", "mini", "--agent", "openai:\udc80")
+    assert (code, shown) == (2, "")
+    assert r"'openai:\udc80' is not UTF-8" in one_line(err)

@@ -2,13 +2,17 @@ from __future__ import annotations
 
 import json
 import os
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
 
 import pytest
 from pydantic import ValidationError
 
 from er_gym.locking import Locked
-from er_gym.rollout.records import EpisodeRecord
-from er_gym.rollout.run_directory import RunDirectory, RunDirectoryError, locked_run_directory
+from er_gym.rollout.records import EpisodeRecord, StepRecord
+from er_gym.rollout.run_directory import REPLIES, RunDirectory, RunDirectoryError, locked_run_directory
 from er_gym.writing import file_stem
 
 GOLDEN = """
@@ -281,3 +285,46 @@ def test_two_do_not_play_in_one_directory(run_directory, manifest):
         locked_run_directory(run_directory.path, manifest),
     ):
         pass
+
+
+def test_an_empty_folder_of_replies_is_nothing_to_keep(store, manifest):
+    """It is made before the first reply: a run killed then gives way to the corrected one."""
+    file = store.path / REPLIES / "cache.db"
+    file.parent.mkdir()
+    with closing(sqlite3.connect(file)) as database:
+        database.execute("CREATE TABLE Cache (key TEXT)")
+    other = manifest.model_copy(update={"agent": "openai:right"})
+    with claimed(store.path, other) as again:
+        assert again.manifest == other
+        file.parent.mkdir(exist_ok=True)
+        with closing(sqlite3.connect(file)) as database:
+            database.execute("CREATE TABLE Cache (key TEXT)")
+            database.execute("INSERT INTO Cache VALUES ('a reply')")
+            database.commit()
+    with pytest.raises(RunDirectoryError, match="its agent is"), claimed(store.path, manifest):
+        pass
+
+
+def test_half_a_character_of_an_agent_is_kept_as_its_escape(store, episode):
+    record = episode(("end",), ("end",)).model_dump() | {"error": "half \ud800"}
+    store.write(EpisodeRecord.model_validate(record))
+    (kept,) = store.episodes()
+    assert kept.error == r"half \ud800"
+    step = StepRecord(verb="end", success=True, thought="\ud800", text="é\udc80")
+    assert (step.thought, step.text) == (r"\ud800", r"é\udc80")
+
+
+def test_a_disk_that_is_full_at_the_start_leaves_nothing(tmp_path, manifest):
+    code = (
+        "import resource, signal, sys\n"
+        "from er_gym.rollout.run_directory import Manifest, claimed\n"
+        "from pathlib import Path\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (64, 64))\n"
+        "with claimed(Path(sys.argv[1]), Manifest.model_validate_json(sys.argv[2])): pass\n"
+    )
+    out = tmp_path / "run"
+    command = [sys.executable, "-c", code, out, manifest.model_dump_json()]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert "CannotWrite" in ended.stderr
+    assert not out.exists()

@@ -295,7 +295,8 @@ def _address(server: Server) -> httpx2.URL:
         url = httpx2.URL(given)
     except httpx2.InvalidURL:
         url = httpx2.URL("")
-    if url.scheme not in ("http", "https") or not url.host:
+    is_port = url.port is None or 0 < url.port < 1 << 16
+    if url.scheme not in ("http", "https") or not url.host or not is_port:
         without_user = given.rpartition("@")[2].partition("?")[0]
         raise ValueError(
             f"server.base_url {without_user!r} is no address; give one such as "

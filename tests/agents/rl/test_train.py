@@ -20,6 +20,7 @@ from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig
 from agents.rl.model_file import MODEL
 from agents.rl.train import RunConflict, load_last_checkpoint, train
+from er_gym.locking import Locked, sole_user
 
 Make = Callable[..., TrainConfig]
 ROOT = Path(__file__).resolve().parents[3]
@@ -213,3 +214,19 @@ def test_sigkill_and_the_same_command_again(make_config: Make, tmp_path: Path) -
     assert done is not None
     assert done.num_timesteps == 4096  # 4,000 asked for, in rollouts of 256
     assert "4,096 steps" in again.stdout
+
+
+def test_two_do_not_train_in_one_directory(make_config: Make, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    with sole_user(run), pytest.raises(Locked, match="in use by process"):
+        train(make_config(), run)
+    assert not run.exists()
+
+
+def test_a_start_that_fails_leaves_nothing(make_config: Make, tmp_path: Path) -> None:
+    """So that the corrected command can have the directory."""
+    run = tmp_path / "run"
+    (run / "notes").mkdir(parents=True)
+    with pytest.raises(ValueError, match="nowhere"):
+        train(make_config(env={"episodes": "nowhere.jsonl"}), run)
+    assert [path.name for path in run.iterdir()] == ["notes"]

@@ -1,0 +1,54 @@
+"""Tries bad command lines, failing servers and misuses of the Gymnasium interface, one after other.
+
+    python -m benchmarks.checks.hostile [--quick | --all]
+
+Prints what falls short as it is found, then a table: what was tried, how often, how much of it
+falls short, and the seconds that it took. The exit code is 1 if anything falls short. Without
+options it takes less than ten minutes on two processors that have nothing else to do, and tries a
+choice of the command lines, of every command and kind. ``--all`` tries each of them; ``--quick``
+fewer, and no whole runs against failing servers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Iterator
+
+from benchmarks.checks.tally import Tally
+
+_LINES, _QUICK_LINES = 420, 60
+
+
+def main() -> int:
+    """Try all, and print what falls short."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    size = parser.add_mutually_exclusive_group()
+    size.add_argument("--quick", action="store_true", help="fewer command lines, no whole runs")
+    size.add_argument("--all", action="store_true", help="every command line")
+    given = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    tallies = []
+    for tally in _tallies(_QUICK_LINES if given.quick else None if given.all else _LINES):
+        print(tally, flush=True)
+        tallies.append(tally)
+    print(f"\n{'':16} {'tried':>6} {'fall short':>11} {'seconds':>8}")
+    for tally in (*tallies, sum(tallies, Tally("in all"))):
+        print(f"{tally.what:16} {tally.tried:6} {tally.short:11} {tally.seconds:8.0f}")
+    return int(any(tally.short for tally in tallies))
+
+
+def _tallies(lines: int | None) -> Iterator[Tally]:
+    # The first one forks, so that the others, which start threads, come after it.
+    from benchmarks.checks import command_lines
+
+    yield command_lines.check((), at_least=lines)
+    from benchmarks.checks import misuse, server_faults
+
+    yield misuse.check()
+    yield server_faults.check((), with_runs=lines != _QUICK_LINES)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
