@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import gymnasium
 import numpy as np
@@ -111,12 +111,11 @@ def _of(env: gymnasium.Env[Obs, Any], steps: Sequence[_Step], gamma: float) -> D
         n for n, step in enumerate(steps) if step.action_index >= 0 and step.mask[step.action_index]
     ]
     unread = sum(step.action_index < 0 for step in steps)
-    space: Any = env.observation_space
-    assert isinstance(space, spaces.Dict)
+    boxes: dict[str, Any] = dict(cast(spaces.Dict, env.observation_space).spaces)
     return Demonstrations(
         obs={
-            key: np.array([steps[n].obs[key] for n in rows], box.dtype).reshape(-1, *box.shape)
-            for key, box in space.spaces.items()
+            key: np.array([steps[n].obs[key] for n in rows], box.dtype).reshape((-1, *box.shape))
+            for key, box in boxes.items()
         },
         masks=np.array([steps[n].mask for n in rows], np.int8).reshape(-1, len(ACTIONS)),
         actions=np.array([steps[n].action_index for n in rows], np.intp),

@@ -17,7 +17,7 @@ import zipfile
 from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
@@ -64,7 +64,8 @@ def save(model: BaseAlgorithm, run: Path) -> None:
     """Write the model; the file is replaced as a whole."""
     about = np.frombuffer(json.dumps(_about(model)).encode(), np.uint8)
     archive = io.BytesIO()
-    np.savez(archive, **{_ABOUT: about}, **_arrays(model))
+    arrays: dict[str, Any] = {_ABOUT: about, **_arrays(model)}
+    np.savez(archive, **arrays)
     write_atomic(run / MODEL, archive.getvalue())
 
 
@@ -81,7 +82,7 @@ def _about(model: BaseAlgorithm) -> dict[str, Any]:
         "format": _FORMAT,
         "algorithm": type(model).__name__,
         "sees": _shapes(model.observation_space),
-        "actions": int(model.action_space.n),
+        "actions": int(cast(spaces.Discrete, model.action_space).n),
         "counters": {name: getattr(model, name) for name in _COUNTERS if hasattr(model, name)},
         # Of the last episodes, for the means in the curve.
         "episodes": [

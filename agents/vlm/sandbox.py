@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
 from functools import wraps
 from itertools import chain
-from typing import Any
+from typing import Any, cast
 
 from jinja2 import nodes
 from jinja2.sandbox import SandboxedEnvironment, SecurityError
@@ -45,10 +45,12 @@ class BoundedEnvironment(SandboxedEnvironment):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options, finalize=self._shown)
         self._bill = threading.local()
-        self.filters = {name: self._paid(filter) for name, filter in self.filters.items()}
+        filters: dict[str, Any] = dict(self.filters)
+        self.filters = {name: self._paid(function) for name, function in filters.items()}
         self.filters[_EACH] = self._each
         self.filters[_MADE] = self._made
-        self.tests = {name: self._paid(test) for name, test in self.tests.items()}
+        tests: dict[str, Any] = dict(self.tests)
+        self.tests = {name: self._paid(function) for name, function in tests.items()}
         self.filters["format"] = _no_format
 
     def begin(self) -> None:
@@ -87,7 +89,7 @@ class BoundedEnvironment(SandboxedEnvironment):
         return super()._load_template(name, globals)
 
     def _parse(self, source: str, name: str | None, filename: str | None) -> nodes.Template:
-        return _Priced().visit(super()._parse(source, name, filename))  # type: ignore[no-any-return]
+        return _Priced().visit(super()._parse(source, name, filename))
 
     # -- charges ---------------------------------------------------------------------------------
 
@@ -128,7 +130,7 @@ class _Priced(NodeTransformer):
         self.generic_visit(node)
         if node.recursive:
             raise ValueError(f"line {node.lineno}: no template: loops may not be recursive here")
-        node.iter = _filtered(node.iter, _EACH)
+        node.iter = _filtered(cast(nodes.Expr, node.iter), _EACH)
         return node
 
     def visit_Tuple(self, node: nodes.Tuple) -> nodes.Node:

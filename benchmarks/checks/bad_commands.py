@@ -114,6 +114,7 @@ _AGENTS = (
 
 def lines() -> Iterator[Line]:
     """All of them."""
+    words: tuple[str, ...]
     for words in (
         ("nonsense",), ("--nonsense",), (HOSTILE,), (f"--{HOSTILE}",), ("",), ("bench",),
         ("bench", "--suite", "mini"), ("render",), ("report",), ("serve",), ("train-rl",),

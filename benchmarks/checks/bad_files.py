@@ -114,7 +114,7 @@ def _task_files(folder: Path) -> None:
     write_paper_tasks(folder / "good.json", tasks)
     header, *lines = (folder / "good.jsonl").read_text().splitlines()
     record = json.loads(lines[0])
-    for name, change in {
+    changes: dict[str, dict[str, Any]] = {
         "said": {"instruction": f"Find it. {HOSTILE}"},
         "named": {"id": HOSTILE},
         "typed": {"type": HOSTILE},
@@ -123,7 +123,8 @@ def _task_files(folder: Path) -> None:
         "temperature": {"goal": [{"object_type": "Mug", "state": {"temperature": "Warm"}}]},
         "difficult": {"extra": {"difficulty": dict.fromkeys(
             ("hidden_depth", "distractors", "distance", "length"), HOSTILE)}},
-    }.items():  # fmt: skip
+    }  # fmt: skip
+    for name, change in changes.items():
         only = json.dumps({**json.loads(header), "tasks": 1})
         (folder / f"{name}.jsonl").write_text(f"{only}\n{json.dumps({**record, **change})}\n")
 

@@ -65,7 +65,9 @@ class VLMOptions:
 _VLM_OPTIONS = (
     agent_config_option,
     overrides_option("sampling.temperature=0.7"),
-    click.option("--base-url", type=Words(), metavar="URL", help="The address of the model's server."),
+    click.option(
+        "--base-url", type=Words(), metavar="URL", help="The address of the model's server."
+    ),
     click.option(
         "--prompts-from",
         type=_existing_file,

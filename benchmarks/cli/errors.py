@@ -67,10 +67,16 @@ def print_problem(message: str) -> None:
 def report_set_aside(
     suite: str, set_aside: Iterable[SetAsideTask], taken: Iterable[Substitution] = ()
 ) -> None:
-    """Print which tasks of a suite are set aside, and which objects stand for missing ones."""
+    """Print which tasks of a suite are set aside, and which objects stand for missing ones.
+
+    Each has a line, as long as there are not too many.
+    """
     from er_gym.tasks.errors import describe_substitutions
 
-    aside = [f"set aside: {one}" for one in describe_substitutions(taken), "objects taken for others"), (aside, "tasks set aside")):
-        print_problem(f"{suite}: {line}")
+    aside = [f"set aside: {one}" for one in set_aside]
+    replaced = describe_substitutions(taken)
+    for lines, what in ((replaced, "objects used for others"), (aside, "tasks set aside")):
+        for line in lines[:_MOST_LINES]:
+            print_problem(f"{suite}: {line}")
         if len(lines) > _MOST_LINES:
-        print_problem(f"{suite}: and {len(lines) - _MOST_LINES:,} more {what}")
+            print_problem(f"{suite}: and {len(lines) - _MOST_LINES:,} more {what}")

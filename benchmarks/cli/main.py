@@ -18,7 +18,10 @@ from benchmarks.cli.doctor import doctor
 from benchmarks.cli.errors import (
     INTERRUPTED,
     BadInput,
-    bad_input, print_problem
+    bad_input,
+    interrupted_by_sigterm,
+    print_problem,
+)
 from benchmarks.cli.inspect import inspect
 from benchmarks.cli.options import scorer_option
 from benchmarks.cli.player import player

@@ -47,7 +47,7 @@ class PlayedEpisode:
             agent: None if it could not be made.
             record: the episode's record.
         """
-        if not isinstance(agent, LeavesAttachments):
+        if agent is None or not isinstance(agent, LeavesAttachments):
             return cls(record)
         stem = file_stem(record.task_id)
         try:

@@ -20,6 +20,7 @@ from er_gym.rollout.executor import (
     unbegun_episode,
 )
 from er_gym.rollout.play import episode_seed, one_line, play_episode
+from er_gym.rollout.processes import Terminated
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.rollout.worker_pool import LostJob, run_jobs
 from er_gym.tasks.task import Task

@@ -317,7 +317,8 @@ def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirector
             if not any(map(_holds_something, (path / name for name in _LOST_WITH_IT))):
                 begun._withdraw()
         new = not (path / MANIFEST).exists()
-        run_directory = RunDirectory.create(path, manifest)
+        try:
+            run_directory = RunDirectory.create(path, manifest)
         except OSError:  # a full disk
             with contextlib.suppress(OSError):
                 (path / EPISODES).rmdir()

@@ -12,7 +12,12 @@ from pydantic import ValidationError
 
 from er_gym.locking import Locked
 from er_gym.rollout.records import EpisodeRecord, StepRecord
-from er_gym.rollout.run_directory import REPLIES, RunDirectory, RunDirectoryError, locked_run_directory
+from er_gym.rollout.run_directory import (
+    REPLIES,
+    RunDirectory,
+    RunDirectoryError,
+    locked_run_directory,
+)
 from er_gym.writing import file_stem
 
 GOLDEN = """
@@ -294,14 +299,17 @@ def test_an_empty_folder_of_replies_is_nothing_to_keep(store, manifest):
     with closing(sqlite3.connect(file)) as database:
         database.execute("CREATE TABLE Cache (key TEXT)")
     other = manifest.model_copy(update={"agent": "openai:right"})
-    with claimed(store.path, other) as again:
+    with locked_run_directory(store.path, other) as again:
         assert again.manifest == other
         file.parent.mkdir(exist_ok=True)
         with closing(sqlite3.connect(file)) as database:
             database.execute("CREATE TABLE Cache (key TEXT)")
             database.execute("INSERT INTO Cache VALUES ('a reply')")
             database.commit()
-    with pytest.raises(RunDirectoryError, match="its agent is"), claimed(store.path, manifest):
+    with (
+        pytest.raises(RunDirectoryError, match="its agent is"),
+        locked_run_directory(store.path, manifest),
+    ):
         pass
 
 
@@ -321,7 +329,7 @@ def test_a_disk_that_is_full_at_the_start_leaves_nothing(tmp_path, manifest):
         "from pathlib import Path\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (64, 64))\n"
-        "with claimed(Path(sys.argv[1]), Manifest.model_validate_json(sys.argv[2])): pass\n"
+        "with locked_run_directory(Path(sys.argv[1]), Manifest.model_validate_json(sys.argv[2])): pass\n"
     )
     out = tmp_path / "run"
     command = [sys.executable, "-c", code, out, manifest.model_dump_json()]
