@@ -325,11 +325,12 @@ def test_half_a_character_of_an_agent_is_kept_as_its_escape(store, episode):
 def test_a_disk_that_is_full_at_the_start_leaves_nothing(tmp_path, manifest):
     code = (
         "import resource, signal, sys\n"
-        "from er_gym.rollout.run_directory import Manifest, claimed\n"
+        "from er_gym.rollout.run_directory import Manifest, locked_run_directory\n"
         "from pathlib import Path\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (64, 64))\n"
-        "with locked_run_directory(Path(sys.argv[1]), Manifest.model_validate_json(sys.argv[2])): pass\n"
+        "manifest = Manifest.model_validate_json(sys.argv[2])\n"
+        "with locked_run_directory(Path(sys.argv[1]), manifest): pass\n"
     )
     out = tmp_path / "run"
     command = [sys.executable, "-c", code, out, manifest.model_dump_json()]
