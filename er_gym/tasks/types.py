@@ -12,12 +12,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from er_gym.plugins import PluginError, added
-
-if TYPE_CHECKING:
-    from er_gym.tasks.generate.task_plan import TaskRule
 
 GROUP = "er_gym.task_types"
 """The entry points in which packages declare task types."""
@@ -26,6 +23,17 @@ VARIABLE = "ER_GYM_TASK_TYPES"
 SEARCH, MANIPULATE, TRANSPORT, COMPOSITE = "Search", "Manipulate", "Transport", "Composite"
 GROUPS = (SEARCH, MANIPULATE, TRANSPORT, COMPOSITE)
 """The groups, in the order of the paper's result table."""
+
+
+class GenerationRule(Protocol):
+    """A rule that generates tasks: an :class:`~er_gym.tasks.generate.task_plan.TaskRule`.
+
+    The table knows no more of it, since rules are made of the table's types.
+    """
+
+    @property
+    def type(self) -> str:
+        """The name of the type that it generates."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +59,7 @@ class TaskType:
     max_steps: int
     ordered: bool = False
     search: bool = False
-    rules: tuple[TaskRule, ...] = field(default=(), compare=False, repr=False)
+    rules: tuple[GenerationRule, ...] = field(default=(), compare=False, repr=False)
 
     def __reduce__(self) -> tuple[Callable[[str], TaskType], tuple[str]]:
         # Unpickled in another process, a row is that row of the table again.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 from er_gym.tasks.generate import composite, manipulate, search, transport
 from er_gym.tasks.generate.recipes import bundled_recipes, recipe_rules
 from er_gym.tasks.generate.task_plan import TaskRule
@@ -21,7 +23,8 @@ GENERATED_TYPES = tuple(BY_NAME[name] for name in dict.fromkeys(rule.type for ru
 
 def all_rules() -> tuple[TaskRule, ...]:
     """The rules of every type, those of other packages too."""
-    return (*RULES, *(rule for kind in BY_NAME.values() for rule in kind.rules))
+    others = (rule for kind in BY_NAME.values() for rule in kind.rules)
+    return (*RULES, *(cast(TaskRule, rule) for rule in others))
 
 
 def generated_types() -> tuple[TaskType, ...]:
