@@ -110,7 +110,7 @@ GOOD = replace(TASK_TYPES[0], name="single_open", env_id="Household-Open-v0")
         ({"group": "Chores"}, "group is 'Chores'; choose one of: Search, Manipulate"),
         ({"max_steps": 1}, "max_steps is 1; give a whole number from 2"),
         ({"max_steps": "24"}, "max_steps is '24'"),
-        ({"rules": ("row",)}, "a rule that generates tasks is 'row'; give a TaskRule of type 'single_o"),
+        ({"rules": ("row",)}, "a rule that generates tasks is 'row'; give a TaskRule of"),
     ],
 )
 def test_a_type_that_cannot_be_used(change: dict[str, Any], message: str) -> None:
