@@ -85,14 +85,14 @@ def _logged() -> Iterator[io.StringIO]:
     log = io.StringIO()
     handler = logging.StreamHandler(log)
     root = logging.getLogger()
-    before = root.level
-    root.addHandler(handler)
+    before, others = root.level, root.handlers[:]
+    root.handlers[:] = [handler]  # the others would print it all
     root.setLevel(logging.DEBUG)
     try:
         yield log
     finally:
         root.setLevel(before)
-        root.removeHandler(handler)
+        root.handlers[:] = others
 
 
 # -- requests --------------------------------------------------------------------------------------
