@@ -108,6 +108,7 @@ def _with_vlm_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--poses", type=_existing_file, help="Exact poses, a file in the paper's format.")
 @click.option(
     "--agent",
+    type=Words(),
     required=True,
     help="Who plays: oracle, random, searcher, rl:RUN, openai:MODEL, package.module:Class …",
 )

@@ -443,7 +443,7 @@ BAD = {
     "range": ((*GENERATE, "--distance", "a-b"), ["'a-b'", "A-B", "--distance"]),
     "depth": ((*GENERATE, "--hidden-depth", "1-x"), ["'1-x'", "--hidden-depth"]),
     "range the wrong way": ((*GENERATE, "--distance", "5-2"), ["'distance'", "smaller"]),
-    "no number": ((*GENERATE, "--distance", "nan"), ["'distance'", "no range"]),
+    "no number": ((*GENERATE, "--distance", "nan"), ["'distance'", "not a range"]),
     "no scene": ((*GENERATE, "--scenes", ","), ["'scenes'", "unknown scene ''"]),
     "bundled suite": (("generate", "--suite", "mini"), ["'mini'", "--out"]),
     "total": ((*GENERATE, "--total", "0"), ["--total", "0"]),

@@ -106,7 +106,7 @@ def test_state_is_relative_to_the_start(state_env: EmbodiedEnv) -> None:
 
 def test_state_keeps_to_its_bounds(state_env: EmbodiedEnv) -> None:
     state_env.reset(options={"task": make_task("single_pickup", ("open", FRIDGE))})
-    state_env._memory.start = AgentPose(99.0, 0.9, -99.0, 0.0)
+    state_env._episode._memory.start = AgentPose(99.0, 0.9, -99.0, 0.0)
     obs, *_ = state_env.step("observe")
     assert [entry(obs, name) for name in ("right", "ahead")] == [-1, 1]
     assert obs["state"] in state_env.observation_space["state"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -118,7 +119,7 @@ def test_far_is_where_the_engine_stops_drawing() -> None:
 
 def test_what_simulators_say_of_nothing_fits_into_the_space() -> None:
     class Situation:
-        class percept:
+        class perception:
             depth = np.array([[np.inf, 99.0, -1.0, 2.5]], dtype=np.float32)
 
     assert observations._depth(Situation).tolist() == [[FAR, FAR, 0.0, 2.5]]  # type: ignore[arg-type]
@@ -181,7 +182,7 @@ def test_an_observation_of_another_package_reads_classes() -> None:
     )
     assert set(SENSORS) >= set(seen.needs)
     env = EmbodiedEnv(obs_mode="text", **SMALL)
-    env._obs = {"classes": seen}
+    env._settings = replace(env._settings, observations={"classes": seen})
     env._controller_arguments |= {"headless": False, **SENSORS["classes"]}
     obs, _ = env.reset(seed=0)
     assert obs["classes"].shape == (64, 96, 3)

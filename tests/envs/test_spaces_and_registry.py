@@ -118,7 +118,10 @@ def test_a_seed_gives_the_same_bytes_in_any_process() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"obs_mode": "rgb+smell"}, "unknown obs_mode 'rgb\\+smell'.*rgb, state, text"),
+        (
+            {"obs_mode": "rgb+smell"},
+            "unknown obs_mode 'rgb\\+smell'.*rgb, depth, instance, state, text",
+        ),
         ({"instances": "any"}, "unknown instances 'any'.*target, explore"),
         ({"render_mode": "human"}, r"unknown render_mode 'human'.*rgb_array"),
         ({"task_type": "cleaning"}, "unknown task type 'cleaning'.*single_search"),

@@ -292,14 +292,14 @@ def test_two_do_not_play_in_one_directory(run_directory, manifest):
         pass
 
 
-def test_an_empty_folder_of_replies_is_nothing_to_keep(store, manifest):
+def test_an_empty_folder_of_replies_is_nothing_to_keep(run_directory, manifest):
     """It is made before the first reply: a run killed then gives way to the corrected one."""
-    file = store.path / REPLIES / "cache.db"
+    file = run_directory.path / REPLIES / "cache.db"
     file.parent.mkdir()
     with closing(sqlite3.connect(file)) as database:
         database.execute("CREATE TABLE Cache (key TEXT)")
     other = manifest.model_copy(update={"agent": "openai:right"})
-    with locked_run_directory(store.path, other) as again:
+    with locked_run_directory(run_directory.path, other) as again:
         assert again.manifest == other
         file.parent.mkdir(exist_ok=True)
         with closing(sqlite3.connect(file)) as database:
@@ -308,15 +308,15 @@ def test_an_empty_folder_of_replies_is_nothing_to_keep(store, manifest):
             database.commit()
     with (
         pytest.raises(RunDirectoryError, match="its agent is"),
-        locked_run_directory(store.path, manifest),
+        locked_run_directory(run_directory.path, manifest),
     ):
         pass
 
 
-def test_half_a_character_of_an_agent_is_kept_as_its_escape(store, episode):
+def test_half_a_character_of_an_agent_is_kept_as_its_escape(run_directory, episode):
     record = episode(("end",), ("end",)).model_dump() | {"error": "half \ud800"}
-    store.write(EpisodeRecord.model_validate(record))
-    (kept,) = store.episodes()
+    run_directory.write(EpisodeRecord.model_validate(record))
+    (kept,) = run_directory.episodes()
     assert kept.error == r"half \ud800"
     step = StepRecord(verb="end", success=True, thought="\ud800", text="é\udc80")
     assert (step.thought, step.text) == (r"\ud800", r"é\udc80")

@@ -314,12 +314,13 @@ def test_an_environment_that_cannot_be_made_ends_it(new_run_directory, tasks):
     assert no_process()
 
 
-def test_what_cannot_be_kept_ends_it(run_directory, tasks):
-    def keep(episode, agent):
+def test_what_cannot_be_kept_ends_it(run_directory, tasks, monkeypatch):
+    def attach(task_id, attachments, folders):
         raise OSError("disk full")
 
+    monkeypatch.setattr(run_directory, "attach", attach)
     with pytest.raises(OSError, match="disk full"):
-        run_threaded(run_directory, tasks, ending, keep=keep)
+        run_threaded(run_directory, tasks, ending)
     assert kept(run_directory) == []
     assert no_process()
 

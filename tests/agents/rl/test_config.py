@@ -46,7 +46,7 @@ def test_what_is_written_out_is_read_the_same(file: Path, tmp_path: Path) -> Non
         (["total_steps=0"], r"'total_steps': input should be greater than 0, not 0"),
         (["steps=5"], r"'steps': extra inputs are not permitted"),
         (["env.types=[fly]"], r"unknown type 'fly'; choose of: single_search,"),
-        (["env.obs_mode=text"], r"'env.obs_mode': input should be 'state' or 'rgb\+state'"),
+        (["env.obs_mode=text"], r"'env.obs_mode': input should be 'state', 'rgb\+state'"),
         (["algorithm.name=sarsa"], r"'algorithm'.*'ppo'"),
         (["total_steps.more=1"], r"'total_steps' is 1000, which has no fields"),
         (

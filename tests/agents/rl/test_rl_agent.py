@@ -71,13 +71,13 @@ def test_a_run_that_is_not_there(tmp_path: Path) -> None:
 
 
 def test_depths_are_made_small_and_stacked() -> None:
-    options = EnvConfig(obs_mode="rgb+depth+state", width=32, height=18, frames=2)
-    env = EmbodiedEnv((), obs_mode=options.obs_mode, width=64, height=36)
+    options = EnvConfig(obs_mode="rgb+depth+state", width=64, height=36, frames=2)
+    env = EmbodiedEnv((), obs_mode=options.obs_mode, width=128, height=72)
     obs, info = env.reset(options={"task": MINI[0]})
     perception = PolicyObservation(options)
     made = perception.reset(obs, info, MINI[0].instruction)
     assert made in perception.space
-    assert made["depth"].shape == (18, 32, 2)
+    assert made["depth"].shape == (36, 64, 2)
     near = obs["depth"][:2, :2].mean()  # four pixels become one
     assert made["depth"][0, 0] == pytest.approx(255 * min(near / 10, 1), abs=1)
     network = TypeNetwork(turned(perception.space), width=16, kind=4)
@@ -100,7 +100,7 @@ def turned(space: spaces.Dict) -> spaces.Dict:
 
 
 def test_pictures_are_made_small_and_stacked() -> None:
-    options = EnvConfig(obs_mode="rgb+state", width=32, height=18, frames=2, instruction="hashed")
+    options = EnvConfig(obs_mode="rgb+state", width=64, height=36, frames=2, instruction="hashed")
     policy_observation = PolicyObservation(options, with_mask=True)
     env = EmbodiedEnv((), obs_mode="rgb+state", width=64, height=36)
     obs, info = env.reset(options={"task": MINI[0]})

@@ -20,7 +20,7 @@ from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig
 from agents.rl.model_file import MODEL
 from agents.rl.train import RunConflict, load_last_checkpoint, train
-from er_gym.locking import Locked, sole_user
+from er_gym.locking import Locked, exclusive_use
 
 Make = Callable[..., TrainConfig]
 ROOT = Path(__file__).resolve().parents[3]
@@ -218,7 +218,7 @@ def test_sigkill_and_the_same_command_again(make_config: Make, tmp_path: Path) -
 
 def test_two_do_not_train_in_one_directory(make_config: Make, tmp_path: Path) -> None:
     run = tmp_path / "run"
-    with sole_user(run), pytest.raises(Locked, match="in use by process"):
+    with exclusive_use(run), pytest.raises(Locked, match="in use by process"):
         train(make_config(), run)
     assert not run.exists()
 
