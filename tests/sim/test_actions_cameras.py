@@ -47,6 +47,13 @@ def test_a_field_of_view_out_of_range_is_refused(drawing, degrees):
     assert event.metadata["fov"] == 90
 
 
+@pytest.mark.parametrize("degrees", [5e-324, 1e-320, 1e-9, np.nextafter(180.0, 0.0)])
+def test_the_narrowest_and_the_widest_field_of_view_are_drawn(drawing, degrees):
+    assert drawing.step("ChangeFOV", fieldOfView=float(degrees)).metadata["lastActionSuccess"]
+    assert drawing.step("Pass").frame.shape == drawing.last_event.frame.shape
+    assert drawing.step("GetObjectInFrame", x=0.5, y=0.5).frame is not None
+
+
 @pytest.mark.parametrize("degrees", [0, 180, 181, -1])
 def test_so_it_is_of_third_party_cameras(drawing, degrees):
     assert not drawing.step("AddThirdPartyCamera", **EYE, fieldOfView=degrees)

@@ -29,6 +29,8 @@ from er_gym.sim.render.textures import texture
 
 NEAR, FAR = 0.1, 40.0
 """The near and the far plane, metres from the camera."""
+SMALLEST_FOV = 1e-3
+"""Degrees. AI2-THOR takes any field of view above 0, but the lens of a smaller one is no number."""
 MOST_INSTANCES = 254
 DEVICES = {
     "cpu": ("p3tinydisplay", "TinyOffscreenGraphicsPipe"),
@@ -167,8 +169,9 @@ class Rasteriser:
                 self._size = (0, 0)  # the size is unknown if the next line is interrupted
                 self._buffer.setSize(width, height)
                 self._size = (width, height)
-            half = tan(radians(camera.fov) / 2)
-            self._lens.setFov(2 * degrees(atan(half * width / height)), camera.fov)
+            fov = max(camera.fov, SMALLEST_FOV)
+            half = tan(radians(fov) / 2)
+            self._lens.setFov(2 * degrees(atan(half * width / height)), fov)
             x, y, z = (float(value) for value in camera.position)
             self._camera.reparentTo(root)
             self._camera.setPos(x, z, y)
