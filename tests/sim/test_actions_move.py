@@ -180,6 +180,14 @@ def test_teleport_goes_where_the_body_has_room_on_or_off_the_grid(kitchen, x, z)
     assert kitchen.agent["position"] == pytest.approx({"x": x, "y": HEIGHT, "z": z}, abs=1e-6)
 
 
+def test_the_agents_own_position_is_reachable_to_the_last_digit(enter):
+    room = enter("FloorPlan1", snapToGrid=False)
+    room.do("Teleport", x=0.5123456789, y=HEIGHT, z=1.5987654321)
+    own = room.agent["position"]
+    assert (own["x"], own["z"]) == (0.5123456789, 1.5987654321)
+    assert own in room.do("GetReachablePositions")
+
+
 def test_who_stands_in_furniture_can_step_out_of_it(enter):
     room = enter("FloorPlan1", snapToGrid=False)
     room.do("TeleportFull", x=-0.5, z=0.0, rotation=270, forceAction=True)

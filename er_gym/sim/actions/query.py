@@ -19,6 +19,8 @@ from er_gym.sim.world import World
 
 _SMALLEST_STEP = 0.01
 """The smallest step of a grid of positions, metres; a smaller one would fill the memory."""
+_SAME_PLACE = 1e-5
+"""Positions nearer to each other than this are one, metres."""
 
 
 @action("Pass", "Done", "PausePhysicsAutoSim", "UnpausePhysicsAutoSim")
@@ -109,6 +111,10 @@ def get_reachable_positions(
     step = world.settings.grid_size if gridSize is None else gridSize
     if maxStepCount is not None and len(places) > maxStepCount // step**2:
         raise ActionFailed("Too many steps taken in GetReachablePositions.")
+    # Programs look the agent's position up among these, so it must be equal to the last digit.
+    own = world.agent.position[[0, 2]]
+    is_own = np.abs(places - own).max(axis=1, initial=0.0) < _SAME_PLACE
+    places = np.where(is_own[:, None], own, places)
     y = float(world.agent.position[1])
     return [{"x": x, "y": y, "z": z} for x, z in places.tolist()]
 
