@@ -59,6 +59,9 @@ def main(words: Sequence[str]) -> int:
 def check(words: Sequence[str], *, with_runs: bool = True) -> Tally:
     """Try all whose names hold the words, whole runs too, and print what falls short."""
     os.environ[_KEY_FROM] = KEY
+    # What a shell starts in the background ignores Ctrl-C, and so would the commands tried here.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     chosen = [case for case in CASES if all(word in case.name for word in words)]
     began = time.monotonic()
     short = 0
