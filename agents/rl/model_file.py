@@ -123,6 +123,8 @@ def restore(file: Path, model: BaseAlgorithm) -> None:
                 setattr(model, name, type(getattr(model, name))(about["counters"][name]))
         for name, kept in (("ep_info_buffer", "episodes"), ("ep_success_buffer", "successes")):
             setattr(model, name, deque(about[kept], maxlen=model._stats_window_size))
+    # zipfile and numpy raise these for archives that are damaged, cut short, encrypted, compressed
+    # in a way unknown here, or that hold other arrays.
     except (
         zipfile.BadZipFile, OSError, KeyError, TypeError, ValueError, RuntimeError, MemoryError,
         NotImplementedError, EOFError,
