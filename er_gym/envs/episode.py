@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -250,14 +251,20 @@ class Episode:
                 name: None if view.frame is None else np.array(self.picture(view))
                 for name, view in views.items()
             }
-        obs = self._observation(feedback, success, info)
+        obs = self._observation(feedback, success, info, views or {})
         return obs, reward, terminated, truncated, cast(dict[str, Any], info)
 
     def picture(self, perception: Perception) -> NDArray[np.uint8] | None:
         """The frame, annotated with object types if the environment asks for it."""
         return perception.annotated if self._settings.annotate else perception.frame
 
-    def _observation(self, feedback: str, success: bool, info: Info) -> dict[str, Any]:
+    def _observation(
+        self,
+        feedback: str,
+        success: bool,
+        info: Info,
+        views: Mapping[str, Perception] = MappingProxyType({}),
+    ) -> dict[str, Any]:
         """The observation; what explains it is added to ``info``."""
         situation = Situation(
             perception=self.perception,
@@ -271,6 +278,7 @@ class Episode:
             steps=self._steps,
             max_steps=self._step_limit,
             annotate=self._settings.annotate,
+            views=views,
         )
         for kind in self._settings.observations.values():
             cast(dict[str, Any], info).update(kind.info(situation))
