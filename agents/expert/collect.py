@@ -1,0 +1,352 @@
+"""Collect trajectories: play candidates, part by part, until enough are taken."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+from agents.expert.acceptance import rejection
+from agents.expert.candidates import Candidate, CandidateSequence
+from agents.expert.corrections import beginning_of
+from agents.expert.recipe import Recipe, quotas
+from agents.expert.silent import SilentAgent
+from agents.expert.thinker import OBS_MODE, ThinkingAgent, TrajectoryHeader
+from agents.expert.thought_kinds import ThoughtKinds
+from agents.expert.writers.base import ThoughtWriter
+from agents.vlm.settings import Pictures
+from er_gym.data.collection import PARTS, Collection, CollectionError
+from er_gym.data.trajectory import Correction, Language, Trajectory
+from er_gym.rollout.agent import Agent
+from er_gym.rollout.events import Cost, EventListener
+from er_gym.rollout.executor import Parallelism
+from er_gym.rollout.run_directory import Manifest, RunDirectory, locked_run_directory
+from er_gym.rollout.runner import run
+from er_gym.tasks.task import Task
+
+ATTEMPTS = "attempts"
+"""The suffix of the run directory with the explorers' attempts that a part corrects."""
+_MOST_ROUNDS = 40
+_FRUITLESS_ROUNDS = 3
+"""A task type of a part of which nothing was taken in this many rounds is given up."""
+
+
+@dataclass(frozen=True)
+class CollectSettings:
+    """What decides the trajectories of a collection.
+
+    Attributes:
+        recipe: how many of what.
+        tasks: the suite's tasks.
+        env: keyword arguments of the environment, without ``obs_mode`` and ``faults``.
+        kinds: which kinds of thoughts are drawn.
+        pictures: how pictures are encoded.
+        language: of the thoughts.
+        seed: of everything that is drawn.
+        manifest: what the parts' manifests have in common with the collection's.
+    """
+
+    recipe: Recipe
+    tasks: Sequence[Task]
+    env: Mapping[str, Any]
+    kinds: ThoughtKinds
+    pictures: Pictures
+    language: Language
+    seed: int
+    manifest: Mapping[str, Any]
+
+
+@dataclass
+class CollectSummary:
+    """What :func:`collect` did.
+
+    Attributes:
+        taken: how many trajectories are in the collection.
+        wanted: how many there should be.
+        played: how many episodes were played now.
+        rejected: how many trajectories were not taken, by the reason.
+        crashed: the errors of episodes that crashed.
+        missing: by part and task type, how many could not be had.
+    """
+
+    taken: int = 0
+    wanted: int = 0
+    played: int = 0
+    rejected: dict[str, int] = field(default_factory=dict)
+    crashed: list[str] = field(default_factory=list)
+    missing: dict[tuple[str, str], int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class MakeThinker:
+    """Makes the agents of a part's episodes: a :class:`~er_gym.rollout.agent.MakeAgent`."""
+
+    candidates: Mapping[str, Candidate]
+    make_writer: Callable[[], ThoughtWriter]
+    settings: CollectSettings
+    most_actions: int
+
+    def __call__(self, task: Task, seed: int) -> Agent:
+        """The agent of a candidate's episode."""
+        candidate, settings = self.candidates[task.id], self.settings
+        correction = None
+        if candidate.beginning is not None:
+            correction = Correction(
+                run=candidate.run,
+                episode=candidate.episode,
+                first_wrong=candidate.beginning.first_wrong,
+            )
+        header = TrajectoryHeader(
+            task_id=candidate.task.id,
+            part=candidate.part,
+            kind=candidate.kind,
+            mode=candidate.mode,
+            language=settings.language,
+            actor=candidate.said_actor,
+            folder=f"{PARTS}/{candidate.part}",
+            correction=correction,
+        )
+        return ThinkingAgent(
+            candidate.course(seed, settings.kinds),
+            header,
+            settings.kinds,
+            self.make_writer(),
+            settings.pictures,
+            seed,
+            rejects=partial(rejection, most_actions=self.most_actions),
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The workers need neither the suite's tasks nor the recipe.
+        light = replace(self.settings, tasks=(), recipe=Recipe(parts={}))
+        return {**self.__dict__, "settings": light}
+
+
+@dataclass(frozen=True)
+class MakeSilent:
+    """Makes the agents of attempts, which are recorded without thoughts and pictures."""
+
+    candidates: Mapping[str, Candidate]
+    kinds: ThoughtKinds
+
+    def __call__(self, task: Task, seed: int) -> Agent:
+        """The agent of a candidate's attempt."""
+        return SilentAgent(self.candidates[task.id].course(seed, self.kinds))
+
+
+@dataclass
+class _Stratum:
+    """The candidates of one part and task type, and which of them were taken.
+
+    Attributes:
+        sequence: the candidates.
+        quota: how many to take.
+        played: how many candidates have been looked at.
+        taken: those taken, in order.
+        fruitless: rounds in a row in which none was taken.
+    """
+
+    sequence: CandidateSequence
+    quota: int
+    played: int = 0
+    taken: list[Candidate] = field(default_factory=list)
+    fruitless: int = 0
+
+    @property
+    def missing(self) -> int:
+        return self.quota - len(self.taken)
+
+    @property
+    def open(self) -> bool:
+        return self.missing > 0 and self.fruitless < _FRUITLESS_ROUNDS
+
+    def next(self) -> list[Candidate]:
+        """The candidates of the next round: as many as are missing, and a few more where many were
+        rejected before."""
+        yield_so_far = (len(self.taken) + 1) / (self.played + 1)
+        number = min(round(self.missing / yield_so_far), 4 * self.missing + 4)
+        first = self.played
+        self.played += number
+        return [self.sequence[index] for index in range(first, first + number)]
+
+
+class Collector:
+    """Plays candidates until every part has its number.
+
+    Args:
+        collection: where to.
+        settings: what decides the trajectories.
+        make_writer: makes the writer of thoughts; picklable for ``executor="processes"``.
+        limit: how many trajectories in all; None for the recipe's number.
+        executor, parallelism: as :func:`er_gym.rollout.runner.run` takes them.
+        listeners: hear of every event of the runs.
+        cost: what the thoughts have cost so far.
+    """
+
+    def __init__(
+        self,
+        collection: Collection,
+        settings: CollectSettings,
+        make_writer: Callable[[], ThoughtWriter],
+        *,
+        limit: int | None = None,
+        executor: str = "processes",
+        parallelism: Parallelism = Parallelism(),  # noqa: B008 (frozen)
+        listeners: Iterable[EventListener] = (),
+        cost: Callable[[], Cost | None] = lambda: None,
+    ) -> None:
+        self._collection, self._settings, self._make_writer = collection, settings, make_writer
+        self._executor, self._parallelism = executor, parallelism
+        self._listeners, self._cost = tuple(listeners), cost
+        by_type: dict[str, list[Task]] = {}
+        for task in settings.tasks:
+            by_type.setdefault(task.type.name, []).append(task)
+        wanted = quotas(settings.recipe, limit, set(by_type))
+        self._strata = {
+            (part, kind): _Stratum(
+                CandidateSequence(part, settings.recipe.parts[part], by_type[kind], settings.seed),
+                number,
+            )
+            for (part, kind), number in wanted.items()
+            if number
+        }
+        self.summary = CollectSummary(wanted=sum(wanted.values()))
+
+    def collect(self) -> CollectSummary:
+        """Collect what is missing, and write ``trajectories.jsonl``, also when interrupted.
+
+        Raises:
+            Stopped, WorkerSetupError, KeyboardInterrupt, OSError: as
+                :func:`er_gym.rollout.runner.run`; what was collected so far is written.
+        """
+        try:
+            for part in self._settings.recipe.parts:
+                strata = [one for (name, _), one in self._strata.items() if name == part]
+                if strata:
+                    self._collect_part(part, strata)
+        finally:
+            self.summary.taken = self._collection.write(self._taken())
+        for key, stratum in self._strata.items():
+            if stratum.missing > 0:
+                self.summary.missing[key] = stratum.missing
+        return self.summary
+
+    def _taken(self) -> Iterator[Trajectory]:
+        for stratum in self._strata.values():
+            for candidate in stratum.taken:
+                yield self._collection.played(candidate.part, candidate.id)
+
+    # -- one part --------------------------------------------------------------------------------
+
+    def _collect_part(self, part: str, strata: Sequence[_Stratum]) -> None:
+        row = self._settings.recipe.parts[part]
+        env: dict[str, Any] = {**self._settings.env, "obs_mode": OBS_MODE}
+        if row.faults:
+            env["faults"] = row.faults
+        with self._part_directory(part, env) as directory:
+            for _ in range(_MOST_ROUNDS):
+                rounds = [(stratum, stratum.next()) for stratum in strata if stratum.open]
+                if not rounds:
+                    break
+                candidates = [each for _, chosen in rounds for each in chosen]
+                ready = self._ready(part, candidates)
+                self._play(directory, ready, row.most_actions)
+                for stratum, chosen in rounds:
+                    self._judge(stratum, [ready[one.id] for one in chosen if one.id in ready])
+
+    @contextmanager
+    def _part_directory(self, part: str, env: Mapping[str, Any]) -> Iterator[RunDirectory]:
+        settings = self._settings
+        row = settings.recipe.parts.get(part.removesuffix(f"-{ATTEMPTS}"))
+        manifest = Manifest(
+            suite=settings.manifest["suite"],
+            suite_digest=settings.manifest["suite_digest"],
+            suite_size=len(settings.tasks),
+            agent=row.actor if row else "explorer",
+            agent_settings=settings.manifest["settings"],
+            env=dict(env),
+            seed=settings.seed,
+            er_gym=settings.manifest["er_gym"],
+        )
+        path = self._collection.part_path(part)
+        with locked_run_directory(path, manifest) as directory:
+            yield directory
+
+    def _ready(self, part: str, candidates: Sequence[Candidate]) -> dict[str, Candidate]:
+        """The candidates that can be played, by id; corrections get their failed attempts."""
+        if not candidates or candidates[0].actor != "corrector":
+            return {each.id: each for each in candidates}
+        attempts = f"{part}-{ATTEMPTS}"
+        env = {**self._settings.env, "obs_mode": "objects"}
+        with self._part_directory(attempts, env) as directory:
+            tasks = _by_scene(each.played_task for each in candidates)
+            make = MakeSilent({each.id: each for each in candidates}, self._settings.kinds)
+            self._run(directory, tasks, make, "processes")
+            wanted = {each.id: each for each in candidates}
+            ready = {}
+            for episode in directory.episodes():
+                candidate = wanted.get(episode.task_id)
+                if candidate is None:
+                    continue
+                beginning = beginning_of(episode)
+                if beginning.problem:
+                    self._reject(f"attempt: {beginning.problem}")
+                    continue
+                ready[candidate.id] = replace(
+                    candidate,
+                    beginning=beginning,
+                    run=attempts,
+                    episode=episode.task_id,
+                    strength=None,
+                )
+        return ready
+
+    def _play(
+        self, directory: RunDirectory, candidates: Mapping[str, Candidate], most: int
+    ) -> None:
+        tasks = _by_scene(each.played_task for each in candidates.values())
+        make = MakeThinker(candidates, self._make_writer, self._settings, most)
+        self._run(directory, tasks, make, self._executor)
+
+    def _run(
+        self, directory: RunDirectory, tasks: Sequence[Task], make: Any, executor: str
+    ) -> None:
+        summary = run(
+            directory,
+            tasks,
+            make,
+            executor=executor,
+            parallelism=self._parallelism,
+            listeners=self._listeners,
+            cost=self._cost,
+        )
+        self.summary.played += summary.played
+        self.summary.crashed += [f"{each.task_id}: {each.error}" for each in summary.crashed]
+
+    def _judge(self, stratum: _Stratum, candidates: Sequence[Candidate]) -> None:
+        """Take candidates of a round, in order, until the quota is full."""
+        before = len(stratum.taken)
+        for candidate in candidates:
+            if stratum.missing <= 0:
+                break
+            try:
+                trajectory = self._collection.played(candidate.part, candidate.id)
+            except CollectionError:  # it crashed, and that is in the summary
+                continue
+            most = self._settings.recipe.parts[candidate.part].most_actions
+            reason = rejection(trajectory, most)
+            if reason:
+                self._reject(reason)
+            else:
+                stratum.taken.append(candidate)
+        stratum.fruitless = 0 if len(stratum.taken) > before else stratum.fruitless + 1
+
+    def _reject(self, reason: str) -> None:
+        self.summary.rejected[reason] = self.summary.rejected.get(reason, 0) + 1
+
+
+def _by_scene(tasks: Iterable[Task]) -> list[Task]:
+    """Tasks in an order in which a worker's room stays warm."""
+    return sorted(tasks, key=lambda task: (task.scene, task.id))
