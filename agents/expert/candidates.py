@@ -17,12 +17,11 @@ from agents.expert.course import Course
 from agents.expert.expert import CorrectedCourse, ExpertCourse
 from agents.expert.explorer import ExplorerCourse, Strength
 from agents.expert.kinds import ORDERED_KIND, draw_mode
-from agents.expert.recipe import ANOMALY, Part
+from agents.expert.recipe import ANOMALY, CORRECTED, EXPLORED, Part
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.tasks.task import Task
 
 _RETRIES = 3
-CORRECTED, EXPLORED = "corrected", "explored"
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,8 @@ class Candidate:
         if self.beginning is not None:
             return CorrectedCourse(task, self.beginning.actions, random, check)
         if self.strength is not None:
-            return ExplorerCourse(task, self.strength, random, check)
+            must_search = self.kind == EXPLORED
+            return ExplorerCourse(task, self.strength, random, check, must_search=must_search)
         anomalous = self.kind == ANOMALY
         return ExpertCourse(
             task,

@@ -21,6 +21,8 @@ _SHOWN = 2
 """How many places a plan names."""
 _LOOKS = 2
 """How often an explorer looks around in one search."""
+_LOSES_HEART = 0.5
+"""The share of careless explorers that end the episode after a place that does not fit."""
 
 
 class Strength(BaseModel):
@@ -30,8 +32,8 @@ class Strength(BaseModel):
         share: of the trajectories that explorers of this strength play.
         temperature: 0 goes to the likeliest place first; larger is more random.
         forgets: the share of places visited that it may visit again.
-        blunders: the share of actions at which it does something wrong: it takes another object,
-            forgets to open a container, or ends too early.
+        blunders: the share of searches and actions at which it does something wrong: it goes to an
+            unlikely place, takes another object, forgets to open a container, or ends too early.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -52,15 +54,30 @@ class ExplorerCourse(TaskCourse):
         strength: how well it plays.
         random: draws places and blunders.
         check: how the task ends.
+        must_search: whether the episode ends at once if the first thing to be searched for is in
+            view from the beginning, since nothing is explored then.
     """
 
-    def __init__(self, task: Task, strength: Strength, random: Random, check: Check = "") -> None:
+    def __init__(
+        self,
+        task: Task,
+        strength: Strength,
+        random: Random,
+        check: Check = "",
+        *,
+        must_search: bool = False,
+    ) -> None:
         super().__init__(task, random, check=check)
-        self._strength = strength
+        self._strength, self._must_search = strength, must_search
 
     def _find(self, leg: Leg) -> Intents:
         tried: list[str] = []
         looks = 0
+        if leg.hidden and self._must_search and self._way_to(leg):
+            raise GiveUp
+        self._must_search = self._must_search and not leg.hidden
+        if self._random.random() < self._strength.blunders:
+            yield from self._stray(leg)
         while True:
             if self._ready(leg):
                 return True
@@ -80,6 +97,15 @@ class ExplorerCourse(TaskCourse):
             if self._random.random() >= self._strength.forgets:
                 tried.append(places[0])
             yield from self._visit(places[0], leg, tuple(places))
+
+    def _stray(self, leg: Leg) -> Intents:
+        """Go to an unlikely place, and perhaps lose heart there."""
+        weighted = [(place, 1.0) for place, _ in candidates(leg.thing, self.view.navigable)]
+        for place in draw_places(weighted, 1, self._random):
+            yield from self._visit(place, leg, (place,))
+        if not leg.actions or self._random.random() < _LOSES_HEART:
+            raise GiveUp
+        return False
 
     def _approach(self, near: str, leg: Leg) -> Intents:
         yield from self._go(near, "carry" if self.view.held else "approach")

@@ -13,8 +13,9 @@ from agents.expert.kinds import MODES
 from er_gym.tasks.types import BY_NAME
 
 DEFAULT = "paper"
-ANOMALY = "anomaly"
-"""The kind of an expert's trajectory in which things go wrong."""
+ANOMALY, EXPLORED, CORRECTED = "anomaly", "explored", "corrected"
+"""Kinds of trajectories beside the expert's ``a``, ``b`` and ``c``: things go wrong, an explorer
+plays, a failed episode is corrected."""
 Share = Annotated[float, Field(ge=0)]
 
 
