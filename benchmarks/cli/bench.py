@@ -25,6 +25,7 @@ from benchmarks.cli.options import (
     Place,
     Words,
     agent_config_option,
+    faults_option,
     overrides_option,
     protocol_option,
     scorer_option,
@@ -38,6 +39,7 @@ from benchmarks.cli.terminal import stdout, terminal
 if TYPE_CHECKING:
     from benchmarks.cli.progress import Progress
     from benchmarks.cli.vlm_run import VLMRun
+    from er_gym.envs.faults import Faults
     from er_gym.rollout.events import Cost
     from er_gym.rollout.run_directory import Manifest, RunDirectory
     from er_gym.rollout.runner import RunSummary
@@ -126,6 +128,7 @@ def _with_vlm_options(command: Callable[..., Any]) -> Callable[..., Any]:
     "--instances", help="Which object a name means: target, explore.  [default: the suite's]"
 )
 @protocol_option
+@faults_option
 @scorer_option
 @_with_vlm_options
 def bench(
@@ -143,6 +146,7 @@ def bench(
     trust: bool,
     instances: str | None,
     protocol: str,
+    faults: Faults | None,
     scorer: str,
     vlm_options: VLMOptions,
 ) -> int:
@@ -175,7 +179,15 @@ def bench(
         if trust and not agent.startswith(RL_PREFIX):
             raise BadInput(f"--trust is for trained policies, {RL_PREFIX}RUN, not for {agent}")
         env = _env_kwargs(
-            asked, agent, seed, vlm_run, protocol, trust, backend=backend, instances=instances
+            asked,
+            agent,
+            seed,
+            vlm_run,
+            protocol,
+            trust,
+            faults,
+            backend=backend,
+            instances=instances,
         )
         fitted = resolve_tasks(asked.tasks, env["backend"])
         aside = (*asked.set_aside, *fitted.set_aside)
@@ -324,6 +336,7 @@ def _env_kwargs(
     vlm_run: VLMRun | None,
     protocol: str,
     trust: bool,
+    faults: Faults | None,
     **given: str | None,
 ) -> dict[str, Any]:
     """The environment's arguments: the suite's, overridden by the options that were given, and the
@@ -340,6 +353,10 @@ def _env_kwargs(
     if protocol_named(protocol).chooses_instances:
         env.pop("instances", None)
     env |= {name: value for name, value in given.items() if value is not None}
+    if faults is not None:
+        env["faults"] = faults
+    if not env.get("faults", 0):  # likewise
+        env.pop("faults", None)
     if env["backend"] not in BACKENDS:
         raise ValueError(
             f"unknown backend {env['backend']!r}; choose one of: {', '.join(BACKENDS)}"

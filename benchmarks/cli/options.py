@@ -32,6 +32,30 @@ protocol_option = click.option(
     "that stand beside its table.",
 )
 
+
+class FaultsType(click.ParamType):
+    """Rates of faults: ``0.1``, or ``navigate=0.2,open=0.1``."""
+
+    name = "RATES"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        from er_gym.envs.faults import parse_faults
+
+        if not isinstance(value, str):
+            return value
+        try:
+            return parse_faults(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+faults_option = click.option(
+    "--faults",
+    type=FaultsType(),
+    metavar="RATE | KIND=RATE,…",
+    help="Let actions go wrong at this rate, such as 0.1 or navigate=0.2,open=0.1.  [default: 0]",
+)
+
 _MOST_WORKERS = 256
 """Each takes a hundred megabytes and more."""
 MOST_SEED = 2**32 - 1

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs import skills
-from er_gym.envs.action_handler import EpisodeSetup
+from er_gym.envs.action_handler import ActionHandler, EpisodeSetup
 from er_gym.envs.actions import Action, AnyAction
+from er_gym.envs.faults import FaultPlan, FaultyActionHandler
 from er_gym.envs.info import Info, LegalActions
 from er_gym.envs.legality import KnownTypes
 from er_gym.envs.observations import MAX_REPEATS, Memory, Observation, Situation, goal_row
@@ -76,9 +77,11 @@ class Episode:
         task: what is asked.
         controller: in any scene; the episode resets it to the task's.
         backend: the name of the controller's backend.
+        faults: which actions go wrong; None for none.
 
     Attributes:
         task: what is asked.
+        faults: which actions go wrong; None for none.
         perception: what the agent perceived last.
         end_reason: why the episode is over, ``""`` while it is not.
     """
@@ -86,12 +89,20 @@ class Episode:
     perception: Perception
 
     def __init__(
-        self, settings: EpisodeSettings, task: Task, controller: Any, backend: str
+        self,
+        settings: EpisodeSettings,
+        task: Task,
+        controller: Any,
+        backend: str,
+        faults: FaultPlan | None = None,
     ) -> None:
         self.task = task
         self.end_reason = ""
+        self.faults = faults
         self._settings, self._protocol = settings, settings.protocol
         self._controller, self._backend = controller, backend
+        self._faulty: FaultyActionHandler | None = None
+        self._fault = ""
         self._progress = Progress.start(Criteria.of(task))
         self._known = KnownTypes(task.navigable_objects)
         self._steps = 1
@@ -106,9 +117,11 @@ class Episode:
         floor = skills.reachable(controller, (self._backend, task.scene, settings.grid_size))
         pose = self._protocol.start(bounds, floor)
         self._memory = Memory(pose, goal_row(task.instruction))
-        self._handler = self._protocol.action_handler(
+        self._handler: ActionHandler = self._protocol.action_handler(
             EpisodeSetup(task, controller, floor, pose, settings.grid_size, settings.instances)
         )
+        if self.faults is not None:
+            self._handler = self._faulty = self.faults.handler(self._handler, self._known)
         placed = skills.place(controller, pose)
         self._perceive(placed)
         feedback = "You look around the room."
@@ -138,6 +151,7 @@ class Episode:
 
     def step(self, understood: Action | None, text: str) -> StepResult:
         """Do an action that :meth:`understand` returned."""
+        self._fault = ""
         if understood is None:
             return self._not_understood(text)
         self._unknown_replies = 0
@@ -155,6 +169,7 @@ class Episode:
             object_id, outcome = self._handler.execute(
                 understood, self.perception, self._available, self._progress.left
             )
+            self._fault = "" if self._faulty is None else self._faulty.fault
         self._memory.act(understood, outcome.success)
         self._perceive(outcome)
         reward = self._judge(understood, outcome, object_id) - self._settings.step_penalty
@@ -288,7 +303,7 @@ class Episode:
         self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
     ) -> Info:
         mask = self.action_mask()
-        return {
+        info: Info = {
             "task": self.task,
             "action": action,
             "action_text": text,
@@ -309,6 +324,9 @@ class Episode:
             "max_steps": self._step_limit,
             "end_reason": self.end_reason,
         }
+        if self._faulty is not None:
+            info["fault"] = self._fault
+        return info
 
 
 def _feedback(action: Action, outcome: skills.Outcome) -> str:

@@ -106,6 +106,9 @@ class Info(_Always, total=False):
 
     end_appended: bool
     """After ``step``: whether the paper's protocol appended an ``end`` to the episode."""
+    fault: str
+    """In an environment with faults: the kind of fault that was injected into the action, ``""``
+    for none (:mod:`er_gym.envs.faults`). It is for records: an agent should not read it."""
     views: dict[str, NDArray[np.uint8] | None]
     """After ``observe``: the picture of each view by its direction, (height, width, 3) uint8; None
     where none is drawn."""
