@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from agents.expert.recipe import ANOMALY, CORRECTED, EXPLORED
+from agents.expert.recipe import ANOMALY, CORRECTED, SEARCH
 from er_gym.data.trajectory import Trajectory
 from er_gym.rollout.records import KeyActionRecord
 from er_gym.tasks import verbs
@@ -18,7 +18,8 @@ def rejection(trajectory: Trajectory, most_actions: int) -> str:
         return "too long"
     if trajectory.kind == "b" and not is_key_actions(trajectory):
         return "more than the key actions"
-    if trajectory.kind in ("a", "c", EXPLORED) and is_key_actions(trajectory):
+    searches = trajectory.kind in ("a", "c") or trajectory.mode == SEARCH
+    if searches and is_key_actions(trajectory):
         return "nothing was searched"
     odd = [turn for turn in trajectory.turns if turn.fault or turn.purpose == "repeat"]
     if trajectory.kind == ANOMALY and not odd:

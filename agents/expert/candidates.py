@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from random import Random
+from typing import Protocol
 
 from agents.expert.corrections import Beginning
 from agents.expert.course import Course
 from agents.expert.expert import CorrectedCourse, ExpertCourse
 from agents.expert.explorer import ExplorerCourse, Strength
 from agents.expert.kinds import ORDERED_KIND, draw_mode
-from agents.expert.recipe import ANOMALY, CORRECTED, EXPLORED, Part
+from agents.expert.recipe import ANOMALY, CORRECTED, EXPLORED, SEARCH, Part
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.tasks.task import Task
 
@@ -34,7 +35,7 @@ class Candidate:
         task: the task, with its own id.
         index: in the sequence of its part and task type.
         kind: of the trajectory. For a correction, the explorer's strength is drawn for its attempt.
-        mode: the expert's first plan.
+        mode: the expert's first plan; ``search`` for an explorer that must have searched.
         explorer: the name of an explorer's strength.
         strength: how well the explorer plays.
         beginning: of the failed episode that is corrected.
@@ -74,7 +75,7 @@ class Candidate:
         if self.beginning is not None:
             return CorrectedCourse(task, self.beginning.actions, random, check)
         if self.strength is not None:
-            must_search = self.kind == EXPLORED
+            must_search = self.mode == SEARCH
             return ExplorerCourse(task, self.strength, random, check, must_search=must_search)
         anomalous = self.kind == ANOMALY
         return ExpertCourse(
@@ -89,8 +90,34 @@ class Candidate:
         )
 
 
+class Candidates(Protocol):
+    """Candidates by index."""
+
+    @property
+    def length(self) -> int | None:
+        """How many there are; None for any number."""
+
+    def __getitem__(self, index: int) -> Candidate:
+        """A candidate, the same every time."""
+
+
+@dataclass(frozen=True)
+class FixedCandidates:
+    """Candidates that are there already."""
+
+    candidates: Sequence[Candidate]
+
+    @property
+    def length(self) -> int:
+        """How many there are."""
+        return len(self.candidates)
+
+    def __getitem__(self, index: int) -> Candidate:
+        return self.candidates[index]
+
+
 class CandidateSequence:
-    """The candidates of one part and task type.
+    """The candidates of one part and task type, drawn without end.
 
     Args:
         name: the part's.
@@ -99,14 +126,11 @@ class CandidateSequence:
         seed: the collection's.
     """
 
+    length = None
+
     def __init__(self, name: str, part: Part, tasks: Sequence[Task], seed: int) -> None:
         self._name, self._part, self._tasks = name, part, tasks
         self._seed = f"{seed}/{name}/{tasks[0].type.name}"
-
-    @property
-    def round_length(self) -> int:
-        """After so many candidates, every task has had its turn once more."""
-        return len(self._tasks)
 
     def __getitem__(self, index: int) -> Candidate:
         round_number, place = divmod(index, len(self._tasks))
@@ -123,6 +147,8 @@ class CandidateSequence:
             shares = {name: strength.share for name, strength in part.explorers.items()}
             explorer = _draw(shares, random)
             kind = EXPLORED if part.actor == "explorer" else CORRECTED
+            if kind == EXPLORED and random.random() >= part.direct:
+                mode = SEARCH
         return Candidate(
             id=f"{task.id}-{kind}{round_number or ''}",
             part=self._name,

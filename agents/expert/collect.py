@@ -9,9 +9,15 @@ from functools import partial
 from typing import Any
 
 from agents.expert.acceptance import rejection
-from agents.expert.candidates import Candidate, CandidateSequence
+from agents.expert.candidates import (
+    Candidate,
+    Candidates,
+    CandidateSequence,
+    FixedCandidates,
+)
 from agents.expert.corrections import beginning_of
-from agents.expert.recipe import Recipe, quotas
+from agents.expert.explorer import Strength
+from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
 from agents.expert.silent import SilentAgent
 from agents.expert.thinker import OBS_MODE, ThinkingAgent, TrajectoryHeader
 from agents.expert.thought_kinds import ThoughtKinds
@@ -25,9 +31,12 @@ from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.run_directory import Manifest, RunDirectory, locked_run_directory
 from er_gym.rollout.runner import run
 from er_gym.tasks.task import Task
+from er_gym.tasks.types import BY_NAME
 
 ATTEMPTS = "attempts"
 """The suffix of the run directory with the explorers' attempts that a part corrects."""
+CORRECTIONS = "corrections"
+"""The part of the corrected episodes of a run."""
 _MOST_ROUNDS = 40
 _FRUITLESS_ROUNDS = 3
 """A task type of a part of which nothing was taken in this many rounds is given up."""
@@ -136,8 +145,8 @@ class MakeSilent:
         return SilentAgent(self.candidates[task.id].course(seed, self.kinds))
 
 
-@dataclass
-class _Stratum:
+@dataclass(eq=False)
+class Stratum:
     """The candidates of one part and task type, and which of them were taken.
 
     Attributes:
@@ -148,7 +157,7 @@ class _Stratum:
         fruitless: rounds in a row in which none was taken.
     """
 
-    sequence: CandidateSequence
+    sequence: Candidates
     quota: int
     played: int = 0
     taken: list[Candidate] = field(default_factory=list)
@@ -160,16 +169,98 @@ class _Stratum:
 
     @property
     def open(self) -> bool:
-        return self.missing > 0 and self.fruitless < _FRUITLESS_ROUNDS
+        exhausted = self.sequence.length is not None and self.played >= self.sequence.length
+        return self.missing > 0 and self.fruitless < _FRUITLESS_ROUNDS and not exhausted
 
     def next(self) -> list[Candidate]:
         """The candidates of the next round: as many as are missing, and a few more where many were
         rejected before."""
         yield_so_far = (len(self.taken) + 1) / (self.played + 1)
         number = min(round(self.missing / yield_so_far), 4 * self.missing + 4)
+        if self.sequence.length is not None:
+            number = min(number, self.sequence.length - self.played)
         first = self.played
         self.played += number
         return [self.sequence[index] for index in range(first, first + number)]
+
+
+def recipe_strata(settings: CollectSettings, limit: int | None) -> dict[tuple[str, str], Stratum]:
+    """What a recipe asks for.
+
+    Args:
+        settings: with the recipe, the tasks and the seed.
+        limit: how many trajectories in all; None for the recipe's number.
+
+    Raises:
+        ValueError: no task has a type that the recipe asks for.
+    """
+    by_type: dict[str, list[Task]] = {}
+    for task in settings.tasks:
+        by_type.setdefault(task.type.name, []).append(task)
+    recipe = settings.recipe
+    wanted = quotas(recipe, limit, set(by_type))
+    if not wanted:
+        asked = dict.fromkeys(kind for part in recipe.parts.values() for kind in part.types)
+        raise ValueError(
+            f"none of the tasks is of a type that the recipe asks for: {', '.join(asked)}"
+        )
+    return {
+        (part, kind): Stratum(
+            CandidateSequence(part, recipe.parts[part], by_type[kind], settings.seed), number
+        )
+        for (part, kind), number in wanted.items()
+        if number
+    }
+
+
+def correction_strata(
+    tasks: Sequence[Task], run_directory: RunDirectory, limit: int | None
+) -> tuple[dict[tuple[str, str], Stratum], dict[str, int]]:
+    """The failed episodes of a run, as candidates to be corrected.
+
+    Args:
+        tasks: the tasks of the run's suite.
+        run_directory: the run.
+        limit: how many trajectories in all; None for as many as there are.
+
+    Returns:
+        The candidates, all in the part :data:`CORRECTIONS`; and how many episodes cannot be
+        corrected, by the reason.
+    """
+    by_id = {task.id: task for task in tasks}
+    candidates: list[Candidate] = []
+    left_out: dict[str, int] = {}
+    for episode in run_directory.episodes():
+        task = by_id.get(episode.task_id)
+        beginning = beginning_of(episode)
+        problem = beginning.problem if task else "its task is not among the suite's"
+        if task is None or problem:
+            left_out[problem] = left_out.get(problem, 0) + 1
+            continue
+        candidates.append(
+            Candidate(
+                id=f"{task.id}-{CORRECTED}",
+                part=CORRECTIONS,
+                actor="corrector",
+                task=task,
+                index=len(candidates),
+                kind=CORRECTED,
+                beginning=beginning,
+                run=run_directory.path.name,
+                episode=episode.task_id,
+            )
+        )
+    if not candidates:
+        return {}, left_out
+    quota = len(candidates) if limit is None else min(limit, len(candidates))
+    return {(CORRECTIONS, ""): Stratum(FixedCandidates(candidates), quota)}, left_out
+
+
+def corrections_recipe() -> Recipe:
+    """The recipe of a collection that corrects a run: one part, whatever the task types."""
+    types = dict.fromkeys(BY_NAME, 1)
+    part = Part(actor="corrector", types=types, explorers={"run": Strength()})
+    return Recipe(parts={CORRECTIONS: part})
 
 
 class Collector:
@@ -179,10 +270,11 @@ class Collector:
         collection: where to.
         settings: what decides the trajectories.
         make_writer: makes the writer of thoughts; picklable for ``executor="processes"``.
-        limit: how many trajectories in all; None for the recipe's number.
+        strata: the candidates by part and task type, and how many of each are wanted.
         executor, parallelism: as :func:`er_gym.rollout.runner.run` takes them.
         listeners: hear of every event of the runs.
         cost: what the thoughts have cost so far.
+        tell: hears the present part, and how many trajectories are taken so far.
     """
 
     def __init__(
@@ -190,29 +282,20 @@ class Collector:
         collection: Collection,
         settings: CollectSettings,
         make_writer: Callable[[], ThoughtWriter],
+        strata: Mapping[tuple[str, str], Stratum],
         *,
-        limit: int | None = None,
         executor: str = "processes",
         parallelism: Parallelism = Parallelism(),  # noqa: B008 (frozen)
         listeners: Iterable[EventListener] = (),
         cost: Callable[[], Cost | None] = lambda: None,
+        tell: Callable[[str, int], None] = lambda part, taken: None,
     ) -> None:
+        self._tell = tell
         self._collection, self._settings, self._make_writer = collection, settings, make_writer
         self._executor, self._parallelism = executor, parallelism
         self._listeners, self._cost = tuple(listeners), cost
-        by_type: dict[str, list[Task]] = {}
-        for task in settings.tasks:
-            by_type.setdefault(task.type.name, []).append(task)
-        wanted = quotas(settings.recipe, limit, set(by_type))
-        self._strata = {
-            (part, kind): _Stratum(
-                CandidateSequence(part, settings.recipe.parts[part], by_type[kind], settings.seed),
-                number,
-            )
-            for (part, kind), number in wanted.items()
-            if number
-        }
-        self.summary = CollectSummary(wanted=sum(wanted.values()))
+        self._strata = strata
+        self.summary = CollectSummary(wanted=sum(one.quota for one in strata.values()))
 
     def collect(self) -> CollectSummary:
         """Collect what is missing, and write ``trajectories.jsonl``, also when interrupted.
@@ -240,7 +323,7 @@ class Collector:
 
     # -- one part --------------------------------------------------------------------------------
 
-    def _collect_part(self, part: str, strata: Sequence[_Stratum]) -> None:
+    def _collect_part(self, part: str, strata: Sequence[Stratum]) -> None:
         row = self._settings.recipe.parts[part]
         env: dict[str, Any] = {**self._settings.env, "obs_mode": OBS_MODE}
         if row.faults:
@@ -255,6 +338,7 @@ class Collector:
                 self._play(directory, ready, row.most_actions)
                 for stratum, chosen in rounds:
                     self._judge(stratum, [ready[one.id] for one in chosen if one.id in ready])
+                self._tell(part, sum(len(one.taken) for one in self._strata.values()))
 
     @contextmanager
     def _part_directory(self, part: str, env: Mapping[str, Any]) -> Iterator[RunDirectory]:
@@ -276,7 +360,7 @@ class Collector:
 
     def _ready(self, part: str, candidates: Sequence[Candidate]) -> dict[str, Candidate]:
         """The candidates that can be played, by id; corrections get their failed attempts."""
-        if not candidates or candidates[0].actor != "corrector":
+        if not candidates or candidates[0].actor != "corrector" or candidates[0].beginning:
             return {each.id: each for each in candidates}
         attempts = f"{part}-{ATTEMPTS}"
         env = {**self._settings.env, "obs_mode": "objects"}
@@ -325,7 +409,7 @@ class Collector:
         self.summary.played += summary.played
         self.summary.crashed += [f"{each.task_id}: {each.error}" for each in summary.crashed]
 
-    def _judge(self, stratum: _Stratum, candidates: Sequence[Candidate]) -> None:
+    def _judge(self, stratum: Stratum, candidates: Sequence[Candidate]) -> None:
         """Take candidates of a round, in order, until the quota is full."""
         before = len(stratum.taken)
         for candidate in candidates:

@@ -16,6 +16,8 @@ DEFAULT = "paper"
 ANOMALY, EXPLORED, CORRECTED = "anomaly", "explored", "corrected"
 """Kinds of trajectories beside the expert's ``a``, ``b`` and ``c``: things go wrong, an explorer
 plays, a failed episode is corrected."""
+SEARCH = "search"
+"""The mode of an explorer's trajectory in which something must have been searched for."""
 Share = Annotated[float, Field(ge=0)]
 
 
@@ -29,6 +31,8 @@ class Part(BaseModel):
         kinds: the shares of the expert's kinds of trajectories: ``a``, ``b``, ``c``, ``anomaly``.
         explorers: by name, how well explorers play.
         faults: the rates of the faults that the environment injects, by kind.
+        direct: the share of an explorer's candidates that are taken even if nothing had to be
+            searched for.
         repeats: the share of actions that the expert repeats without need.
         most_actions: longer trajectories are not taken.
     """
@@ -39,6 +43,7 @@ class Part(BaseModel):
     types: dict[str, int]
     kinds: dict[str, Share] = {}
     explorers: dict[str, Strength] = {}
+    direct: float = Field(default=0.0, ge=0, le=1)
     faults: dict[str, float] = {}
     repeats: float = Field(default=0.0, ge=0, le=1)
     most_actions: int = Field(default=36, gt=0)

@@ -14,6 +14,7 @@ from typing import NoReturn
 import click
 
 from benchmarks.cli.bench import bench
+from benchmarks.cli.collect import collect
 from benchmarks.cli.doctor import doctor
 from benchmarks.cli.errors import (
     INTERRUPTED,
@@ -82,6 +83,7 @@ def cli(context: click.Context, version: bool) -> None:
 
 
 cli.add_command(bench)
+cli.add_command(collect)
 cli.add_command(player)
 cli.add_command(doctor)
 cli.add_command(render)

@@ -235,7 +235,8 @@ class Trajectory(_Record):
         part: the part of the collection, such as ``imitation``, ``exploration``, ``anomalies``.
         kind: ``a``, ``b`` or ``c`` for the expert's kinds of search, ``explored``, ``corrected``,
             ``model`` where a model decided, or ``played`` for episodes of other programs.
-        mode: the expert's first plan: how many places and which is right, such as ``010``.
+        mode: the expert's first plan: how many places and which is right, such as ``010``. For an
+            explorer, ``search`` where nothing to be searched for was in view from the beginning.
         language: of the thoughts.
         actor: who decided: ``expert``, ``explorer``, or a model.
         max_steps: the step limit.

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
 
 from agents.expert.writers.base import ThoughtWriter
 from agents.expert.writers.grounded import GroundedWriter
@@ -17,3 +19,23 @@ WRITERS: Registry[Callable[[], ThoughtWriter]] = Registry(
     fits=callable,
 )
 """The factories of writers by name. A factory is called without arguments."""
+
+
+@dataclass(frozen=True)
+class NamedWriter:
+    """Makes a writer by name, in any process; each process has one of each name."""
+
+    name: str
+
+    def __call__(self) -> ThoughtWriter:
+        """The writer.
+
+        Raises:
+            ValueError: there is no such writer; the message lists those there are.
+        """
+        return _writer(self.name)
+
+
+@lru_cache(maxsize=8)
+def _writer(name: str) -> ThoughtWriter:
+    return WRITERS.get(name)()
