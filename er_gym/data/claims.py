@@ -305,9 +305,10 @@ def hand(thought: Thought) -> Iterator[Refusal]:
             for mention in clause.named(match, "xs"):
                 if mention.types <= thought.held:
                     yield Refusal("held", f"Do not deny it: {truth}.")
-        if clause.negated or clause.intended or clause.wanted:
-            continue
         for match in _matches(clause, phrases.held):
+            senses = (phrases.negation, phrases.intention, phrases.goal)
+            if any(clause.says_before(sense, match.end()) for sense in senses):
+                continue
             for mention in clause.named(match, "xs", "x"):
                 if not mention.types & thought.held:
                     yield Refusal("held", f"{name_of(mention)} is not in the hand: {truth}.")

@@ -21,6 +21,8 @@ _PAST_VERB = {
     verbs.NAVIGATE: "go to",
     "searched": "search",
 }
+_NEAR = 4
+"""Letters before a claim in which a negation is one of it."""
 _RECENT = 3
 """So many actions ago, a failure can still be spoken of."""
 
@@ -36,7 +38,9 @@ def history(thought: Thought) -> Iterator[Refusal]:
         for verb, phrases in thought.phrases.did.items():
             for phrase in phrases:
                 for match in phrase.finditer(clause.text):
-                    if clause.negated and thought.phrases.negation.search(match.group()):
+                    if clause.negated and thought.phrases.negation.search(
+                        clause.text, max(0, match.start() - _NEAR), match.end()
+                    ):
                         continue
                     for mention in clause.named(match, "y" if verb == verbs.PUT else "x"):
                         if not _has_done(thought, verb, mention):
@@ -84,14 +88,11 @@ def outcome(thought: Thought) -> Iterator[Refusal]:
                 if last
                 else "Nothing was done yet: do not say that an action failed.",
             )
-        succeeded = phrases.succeeded.search(clause.text) and not clause.negated
-        if (
-            succeeded
-            and not clause.intended
-            and not admits
-            and last is not None
-            and not last.success
-        ):
+        if last is None or last.success or admits:
+            continue
+        said = phrases.succeeded.search(clause.text)
+        senses = (phrases.negation, phrases.intention)
+        if said and not any(clause.says_before(sense, said.start()) for sense in senses):
             yield Refusal(
                 "history", f"The last action, {last.action}, failed; say so, or say nothing."
             )
@@ -124,7 +125,9 @@ class Decided:
 def decision(thought: Thought) -> Iterator[Refusal]:
     """Decides on another action than the one that is taken."""
     known, phrases = thought.known, thought.phrases
-    decided = list(_decided(thought))
+    decided = [
+        each for each in _decided(thought) if each.act != "look around" or each.clause.last
+    ]
     fitting = [each for each in decided if _fits(thought, each)]
     others = [each for each in decided if each not in fitting and not each.later]
     wrong = None
@@ -211,7 +214,7 @@ def _fits(thought: Thought, decided: Decided) -> bool:
         near = act in ("go", "visit", "check", "take") and known.purpose in ("get closer", "check")
         return act == "forward" or near
     if act in ("look around", "end"):
-        return act == "look around" and thought.kind == "analysis"
+        return False
     if act == "forward":
         return verb == verbs.NAVIGATE
     if act in ("go", "visit"):

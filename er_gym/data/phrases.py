@@ -24,6 +24,7 @@ class Phrases:
     Attributes:
         sentence, clause: where a sentence and a clause end.
         verb: what makes a clause a clause: without it, it belongs to the one before.
+        aside: a relative clause between a subject and its verb.
         question: a sentence that asks.
         hedge, negation, condition, goal, custom, past, intention: marks of clauses that claim
             something else than what is so now: what may be, what is not, what would be, what is
@@ -60,6 +61,7 @@ class Phrases:
     sentence: Phrase
     clause: Phrase
     verb: Phrase
+    aside: Phrase
     question: Phrase
     hedge: Phrase
     negation: Phrase

@@ -77,6 +77,7 @@ PHRASES = Phrases(
         r"\s+[—–-]\s+|—",
         r"\s(?:but|while|because|since|although|though|so that|so|whereas|yet|then)\s",
         r"\s(?:and|or)\s(?=(?:i|there|it|they|my|let|this|that|then|next)\b)",
+        r"\s(?=that (?:i|we) (?:can|could|may|might|would|should|will|need|want|have to)\b)",
         r"\swhich\s(?=(?:is|are|may|might|could|would|means|tells|gives|should|must)\b)",
     ),
     verb=re.compile(
@@ -85,6 +86,7 @@ PHRASES = Phrases(
         r"|needs?|isn't|aren't|don't|doesn't|catches|makes|remains?|comes|waits?|did|does|do|put"
         r"|go|open|close|take|turn|tells?|means|happens|turns|gives)\b|'s |'m |'ve |'ll |'re |n't "
     ),
+    aside=re.compile(rf", (?:which|who|that) [^,.{MARK}]{{0,60}},(?= (?:is|are|was|stands?|sits?|lies|rests?|hangs?|has|holds?)\b)"),
     question=re.compile(r"\?[\"')]*\s*$"),
     hedge=_any(
         _word(
@@ -93,17 +95,17 @@ PHRASES = Phrases(
             "/expect/expected/imagine/wonder/wondering/chance/chances/hope/hoping/hopefully/bet"
             "/should be/must be/must have/should have/ought to/seems/seem/appears to be/as if/as though"
             "/supposedly/apparently/unclear/unsure/not sure/uncertain/cannot tell/can't tell"
-            "/would/i think/i believe/i'd/promising/candidate/candidates/or/either/idea/unless"
+            "/would/i think/i believe/i'd/or/either/no idea/unless"
             "/whether/reckon/apt/doubt/odds/likelihood/looks like/look like/resembles"
         ),
     ),
     negation=_any(
-        r"\b(?:no|not|never|none|neither|nor|nothing|nowhere|without|cannot|missing|absent|lacks?"
-        r"|instead of|rather than|no sign|yet to|fails?|failed|still need|far from|empty of|free of)\b"
+        r"\b(?:no|not(?! (?:far|only|just|long|too|very)\b)|never|none|neither|nor|nothing(?! but\b)|nowhere|without|cannot|missing|absent|lacks?"
+        r"|instead of|rather than|no sign|yet to|fails?|failed|still need|empty of|free of)\b"
         r"|n't\b|n’t\b"
     ),
     condition=_any(
-        r"\b(?:if|unless|in case|once|until|as soon as|otherwise|before|provided|suppose|assuming"
+        r"\b(?:if|unless|in case|once|until|as soon as|otherwise|before(?= [a-z])|provided|suppose|assuming"
         r"|even when|whenever|wherever|would have|in order to|so as to)\b|\bwhen (?!i (?:opened|looked|went|got|arrived|came))"
     ),
     goal=_any(
@@ -125,7 +127,7 @@ PHRASES = Phrases(
         r"|at first|used to|initially|a moment ago)\b"
     ),
     intention=_any(
-        r"\b(?:will|shall|let me|let's|let us|going to|about to|plan(?:s|ned|ning)?|intend|decided?|next"
+        r"\b(?:will|shall|let me|let's|let us|going to|about to|plan(?:s|ned|ning)?|intend|decided?|next(?! to\b)"
         r"|want to|had better|i'd better|time to|heading|consider|option|options|could|ready to|try|bring|carry"
         r"|(?:am|'m) (?:taking|bringing|carrying .* to))\b|'ll\b|^(?:to|by) "
     ),
@@ -176,7 +178,7 @@ PHRASES = Phrases(
         re.compile(rf"{_Y},? (?:which is |is )?where {_D}(?P<xs>{MARK}) (?:is|are|lies|sits|rests|stands|waits|hides)\b"),
     ),
     placing=re.compile(
-        r"\b(?:put|puts|putting|place|placing|placed|set|setting|leave|leaving|left|drop|dropping|dropped|lay|laid|laying"
+        r"\b(?:put|puts|putting|place|placing|(?<!has )(?<!been )(?<!is )(?<!was )placed|set|setting|leave|leaving|(?:i|i've|i have) left|drop|dropping|dropped|lay|laid|laying"
         r"|store|storing|stored|bring|bringing|brought|move|moved|moving|carry|carrying|carried|add|insert|inserted|look|looking"
         rf"|search|searching|searched|check|checking|checked|deposit|deposited|deliver|belongs?|want) (?!on |at |in ){_D}(?:for {_D})?(?:{MARK}{_JOINT}{_D})*$"
     ),
@@ -207,6 +209,7 @@ PHRASES = Phrases(
     is_so=re.compile(r"\b(?:is|are|stands?|sits?|lies|located|rests?)\b"),
     states=(
         re.compile(rf"{_X}(?:'s)?(?: doors?| lid| cover| screen)?(?: (?:in front of me|here|there|ahead|nearby))?,?(?: {_IS}|'s){_STATE}"),
+        re.compile(rf"{_X},? (?:and |but )?it(?: {_IS}|'s){_STATE}"),
         re.compile(
             r"\b(?:the|an?|this|that|its|already|still|now|currently) (?:already |still |now |half-)?(?:(?P<open>open|opened)|(?P<closed>closed|shut)|(?P<on>lit|switched-on)"
             rf"|(?P<off>unlit|switched-off)) (?:[a-z]+ )?{_X}(?P<no>)"
@@ -242,7 +245,10 @@ PHRASES = Phrases(
             re.compile(rf"{_PAST}(?:opened(?: up)?|pulled open) {_D}{_X}"),
             re.compile(rf"{_X} (?:has|have)(?: already| just)* been opened\b(?! by)"),
         ),
-        verbs.CLOSE: (re.compile(rf"{_PAST}(?:closed|shut) {_D}{_X}"),),
+        verbs.CLOSE: (
+            re.compile(rf"{_PAST}closed {_D}{_X}"),
+            re.compile(rf"\bi(?:'ve| have)(?: \w+)? shut {_D}{_X}"),
+        ),
         verbs.PICKUP: (
             re.compile(rf"{_PAST}(?:picked up|taken|took|grabbed|collected|fetched|retrieved|lifted) {_D}{_X}(?! into account| in)"),
             re.compile(rf"{_PAST}(?:picked|taken) {_D}{_X} up\b"),
@@ -306,7 +312,7 @@ PHRASES = Phrases(
             "check/search/inspect/examine/investigate/explore/look/peek/take a look/take a closer look/have a look/have a closer look/see what is/rummage",
             rf"(?:(?:in|into|inside|at|on|under|behind|through|over|closely|around|out|more|once|again|beneath|next|what|is|near|by) )*{_D}{_X}",
         ),
-        "open": _act("open|open up|pull open", _AND_SO),
+        "open": re.compile(rf"(?:open|open up|pull open) {_D}{_X}|(?:pull|swing|slide) {_D}(?P<x2>{MARK}) open"),
         "close": _act("close|shut", _AND_SO),
         "take": _act("pick up|pick|take out|take|grab|grasp|get|fetch|collect|lift|retrieve", _AND_SO),
         "put": re.compile(

@@ -42,6 +42,7 @@ PHRASES = Phrases(
     sentence=re.compile(r"[。！？；\n]+|(?<=[.!?;])\s+"),
     clause=re.compile(r"[，：,:]\s*|——|(?<=[^，])(?=但是?|不过|可是|然而)"),
     verb=re.compile(r"[^§、，,：或和与以及者里面上中内的边附近。；！？\s]"),
+    aside=re.compile(r"(?!)"),
     question=re.compile(r"[？?]|吗[。？?]?$|呢[。？?]?$|会不会|是不是|能不能|哪里|哪儿"),
     hedge=re.compile(
         r"可能|也许|或许|大概|估计|说不定|似乎|好像|猜|推测|多半|兴许|想必|会不会|恐怕|应该|不知道|是否|没准|希望|不确定"
@@ -86,7 +87,7 @@ PHRASES = Phrases(
     of_other=re.compile(r"(?:靠近|紧挨着|挨着|紧邻|在)$"),
     is_so=re.compile(r"在|位于"),
     states=(
-        re.compile(rf"{_X}{_STATE}"),
+        re.compile(rf"(?<![把将]){_X}{_STATE}"),
         re.compile(
             rf"(?<![我要刚会经])(?:(?P<loose_open>开着|敞开|打开着?)|(?P<loose_closed>关着|紧闭|关闭着?|合着|关上))的{_X}(?P<no>)"
         ),

@@ -63,6 +63,10 @@ class Clause:
         pairs = zip(self.places, self.mentions, strict=True)
         return [mention for place, mention in pairs if start <= place < end]
 
+    def says_before(self, phrase: Phrase, place: int) -> bool:
+        """Whether a phrase stands before a place in the text."""
+        return phrase.search(self.text, 0, place) is not None
+
     def named(self, match: re.Match[str], *groups: str) -> list[Mention]:
         """The names in the groups of a match; groups that it does not have count as empty."""
         spans = (match.span(group) for group in groups if group in match.re.groupindex)
@@ -78,6 +82,7 @@ def read(text: str, language: Language) -> tuple[Clause, ...]:
     sentences = [each for each in _parts(masked, phrases.sentence) if each.strip()]
     found: list[Clause] = []
     for number, sentence in enumerate(sentences):
+        sentence = phrases.aside.sub("", sentence)
         asks = bool(phrases.question.search(sentence))
         before: tuple[Mention, ...] = ()
         for part in _clauses(sentence, phrases):

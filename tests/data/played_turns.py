@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from er_gym.data.knowledge import Knowledge, knowledge_at
+from er_gym.data.mentions import named_in
 from er_gym.data.trajectory import Language, Purpose, SeenObject, Subgoal, Turn
 from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -62,16 +63,21 @@ def _actions(info: Any) -> Any:
         if opens and Action(verbs.OPEN, opens[0]) in to_open:
             info = yield Action(verbs.OPEN, opens[0])
             info = yield Action(verbs.CLOSE, opens[0])
-    thing = next((key.actual_type for key in info["key_actions_left"] if key.object_id), "")
-    info = yield Action(verbs.PICKUP, thing)  # fails: it is not in reach
+    info = yield Action(verbs.PICKUP, _thing(info))  # fails: it is not in reach
     info = yield Action(verbs.OBSERVE)
     solver = Solver()
     while True:
         info = yield solver.next(info)[0]
 
 
+def _thing(info: Mapping[str, Any]) -> str:
+    """What the agent is after."""
+    left = info["key_actions_left"]
+    keys = [key for key in left if key.verb in (verbs.PICKUP, verbs.TOGGLE)]
+    return keys[0].actual_type if keys else next(iter(named_in(info["task"].instruction)))
+
+
 def _turn(info: Mapping[str, Any], at: str, action: Action, reward: float, after: Any) -> Turn:
-    key = next((key for key in info["key_actions_left"] if key.object_id), None)
     return Turn(
         view=[SeenObject.of(each) for each in info["object_views"]],
         views={
@@ -83,7 +89,7 @@ def _turn(info: Mapping[str, Any], at: str, action: Action, reward: float, after
         interactable=list(info["interactable"]),
         at=at,
         purpose=_PURPOSE.get(action.verb, "use"),
-        subgoal=Subgoal(thing=key.actual_type if key else ""),
+        subgoal=Subgoal(thing=_thing(info)),
         verb=action.verb,
         object_type=action.object_type,
         object_id=after["object_id"],
