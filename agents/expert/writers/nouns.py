@@ -1,0 +1,146 @@
+"""Object types in words: "a mug", "the fridge", "on the coffee table", "一把椅子", "冰箱里"."""
+
+from __future__ import annotations
+
+import random
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+from er_gym.tasks.generate.words import HOLLOW, PLURAL, UNCOUNTED
+from er_gym.tasks.reading import read_yaml
+from er_gym.tasks.suites import config_directory
+
+_FIRST_NAME = 0.6
+"""The probability of a type's first name, where it has several."""
+_ONES = frozenset({"RoomDecor", "TableTopDecor"})
+"""Types that take "some", whose names here are countable: "a table decoration"."""
+
+
+class Nouns(ABC):
+    """The words for object types within a piece of writing. A type keeps its first name.
+
+    Args:
+        names: object type to its names.
+    """
+
+    def __init__(self, names: Mapping[str, Sequence[str]]) -> None:
+        self._names = names
+        self._chosen: dict[str, str] = {}
+
+    def word(self, value: str, form: str, choices: random.Random) -> str:
+        """A fact in a form; what is no object type stays as it is.
+
+        Forms: ``""`` bare, ``the``, ``a``, ``in`` with the preposition, ``type`` in the spelling of
+        the environment; English also has ``it``, ``is`` and ``s`` (the plural).
+        """
+        if value not in self._names or form == "type":
+            return value
+        if value not in self._chosen:
+            first, *others = self._names[value]
+            usual = not others or choices.random() < _FIRST_NAME
+            self._chosen[value] = first if usual else choices.choice(others)
+        return self._formed(value, self._chosen[value], form)
+
+    @abstractmethod
+    def _formed(self, object_type: str, name: str, form: str) -> str:
+        """A name in a form."""
+
+    @abstractmethod
+    def counted(self, thing: Mapping[str, Any], choices: random.Random) -> str:
+        """A thing of a pool, one or more: "a chair", "two chairs"."""
+
+    @abstractmethod
+    def joined(self, words: Sequence[str]) -> str:
+        """A list of words: "a, b and c"."""
+
+
+class EnglishNouns(Nouns):
+    """See :class:`Nouns`."""
+
+    def _formed(self, object_type: str, name: str, form: str) -> str:
+        plural = object_type in PLURAL
+        match form:
+            case "the":
+                return f"the {name}"
+            case "in":
+                return f"{'in' if object_type in HOLLOW else 'on'} the {name}"
+            case "into":
+                return f"{'into' if object_type in HOLLOW else 'onto'} the {name}"
+            case "a":
+                if object_type in UNCOUNTED - _ONES or plural:
+                    return f"some {name}"
+                return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
+            case "it":
+                return "them" if plural else "it"
+            case "they":
+                return "they" if plural else "it"
+            case "is":
+                return "are" if plural else "is"
+            case "s":
+                return _plural(name)
+            case _:
+                return name
+
+    def counted(self, thing: Mapping[str, Any], choices: random.Random) -> str:
+        kind, count = thing["o"], thing.get("count", 1)
+        if count > 1 and kind not in UNCOUNTED | PLURAL:
+            several = ("two", "a couple of") if count == 2 else ("several", "a few")
+            return f"{choices.choice(several)} {self.word(kind, 's', choices)}"
+        return self.word(kind, "a", choices)
+
+    def joined(self, words: Sequence[str]) -> str:
+        *others, last = words
+        return f"{', '.join(others)} and {last}" if others else last
+
+
+class ChineseNouns(Nouns):
+    """See :class:`Nouns`. Names are written with their measure word: ``把 椅子``."""
+
+    def _formed(self, object_type: str, name: str, form: str) -> str:
+        measure, _, noun = name.rpartition(" ")
+        match form:
+            case "a":
+                return f"一{measure or '个'}{noun}"
+            case "this":
+                return f"这{measure or '个'}{noun}"
+            case "that":
+                return f"那{measure or '个'}{noun}"
+            case "in":
+                return f"{noun}{'里' if object_type in HOLLOW else '上'}"
+            case _:
+                return noun
+
+    def counted(self, thing: Mapping[str, Any], choices: random.Random) -> str:
+        one = self.word(thing["o"], "a", choices)
+        count = thing.get("count", 1)
+        if count == 1:
+            return one
+        return ("两" if count == 2 else "几") + one[1:]
+
+    def joined(self, words: Sequence[str]) -> str:
+        *others, last = words
+        return f"{'、'.join(others)}和{last}" if others else last
+
+
+def _plural(name: str) -> str:
+    if name.endswith("shelf"):
+        return f"{name[:-1]}ves"
+    if name.endswith("knife"):
+        return f"{name[:-2]}ves"
+    if name.endswith(("s", "x", "ch", "sh", "potato", "tomato")):
+        return f"{name}es"
+    return f"{name}s"
+
+
+@lru_cache(maxsize=4)
+def names(language: str) -> Mapping[str, tuple[str, ...]]:
+    """The names of object types in a language, from ``configs/thoughts/LANGUAGE/names.yaml``."""
+    table = read_yaml(config_directory("thoughts") / language / "names.yaml")
+    return {kind: tuple(map(str.strip, line.split(","))) for kind, line in table.items()}
+
+
+def nouns(language: str) -> Nouns:
+    """Nouns for a piece of writing."""
+    return (ChineseNouns if language == "zh" else EnglishNouns)(names(language))
