@@ -69,6 +69,7 @@ class Knowledge:
         visits: the places searched for the present subgoal's object, in order.
         navigable, interactable: the object types that are legal targets now.
         last: the last action; None at the first turn.
+        actions: every action before this turn, oldest first.
         decision: the action of this turn.
         purpose, subgoal, plan: see :class:`~er_gym.data.trajectory.Turn`.
         earlier: the thoughts of the turns before, oldest first, without this turn's.
@@ -89,6 +90,7 @@ class Knowledge:
     navigable: Sequence[str] = ()
     interactable: Sequence[str] = ()
     last: LastAction | None = None
+    actions: Sequence[LastAction] = ()
     plan: Sequence[str] = ()
     earlier: Sequence[Sequence[ThoughtRecord]] = ()
 
@@ -116,17 +118,17 @@ def knowledge_at(
         around = (one for view in each.views.values() for one in view)
         for one in (*each.view, *around):
             seen[one.type] = each.at
-    last = None
-    if before:
-        previous = before[-1]
-        last = LastAction(
-            action=previous.action,
-            purpose=previous.purpose,
-            success=previous.success,
-            earned=previous.earned,
-            feedback=previous.feedback,
-            fault=previous.fault,
+    actions = [
+        LastAction(
+            action=each.action,
+            purpose=each.purpose,
+            success=each.success,
+            earned=each.earned,
+            feedback=each.feedback,
+            fault=each.fault,
         )
+        for each in before
+    ]
     return Knowledge(
         language=language,
         instruction=instruction,
@@ -139,7 +141,8 @@ def knowledge_at(
         visits=_visits(before, turn.subgoal),
         navigable=turn.navigable,
         interactable=turn.interactable,
-        last=last,
+        last=actions[-1] if actions else None,
+        actions=actions,
         decision=turn.action,
         purpose=turn.purpose,
         subgoal=turn.subgoal,
