@@ -99,7 +99,7 @@ def test_a_picture_that_its_kind_cannot_hold_is_a_line(tmp_path: Path) -> None:
     path = tmp_path / "a.jpg"
     with pytest.raises(ValueError, match=r"a\.jpg: a JPEG file cannot hold this picture"):
         write_picture(path, Image.new("I;16", (9, 9)))
-    with pytest.raises(ValueError, match=r"'\.mug' is no kind of picture"):
+    with pytest.raises(ValueError, match=r"'\.mug' is not a picture format"):
         write_picture(tmp_path / "a.mug", Image.new("RGB", (9, 9)))
     assert list(tmp_path.iterdir()) == []
 

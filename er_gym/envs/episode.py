@@ -71,9 +71,9 @@ class Episode:
     """An episode of one task; :meth:`begin` it, then :meth:`step` until it has an ``end_reason``.
 
     Args:
-        settings: of the environment.
+        settings: the environment's settings.
         task: what is asked.
-        controller: in any scene; the episode resets it to the task's.
+        controller: a controller in any scene; the episode resets it to the task's scene.
         backend: the name of the controller's backend.
 
     Attributes:
@@ -120,10 +120,10 @@ class Episode:
         return self.perception.pose, self._steps, self.end_reason, self._known.names
 
     def understand(self, action: AnyAction) -> tuple[Action | None, str]:
-        """The action that is meant, None if none is; and its text.
+        """The action that a reply means (None if it names no action), and its text.
 
         Raises:
-            gymnasium.error.InvalidAction: it is no action at all; nothing has changed.
+            gymnasium.error.InvalidAction: the reply is not an action; nothing has changed.
         """
         return self._protocol.understand(action, self.perception.objects)
 
@@ -258,7 +258,7 @@ class Episode:
         return perception.annotated if self._settings.annotate else perception.frame
 
     def _observation(self, feedback: str, success: bool, info: Info) -> dict[str, Any]:
-        """The observation; what explains it is added to ``info``."""
+        """Build the observation, and add to ``info`` what explains it."""
         situation = Situation(
             perception=self.perception,
             available=self._available,

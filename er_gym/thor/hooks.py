@@ -1,4 +1,4 @@
-"""Installs :mod:`er_gym.thor.client_hook` where a Python loads it at its start, and removes it."""
+"""Installs :mod:`er_gym.thor.client_hook` where Python loads it at its start, and removes it."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def hook_folders(python: str) -> list[Path]:
 
 
 def write_hook(folders: Sequence[Path]) -> Path | None:
-    """Make sure that one of the folders has the hook; return its path, None if none can."""
+    """Make sure that one of the folders has the hook; return its path, None if none can have it."""
     for folder in folders:
         if all(_has_text(folder / name, text) for name, text in _hook_files().items()):
             return folder / f"{_HOOK}.pth"  # another user may own it; only the owner removes it

@@ -71,7 +71,7 @@ def test_wrappers_and_vectors_ask_as_well() -> None:
         ("backend", ["unity"], "unknown backend .*; choose one of: embedded, unity"),
         ("protocol", None, "unknown protocol None; choose one of: default, paper"),
         ("obs_mode", 3, "unknown obs_mode 3; join any of"),
-        ("episode_source", np.arange(3), "is no source of episodes"),
+        ("episode_source", np.arange(3), "is not a source of episodes"),
     ],
 )
 def test_what_an_environment_cannot_be_made_with(name: str, value: Any, allowed: str) -> None:

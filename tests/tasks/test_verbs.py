@@ -73,7 +73,7 @@ def test_added_verbs_follow_in_the_order_of_their_names(monkeypatch: pytest.Monk
     ("names", "message"),
     [
         ("household_verbs:CLAEN", r"verb 'household_verbs:CLAEN'.* \(did you mean CLEAN\?\)"),
-        ("household_verbs", "is no package.module:Name"),
+        ("household_verbs", "is not a package.module:Name"),
         ("household_verbs:Words", r"ER_GYM_VERBS is .*give an er_gym\.tasks\.verbs\.Verb"),
         ("no_such:X", "Cannot import 'no_such'"),
     ],
