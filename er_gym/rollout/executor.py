@@ -1,4 +1,4 @@
-"""What all executors share: the played episode, who takes it, and how much runs at once."""
+"""What all executors share: the played episode, the sink for it, and how much runs at once."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class PlayedEpisode:
             check_attachments(files, folders, stem)
         except CannotGoOn:
             raise
-        except Exception as error:  # agents are anybody's code; one must not end the run
+        except Exception as error:  # agents are other people's code and must not end the run
             problem = record.error or one_line(error)
             crashed = {"success": False, "end_reason": "", "error": problem}
             return cls(record.model_copy(update=crashed))

@@ -50,7 +50,7 @@ def play_in_processes(
 
 
 def _check_picklable(make_agent: MakeAgent) -> None:
-    """Raise ValueError if worker processes cannot be sent what makes agents."""
+    """Raise ValueError if ``make_agent`` cannot be sent to worker processes."""
     try:
         pickle.dumps(make_agent)
     except Exception as error:  # pickle raises PicklingError, AttributeError, TypeError and others
@@ -75,7 +75,7 @@ class EpisodeWorker:
 
     Args:
         make_agent: makes the agent of an episode.
-        manifest: the run's.
+        manifest: the run's manifest.
         directory: the run directory; events are appended to its stream.
     """
 
@@ -98,7 +98,7 @@ class EpisodeWorker:
             return _Stop(str(stop))
         except Terminated:
             raise
-        except (Exception, SystemExit) as error:  # as in play_episode, one must not end the run
+        except (Exception, SystemExit) as error:  # it must not end the run, as in play_episode
             return PlayedEpisode(unbegun_episode(task, self._manifest, one_line(error)))
         try:
             record = play_episode(

@@ -32,8 +32,8 @@ class RunSummary:
 
     Attributes:
         played: the number of episodes played.
-        already_done: how many were finished before it started.
-        crashed: of those played, the episodes that crashed or whose worker died three times. They
+        already_done: the number of episodes that were finished before it started.
+        crashed: those of the played episodes that crashed or whose worker died three times. They
             are in the run directory and count as failures. The next run plays them again.
     """
 
@@ -43,11 +43,11 @@ class RunSummary:
 
 
 class Stopped(CannotGoOn):
-    """An agent could not go on, so the run has stopped; ``outcome`` says what was played before."""
+    """The run has stopped because an agent could not go on; ``summary`` says what was played."""
 
-    def __init__(self, message: str, outcome: RunSummary) -> None:
+    def __init__(self, message: str, summary: RunSummary) -> None:
         super().__init__(message)
-        self.outcome = outcome
+        self.summary = summary
 
 
 def finished(directory: RunDirectory, tasks: Iterable[Task]) -> list[EpisodeRecord]:
@@ -66,7 +66,7 @@ def run(
     listeners: Iterable[EventListener] = (),
     cost: Callable[[], Cost | None] = lambda: None,
 ) -> RunSummary:
-    """Play the tasks that the run directory has no finished episode of.
+    """Play the tasks without a finished episode in the run directory.
 
     Each episode is written before the next result is looked at. A run that is interrupted or killed
     thus loses no more than the episodes under way. If a worker process dies, its episode is played

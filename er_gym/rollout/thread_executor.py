@@ -94,7 +94,7 @@ class _ThreadedRun:
         results: the queue from the threads to the main thread: an episode, an exception that ends
             the run, or None from a thread that has ended. The main thread removes a result once it
             has handled it.
-        unhandled: counts the results that the main thread has not taken up.
+        unhandled: counts the results that the main thread has not handled yet.
         stopping: set when no agent may act any more.
     """
 
@@ -162,7 +162,7 @@ class _ThreadedRun:
             player = _Stoppable(agent, self.stopping)
         except CannotGoOn:
             raise
-        except (Exception, SystemExit) as error:  # as in play_episode, one must not end the run
+        except (Exception, SystemExit) as error:  # it must not end the run, as in play_episode
             return None, unbegun_episode(task, manifest, one_line(error))
         record = play_episode(
             env,

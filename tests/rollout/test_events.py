@@ -146,6 +146,6 @@ def test_a_link_is_not_written_to(tmp_path, hard):
     other = tmp_path / "other"
     other.write_text("theirs")
     (tmp_path / EVENTS).hardlink_to(other) if hard else (tmp_path / EVENTS).symlink_to(other)
-    with pytest.raises(ValueError, match="is a link or no regular file"):
+    with pytest.raises(ValueError, match="is a link, or not a regular file"):
         EventLog(tmp_path)
     assert other.read_text() == "theirs"

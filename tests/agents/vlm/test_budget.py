@@ -216,7 +216,7 @@ def test_a_link_is_not_written_to(make: Make, ledger: Path, tmp_path: Path) -> N
     ledger.parent.mkdir()
     for link in (os.symlink, os.link):
         link(other, ledger)
-        with pytest.raises(ValueError, match=r"spending\.jsonl is a link or no regular file"):
+        with pytest.raises(ValueError, match=r"spending\.jsonl is a link, or not a regular file"):
             make(Costly())
         ledger.unlink()
     os.mkfifo(ledger)
