@@ -207,6 +207,6 @@ def test_nothing_is_left_of_a_folder_that_was_made_for_nothing(tmp_path: Path) -
 
 def test_a_lock_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / LOCK).write_text("my own lock\n")
-    with pytest.raises(ForeignFile, match=r"run\.lock is there"):
+    with pytest.raises(ForeignFile, match=r"run\.lock exists"):
         exclusive_use(tmp_path).__enter__()
     assert (tmp_path / LOCK).read_text() == "my own lock\n"
