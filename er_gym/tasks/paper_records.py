@@ -34,7 +34,7 @@ _SPELLED = {verbs.PUT: "put"}
 class OwnFields(BaseModel):
     """The attributes of a task that the paper's fields do not state.
 
-    Each attribute overrides the paper's fields. One that is left out is as they say.
+    Each attribute overrides the paper's fields. If it is left out, the paper's fields decide.
 
     Attributes:
         id: also stated where ``extra`` differs from what the paper's fields give. A task that
@@ -155,7 +155,7 @@ def metadata_record(task: Task) -> dict[str, Any]:
 
 
 def without_fields_of(fields: object, model: type[BaseModel]) -> dict[str, Any]:
-    """The fields that a model does not declare; none if ``fields`` is no mapping."""
+    """The fields that a model does not declare; empty if ``fields`` is not a mapping."""
     if not isinstance(fields, Mapping):
         return {}
     return {name: value for name, value in fields.items() if name not in model.model_fields}
