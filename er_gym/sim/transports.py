@@ -128,7 +128,7 @@ class Wsgi:
         if response.status != OK:
             raise ConnectionError(f"AI2-THOR's client answered {response.status} {response.reason}")
         request: dict[str, Any] = json.loads(body)
-        return request if "action" in request else None  # the client says in this way that it stops
+        return request if "action" in request else None  # the client's way to say that it stops
 
     def _head(self, disposition: str, kind: str) -> bytes:
         # The client's parser wants these two names in exactly this spelling.

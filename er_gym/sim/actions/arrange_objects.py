@@ -104,7 +104,7 @@ def set_object_poses(
             moved.append(i)
     left_behind = {child for i in moved for child in world.contents[i]}
     size = np.prod(world.high - world.low, axis=1)
-    # Large objects first: what a plate is in, the things on the plate are in as well.
+    # Large objects first: things on a plate are also in every receptacle that the plate is in.
     for i in sorted({*moved, *left_behind}, key=lambda i: -float(size[i])):
         world.relocate_alone(i, receptacles_of(world, i))
     if not placeStationary:

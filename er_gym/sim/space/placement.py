@@ -51,7 +51,7 @@ _GIVE = 0.02
 _RISES = 0.03
 """A fixed object is an obstacle on a surface if it rises above it by more than this, metres."""
 _OVERHANG = 1.0
-"""Objects farther from a receptacle than this are no obstacles, metres."""
+"""Objects farther from a receptacle than this are not obstacles, metres."""
 _PICKUPABLE = PROPERTIES.index("pickupable")
 _HOLES = frozenset({"Sink", "SinkBasin", "StoveBurner"})
 """Types that are built into a counter and leave no place for other objects."""
@@ -191,7 +191,7 @@ def _in_vessel(
                 yield yaw, np.array([spot[0], base, spot[1]])
 
 
-# -- the thing -------------------------------------------------------------------------------------
+# -- the object ------------------------------------------------------------------------------------
 
 
 def _headings(world: World, i: int) -> list[tuple[float, NDArray[np.float64]]]:
@@ -255,7 +255,7 @@ def _obstacles(
     close = world.exists & (world.high > low).all(axis=1) & (world.low < high).all(axis=1)
     middle = (world.low[receptacle] + world.high[receptacle]) / 2
     loose = world.properties[:, _PICKUPABLE]
-    # A drawer is part of a dresser, so the dresser is no obstacle in it.
+    # A drawer is part of a dresser, so the dresser is not an obstacle in it.
     around = (world.low <= middle).all(axis=1) & (middle <= world.high).all(axis=1)
     close &= loose | ~around
     close[list(aside)] = False

@@ -105,7 +105,7 @@ def upright_box(
 
 
 def _with_stove(world: SceneObjects, i: int) -> Solid:
-    """A burner. The first one of a kitchen also stands for the stove, which is no object.
+    """A burner. The first one of a kitchen also stands for the stove, which is not an object.
 
     The stove hides what is behind it, from the floor to just below the burners. It is a little
     wider than they are.
