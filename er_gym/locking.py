@@ -32,7 +32,7 @@ def exclusive_use(folder: Path) -> Iterator[None]:
     The folder is made if it is missing. The operating system locks the file ``run.lock`` in it, and
     releases the lock when the process ends, in any way. The file names the process and is removed
     at the end; a file that a killed process left does no harm. A folder made here that is empty at
-    the end is removed. A file system without locks keeps nobody out.
+    the end is removed. On a file system without locks nothing keeps other processes out.
 
     Raises:
         Locked: another process, or another part of this one, uses it.

@@ -143,7 +143,9 @@ class Episode:
         if understood == self._memory.last and self._memory.repeats >= MAX_REPEATS:
             self.end_reason = "repeated action"
             times = self._memory.repeats + 1
-            feedback = f"You have tried to {understood} {times} times in a row; that is it."
+            feedback = (
+                f"You have tried to {understood} {times} times in a row, so the episode ends."
+            )
             said = self._protocol.repeated or understood
             return self._reply(said, text, False, "", feedback, 0.0)
         self._steps += understood.verb != verbs.END or self._protocol.end_is_step

@@ -140,4 +140,4 @@ class Wsgi:
 
 
 TRANSPORTS: dict[str, type[Fifo] | type[Wsgi]] = {"FIFO": Fifo, "WSGI": Wsgi}
-"""For each value of ``AI2THOR_SERVER_TYPE`` the class that implements it."""
+"""The class of each transport, by the value of ``AI2THOR_SERVER_TYPE``."""

@@ -41,7 +41,7 @@ def hook_folders(python: str) -> list[Path]:
     except (OSError, ValueError, subprocess.SubprocessError) as error:
         reason = str(error) if isinstance(error, OSError) else "it cannot import ai2thor._builds"
         raise PlayerError(
-            f"{python} runs no AI2-THOR programs: {reason}; pip install ai2thor=="
+            f"{python} cannot run AI2-THOR programs: {reason}; pip install ai2thor=="
             f"{version('ai2thor')} there, or name another Python"
         ) from error
     if told["commit"] != COMMIT_ID:

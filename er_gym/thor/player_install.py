@@ -98,8 +98,8 @@ def uninstall() -> tuple[Release, ...]:
         PlayerError: er-gym has installed nothing.
     """
     unity = [str(release.path) for release in RELEASES if release.is_unity]
-    others = f", but builds that er-gym did not put there: {', '.join(unity)}" if unity else ""
-    nothing = PlayerError(f"nothing of er-gym's is in {client_home()}{others}")
+    others = f"; other builds are there: {', '.join(unity)}" if unity else ""
+    nothing = PlayerError(f"er-gym has installed nothing in {client_home()}{others}")
     if not client_home().is_dir():
         raise nothing
     with _installation_lock():
