@@ -206,7 +206,7 @@ def test_a_server_that_hangs_is_told_of_and_left_in_time(tmp_path: Path) -> None
         hangs = bench(server.url, tmp_path, "--limit", "6", "--set", "server.timeout=0.5")
         assert hangs.return_value == 3
         assert "no whole answer within 0.5 s (try 1 of 2); trying again in" in hangs.output
-        assert "(tried 2 times); nothing has answered yet: see whether the server" in hangs.output
+        assert "(tried 2 times); nothing has answered yet: check that the server" in hangs.output
         over = bench(server.url, tmp_path, "--limit", "6", "--max-minutes", "0.01")
         assert over.return_value == 3
         assert "the 0.01 minutes are over" in over.output

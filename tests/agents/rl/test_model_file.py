@@ -147,8 +147,11 @@ def pickled(run: Path) -> np.ndarray:
         (lambda run: {"about": pickled(run)}, "Object arrays cannot be loaded"),
         (lambda run: {"policy/value_net.0.bias": pickled(run)}, "Object arrays cannot be loaded"),
         (lambda run: {"policy/value_net.0.bias": np.zeros(3, np.float32)}, r"\(16,\) is needed"),
-        (lambda run: {"policy/value_net.0.bias": np.zeros(10**6)}, "larger than it can be"),
-        (lambda run: {"optimizer/99/exp_avg": np.zeros(3, np.float32)}, "belongs to no weight"),
+        (lambda run: {"policy/value_net.0.bias": np.zeros(10**6)}, "larger than its weight"),
+        (
+            lambda run: {"optimizer/99/exp_avg": np.zeros(3, np.float32)},
+            "does not belong to a weight",
+        ),
         (lambda run: {"about": about(run, actions=7)}, "its actions is 7, and 286 is needed"),
         (lambda run: {"about": about(run, counters={})}, "num_timesteps"),
         (lambda run: {"about": np.zeros(5, np.uint8)}, "Expecting value"),

@@ -185,7 +185,7 @@ def test_even_a_reply_that_reads_like_an_action_is_not_done_if_it_has_a_problem(
     script = Script(*decided("fly to Fridge", "end"))
     _, episode = play(env(), script, settings())
     assert [step.verb for step in episode.steps] == ["init", "error", "end"]
-    assert "'fly to Fridge' is no action" in texts(script.sent[1][-1])
+    assert "'fly to Fridge' is not an action" in texts(script.sent[1][-1])
 
 
 def test_names_are_matched_to_types(env: Callable[..., EmbodiedEnv]) -> None:

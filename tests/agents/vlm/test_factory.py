@@ -36,7 +36,7 @@ def test_settings_that_come_with_er_gym_can_be_used(name: str) -> None:
         (("pictures.keep=-1",), "wrong field 'pictures.keep'"),
         (("pictures.min_pixels=999999",), "min_pixels 999999 is more than max_pixels"),
         (("server.key=abc",), "wrong field 'server.key'"),
-        (("sees",), "'sees' is no override"),
+        (("sees",), "'sees' is not an override"),
     ],
 )
 def test_wrong_settings_are_told(overrides: tuple[str, ...], message: str) -> None:

@@ -98,7 +98,7 @@ def user(*parts: str | Picture) -> Message:
 
 
 def conversations(family: str) -> list[Conversation]:
-    """Four that differ in length and in pictures, which a family without eyes is not shown."""
+    """Four that differ in length and in pictures, which a family without vision is not shown."""
     system = Message("system", ("Find it.",))
     talks: list[Conversation] = [
         (system, user("You see: ", picture(300, 300, 1), " What now?")),
@@ -477,8 +477,8 @@ def with_other_eyes(directory: Path) -> None:
         (lambda d: (d / "tokenizer.json").unlink(), "cannot be loaded: "),
         (lambda d: (d / "preprocessor_config.json").unlink(), "cannot be loaded: "),
         (lambda d: (d / "chat_template.jinja").unlink(), "has no chat template"),
-        (with_other_eyes, "does not see as Qwen's models do (CLIPImageProcessorPil)"),
-        (without_a_weight, "1 of its weights are not there, such as lm_head.weight"),
+        (with_other_eyes, "does not process pictures as Qwen's models do (CLIPImageProcessorPil)"),
+        (without_a_weight, "1 of its weights are missing, such as lm_head.weight"),
     ],
 )
 def test_a_broken_model(
@@ -498,7 +498,7 @@ def test_a_broken_model(
         ({"local": {"dtype": "float33"}}, "cannot be loaded: "),
         ({"local": {"attention": "none at all"}}, "cannot be loaded: "),
         ({"local": {"device_map": "cuda:77"}}, "cannot be loaded: "),
-        ({"local": {"adapter": "nowhere"}}, "local.adapter nowhere is no adapter"),
+        ({"local": {"adapter": "nowhere"}}, "local.adapter nowhere is not an adapter"),
     ],
 )
 def test_settings_that_do_not_fit(models: Models, changes: dict[str, Any], message: str) -> None:
@@ -510,10 +510,10 @@ def test_settings_that_do_not_fit(models: Models, changes: dict[str, Any], messa
 
 
 def test_a_model_without_eyes_is_shown_no_pictures(models: Models, client: Clients) -> None:
-    with pytest.raises(ValueError, match="has no eyes; let the agent's setting sees be text"):
+    with pytest.raises(ValueError, match="has no vision; set the agent's setting sees to text"):
         LocalClient(str(models("qwen2")), settings())
     for family in ("qwen2", "qwen2_5_vl"):
-        with pytest.raises(CannotGoOn, match="without eyes"):
+        with pytest.raises(CannotGoOn, match="without vision"):
             client(family, sees="text").reply([user(picture(56, 56))], 0)
 
 
@@ -528,9 +528,9 @@ def test_conversations_that_cannot_be_had(client: Clients) -> None:
     broken = Picture(picture(56, 56).data[:40], "image/png", 56, 56)
     thin = picture(3, 900)
     cases = [
-        (user(broken), "a picture cannot be seen: "),
-        (user(thin), "a picture cannot be seen: ValueError: absolute aspect ratio"),
-        (user("x" * 16_384), "more than the 16384 of .*; let pictures.keep be fewer"),
+        (user(broken), "a picture cannot be processed: "),
+        (user(thin), "a picture cannot be processed: ValueError: absolute aspect ratio"),
+        (user("x" * 16_384), "more than the 16384 of .*; lower pictures.keep"),
         (user("<|image_pad|>"), "has 0 pictures and 1 places for them"),
     ]
     for message, words in cases:
@@ -546,7 +546,7 @@ def test_a_template_that_does_not_take_it(models: Models, tmp_path: Path, client
         (directory / "chat_template.jinja").write_text(template)
 
     path = edited(models, tmp_path / "strict", edit)
-    with pytest.raises(CannotGoOn, match=r"does not take this conversation: .*no system, please"):
+    with pytest.raises(CannotGoOn, match=r"does not accept this conversation: .*no system, please"):
         client(path).reply([user("Hello")], 0)
 
 
@@ -579,7 +579,7 @@ def test_a_device_that_fails_ends_the_run(client: Clients, monkeypatch: pytest.M
         raise torch.AcceleratorError("CUDA error: device-side assert triggered\nmore")
 
     monkeypatch.setattr(model._model, "generate", fails)
-    with pytest.raises(CannotGoOn, match=r"the device fails, .*device-side assert triggered more"):
+    with pytest.raises(CannotGoOn, match=r"the device failed, .*device-side assert triggered more"):
         model.reply([user("Hello")], 0)
 
 

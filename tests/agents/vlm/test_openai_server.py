@@ -485,7 +485,7 @@ def test_who_listens_slowly_or_not_at_all_is_not_waited_for(make: Make, pause: f
     ("behaviour", "words"),
     [
         ("401", "401, incorrect key; the server does not accept the key of OUR_TEST_KEY"),
-        ("403", "403, not for you; the server does not let the key of OUR_TEST_KEY do this"),
+        ("403", "403, not for you; the server does not allow the key of OUR_TEST_KEY to do this"),
         ("404", "404, the model does not exist; the server has no such model"),
         ("quota", "429, you exceeded your current quota"),
     ],
@@ -506,7 +506,7 @@ def test_what_ends_the_run(
 def test_a_request_that_is_wrong_in_itself_ends_the_run(naughty: NaughtyServer, make: Make) -> None:
     client = make(naughty.url)
     naughty.then("400", "ok", "400")
-    with pytest.raises(CannotGoOn, match="400, unknown parameter 'top_p'; no request like this"):
+    with pytest.raises(CannotGoOn, match="400, unknown parameter 'top_p'; every request"):
         client.reply(HELLO, seed=0)
     client.reply(HELLO, seed=0)
     with pytest.raises(ModelError, match=r"400, unknown parameter 'top_p'$"):
@@ -534,9 +534,7 @@ def test_no_server(naughty: NaughtyServer, make: Make) -> None:
     never, once = make(naughty.url, tries=1), make(naughty.url, tries=1)
     once.reply(HELLO, seed=0)
     naughty.close()
-    with pytest.raises(
-        CannotGoOn, match=r"refused; nothing has answered yet: see whether the serv"
-    ):
+    with pytest.raises(CannotGoOn, match=r"refused; nothing has answered yet: check that the serv"):
         never.reply(HELLO, seed=0)
     with pytest.raises(ModelError):
         once.reply(HELLO, seed=0)
@@ -556,9 +554,13 @@ def test_no_server(naughty: NaughtyServer, make: Make) -> None:
             CannotGoOn,
             "set NO_SUCH,",
         ),
-        ({"base_url": "", "key_from": "ODD"}, CannotGoOn, "ODD holds characters that are in no"),
-        ({"base_url": "localhost:8000"}, ValueError, "'localhost:8000' is no address; give one"),
-        ({"base_url": "http://me:sk-2@host:x/v1"}, ValueError, "'host:x/v1' is no address"),
+        ({"base_url": "", "key_from": "ODD"}, CannotGoOn, "ODD holds characters that no"),
+        (
+            {"base_url": "localhost:8000"},
+            ValueError,
+            "'localhost:8000' is not an address; give one",
+        ),
+        ({"base_url": "http://me:sk-2@host:x/v1"}, ValueError, "'host:x/v1' is not an address"),
         ({"base_url": "", "api_version": "1"}, ValueError, "give server.base_url too, such as"),
     ],
 )
@@ -699,7 +701,7 @@ def test_a_query_is_sent_with_each_request(naughty: NaughtyServer, make: Make) -
 @pytest.mark.parametrize("status", [301, 307, 308])
 def test_requests_are_not_sent_on(naughty: NaughtyServer, make: Make, status: int) -> None:
     naughty.then(Raw({}, status, {"Location": f"http://elsewhere.invalid/?key={KEY}"}))
-    words = r"not sent on to http://elsewhere\.invalid/\?key=\*\*\*; if the server is there"
+    words = r"redirects to http://elsewhere\.invalid/\?key=\*\*\*; if the server is there"
     with pytest.raises(CannotGoOn, match=words):
         make(naughty.url).reply(HELLO, seed=0)
     assert naughty.count == 1

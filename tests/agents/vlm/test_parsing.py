@@ -118,7 +118,7 @@ def test_json_is_the_normal_form_where_it_is_asked_for() -> None:
 
 
 def test_a_call_that_cannot_be_read_is_a_problem_whatever_the_text_says() -> None:
-    assert "'{\"x\": 5}' is no action" in parse(NORMAL, '{"x": 5}').problem
+    assert "'{\"x\": 5}' is not an action" in parse(NORMAL, '{"x": 5}').problem
 
 
 # -- rules -----------------------------------------------------------------------------------------
@@ -512,15 +512,15 @@ def test_a_refusal_is_kept_as_a_thought() -> None:
 )  # fmt: skip
 def test_unknown_verbs_list_those_there_are(said: str) -> None:
     assert parse(tagged(said)) == ParsedReply(
-        problem=f"'{said}' is no action. With an object, there are: navigate to, pickup, put in, "
-        "open, close, toggle, slice; without: observe, move forward, end. Write one, such as "
+        problem=f"'{said}' is not an action. Actions with an object: navigate to, pickup, put in, "
+        "open, close, toggle, slice; without one: observe, move forward, end. Write one, such as "
         "'navigate to Fridge'."
     )
 
 
 def test_what_is_no_action_is_quoted_in_a_line_and_not_at_length() -> None:
     problem = parse(tagged("dance\n" * 1000)).problem
-    assert problem.startswith(f"'{'dance ' * 9}dance…' is no action.")
+    assert problem.startswith(f"'{'dance ' * 9}dance…' is not an action.")
 
 
 @in_one_test("verb", verbs.OBJECT_VERBS)

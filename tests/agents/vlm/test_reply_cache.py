@@ -219,7 +219,7 @@ def test_a_damaged_file_is_set_aside(
         for seed in range(300):
             assert kept.reply(HELLO, seed).text.startswith("reply ")
     assert [re.sub(r"\(.*?\)", "()", str(each.message)) for each in warned] == [
-        f"{directory} is damaged (); it is now {directory}.damaged-1"
+        f"{directory} is damaged (); it was moved to {directory}.damaged-1"
     ]
     assert (tmp_path / "run" / "replies.damaged-1").is_dir()
     asked = client.asked
@@ -265,5 +265,5 @@ def test_nothing_is_unpickled(make: Make, tmp_path: Path) -> None:
 
 def test_a_directory_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "replies").write_text("")
-    with pytest.raises(ValueError, match=r"replies cannot be kept in .*choose another --out"):
+    with pytest.raises(ValueError, match=r"replies cannot be cached in .*choose another --out"):
         ReplyCache(Counting(), tmp_path / "replies")

@@ -383,10 +383,10 @@ def test_dry_run_only_says_what_it_would_do(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["nothing.gguf"], "nothing.gguf is no file"),
-        (["./nothing"], "./nothing is not there"),
+        (["nothing.gguf"], "nothing.gguf is not a file"),
+        (["./nothing"], "./nothing does not exist"),
         (["x/y", "--python", "/nothing"], "/nothing does not run as a Python"),
-        (["x/y", "--engine", "vllm", "--dry-run"], "x/y is for vllm to serve"),
+        (["x/y", "--engine", "vllm", "--dry-run"], "vllm should serve x/y"),
     ],
 )
 def test_bad_input_is_one_line(arguments, says, tmp_path, monkeypatch):
