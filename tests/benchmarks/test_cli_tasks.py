@@ -1,4 +1,4 @@
-"""``er-gym tasks`` as a user gives it: tasks are made, checked, read, counted, converted."""
+"""``er-gym tasks`` as a user runs it: generate, verify, show, stats and convert."""
 
 from __future__ import annotations
 

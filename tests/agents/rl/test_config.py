@@ -1,4 +1,4 @@
-"""A run's YAML: what fits, what does not, and how that is said."""
+"""The YAML of a training run: valid values, invalid values and their error messages."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def file(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("name", config_names())
 def test_those_that_come_with_er_gym_are_whole(name: str) -> None:
     config = load_config(config_file(name))
-    assert config.env.instances == "explore"  # what the figures of docs/baselines.md are under
+    assert config.env.instances == "explore"  # the figures of docs/baselines.md use this setting
 
 
 def test_defaults_and_overrides(file: Path) -> None:

@@ -1,4 +1,4 @@
-"""Runs are weights and JSON; a file that could run code is read only when that is allowed."""
+"""Model files are weights and JSON. A file that could run code is read only with ``trust``."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_a_zip_that_runs_code_is_refused_and_does_not_run(hostile: tuple[Path, P
     assert not written.exists()
     with pytest.raises(ValueError, match="cannot be read as a model"):
         load_last_checkpoint(path, trust=True)
-    assert written.exists()  # so this test tests what it says
+    assert written.exists()  # otherwise this test would prove nothing
 
 
 def test_the_commands_refuse_it_in_one_line(hostile: tuple[Path, Path], tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A real, tiny Qwen in this process: what it is given, what it gives back, and what goes wrong."""
+"""A real, tiny Qwen in this process: its inputs, its replies and its errors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.agent import CannotGoOn
 
-LONG = 60.0  # seconds; nothing here waits so long unless it is broken
+LONG = 60.0  # seconds; only broken code waits so long
 PATCH = {"qwen2_vl": 14, "qwen2_5_vl": 14, "qwen3_vl": 16}  # pixels a side; a token is 2 by 2
 EYES = tuple(PATCH)
 
@@ -282,7 +282,7 @@ def test_a_conversation_in_the_models_format(client: Clients, in_history: bool) 
 
 @pytest.mark.parametrize("temperature", [0.0, 1.0])
 @pytest.mark.parametrize("family", ["qwen2", *EYES])
-def test_four_at_once_say_what_each_says_alone(
+def test_a_batch_of_four_gives_the_replies_of_each_alone(
     client: Clients, family: str, temperature: float
 ) -> None:
     sampling = {"max_tokens": 24, "temperature": temperature, "top_p": 0.9}
@@ -319,7 +319,7 @@ def test_seeds(client: Clients) -> None:
     assert client(seed=1)._row(talk, 3).seed != model._row(talk, 3).seed
     unseeded = client(seed=None, sampling={"max_tokens": 24, "temperature": 1.0})
     assert unseeded.reply(talk, 3).text != unseeded.reply(talk, 3).text
-    assert torch.equal(torch.get_rng_state(), before)  # what others draw is none of our business
+    assert torch.equal(torch.get_rng_state(), before)  # other code's random numbers do not change
 
 
 @pytest.mark.parametrize(
@@ -509,7 +509,7 @@ def test_settings_that_do_not_fit(models: Models, changes: dict[str, Any], messa
     assert "\n" not in str(caught.value)
 
 
-def test_a_model_without_eyes_is_shown_no_pictures(models: Models, client: Clients) -> None:
+def test_a_model_without_vision_refuses_pictures(models: Models, client: Clients) -> None:
     with pytest.raises(ValueError, match="has no vision; set the agent's setting sees to text"):
         LocalClient(str(models("qwen2")), settings())
     for family in ("qwen2", "qwen2_5_vl"):
@@ -537,7 +537,7 @@ def test_conversations_that_cannot_be_had(client: Clients) -> None:
         with pytest.raises(ModelError, match=words) as caught:
             model.reply([message], 0)
         assert "\n" not in str(caught.value)
-    assert model.reply([user("Hello")], 0).text  # the next one is none the worse
+    assert model.reply([user("Hello")], 0).text  # the next conversation still works
 
 
 def test_a_template_that_does_not_take_it(models: Models, tmp_path: Path, client: Clients) -> None:

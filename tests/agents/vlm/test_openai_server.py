@@ -337,7 +337,7 @@ def test_tokens_that_the_server_does_not_tell_or_cannot_have_counted(
     assert reply.model == ""
 
 
-def test_tokens_that_are_told_are_believed(naughty: NaughtyServer, make: Make) -> None:
+def test_reported_token_counts_are_used(naughty: NaughtyServer, make: Make) -> None:
     usage = {"prompt_tokens": 5, "prompt_tokens_details": None, "completion_tokens_details": {}}
     naughty.then(
         Raw({**completion({"content": "end"}), "usage": {**usage, "completion_tokens": 2}})
@@ -398,7 +398,7 @@ SLOW = ("drip", "drip_head", "stall")
         *((slow, "no whole answer within 0.5 s") for slow in SLOW),
     ],
 )
-def test_what_may_pass_is_tried_again(
+def test_temporary_failures_are_tried_again(
     naughty: NaughtyServer, make: Make, behaviour: str, words: str
 ) -> None:
     client = make(naughty.url, timeout=0.5 if behaviour in SLOW else 20)
@@ -453,7 +453,7 @@ def test_the_server_says_how_long_to_wait(make: Make) -> None:
     with NaughtyServer(script=["429"], retry_after="1.2") as server:
         make(server.url).reply(HELLO, seed=0)
         first, second = server.seen
-        assert second.at - first.at >= 1.2  # of its own accord the SDK waits half a second
+        assert second.at - first.at >= 1.2  # the SDK alone would wait half a second
 
 
 @pytest.mark.parametrize("pause", [0.01, 600])
@@ -623,7 +623,7 @@ def test_who_waits_for_a_turn_is_let_go() -> None:
     assert str(raised[0]) == "the client has been closed"
 
 
-def test_the_key_is_never_told(
+def test_the_key_never_appears(
     naughty: NaughtyServer, make: Make, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.DEBUG)
@@ -760,7 +760,7 @@ def test_a_server_that_refuses_again_and_again_stops_the_run(
     for kind in (ModelError, ModelError, CannotGoOn):
         with pytest.raises(kind, match="500, something broke"):
             client.reply(HELLO, seed=0)
-    assert client.reply(HELLO, seed=0).text == "observe"  # what is asked later is asked
+    assert client.reply(HELLO, seed=0).text == "observe"  # later requests are sent again
 
 
 def test_those_who_wait_are_let_go_when_the_run_stops(

@@ -1,4 +1,4 @@
-"""Words read off training files: of several styles, and of people who mean no good."""
+"""Prompts from training files: files of several styles, and malicious files."""
 
 from __future__ import annotations
 
@@ -214,7 +214,7 @@ def test_the_language_of_what_is_not_in_the_file(read: Reader) -> None:
 def test_only_as_much_is_read_as_is_needed(read: Reader) -> None:
     samples = [conversation(first_turn(TASKS[i % 6]), ACTIONS[:2]) for i in range(2 * ENOUGH)]
     text = json.dumps(samples)
-    padding = json.dumps("x" * (1 << 22))  # what follows is not even reached
+    padding = json.dumps("x" * (1 << 22))  # the rest is not read
     prompts = read.text(f"{text[:-1]}, {padding}, nonsense")
     assert (prompts.samples, prompts.odd) == (ENOUGH, 0)
 

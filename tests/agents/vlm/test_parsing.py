@@ -1,4 +1,4 @@
-"""What models write, as decisions and thoughts."""
+"""Replies of models, parsed as decisions and thoughts."""
 
 from __future__ import annotations
 
@@ -518,7 +518,7 @@ def test_unknown_verbs_list_those_there_are(said: str) -> None:
     )
 
 
-def test_what_is_no_action_is_quoted_in_a_line_and_not_at_length() -> None:
+def test_an_invalid_action_is_quoted_briefly_in_one_line() -> None:
     problem = parse(tagged("dance\n" * 1000)).problem
     assert problem.startswith(f"'{'dance ' * 9}dance…' is not an action.")
 
@@ -587,7 +587,7 @@ def test_huge_replies_are_read_in_no_time(piece: str) -> None:
     for text in (huge, "<DecisionMaking>" + huge[: LONGEST - 20]):
         began = time.process_time()
         parse(text)
-        assert time.process_time() - began < 5  # what is quadratic takes minutes
+        assert time.process_time() - began < 5  # a quadratic parser takes minutes
     began = time.process_time()
     parse("", huge)
     assert time.process_time() - began < 0.5

@@ -1,4 +1,4 @@
-"""The words that a model is given: what comes with er-gym, and what others write."""
+"""Prompts: those that come with er-gym, and those that users write."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def test_words_instead_of_pictures(prompts: PromptSet) -> None:
 
 
 def test_no_list_of_types_is_given_away(prompts: PromptSet) -> None:
-    """Who has eyes has to see what there is."""
+    """A model with vision must find the objects itself, so its prompts list no object types."""
     text = "\n".join(said(prompts, "tags", "pictures"))
     for name in ("Mug", "Drawer", "Cabinet", "Sofa", "Bed", "Desk"):
         assert name not in text.replace(TASK, "")

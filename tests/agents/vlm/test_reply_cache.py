@@ -1,4 +1,4 @@
-"""Replies kept on disk: what is a hit and what is not, several processes, and damage."""
+"""The reply cache on disk: hits and misses, several processes, and damage."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def make(tmp_path: Path) -> Iterator[Make]:
         each.close()
 
 
-def test_what_was_asked_once_is_not_asked_again(make: Make) -> None:
+def test_a_repeated_request_is_answered_from_the_cache(make: Make) -> None:
     client = Counting()
     first = make(client).reply(HELLO, seed=1)
     assert (first.from_cache, first.cost) == (False, 0.5)
@@ -224,7 +224,7 @@ def test_a_damaged_file_is_set_aside(
     assert (tmp_path / "run" / "replies.damaged-1").is_dir()
     asked = client.asked
     kept.reply(HELLO, seed=299)
-    assert client.asked == asked  # kept anew
+    assert client.asked == asked  # cached again
 
 
 @pytest.mark.parametrize("damage", [_cut, Path.unlink])

@@ -1,4 +1,4 @@
-"""Templates do only so much."""
+"""The sandbox limits the work of a template."""
 
 from __future__ import annotations
 

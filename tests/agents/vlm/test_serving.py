@@ -1,4 +1,4 @@
-"""Commands for servers as a table; real processes that stand in for servers."""
+"""The command lines of servers as a table, and real processes in place of servers."""
 
 from __future__ import annotations
 
@@ -435,7 +435,7 @@ def serving(stand_in):
     command = stand_in(STAND_IN, 0.5, "helper")
     code = (
         "import signal, sys\n"
-        # What runs in the background has Ctrl-C ignored.
+        # Background processes ignore Ctrl-C.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from agents.vlm.serving import Command\n"
         "from benchmarks.cli.serve import run_server\n"
