@@ -1,4 +1,4 @@
-"""The common behaviour of all executors: events, attachments, agents that cannot continue, bad input."""
+"""The common behaviour of all executors: events, attachments, agents that stop, bad input."""
 
 from __future__ import annotations
 
