@@ -1,4 +1,4 @@
-"""What tests of every package share."""
+"""Fixtures that tests of all packages share."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
-# Whatever a shell starts in the background ignores Ctrl-C, and so do its children, of which some
+# A shell's background processes ignore Ctrl-C, and so do their children, of which some
 # tests want to see what they do at Ctrl-C. What is not ignored here is not ignored there.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -1,4 +1,4 @@
-"""What tests of several packages make their cases with."""
+"""Helpers that tests of several packages use for their cases."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The soak and its invariants: each finds what it is there to find, and the engine passes them."""
+"""The soak's invariants: each finds the faults that it is for, and the engine passes them."""
 
 from __future__ import annotations
 

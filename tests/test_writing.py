@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, and over nothing that er-gym did not write."""
+"""Files are written completely or not at all, and replace only files that er-gym wrote."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Saves a learner as arrays and JSON; reading the file runs no code.
 
 ``model.npz`` is NumPy's archive of arrays, read without pickle: ``policy/…`` (the weights),
-``optimizer/N/…`` (what Adam remembers of the N-th of them) and ``about``, JSON in UTF-8 (which
-algorithm, what it sees, how far it has come). ``config.yaml`` beside it holds the rest: the
-hyper-parameters and the shape of the network.
+``optimizer/N/…`` (Adam's state for the N-th weight) and ``about``, JSON in UTF-8 (the algorithm,
+its observations and its progress). ``config.yaml`` beside it holds the rest: the hyper-parameters
+and the shape of the network.
 
 Files of Stable-Baselines3, such as the ``model.zip`` of older runs, hold pickled objects. Reading
 one runs the code in it, so it needs an explicit ``trust``.
@@ -147,7 +147,7 @@ def _array(archive: zipfile.ZipFile, name: str, most: int) -> NDArray[Any]:
     """Read an array of at most ``most`` bytes."""
     entry = archive.getinfo(f"{name}.npy")
     if entry.file_size > most + _HEADER:
-        raise ValueError(f"{name} is larger than it can be")
+        raise ValueError(f"{name} is larger than its weight")
     with archive.open(entry) as stream:
         return npy.read_array(stream, allow_pickle=False)
 
@@ -172,7 +172,7 @@ def _optimizer(archive: zipfile.ZipFile, model: BaseAlgorithm) -> dict[str, Any]
             continue
         place, _, name = entry.removeprefix("optimizer/").removesuffix(".npy").partition("/")
         if not place.isdecimal() or int(place) >= len(weights):
-            raise ValueError(f"{entry} belongs to no weight")
+            raise ValueError(f"{entry} does not belong to a weight")
         like = number if name == "step" else weights[int(place)]
         state.setdefault(int(place), {})[name] = _tensor(archive, entry[:-4], like)
     return {"state": state, "param_groups": model.policy.optimizer.state_dict()["param_groups"]}

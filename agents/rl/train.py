@@ -201,7 +201,7 @@ def _warm_start(
     if demonstrations.refused or demonstrations.unread:
         played = len(demonstrations) + demonstrations.refused + demonstrations.unread
         warnings.warn(
-            f"cloning {warm_start.teacher}: of its {played:,} steps {demonstrations.refused:,} "
+            f"cloning {warm_start.teacher}: of {played:,} steps, {demonstrations.refused:,} "
             f"illegal ones and {demonstrations.unread:,} whose text names no action are left out",
             stacklevel=2,
         )
@@ -224,21 +224,20 @@ def prepare_run(config: TrainConfig, run: Path) -> bool:
     file = run / CONFIG
     new = not any((run / name).exists() for name in (MODEL, SB3_MODEL))
     if file.exists() and new and not is_ours(file):
-        raise RunConflict(f"{file} is there, and er-gym did not write it; give another --out")
+        raise RunConflict(f"{file} exists, and er-gym did not write it; give another --out")
     if not file.exists():
         there = [name for name in _OF_A_RUN if (run / name).exists()]
         if there:
             raise RunConflict(
-                f"{run} holds {there[0]} but no {CONFIG} that tells of which run; "
-                "give another --out"
+                f"{run} holds {there[0]} but no {CONFIG} that describes the run; give another --out"
             )
     elif not new:
         before = load_config(file)
         if before.model_copy(update={"total_steps": config.total_steps}) != config:
             differ = _differences(before.model_dump(), config.model_dump())
             raise RunConflict(
-                f"{run} holds a run of another configuration ({differ}); give another --out, "
-                "or the configuration that it was begun with"
+                f"{run} holds a run of another configuration ({differ}); give another --out, or "
+                "the configuration that it started with"
             )
     make_folder(run)
     write_atomic(file, YAML_MARK + dump(config))

@@ -157,7 +157,7 @@ SHARED_EN: Mapping[str, tuple[str, ...]] = {
     "footrest": ("Footstool", "Ottoman"),
     "chest": ("Dresser", "Safe"),
 }
-"""Names of several types. One that is at hand is meant, else the first."""
+"""Names that stand for several types. A type within reach is chosen, else the first."""
 
 MODIFIERS = frozenset(
     {
@@ -173,4 +173,4 @@ MODIFIERS = frozenset(
         "living", "room", "office",
     }
 )  # fmt: skip
-"""Words before a name that say which one, or what it is like."""
+"""Words before a name that choose among objects or describe them."""

@@ -148,7 +148,7 @@ NAMES_ZH: Mapping[str, tuple[str, ...]] = {
     "Window": ("窗户", "窗"),
     "WineBottle": ("酒瓶", "红酒", "葡萄酒", "红酒瓶", "葡萄酒瓶"),
 }
-"""Object type to its names, the usual one first; all types are there."""
+"""The names of each object type, the usual one first; every type has an entry."""
 
 SHARED_ZH: Mapping[str, tuple[str, ...]] = {
     "桌子": ("DiningTable", "CoffeeTable", "SideTable", "Desk"),
@@ -169,4 +169,4 @@ SHARED_ZH: Mapping[str, tuple[str, ...]] = {
     "毛巾架": ("TowelHolder", "HandTowelHolder"),
     "笔": ("Pen", "Pencil"),
 }
-"""Names of several types. One that is at hand is meant, else the first."""
+"""Names that stand for several types. A type within reach is chosen, else the first."""

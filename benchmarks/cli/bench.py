@@ -77,9 +77,9 @@ _VLM_OPTIONS = (
     click.option(
         "--concurrency",
         type=click.IntRange(1, 1000),
-        help="How many conversations at once.  [default: 8]",
+        help="The number of simultaneous conversations.  [default: 8]",
     ),
-    click.option("--max-usd", type=Finite(), help="Stop after spending this much."),
+    click.option("--max-usd", type=Finite(), help="Stop after spending this many US dollars."),
     click.option("--max-tokens", type=int, help="Stop after this many tokens."),
     click.option(
         "--max-minutes", type=Finite(), help="Stop after this many minutes, even within a request."
@@ -105,15 +105,19 @@ def _with_vlm_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.command(name="bench")
 @click.option("--suite", help="A bundled suite; `er-gym suites` lists them.")
 @click.option("--tasks-file", type=_existing_file, help="A task file in the paper's format.")
-@click.option("--poses", type=_existing_file, help="Exact poses, a file in the paper's format.")
+@click.option(
+    "--poses", type=_existing_file, help="A file of exact object poses in the paper's format."
+)
 @click.option(
     "--agent",
     type=Words(),
     required=True,
-    help="Who plays: oracle, random, searcher, rl:RUN, openai:MODEL, package.module:Class …",
+    help="The agent: oracle, random, searcher, rl:RUN, openai:MODEL, package.module:Class …",
 )
 @click.option("--out", type=_directory, help="The run directory.  [default: runs/SUITE-AGENT]")
-@click.option("--workers", type=workers_type, default=1, show_default=True)
+@click.option(
+    "--workers", type=workers_type, default=1, show_default=True, help="The number of processes."
+)
 @click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
 @click.option(
     "--task-ids", multiple=True, metavar="ID,…", help="Play these tasks; may be repeated."
@@ -123,7 +127,7 @@ def _with_vlm_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--backend", help="The engine: embedded or unity.  [default: the suite's]")
 @trust_option
 @click.option(
-    "--instances", help="Which object a name means: target, explore.  [default: the suite's]"
+    "--instances", help="Which object a type name means: target or explore.  [default: the suite's]"
 )
 @protocol_option
 @scorer_option
@@ -148,9 +152,9 @@ def bench(
 ) -> int:
     """Play a suite with an agent and print the result table.
 
-    The same command continues a run: it plays only the episodes that are missing. A task that
-    cannot be played is set aside and named; the others are played. The options from --agent-config
-    on are for vision-language agents, such as openai:MODEL.
+    The same command continues a run: it plays only the episodes that are missing. If a task cannot
+    be played, the command names it and plays the others. The options from --agent-config on are for
+    vision-language agents, such as openai:MODEL.
     """
     from agents import RL_PREFIX
     from benchmarks.cli.progress import Progress
@@ -303,7 +307,7 @@ def _load_suite(
         raise BadInput(f"give either --suite (one of: {', '.join(suite_names())}) or --tasks-file")
     if name is not None:
         if poses is not None:
-            raise BadInput("--poses goes with --tasks-file; a suite has its own")
+            raise BadInput("--poses needs --tasks-file; a suite has its own poses")
         suite = load_suite(name)
     else:
         assert tasks_file is not None

@@ -1,4 +1,4 @@
-"""Runs of vision-language agents: what the command line says of them, and how they are played."""
+"""Runs of vision-language agents: their command-line options, and how they are played."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class VLMRun:
 
     @property
     def comparable_settings(self) -> dict[str, Any]:
-        """What decides what it says."""
+        """The settings that decide its replies."""
         return comparable_settings(self.settings, load_prompts(self.settings.prompts).digest)
 
     @property
@@ -88,7 +88,7 @@ class VLMRun:
     ) -> RunSummary:
         """Play the tasks that the run directory has no finished episode of.
 
-        ``say`` is called with what a user should hear of the server, from any thread; without it,
+        ``say`` is called, from any thread, with messages about the server for the user; without it,
         a logger warns.
         """
         if say is not None:

@@ -1,4 +1,4 @@
-"""``er-gym tasks`` as a user gives it: tasks are made, checked, read, counted, converted."""
+"""``er-gym tasks`` as a user runs it: generate, verify, show, stats and convert."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def test_fewer_than_were_asked_for_is_said(er_gym: Command, tmp_path: Path) -> N
     )
     assert code == 0
     assert "1 tasks of 1 verified" in shown
-    assert err.splitlines()[-1] == "100 were asked for; more layouts or rooms give more"
+    assert err.splitlines()[-1] == "100 were requested; more layouts or rooms give more"
     assert len(read_tasks(out)) == 1
     assert files_in(tmp_path) == ["not/there/few.jsonl", "not/there/few.md"]
 

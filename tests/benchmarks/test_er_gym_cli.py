@@ -1,4 +1,4 @@
-"""The command as a user gives it."""
+"""The command as a user runs it."""
 
 from __future__ import annotations
 
@@ -374,7 +374,7 @@ def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, epi
     )
 
 
-def test_a_full_disk_is_told_in_one_line(tasks_file, tmp_path, er_gym, monkeypatch):
+def test_a_full_disk_is_reported_in_one_line(tasks_file, tmp_path, er_gym, monkeypatch):
     def run(run_directory, tasks, make_agent, **how):
         raise OSError(28, "No space left on device")
 

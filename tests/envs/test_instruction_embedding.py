@@ -78,7 +78,7 @@ def test_action_masks(wrapped: InstructionEmbedding) -> None:
 
 
 @pytest.mark.parametrize("obs_mode", ["state", "text", "rgb+state"])
-def test_check_env_has_nothing_to_say(obs_mode: str) -> None:
+def test_check_env_finds_no_problem(obs_mode: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         # It warns of wrappers as such.
@@ -133,7 +133,7 @@ class Bare(gymnasium.Env[Any, Any]):
         return self.observation_space.sample(), {}
 
 
-def test_what_cannot_be_wrapped(wrapped: InstructionEmbedding) -> None:
+def test_invalid_uses_of_the_wrapper(wrapped: InstructionEmbedding) -> None:
     box = gymnasium.spaces.Box(0.0, 1.0, (2,))
     with pytest.raises(ValueError, match=r"cannot add 'instruction' to .*Box.* is a Dict"):
         InstructionEmbedding(Bare(box))

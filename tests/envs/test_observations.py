@@ -1,4 +1,4 @@
-"""State and text say what the agent could know, and nothing else."""
+"""The state and text observations hold only what the agent could know."""
 
 from __future__ import annotations
 

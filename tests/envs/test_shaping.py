@@ -1,4 +1,4 @@
-"""Shaping tells how far a task has come, and adds up to nothing that could be gamed."""
+"""Shaping rewards progress in a task, and its sum cannot be exploited."""
 
 from __future__ import annotations
 

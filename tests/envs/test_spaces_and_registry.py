@@ -23,7 +23,7 @@ SMALL = {"width": 96, "height": 64}
 
 @pytest.mark.parametrize("obs_mode", ["rgb", "state", "text", "rgb+state+text"])
 @pytest.mark.parametrize("env_id", IDS)
-def test_check_env_has_nothing_to_say(env_id: str, obs_mode: str) -> None:
+def test_check_env_finds_no_problem(env_id: str, obs_mode: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         env = gymnasium.make(env_id, obs_mode=obs_mode, **SMALL)

@@ -1,4 +1,4 @@
-"""What is put down is put where there is room, in AI2-THOR's order."""
+"""Objects are put down where there is room, in AI2-THOR's order."""
 
 from __future__ import annotations
 

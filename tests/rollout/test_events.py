@@ -1,4 +1,4 @@
-"""The event stream: its lines, what readers skip, and who hears of events."""
+"""The event stream: its lines, the lines that readers skip, and its listeners."""
 
 from __future__ import annotations
 

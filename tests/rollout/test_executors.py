@@ -1,4 +1,4 @@
-"""What every executor does alike: events, attachments, agents that cannot go on, bad input."""
+"""The common behaviour of all executors: events, attachments, agents that stop, bad input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every action on an object asks of it, whatever the action."""
+"""The conditions that all actions on objects share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Things that leave the scene and come back, points, pushes and shortest ways, in FloorPlan1."""
+"""Removed and restored objects, points, pushes and shortest paths, in FloorPlan1."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What follows from what: water, flames and cold do their work on what lies there."""
+"""Consequences of actions: water, flames and cold change the objects there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the official client is told: keys, types, errors, and events that stay as they were."""
+"""The answers to the official client: keys, types, errors, and events that do not change later."""
 
 from __future__ import annotations
 

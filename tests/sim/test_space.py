@@ -1,4 +1,4 @@
-"""Where one can stand, what hides what, what is in the picture, and from where a thing is seen."""
+"""Geometry: walkable positions, occlusion, the camera's view, and interactable poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tasks on request, their words, and what recorded rooms give."""
+"""Requested tasks, their wording, and the tasks of recorded rooms."""
 
 from __future__ import annotations
 

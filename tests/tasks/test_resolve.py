@@ -1,4 +1,4 @@
-"""Tasks are fitted to their scenes; what cannot be is set aside, by name and with its reason."""
+"""Tasks are matched with their scenes; tasks that do not fit are set aside by id with a reason."""
 
 from __future__ import annotations
 

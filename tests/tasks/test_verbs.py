@@ -1,4 +1,4 @@
-"""The table of verbs, and what may be added to it."""
+"""The table of verbs, and rows of other packages."""
 
 from __future__ import annotations
 

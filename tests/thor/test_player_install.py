@@ -1,4 +1,4 @@
-"""What ``er-gym player install`` puts into the client's folder, and what it leaves as it was."""
+"""The files that ``er-gym player install`` writes to the client's folder, and those it keeps."""
 
 from __future__ import annotations
 

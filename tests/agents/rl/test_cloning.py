@@ -1,4 +1,4 @@
-"""Behaviour cloning: what a teacher does is learnt from its episodes."""
+"""Behaviour cloning: a policy learns a teacher's actions from its episodes."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_demonstrations_are_what_the_learner_would_have_seen(
     assert seen.returns.max() > 1.5
 
 
-def test_a_policy_comes_to_do_what_the_teacher_did(make_config: Make) -> None:
+def test_a_policy_learns_the_teachers_actions(make_config: Make) -> None:
     config = make_config()
     how = WarmStart(teacher="oracle", episodes=20, epochs=150, batch_size=32, learning_rate=3e-3)
     seen = collect_demonstrations(config, how, seed=0)
@@ -84,7 +84,7 @@ class Mumbler:
         return Decision(next(self.says))
 
 
-def test_what_names_no_action_is_left_out_and_counted(
+def test_texts_without_an_action_are_left_out_and_counted(
     make_config: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(agents.rl.demonstrations, "make_agent", lambda _: Mumbler())
@@ -120,7 +120,7 @@ def test_a_step_left_out_counts_in_the_returns_before_it(
     env.close()
 
 
-def test_a_teacher_that_shows_nothing_is_one_clear_error(make_config: Make) -> None:
+def test_a_teacher_without_usable_steps_is_one_clear_error(make_config: Make) -> None:
     config = make_config(env={"episodes": "mini", "types": ["single_pickup"], "max_steps": 1})
     with pytest.raises(ValueError, match=r"oracle showed nothing to learn in 2 episodes \(0 succ"):
         collect_demonstrations(config, WarmStart(teacher="oracle", episodes=2), seed=0)

@@ -247,7 +247,7 @@ class _Listener(ThreadingHTTPServer):
     request_queue_size = 256
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        if not isinstance(sys.exc_info()[1], OSError):  # those who hang up are no news
+        if not isinstance(sys.exc_info()[1], OSError):  # do not report clients that hang up
             super().handle_error(request, client_address)
 
 

@@ -1,4 +1,4 @@
-"""What replies cost: written down, added up over restarts, and stopped in time."""
+"""The costs of replies are recorded, added up over restarts, and limited by the budget."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_what_is_spent_is_added_up_over_restarts(make: Make) -> None:
     assert again.spent == Spent(Usage(20, 4, 6, 2), 1.0, 2)
 
 
-def test_half_a_line_says_nothing_and_harms_no_other(make: Make, ledger: Path) -> None:
+def test_half_a_line_is_ignored_and_harms_no_other(make: Make, ledger: Path) -> None:
     make(Costly()).reply(HELLO, seed=0)
     with ledger.open("a") as file:
         file.write(ledger.read_text()[:40])

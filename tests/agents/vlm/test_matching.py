@@ -125,7 +125,7 @@ def test_looked_up(name: str, object_type: str, how: str) -> None:
     assert (match.object_type, match.how) == (object_type, how)
 
 
-def test_what_is_at_hand_is_meant() -> None:
+def test_a_type_within_reach_is_preferred() -> None:
     assert MATCHER.match("table").object_type == "DiningTable"
     assert MATCHER.match("table", prefer={"Mug", "CoffeeTable"}).object_type == "CoffeeTable"
     assert MATCHER.match("tables", prefer=["SideTable", "CoffeeTable"]).object_type == "CoffeeTable"
@@ -193,7 +193,7 @@ def test_of_two_that_are_as_near_the_one_at_hand_is_meant() -> None:
     assert lenient.match(name, prefer=["GarbageCan"]).object_type == "GarbageCan"
 
 
-def test_what_is_none_says_what_is_near() -> None:
+def test_an_unknown_name_lists_the_nearest_types() -> None:
     match = MATCHER.match("tosater")
     assert match.near[0] == "Toaster"
     assert len({*match.near}) == 3
