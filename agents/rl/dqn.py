@@ -199,9 +199,7 @@ class LegalQRDQN(_Legal, QRDQN):
     """QR-DQN, which learns the distribution of returns, over the legal actions."""
 
 
-def make(
-    config: TrainConfig, settings: DQNSettings, env: VecEnv, **policy: Any
-) -> BaseAlgorithm:
+def make(config: TrainConfig, settings: DQNSettings, env: VecEnv, **policy: Any) -> BaseAlgorithm:
     """Make an untrained learner: DQN or QR-DQN, by ``settings.name``; ``policy`` holds more
     parameters of its policy."""
     policy_kwargs = {**config.network.model_dump(), **policy}
