@@ -201,8 +201,11 @@ WITHOUT = """
 import sys
 from er_gym.sim.controller import EmbeddedController
 controller = EmbeddedController(scene="FloorPlan1", headless=True)
-assert not {"botocore", "flask"} & sys.modules.keys()
+assert not {"botocore", "flask", "requests"} & sys.modules.keys()
 import ai2thor.build, ai2thor.controller
+assert issubclass(ai2thor.build.requests.exceptions.ConnectionError, OSError)
+import requests
+assert ai2thor.build.requests.head is requests.head
 assert ai2thor.controller.ai2thor.wsgi_server.WsgiServer.server_type == "WSGI"
 import ai2thor.wsgi_server
 assert ai2thor.wsgi_server is sys.modules["ai2thor.wsgi_server"]
