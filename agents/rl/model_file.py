@@ -15,7 +15,7 @@ import io
 import json
 import zipfile
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -191,3 +191,20 @@ class _UnplayableEnv(gymnasium.Env[Any, Any]):
 def placeholder_env(sees: spaces.Space[Any], actions: int, count: int) -> VecEnv:
     """Placeholder environments for a learner that only plays, or gets its environments later."""
     return DummyVecEnv([lambda: _UnplayableEnv(sees, spaces.Discrete(actions))] * count)
+
+
+class NoOptimizer:
+    """Stands where a policy has its optimizer, and does nothing: for a policy that only plays.
+
+    torch's optimizers import torch's compiler, which takes longer than all that playing imports.
+    """
+
+    def __init__(self, weights: Iterable[torch.nn.Parameter], **settings: Any) -> None:
+        self.param_groups = [{"params": list(weights)}]
+
+    def state_dict(self) -> dict[str, Any]:
+        """Of nothing."""
+        return {"state": {}, "param_groups": []}
+
+    def load_state_dict(self, state: Mapping[str, Any], strict: bool = True) -> None:
+        """Leave what it says: nothing here would use it."""

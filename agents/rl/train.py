@@ -41,7 +41,15 @@ from agents.rl.callbacks import (
 from agents.rl.cloning import clone_behaviour, collect_demonstrations
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, WarmStart, load_config
 from agents.rl.envs import evaluation_config, make_env
-from agents.rl.model_file import MODEL, SB3_MODEL, placeholder_env, restore, save, untrusted_model
+from agents.rl.model_file import (
+    MODEL,
+    SB3_MODEL,
+    NoOptimizer,
+    placeholder_env,
+    restore,
+    save,
+    untrusted_model,
+)
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.vec_env import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS
@@ -59,7 +67,9 @@ _EVALUATION_SEED = 10_000
 class AlgorithmSpec(NamedTuple):
     """How the learners of an algorithm are made and loaded."""
 
-    make: Callable[[TrainConfig, Any, VecEnv], BaseAlgorithm]
+    make: Callable[..., BaseAlgorithm]
+    """Called with the configuration, that of the algorithm and the environments; by keyword, with
+    more parameters of the policy."""
     model_class: type[BaseAlgorithm]
     """The class that loads a file of Stable-Baselines3, which may run code in it."""
     needs_mask: bool
@@ -268,12 +278,13 @@ def load_last_checkpoint(run: Path, trust: bool = False) -> BaseAlgorithm | None
     return None if file is None else load_model(file, trust)
 
 
-def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
+def load_model(file: Path, trust: bool = False, *, learns: bool = True) -> BaseAlgorithm:
     """Load the learner of a file, with the ``config.yaml`` beside it.
 
     Args:
         file: ``model.npz``; or, with ``trust``, a file of Stable-Baselines3.
         trust: whether a file of Stable-Baselines3, which can run code, may be loaded.
+        learns: False for a learner that only plays; it is loaded faster, and cannot be trained.
 
     Raises:
         UntrustedModel: ``trust`` is False, and the file can run code. (It is a ValueError.)
@@ -285,9 +296,9 @@ def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
     config = load_config(file.parent / CONFIG)
     spec = ALGORITHMS[config.algorithm.name]
     space = PolicyObservation(config.env, spec.needs_mask).space
-    model = spec.make(
-        config, config.algorithm, placeholder_env(space, len(ACTIONS), config.vec.envs)
-    )
+    env = placeholder_env(space, len(ACTIONS), config.vec.envs)
+    policy = {} if learns else {"optimizer_class": NoOptimizer}
+    model = spec.make(config, config.algorithm, env, **policy)
     if not foreign:
         restore(file, model)
         return model
