@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 from PIL import Image
-from support import with_ids
+from support import run_python, with_ids
 
 from er_gym.tasks import TASK_TYPES, Task, TaskFileError, load_suite, suite_from_file
 from er_gym.tasks.describe import describe
@@ -593,8 +593,6 @@ def test_help_imports_nothing_heavy(group: list[str]) -> None:
         "heavy = ('numpy', 'gymnasium', 'pydantic', 'rich', 'ai2thor', 'er_gym', 'matplotlib')\n"
         "print([name for name in heavy if name in sys.modules])"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program], env=ENVIRONMENT, capture_output=True, text=True
-    )
+    done = run_python(program)
     assert done.stdout.splitlines()[-1] == "[]", done.stderr
     assert done.stdout.startswith(f"Usage: er-gym {' '.join(['tasks', *group])} ")

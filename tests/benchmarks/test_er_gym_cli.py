@@ -15,6 +15,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
+from support import run_python
 
 from er_gym.rollout import runner
 from er_gym.rollout.run_directory import RunDirectory
@@ -177,9 +178,7 @@ def test_help_imports_nothing_heavy():
         "heavy = {'gymnasium', 'numpy', 'pydantic', 'rich', 'ai2thor', 'er_gym', 'agents'}\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, text=True
-    )
+    done = run_python(code)
     assert done.stderr == ""
     assert "--suite" in done.stdout
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.actions.registry import action
+from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.world import World
 
