@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from floor_plan_1 import APPLE, BOWL, EGG, FRIDGE, ISLAND
 from rich.console import Console
 
 from benchmarks.checks import soak as soak_script
@@ -22,12 +23,6 @@ from benchmarks.checks.soak import SoakReport, choose_scenes, soak, soak_scene, 
 from benchmarks.perf import steps as steps_script
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.thor import SCENE_NAMES, make_controller
-
-APPLE = "Apple|-00.47|+01.15|+00.48"
-BOWL = "Bowl|+00.27|+01.10|-00.75"
-EGG = "Egg|-02.04|+00.81|+01.24"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
-ISLAND = "CounterTop|-00.08|+01.15|00.00"
 
 
 @pytest.fixture(scope="module")
