@@ -205,7 +205,6 @@ class Run:
         name: of the run.
         fault: the name of the fault.
         options: of the command.
-        code: the exit code that it should have.
         says: the texts that it should print, on either stream.
         seconds: its time limit.
         crashed: how many episodes may be recorded as crashed.
@@ -216,70 +215,66 @@ class Run:
     name: str
     fault: str
     options: tuple[str, ...] = ()
-    code: int = 3
     says: str = "the same command"
     seconds: float = 60.0
-    crashed: int = 2
+    crashed: int = 0
     good_first: int = 0
     interrupt: str = ""
+
+    @property
+    def code(self) -> int:
+        """The exit code that it should have."""
+        return 130 if self.interrupt else 3
 
 
 _QUICK = ("--set", "server.tries=2", "--set", "server.timeout=2")
 _ALONE = ("--concurrency", "1")
 RUNS = [
-    Run("a dead server", "hangs up", _QUICK, says="requests in a row", good_first=6),
-    Run("a dead server, one by one", "answers 500", (*_QUICK, *_ALONE), says="requests in a row"),
+    Run("a dead server", "hangs up", _QUICK, says="requests in a row", crashed=2, good_first=6),
     Run(
-        "a server that hangs",
-        "hangs before the head",
-        _QUICK,
-        says="nothing has answered yet",
-        crashed=0,
+        "a dead server, one by one",
+        "answers 500",
+        (*_QUICK, *_ALONE),
+        says="requests in a row",
+        crashed=2,
     ),
+    Run("a server that hangs", "hangs before the head", _QUICK, says="nothing has answered yet"),
     Run(
         "minutes end a request",
         "hangs before the head",
         ("--max-minutes", "0.05"),
         says="0.05 minutes are over",
-        crashed=0,
     ),
     Run(
         "minutes end a drip",
         "drips the body",
         ("--max-minutes", "0.05"),
         says="0.05 minutes are over",
-        crashed=0,
     ),
     Run(
         "a wait beyond the minutes",
         "answers 503, Retry-After '300'",
         ("--max-minutes", "4"),
         says="asks to wait 5 min, and",
-        crashed=0,
     ),
     Run(
         "a long wait without minutes",
         "answers 503, Retry-After '300'",
         (),
         says="give --max-minutes",
-        crashed=0,
     ),
     Run(
         "a long wait that the minutes allow",
         "answers 503, Retry-After '300'",
         ("--max-minutes", "90"),
-        code=130,
         says="trying again in 5 min",
-        crashed=0,
         interrupt="trying again in 5 min",
     ),
     Run(
         "Ctrl-C while it hangs",
         "hangs before the head",
         ("--set", "server.timeout=120"),
-        code=130,
         says="interrupted",
-        crashed=0,
         interrupt="no answer for",
     ),
     Run(
@@ -287,21 +282,18 @@ RUNS = [
         "sends no token counts",
         ("--max-tokens", "20000"),
         says="the budget is spent",
-        crashed=0,
     ),
     Run(
         "tokens given back",
         "counts -1000000 of both",
         ("--max-usd", "0.02"),
         says="the budget is spent",
-        crashed=0,
     ),
     Run(
         "answers that are rejected",
         "sends choices []",
         ("--max-usd", "0.02", "--set", "server.tries=9"),
         says="the budget is spent",
-        crashed=0,
     ),
 ]
 

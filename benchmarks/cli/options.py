@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from pathlib import Path
 from typing import Any
 
 import click
@@ -107,6 +108,9 @@ class Words(click.ParamType):
         except UnicodeEncodeError:
             self.fail(f"{value!a:.80} is not UTF-8 text; spell it in UTF-8", param, ctx)
         return str(value)
+
+
+EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
 class Finite(click.FloatRange):

@@ -22,6 +22,7 @@ from typing import Any
 
 import click
 
+from benchmarks.cli.vlm_options import VLMOptions
 from benchmarks.cli.vlm_run import VLMRun
 from er_gym import __version__
 from er_gym.rollout.events import EpisodeEnded, Event
@@ -127,12 +128,12 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
     )
     process.start()
     theirs.close()
-    vlm_run = VLMRun.of(
-        "openai:answering-server",
+    options = VLMOptions(
         base_url=ours.recv(),
         overrides=[f"pictures.width={size}", f"pictures.height={size}"],
         concurrency=concurrency,
     )
+    vlm_run = VLMRun.of("openai:answering-server", options)
     env = {**suite.env, **vlm_run.env}
     ended: list[tuple[float, int]] = []
     with tempfile.TemporaryDirectory() as place:

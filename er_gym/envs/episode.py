@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs import skills
-from er_gym.envs.action_handler import EpisodeSetup
+from er_gym.envs.action_handler import EpisodeSetup, Moment
 from er_gym.envs.actions import Action, AnyAction
 from er_gym.envs.info import Info, LegalActions
 from er_gym.envs.legality import KnownTypes
@@ -154,7 +154,7 @@ class Episode:
             object_id, outcome = "", skills.Outcome(None, False, refused)
         else:
             object_id, outcome = self._handler.execute(
-                understood, self.perception, self._available, self._progress.left
+                understood, Moment(self.perception, self._available, self._progress.left)
             )
         self._memory.act(understood, outcome.success)
         self._perceive(outcome)

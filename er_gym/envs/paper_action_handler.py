@@ -6,12 +6,10 @@ rules are kept, too, so that numbers compare with the paper's table.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.action_handler import EpisodeSetup, ExecutedAction
+from er_gym.envs.action_handler import EpisodeSetup, ExecutedAction, Moment
 from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
 from er_gym.envs.legality import AvailableObjects, KnownTypes, navigable_within
 from er_gym.envs.paper_approach import ObjectSnapshot, approach, current_snapshot, snapshot_of
@@ -19,7 +17,6 @@ from er_gym.envs.paper_skills import interact, move_forward, observe, start_agai
 from er_gym.envs.perception import Perception, type_mask
 from er_gym.envs.skills import Outcome
 from er_gym.tasks import verbs
-from er_gym.tasks.task import KeyAction
 from er_gym.thor.objects import KIND_OF, TYPES, ObjectTable
 
 NO_OBJECT = "No Suitable Object"
@@ -134,13 +131,7 @@ class PaperActionHandler:
             legal[indices[indices >= 0]] = 1
         return legal
 
-    def execute(
-        self,
-        action: Action,
-        perception: Perception,
-        available: AvailableObjects,
-        left: Sequence[KeyAction],
-    ) -> ExecutedAction:
+    def execute(self, action: Action, now: Moment) -> ExecutedAction:
         """Carry out a legal action."""
         setup, controller = self._setup, self._setup.controller
         if action.verb == verbs.OBSERVE:
@@ -151,7 +142,7 @@ class PaperActionHandler:
             return "", Outcome(None, True)
         if action.verb == verbs.INIT:
             return "", start_again(controller, setup.start)
-        target = self._choose(action, perception.objects)
+        target = self._choose(action, now.perception.objects)
         if target is None:
             return "", Outcome(None, False, f"there is no such {action.object_type}")
         if action.verb != verbs.NAVIGATE:

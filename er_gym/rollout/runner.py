@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
 from er_gym.rollout.events import Cost, EpisodeEnded, EventListener, EventLog, RunBegun, RunEnded
-from er_gym.rollout.executor import Executor, Parallelism, PlayedEpisode
+from er_gym.rollout.executor import Assignment, Executor, Parallelism, PlayedEpisode
 from er_gym.rollout.process_executor import play_in_processes
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import RunDirectory
@@ -103,7 +103,7 @@ def run(
         stopped = ""
         try:
             if todo:
-                EXECUTORS[executor](directory, todo, make_agent, sink, parallelism)
+                EXECUTORS[executor](Assignment(directory, todo, make_agent, sink, parallelism))
         except CannotGoOn as stop:
             stopped = str(stop)
             raise Stopped(stopped, sink.summary(len(done))) from stop

@@ -17,18 +17,22 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, astuple, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.tasks import verbs
 from er_gym.tasks.arrangement import Arrangement, ObjectPose
+from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import as_utf8, known_scene, known_type, known_verb
 from er_gym.tasks.jsonl_format import ConditionRecord, PoseRecord
+from er_gym.tasks.reading import parse_json, read_text
 from er_gym.tasks.task import AgentPose, KeyAction, Task
 
 _SPELLED = {verbs.PUT: "put"}
 """Verbs that the paper's task files and its agents' replies spell differently."""
+_KINDS = {dict: "an object", list: "a list", str: "a string", type(None): "null"}
+Kind = TypeVar("Kind", list[Any], dict[str, Any])
 
 
 class OwnFields(BaseModel):
@@ -213,10 +217,23 @@ def with_own_fields(plain: Task, own: OwnFields, where: str) -> Task:
     )
 
 
-def json_kind(data: object) -> str:
-    """The kind of a parsed JSON value, for a message."""
-    kinds = {dict: "an object", list: "a list", str: "a string", type(None): "null"}
-    return kinds.get(type(data), "a number or a truth value")
+def read_json(path: Path, kind: type[Kind], of: str, example: str) -> Kind:
+    """Read a JSON file of the paper.
+
+    Args:
+        path: the file.
+        kind: list or dict.
+        of: what it holds, for messages.
+        example: a sentence that shows such a file, for messages.
+
+    Raises:
+        TaskFileError: the file cannot be read, or holds another kind of value.
+    """
+    data = parse_json(read_text(path), path)
+    if isinstance(data, kind):
+        return data
+    found = _KINDS.get(type(data), "a number or a truth value")
+    raise TaskFileError(f"{path}: not {_KINDS[kind]} of {of} but {found}; {example}")
 
 
 def as_json(path: Path, data: object) -> bytes:

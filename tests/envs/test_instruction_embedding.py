@@ -10,6 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from floor_plan_1 import FRIDGE
 from gymnasium.utils.env_checker import check_env
 from support import make_task
 
@@ -17,7 +18,6 @@ from er_gym.envs.actions import ACTIONS, INDEX, parse
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.wrappers import InstructionEmbedding, KeyActionShaping, make_encoder
 
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 OPEN = make_task("single_pickup", ("open", FRIDGE), instruction="Open the Fridge.")
 CLOSE = make_task("single_pickup", ("close", FRIDGE), instruction="Close the Fridge.")
 ID = "ER-SinglePickup-v0"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from floor_plan_1 import FRIDGE
 from support import make_task
 
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -16,8 +17,6 @@ from er_gym.envs.observations import (
     parse_obs_mode,
 )
 from er_gym.tasks.task import AgentPose
-
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 
 
 def entry(obs: dict[str, np.ndarray], name: str) -> float:

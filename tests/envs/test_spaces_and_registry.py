@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from support import run_python
 
 import er_gym
 from er_gym.envs.actions import ACTIONS
@@ -102,16 +103,7 @@ print(digest.hexdigest())
 
 
 def test_a_seed_gives_the_same_bytes_in_any_process() -> None:
-    runs = [
-        subprocess.run(
-            [sys.executable, "-c", ROLLOUT],
-            capture_output=True,
-            text=True,
-            check=True,
-            env={"PYTHONHASHSEED": hashseed, "PATH": ""},
-        ).stdout
-        for hashseed in ("1", "2")
-    ]
+    runs = [run_python(ROLLOUT, PYTHONHASHSEED=hashseed).stdout for hashseed in ("1", "2")]
     assert runs[0] == runs[1]
 
 

@@ -10,11 +10,10 @@ import sys
 
 import numpy as np
 import pytest
+from floor_plan_1 import APPLE, FRIDGE
 
 from er_gym.sim.controller import EmbeddedController
 
-APPLE = "Apple|-00.47|+01.15|+00.48"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 ACROSS = {"x": 1.0, "z": 1.25, "rotation": 270, "horizon": 0}
 """From here one faces the fridge, 2.65 m away: its box ends at x = -1.653."""
 

@@ -8,13 +8,10 @@ import pickle
 
 import msgpack
 import pytest
+from floor_plan_1 import APPLE, FRIDGE, ISLAND
 from support import in_one_test
 
 from er_gym.sim.scene import SCENE_NAMES
-
-APPLE = "Apple|-00.47|+01.15|+00.48"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
-ISLAND = "CounterTop|-00.08|+01.15|00.00"
 
 AGENT_KEYS = [
     "screenWidth",

@@ -12,7 +12,8 @@ from pydantic import BaseModel
 from er_gym.sim import consequences
 from er_gym.sim.actions.checks import FARTHEST, within
 from er_gym.sim.actions.pick_place import fall, put_down
-from er_gym.sim.actions.registry import Vector, action, quoted
+from er_gym.sim.actions.registry import action, quoted
+from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.placement_restrictions import accepts
 from er_gym.sim.space.placement import free_spots

@@ -25,8 +25,6 @@ from difflib import get_close_matches
 from functools import cached_property
 from typing import Any, get_type_hints
 
-from pydantic import BaseModel, ConfigDict
-
 from er_gym.plugins import PluginError, added
 from er_gym.sim.actions.conversion import Kind, Unconvertible, kind_of
 from er_gym.sim.errors import (
@@ -63,16 +61,6 @@ _MOST_NAMES = 8
 """Argument names that an error message repeats."""
 
 Run = Callable[..., Any]
-
-
-class Vector(BaseModel):
-    """A point or a direction as AI2-THOR writes it; other keys are ignored."""
-
-    model_config = ConfigDict(allow_inf_nan=False)
-
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,6 @@ import json
 import math
 import os
 import resource
-import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -17,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from naughty_server import MODEL, NaughtyServer
+from support import lines_until_killed
 
 from agents.vlm.chat import Message, Reply, Usage
 from agents.vlm.clients.budget import Budget, Entry, Ledger, MeteredClient, Spent
@@ -326,17 +324,8 @@ while True:
 """
 
 
-def test_a_budget_holds_over_a_killed_process(make: Make, ledger: Path, repository: Path) -> None:
-    with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(ledger)],
-        cwd=repository,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdout is not None
-        for _ in range(20):
-            assert process.stdout.readline() == "\n"
-        process.send_signal(signal.SIGKILL)
+def test_a_budget_holds_over_a_killed_process(make: Make, ledger: Path) -> None:
+    assert lines_until_killed(PROGRAM, ledger, 20) == ["\n"] * 20
     metered = make(Costly(), Budget(max_tokens=20 * 12))
     assert metered.spent.requests >= 20
     with pytest.raises(CannotGoOn, match="of 240 tokens"):

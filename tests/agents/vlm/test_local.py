@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import one_torch_thread
 
 pytest.importorskip("torch", reason="needs the extra local")
 pytest.importorskip("transformers", reason="needs the extra local")
@@ -41,11 +42,8 @@ Clients = Callable[..., LocalClient]
 
 @pytest.fixture(scope="module", autouse=True)
 def one_thread() -> Iterator[None]:
-    """Torch's threads would wait for each other where tests share cores."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+    with one_torch_thread():
+        yield
 
 
 @pytest.fixture(scope="session")

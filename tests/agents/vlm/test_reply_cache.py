@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import signal
-import subprocess
-import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -14,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from support import lines_until_killed
 
 pytest.importorskip("diskcache", reason="needs pip install 'er-gym[vlm]'")
 
@@ -164,18 +162,10 @@ for seed in itertools.count():
 """
 
 
-def test_a_killed_process_leaves_what_it_kept(make: Make, tmp_path: Path, repository: Path) -> None:
+def test_a_killed_process_leaves_what_it_kept(make: Make, tmp_path: Path) -> None:
     directory = tmp_path / "run" / "replies"
     mine = make(Counting())  # open at the same time
-    with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(directory)],
-        cwd=repository,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdout is not None
-        seen = [int(process.stdout.readline()) for _ in range(40)]
-        process.send_signal(signal.SIGKILL)
+    seen = list(map(int, lines_until_killed(PROGRAM, directory, 40)))
     question = (Message("user", ("hello",)),)
     for client in (mine, make(Counting())):
         replies = [client.reply(question, seed) for seed in seen]
