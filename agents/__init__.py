@@ -75,8 +75,8 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
     ]
     if lacking:
         raise PluginError(
-            f"agent {name!r} makes {type(agent).__name__}, which has no {lacking[0]!r}; "
-            "an agent has a text obs_mode, and reset and act (er_gym.rollout.agent.Agent)"
+            f"agent {name!r} makes {type(agent).__name__}, which has no {lacking[0]!r}; an agent "
+            "needs obs_mode (a text), reset and act (er_gym.rollout.agent.Agent)"
         )
     return agent
 

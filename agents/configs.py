@@ -65,7 +65,7 @@ def load(
     for text in overrides:
         path, equals, value = text.partition("=")
         if not (equals and path):
-            raise ValueError(f"{text!r} is no override; give NAME=VALUE")
+            raise ValueError(f"{text!r} is not an override; give NAME=VALUE")
         _put(data, path.split("."), parse_yaml(value, f"--set {text:.60}"), text)
     where = f"{file}: the {what}" if file else f"the {what}"
     return validated(model, {**data, **(more or {})}, where)

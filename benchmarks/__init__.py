@@ -8,5 +8,5 @@ Nothing is imported here, so ``er-gym --help`` is instant. The parts:
 * :mod:`benchmarks.checks`: scripts that look for faults and compare; not in the wheel.
 * :mod:`benchmarks.pages`: scripts that make pages of ``docs/``; not in the wheel.
 
-What plays the episodes is :mod:`er_gym.rollout`.
+:mod:`er_gym.rollout` plays the episodes.
 """

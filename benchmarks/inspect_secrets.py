@@ -1,6 +1,6 @@
-"""Keeps a model's key, and what the query of its address holds, out of Inspect's logs.
+"""Keeps a model's key and the query of its address out of Inspect's logs.
 
-Inspect writes down what a server answers, word by word; some servers repeat the key.
+Inspect logs each answer of a server literally, and some servers repeat the key.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ _DONE = "_er_gym_discreet"
 
 
 def model_at_url(name: str, address: str | None) -> Model:
-    """A model of Inspect behind an address, whose query is sent with each request and not logged.
+    """A model of Inspect at an address. The address's query is sent with each request and not
+    logged.
 
     Raises:
         ValueError: the address holds a password, or a query that the provider cannot send.
@@ -35,13 +36,15 @@ def model_at_url(name: str, address: str | None) -> Model:
     if url.query:
         client: Any = getattr(model.api, "client", None)
         if not hasattr(client, "with_options"):
-            raise ValueError(f"{name} takes no query in --model-base-url; give the address alone")
+            raise ValueError(
+                f"{name} does not accept a query in --model-base-url; give the address alone"
+            )
         model.api.client = client.with_options(default_query=dict(url.params))
     return without_secrets(model, address)
 
 
 def without_secrets(model: Model, address: str = "") -> Model:
-    """The model, whose answers and errors no longer hold its key."""
+    """The model, with its key removed from answers and errors."""
     api: Any = model.api
     if getattr(api, _DONE, False):
         return model
@@ -74,14 +77,14 @@ def _redact_output(output: ModelOutput | Exception, secrets: Secrets) -> ModelOu
 
 
 def _redact_call(call: ModelCall | None, secrets: Secrets) -> ModelCall | None:
-    # In place: Inspect may hold it already.
+    # In place, since Inspect may hold the object already.
     if call is not None and call.response is not None:
         call.response = secrets.redact_all(call.response)
     return call
 
 
 def _redact_error(error: BaseException | None, secrets: Secrets) -> None:
-    """Strike secrets out of an exception, and of those that it came of."""
+    """Remove secrets from an exception and from its causes."""
     while error is not None:
         error.args = tuple(secrets.redact_all(each) for each in error.args)
         for name, value in vars(error).items():

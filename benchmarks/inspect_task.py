@@ -2,7 +2,7 @@
 
 ``inspect eval benchmarks/inspect_task.py@er_gym --model openai/gpt-4o -T suite=mini``, or
 ``er-gym inspect``. Needs the extra ``inspect``. Prompts, parsing, matching and scores are those of
-``er-gym bench``; what chooses the next words is Inspect's model.
+``er-gym bench``; the replies come from Inspect's model.
 """
 
 from __future__ import annotations
@@ -76,10 +76,10 @@ def er_gym(
 
     Args:
         suite: its name.
-        limit: no more than the first so many tasks.
-        agent_config: the agent's settings: a file, or the name of one that comes with er-gym. The
-            server's and the prices in it are of no effect: the model is Inspect's.
-        overrides: settings that overrule it, such as ``sees=text``.
+        limit: the number of tasks, from the first; all by default.
+        agent_config: the agent's settings: a file, or the name of one that comes with er-gym. Its
+            server and prices have no effect, since the model is Inspect's. overrides: settings that
+            override it, such as ``sees=text``.
         seed: of the run; each episode's, and each epoch's, is derived from it.
     """
     given = (overrides,) if isinstance(overrides, str) else tuple(overrides)
@@ -113,11 +113,11 @@ def _sample(each: Task) -> Sample:
 
 
 def _generation(settings: AgentSettings) -> GenerateConfig:
-    """Sampling arguments, where the command line does not set them."""
+    """Sampling arguments that the command line does not set."""
     sampling = settings.sampling
     return GenerateConfig(
         temperature=sampling.temperature,
-        # Some models take one of the two only.
+        # Some models accept only one of the two.
         top_p=None if sampling.top_p == 1 else sampling.top_p,
         max_tokens=sampling.max_tokens,
         reasoning_effort=settings.reasoning.effort or None,
@@ -132,7 +132,7 @@ def _generation(settings: AgentSettings) -> GenerateConfig:
 def episode(
     tasks: Mapping[str, Task], settings: AgentSettings, env: Mapping[str, Any], seed: int
 ) -> Solver:
-    """Plays the sample's task with the model, in an environment in a process of its own."""
+    """Plays the sample's task with the model, in an environment in its own process."""
     prompts, matcher = load_prompts(settings.prompts), Matcher(settings.matching)
     matcher.prepare()
 
@@ -176,7 +176,7 @@ def episode(
 
 
 async def _in_thread(wait: Callable[[], _Result]) -> _Result:
-    # A limiter of its own: the common one's threads are for what does not take long.
+    # Its own limiter: the default one is for threads that end soon.
     return await anyio.to_thread.run_sync(wait, limiter=anyio.CapacityLimiter(1))
 
 
@@ -184,8 +184,8 @@ class _ReplyExchange:
     """A :class:`agents.vlm.chat.Client` whose replies come from another thread.
 
     Attributes:
-        questions: the conversation and seed of each reply that is waited for; None at the end.
-        answers: the replies; None where there will be none.
+        questions: the conversation and seed of each reply that an agent waits for; None at the end.
+            answers: the replies; None if there will be no reply.
     """
 
     def __init__(self) -> None:
@@ -201,7 +201,7 @@ class _ReplyExchange:
         return answer
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: nothing is open."""
 
 
 class _Conversation:
@@ -242,8 +242,8 @@ class _Conversation:
     def _message(self, place: int, message: Message) -> ChatMessage:
         """A message in Inspect's terms; a new one is also put into the sample's conversation.
 
-        The same object stands for a message again and again, so that the log has it once; only a
-        message that is sent without its pictures now is another.
+        A message keeps its object, so the log has it once; only a message that is now sent without
+        its pictures gets a new one.
         """
         if place < len(self._known):
             before, known = self._known[place]
@@ -252,8 +252,8 @@ class _Conversation:
         if message.role != "assistant":
             self._state.messages.append(made)
         elif self._said is not None and not self._said.tool_calls:
-            # As it came, for models that want their signed thoughts back. A call has no result to
-            # go with it, and is told in words.
+            # Unchanged, for models that need their signed thoughts back. A tool call has no result
+            # here, so it becomes text.
             made = self._said
         self._known.append((message, made))
         return made
@@ -297,7 +297,7 @@ def _reply(output: ModelOutput, seconds: float) -> Reply:
     )
 
 
-# -- how a decision is asked for: arguments of Model.generate --------------------------------------
+# -- how a decision is requested: arguments of Model.generate --------------------------------------
 
 
 def _tags_arguments() -> dict[str, Any]:

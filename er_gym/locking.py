@@ -17,7 +17,7 @@ LOCK = "run.lock"
 _FLAGS = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 _LONGEST = 300
 _OURS = re.compile(rb"((?P<pid>[0-9]+) (?P<host>[!-~]*)\n)?")
-"""What the file says: a process and its machine; nothing, if it was killed before it could."""
+"""The content of the file: a process and its machine; empty if a kill came before the write."""
 _NO_LOCKS = {errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK}
 
 
@@ -32,7 +32,7 @@ def exclusive_use(folder: Path) -> Iterator[None]:
     The folder is made if it is missing. The operating system locks the file ``run.lock`` in it, and
     releases the lock when the process ends, in any way. The file names the process and is removed
     at the end; a file that a killed process left does no harm. A folder made here that is empty at
-    the end is removed. A file system without locks keeps nobody out.
+    the end is removed. On a file system without locks nothing keeps other processes out.
 
     Raises:
         Locked: another process, or another part of this one, uses it.
@@ -47,7 +47,8 @@ def exclusive_use(folder: Path) -> Iterator[None]:
         try:
             yield
         finally:
-            # Before the lock is let go of: whoever waits for it sees that the file has gone.
+            # Removed while the lock is held: a process that waits for the lock sees that the file
+            # is gone.
             with contextlib.suppress(OSError):
                 os.unlink(folder / LOCK)
             os.close(handle)
@@ -69,7 +70,7 @@ def _lock(folder: Path) -> int:
     while True:
         try:
             handle = os.open(path, _FLAGS, 0o644)
-        except FileNotFoundError:  # whoever made the folder has just removed it
+        except FileNotFoundError:  # the process that made the folder has just removed it
             make_folder(folder)
             continue
         try:
@@ -77,8 +78,8 @@ def _lock(folder: Path) -> int:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise Locked(
-                    f"{folder} is in use by {_holder(handle)}; wait for its end, or choose another "
-                    "--out"
+                    f"{folder} is in use by {_holder(handle)}; wait until it ends, or choose "
+                    "another --out"
                 ) from None
             except OSError as error:
                 if error.errno not in _NO_LOCKS:
@@ -86,7 +87,7 @@ def _lock(folder: Path) -> int:
             if _is_at(handle, path):
                 if not _OURS.fullmatch(os.pread(handle, _LONGEST, 0)):
                     raise ForeignFile(
-                        f"{path} is there, and er-gym did not write it; choose another --out"
+                        f"{path} exists, and er-gym did not write it; choose another --out"
                     )
                 os.ftruncate(handle, 0)
                 os.pwrite(handle, f"{os.getpid()} {socket.gethostname()}\n".encode(), 0)
@@ -94,7 +95,7 @@ def _lock(folder: Path) -> int:
         except BaseException:
             os.close(handle)
             raise
-        os.close(handle)  # of one who has just removed the file: there may be another by now
+        os.close(handle)  # the holder has just removed the file; there may be another one by now
 
 
 def _is_at(handle: int, path: Path) -> bool:

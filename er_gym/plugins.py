@@ -2,7 +2,7 @@
 
 There are two ways to name a plugin:
 
-- ``package.module:Name``, a dotted name: the module is imported, and has ``Name``;
+- ``package.module:Name``, a dotted name of an object in a module;
 - the name of an entry point that an installed package declares in one of er-gym's groups, such as
   ``er_gym.agents``.
 
@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 
 class PluginError(ValueError):
-    """A name stands for no usable plugin; the message says why, and which names are allowed."""
+    """A name does not stand for a usable plugin; the message says why and what is allowed."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Registry(Generic[T]):
     """Objects of one kind that a user chooses by name.
 
     Attributes:
-        kind: what they are, for messages: ``"agent"``.
-        group: the group of entry points in which other packages declare theirs.
-        own: those that come with er-gym, by name.
-        expected: what one has to be, for messages: ``"a class with reset and act"``.
-        fits: whether an object is of this kind, as far as can be told without calling it.
-        others: further ways to name one, for messages.
+        kind: the kind of the objects, for messages: ``"agent"``.
+        group: the group of entry points in which other packages declare such objects.
+        own: the objects that come with er-gym, by name.
+        expected: what an object has to be, for messages: ``"a class with reset and act"``.
+        fits: returns whether an object is of this kind, as far as this shows without calling it.
+        others: further ways to name an object, for messages.
     """
 
     kind: str
@@ -51,14 +51,14 @@ class Registry(Generic[T]):
     others: str = ""
 
     def names(self) -> tuple[str, ...]:
-        """The names of er-gym's own, then those of installed packages, each once."""
+        """The names of er-gym's own objects, then those of installed packages, each once."""
         return tuple(dict.fromkeys((*self.own, *sorted(entry_points(self.group)))))
 
     def get(self, name: str) -> T:
-        """What a name stands for; er-gym's own come before those of other packages.
+        """The object of a name; er-gym's own objects come before those of other packages.
 
         Raises:
-            PluginError: the name is unknown, or what it stands for cannot be imported or used.
+            PluginError: the name is unknown, or its object cannot be imported or used.
         """
         if name in self.own:
             return self.own[name]
@@ -77,7 +77,7 @@ class Registry(Generic[T]):
         return self._checked(found, repr(name))
 
     def unknown(self, name: str) -> str:
-        """The message for a name that stands for nothing: what there is, and what is near."""
+        """The message for an unknown name: the known names, and the similar ones."""
         near = get_close_matches(name, self.names(), n=3)
         hint = f" (did you mean {' or '.join(near)}?)" if near else ""
         ways = [", ".join(self.names()), "package.module:Name", self.others]
@@ -110,7 +110,7 @@ def entry_points(group: str) -> Mapping[str, metadata.EntryPoint]:
 
 
 def load_entry_point(entry: metadata.EntryPoint, kind: str) -> Any:
-    """What an entry point stands for.
+    """Load the object of an entry point.
 
     Raises:
         PluginError: it cannot be loaded.
@@ -127,16 +127,16 @@ def load_entry_point(entry: metadata.EntryPoint, kind: str) -> Any:
 def added(
     kind: str, group: str, variable: str, expected: str, *, registers: bool = False
 ) -> Iterator[tuple[Any, str]]:
-    """What an environment variable names and installed packages declare, each with its origin.
+    """The objects that an environment variable names and installed packages declare.
 
     Args:
-        kind: what it is, for messages: ``"verb"``.
+        kind: the kind of the objects, for messages: ``"verb"``.
         group: the group of entry points.
         variable: the environment variable; it holds dotted names, separated by commas.
-        expected: what one has to be, for messages.
-        registers: whether a module registers its things itself when it is imported. Then a module
-            is left out that is being imported now, and is what made er-gym look: it goes on
-            afterwards.
+        expected: what an object has to be, for messages.
+        registers: whether a module registers its objects itself when it is imported. Then a module
+            that is being imported now is left out: its import made er-gym call this function, and
+            goes on afterwards.
 
     Raises:
         PluginError: something cannot be loaded.
@@ -162,15 +162,15 @@ def is_dotted(name: str) -> bool:
 
 
 def load_dotted(name: str, kind: str, expected: str) -> Any:
-    """What ``package.module:Name`` stands for.
+    """Load the object that ``package.module:Name`` names.
 
-    A module is looked for as ``import`` does, then in the working directory.
+    The module is searched as by ``import``, then in the working directory.
 
     Raises:
-        PluginError: it is no such name, its module cannot be imported, or lacks the attribute.
+        PluginError: the name has another form, or the module cannot be imported or lacks ``Name``.
     """
     if not is_dotted(name):
-        raise PluginError(f"{kind} {name!r} is no package.module:Name; give {expected}")
+        raise PluginError(f"{kind} {name!r} is not a package.module:Name; give {expected}")
     module_name, _, attributes = name.partition(":")
     try:
         found: Any = _imported(module_name)

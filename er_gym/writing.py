@@ -15,8 +15,8 @@ PNG                       the text chunk ``Software`` is ``er-gym``
 JPEG                      the comment begins with ``Written by er-gym``
 ========================  ======================================================================
 
-The paper's task files have no place for such a mark, nor have other kinds of pictures. An empty
-file holds nothing that could be lost, and counts as er-gym's.
+The paper's task files and other kinds of pictures have no place for such a mark. An empty file
+counts as er-gym's, since it holds nothing that could be lost.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 MARKDOWN_MARK = "<!-- Written by er-gym -->\n"
-"""The first line of a Markdown file of er-gym's; readers do not see it."""
+"""The first line of er-gym's Markdown files; readers do not see it."""
 YAML_MARK = "# Written by er-gym\n"
-"""The first line of a YAML file of er-gym's."""
+"""The first line of er-gym's YAML files."""
 PICTURE_MARK: Mapping[str, str] = {"Software": "er-gym"}
-"""What a PNG file of er-gym's says of itself."""
+"""The text chunk of er-gym's PNG files."""
 
 _LONGEST_NAME = 200
-"""Bytes that a draft's name takes from the file's; file systems allow 255, the rest included."""
+"""The number of bytes of the file's name in a draft's name; file systems allow 255 in all."""
 _LONGEST_STEM = 120
 _HEAD = 4096
 """The number of bytes at the beginning of a file in which its mark is looked for."""
@@ -63,15 +63,15 @@ class ForeignFile(ValueError):
 
 
 def writable(text: str) -> str:
-    r"""A text as UTF-8 can hold it: half a character (a lone surrogate) becomes ``\ud800``."""
+    r"""A text that UTF-8 can hold: half a character (a lone surrogate) becomes ``\ud800``."""
     return text if text.isascii() else text.encode(errors="backslashreplace").decode()
 
 
 def file_stem(name: str) -> str:
     """A file name without suffix for any name.
 
-    It is the name itself if that is fit for a file; else a readable, unique one of at most 129
-    characters.
+    It is the name itself if a file can have that name; otherwise a readable, unique name of at most
+    129 characters.
     """
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", name)[:_LONGEST_STEM]
     if stem == name and not stem.startswith("."):
@@ -80,19 +80,19 @@ def file_stem(name: str) -> str:
 
 
 def write_atomic(path: Path, data: str | bytes, *, mode: int | None = None) -> None:
-    """Write a file so that it is found whole or not at all, power cuts included.
+    """Write a file completely or not at all, even in a power cut.
 
     Args:
-        path: the file; its folder must be there. What is there is replaced, a link too.
-        data: text is encoded as UTF-8; ends of lines stay as they are.
-        mode: permissions; by default those of the file that is replaced, or the user's usual ones.
+        path: the file; its folder must exist. An existing file or link is replaced.
+        data: text is encoded as UTF-8; line ends are kept.
+        mode: permissions; by default those of the replaced file, or else the user's usual ones.
 
     Raises:
-        CannotWrite: the disk is full, the folder is not there or may not be written to, a folder
-            stands in the file's place.
+        CannotWrite: the disk is full, the folder does not exist or is not writable, or ``path`` is
+            a folder.
     """
     content = data.encode() if isinstance(data, str) else data
-    # What a kill leaves behind tells by its name of which file it is.
+    # The name of a draft that a kill leaves behind shows which file it belongs to.
     name = os.fsdecode(os.fsencode(path.name)[:_LONGEST_NAME])
     draft = path.with_name(f"{name}.{secrets.token_hex(8)}.tmp")
     try:
@@ -119,17 +119,16 @@ def write_atomic(path: Path, data: str | bytes, *, mode: int | None = None) -> N
 def write_output(path: str | Path, data: str | bytes, *, force: bool = False) -> None:
     """Write a file that the user asked for.
 
-    Where the same content is there already, nothing is done. A link is followed.
+    If the file already has this content, nothing is done. A link is followed.
 
     Args:
         path: the file; its folder must be there.
         data: text is encoded as UTF-8.
-        force: whether to replace also what er-gym did not write.
+        force: whether to replace a file that er-gym did not write.
 
     Raises:
-        ForeignFile: it did not write what is there.
-        CannotWrite: as :func:`write_atomic`; or a device or a pipe is there, or a file that may not
-            be written to.
+        ForeignFile: er-gym did not write the existing file.
+        CannotWrite: as :func:`write_atomic`; or ``path`` is a device, a pipe or a read-only file.
     """
     path = Path(path)
     content = data.encode() if isinstance(data, str) else data
@@ -139,11 +138,11 @@ def write_output(path: str | Path, data: str | bytes, *, force: bool = False) ->
 
 
 def check_output(path: str | Path, data: bytes | None = None, *, force: bool = False) -> None:
-    """Raise the exception that :func:`write_output` would, as far as can be known beforehand.
+    """Raise the exception that :func:`write_output` would raise, as far as it can be foreseen.
 
     Args:
         path: the file.
-        data: its content, if that is known already.
+        data: the content, if it is known already.
         force: as in :func:`write_output`.
     """
     path = Path(path)
@@ -174,10 +173,10 @@ def check_output(path: str | Path, data: bytes | None = None, *, force: bool = F
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder and those above it, where they are not there.
+    """Make a folder and its parents, if they do not exist.
 
     Raises:
-        CannotWrite: it cannot be made.
+        CannotWrite: the folder cannot be made.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -208,31 +207,31 @@ def is_ours(path: Path) -> bool:
 
 
 def picture_format(path: Path) -> str:
-    """The kind of picture that a name's ending asks for, as Pillow calls it.
+    """Pillow's name of the picture format of a file name's ending.
 
     Raises:
-        ValueError: there is none of that ending.
+        ValueError: no picture format has that ending.
     """
     from PIL.Image import SAVE, registered_extensions
 
     kind = registered_extensions().get(path.suffix.lower(), "")
     if kind not in SAVE:
-        raise ValueError(f"{path}: {path.suffix!r} is no kind of picture; give .png or .jpg")
+        raise ValueError(f"{path}: {path.suffix!r} is not a picture format; give .png or .jpg")
     return kind
 
 
 def write_picture(path: Path, picture: Image, *, force: bool = False, **options: Any) -> None:
-    """Write a picture that the user asked for, of the kind that its name ends in.
+    """Write a picture that the user asked for, in the format of its name's ending.
 
     Args:
         path: the file.
         picture: what to write.
         force: as in :func:`write_output`.
-        options: of Pillow's writer.
+        options: options of Pillow's writer.
 
     Raises:
         ForeignFile, CannotWrite: as :func:`write_output`.
-        ValueError: there is no such kind of picture, or it cannot hold this one.
+        ValueError: there is no such picture format, or it cannot hold this picture.
     """
     from PIL.PngImagePlugin import PngInfo
 
@@ -252,13 +251,13 @@ def write_picture(path: Path, picture: Image, *, force: bool = False, **options:
 
 
 def write_figure(path: Path, figure: Figure, *, force: bool = False, **options: Any) -> None:
-    """Write a figure of matplotlib's as PNG.
+    """Write a matplotlib figure as PNG.
 
     Args:
         path: the file.
         figure: what to write.
         force: as in :func:`write_output`.
-        options: of ``savefig``.
+        options: options of ``savefig``.
 
     Raises:
         ForeignFile, CannotWrite: as :func:`write_output`.
@@ -269,7 +268,7 @@ def write_figure(path: Path, figure: Figure, *, force: bool = False, **options: 
 
 
 def _holds(path: Path, content: bytes) -> bool:
-    """Whether a file's content is this."""
+    """Whether a file has this content."""
     try:
         state = os.stat(path)
         same_size = stat.S_ISREG(state.st_mode) and state.st_size == len(content)
@@ -279,7 +278,7 @@ def _holds(path: Path, content: bytes) -> bool:
 
 
 def _reason(error: OSError, path: Path) -> str:
-    """The reason of an error, in words; it names the file's folder, not the draft."""
+    """The reason for an error, in words; it names the file's folder, not the draft."""
     if isinstance(error, (FileNotFoundError, NotADirectoryError)):
         return f"there is no folder {path.parent}; make it first"
     if isinstance(error, IsADirectoryError):

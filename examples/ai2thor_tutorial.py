@@ -3,7 +3,7 @@
     python examples/ai2thor_tutorial.py            # on er-gym's engine
     python examples/ai2thor_tutorial.py --unity    # on AI2-THOR's own build
 
-Nothing in it but the choice of the engine knows of er-gym.
+Only the choice of the engine uses er-gym.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from ai2thor.controller import Controller
 
 
 def make_controller(unity):
-    """The official controller, on one engine or the other."""
+    """The official controller, on either engine."""
     settings = {
         "scene": "FloorPlan1",
         "width": 400,
@@ -36,7 +36,7 @@ def find(event, object_type):
 
 
 def go_to(controller, thing):
-    """Stand where a thing can be handled, as near to it as possible."""
+    """Stand at the nearest position from which an object is interactable."""
     event = controller.step(
         action="GetInteractablePoses",
         objectId=thing["objectId"],
@@ -50,7 +50,7 @@ def go_to(controller, thing):
 
 
 def main():
-    """Play, and say what happens."""
+    """Play, and print what happens."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--unity", action="store_true", help="AI2-THOR's own build")
     controller = make_controller(parser.parse_args().unity)
@@ -59,7 +59,7 @@ def main():
     print(f"{event.metadata['sceneName']}: {len(event.metadata['objects'])} objects")
 
     event = controller.step(action="GetReachablePositions")
-    print(f"one can stand at {len(event.metadata['actionReturn'])} places")
+    print(f"the agent can stand at {len(event.metadata['actionReturn'])} positions")
 
     for action in ("MoveAhead", "RotateRight", "MoveAhead", "LookDown"):
         event = controller.step(action=action)

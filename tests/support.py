@@ -1,16 +1,24 @@
-"""What tests of several packages make their cases with."""
+"""Helpers that tests of several packages use for their cases."""
 
 from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Iterable
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from er_gym.tasks.task import KeyAction, Task, type_of_id
 from er_gym.tasks.types import task_type
 
+ROOT = Path(__file__).resolve().parents[1]
 Play = Callable[..., list[dict[str, Any]]]
 """Plays texts in a task: the infos of reset and of each step, with reward, ended and cut."""
 
@@ -51,6 +59,62 @@ def in_one_test(
         return test
 
     return decorate
+
+
+def run_python(program: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a program in another process, in the checkout, with more environment variables."""
+    return subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=ROOT,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+
+
+def lines_until_killed(program: str, path: Path, count: int) -> list[str]:
+    """The first lines that a program prints about a path; it is killed after the last of them."""
+    command = [sys.executable, "-c", program, str(path)]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        lines = list(islice(process.stdout, count))
+        process.send_signal(signal.SIGKILL)
+    return lines
+
+
+@contextmanager
+def one_torch_thread() -> Iterator[None]:
+    """Torch's threads would wait for each other where tests share cores."""
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+def with_ids(task: Task, changed: Callable[[str], str]) -> Task:
+    """The task with other ids of its key actions' and its own objects."""
+
+    def all_changed(ids: Iterable[str]) -> tuple[str, ...]:
+        return tuple(map(changed, ids))
+
+    keys = tuple(
+        replace(
+            key,
+            object_id=changed(key.object_id),
+            related_objects=all_changed(key.related_objects),
+        )
+        for key in task.key_actions
+    )
+    return replace(
+        task,
+        key_actions=keys,
+        target_objects=all_changed(task.target_objects),
+        related_objects=all_changed(task.related_objects),
+    )
 
 
 def make_task(

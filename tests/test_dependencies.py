@@ -1,4 +1,4 @@
-"""What is imported is declared, and what is declared is used."""
+"""Every imported package is declared, and every declared package is used."""
 
 from __future__ import annotations
 

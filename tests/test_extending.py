@@ -1,4 +1,4 @@
-"""The walk-throughs of docs/extending.md do what they say."""
+"""The examples of docs/extending.md work as described."""
 
 from __future__ import annotations
 

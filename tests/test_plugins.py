@@ -1,4 +1,4 @@
-"""Things of other packages, by dotted names and by entry points: one of each kind."""
+"""Plugins of other packages, by dotted names and by entry points: one of each kind."""
 
 from __future__ import annotations
 

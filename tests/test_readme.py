@@ -1,4 +1,4 @@
-"""What the README shows is what one gets."""
+"""The README's examples give the output that it shows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, and over nothing that er-gym did not write."""
+"""Files are written completely or not at all, and replace only files that er-gym wrote."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_a_picture_that_its_kind_cannot_hold_is_a_line(tmp_path: Path) -> None:
     path = tmp_path / "a.jpg"
     with pytest.raises(ValueError, match=r"a\.jpg: a JPEG file cannot hold this picture"):
         write_picture(path, Image.new("I;16", (9, 9)))
-    with pytest.raises(ValueError, match=r"'\.mug' is no kind of picture"):
+    with pytest.raises(ValueError, match=r"'\.mug' is not a picture format"):
         write_picture(tmp_path / "a.mug", Image.new("RGB", (9, 9)))
     assert list(tmp_path.iterdir()) == []
 
@@ -207,6 +207,6 @@ def test_nothing_is_left_of_a_folder_that_was_made_for_nothing(tmp_path: Path) -
 
 def test_a_lock_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / LOCK).write_text("my own lock\n")
-    with pytest.raises(ForeignFile, match=r"run\.lock is there"):
+    with pytest.raises(ForeignFile, match=r"run\.lock exists"):
         exclusive_use(tmp_path).__enter__()
     assert (tmp_path / LOCK).read_text() == "my own lock\n"

@@ -1,4 +1,4 @@
-"""Things as the generator reads them, made by hand."""
+"""Objects made by hand, as the generator reads them."""
 
 from __future__ import annotations
 

@@ -24,9 +24,9 @@ def rejection(trajectory: Trajectory, most_actions: int) -> str:
     odd = [turn for turn in trajectory.turns if turn.fault or turn.purpose == "repeat"]
     if trajectory.kind == ANOMALY and not odd:
         return "nothing went wrong"
-    if trajectory.kind not in (ANOMALY, CORRECTED):
-        if any(not turn.success for turn in trajectory.turns):
-            return "an action was refused"
+    refused = any(not turn.success for turn in trajectory.turns)
+    if refused and trajectory.kind not in (ANOMALY, CORRECTED):
+        return "an action was refused"
     return ""
 
 

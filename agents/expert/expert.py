@@ -84,7 +84,7 @@ class ExpertCourse(TaskCourse):
             wrong.append(place)
             if place in self.view.navigable and (yield from self._visit(place, leg, rest)):
                 if any(key.verb == verbs.OPEN for key in leg.actions):
-                    raise GiveUp  # another object of the type lies here, which the task is not about
+                    raise GiveUp  # the task is about another object of the type
                 break
         place = self._known(leg.place)
         if not place:

@@ -75,4 +75,4 @@ def _model_file(path: Path) -> Path:
 def _loaded(file: Path, changed: int, trust: bool) -> Any:
     """Load the model of a file; the cache serves many episodes while the file is unchanged."""
     torch.set_num_threads(1)  # observations come one at a time, and several workers may run
-    return load_model(file, trust)
+    return load_model(file, trust, learns=False)

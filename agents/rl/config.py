@@ -40,8 +40,8 @@ class EnvConfig(_Model):
     Attributes:
         episodes: a suite's name, a task file, or ``generate`` for newly generated tasks.
         types: the task types, drawn with equal probability; all types if empty.
-        obs_mode: ``state``, with ``rgb`` or ``depth`` or both before it. (The numbers of
-            ``instance`` are names, nothing that a network could reckon with.)
+        obs_mode: ``state``, with ``rgb`` or ``depth`` or both before it. (``instance`` is not
+            offered: its numbers only name objects, so a network cannot calculate with them.)
         instruction: the encoder of the instruction, as
             :func:`er_gym.envs.wrappers.make_encoder` has it; "" for none, since ``state`` says
             which types it names.
@@ -211,7 +211,9 @@ class TrainConfig(_Model):
     def _phases_in_order(self) -> TrainConfig:
         ends = [phase.until for phase in self.curriculum]
         if ends != sorted(set(ends)):
-            raise ValueError(f"the phases of a curriculum end at {ends}; let each end later")
+            raise ValueError(
+                f"the phases of a curriculum end at {ends}; each must end after the one before it"
+            )
         return self
 
     @model_validator(mode="after")

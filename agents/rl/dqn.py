@@ -104,7 +104,7 @@ class TypeDQNPolicy(_TypeWise, DQNPolicy):
 
     # Our network in place of Stable-Baselines3's own, which only needs to be callable.
     def make_q_net(self) -> ValueNetwork:  # type: ignore[override]
-        """Another one, online or target."""
+        """Make a network, online or target."""
         seen, actions = _spaces(self)
         return ValueNetwork(seen, actions, **self._shape, quantiles=1).to(self.device)
 
@@ -114,7 +114,7 @@ class TypeQRDQNPolicy(_TypeWise, QRDQNPolicy):
 
     # As above.
     def make_quantile_net(self) -> QuantileNetwork:  # type: ignore[override]
-        """Another one, online or target."""
+        """Make a network, online or target."""
         seen, actions = _spaces(self)
         network = QuantileNetwork(seen, actions, **self._shape, quantiles=self.n_quantiles)
         return network.to(self.device)
@@ -199,9 +199,10 @@ class LegalQRDQN(_Legal, QRDQN):
     """QR-DQN, which learns the distribution of returns, over the legal actions."""
 
 
-def make(config: TrainConfig, settings: DQNSettings, env: VecEnv) -> BaseAlgorithm:
-    """Make an untrained learner: DQN or QR-DQN, by ``settings.name``."""
-    policy_kwargs = config.network.model_dump()
+def make(config: TrainConfig, settings: DQNSettings, env: VecEnv, **policy: Any) -> BaseAlgorithm:
+    """Make an untrained learner: DQN or QR-DQN, by ``settings.name``; ``policy`` holds more
+    parameters of its policy."""
+    policy_kwargs = {**config.network.model_dump(), **policy}
     if settings.name == "qrdqn":
         policy_kwargs["n_quantiles"] = settings.quantiles
     given: dict[str, Any] = {

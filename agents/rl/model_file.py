@@ -1,9 +1,9 @@
 """Saves a learner as arrays and JSON; reading the file runs no code.
 
 ``model.npz`` is NumPy's archive of arrays, read without pickle: ``policy/…`` (the weights),
-``optimizer/N/…`` (what Adam remembers of the N-th of them) and ``about``, JSON in UTF-8 (which
-algorithm, what it sees, how far it has come). ``config.yaml`` beside it holds the rest: the
-hyper-parameters and the shape of the network.
+``optimizer/N/…`` (Adam's state for the N-th weight) and ``about``, JSON in UTF-8 (the algorithm,
+its observations and its progress). ``config.yaml`` beside it holds the rest: the hyper-parameters
+and the shape of the network.
 
 Files of Stable-Baselines3, such as the ``model.zip`` of older runs, hold pickled objects. Reading
 one runs the code in it, so it needs an explicit ``trust``.
@@ -15,7 +15,7 @@ import io
 import json
 import zipfile
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -147,7 +147,7 @@ def _array(archive: zipfile.ZipFile, name: str, most: int) -> NDArray[Any]:
     """Read an array of at most ``most`` bytes."""
     entry = archive.getinfo(f"{name}.npy")
     if entry.file_size > most + _HEADER:
-        raise ValueError(f"{name} is larger than it can be")
+        raise ValueError(f"{name} is larger than its weight")
     with archive.open(entry) as stream:
         return npy.read_array(stream, allow_pickle=False)
 
@@ -172,7 +172,7 @@ def _optimizer(archive: zipfile.ZipFile, model: BaseAlgorithm) -> dict[str, Any]
             continue
         place, _, name = entry.removeprefix("optimizer/").removesuffix(".npy").partition("/")
         if not place.isdecimal() or int(place) >= len(weights):
-            raise ValueError(f"{entry} belongs to no weight")
+            raise ValueError(f"{entry} does not belong to a weight")
         like = number if name == "step" else weights[int(place)]
         state.setdefault(int(place), {})[name] = _tensor(archive, entry[:-4], like)
     return {"state": state, "param_groups": model.policy.optimizer.state_dict()["param_groups"]}
@@ -191,3 +191,20 @@ class _UnplayableEnv(gymnasium.Env[Any, Any]):
 def placeholder_env(sees: spaces.Space[Any], actions: int, count: int) -> VecEnv:
     """Placeholder environments for a learner that only plays, or gets its environments later."""
     return DummyVecEnv([lambda: _UnplayableEnv(sees, spaces.Discrete(actions))] * count)
+
+
+class NoOptimizer:
+    """Stands where a policy has its optimizer, and does nothing: for a policy that only plays.
+
+    torch's optimizers import torch's compiler, which takes longer than all that playing imports.
+    """
+
+    def __init__(self, weights: Iterable[torch.nn.Parameter], **settings: Any) -> None:
+        self.param_groups = [{"params": list(weights)}]
+
+    def state_dict(self) -> dict[str, Any]:
+        """Of nothing."""
+        return {"state": {}, "param_groups": []}
+
+    def load_state_dict(self, state: Mapping[str, Any], strict: bool = True) -> None:
+        """Leave what it says: nothing here would use it."""

@@ -103,7 +103,7 @@ class TypeNetwork(nn.Module):
         first = (goal == 1).float() @ kinds  # (B, K)
         later = (goal * (goal < 1)) @ kinds
         wanted = torch.cat([first, later], dim=1)
-        # How well a type fits the instruction's types: an apple is searched for in a fridge.
+        # How well a type fits the instruction's types: a fridge is a good place for an apple.
         fit = functional.embedding(which, self.offers(kinds)) * self.asks(wanted).index_select(
             0, at
         )

@@ -51,7 +51,7 @@ class _Split(nn.Module):
 class TypePolicy(MaskableActorCriticPolicy):
     """Logits and value from one :class:`TypeNetwork`; ``policy_kwargs``: ``width``, ``kind``."""
 
-    # Other modules than those that Stable-Baselines3 makes itself.
+    # These modules replace those that Stable-Baselines3 makes.
     mlp_extractor: _Split  # type: ignore[assignment]
     value_net: nn.Sequential  # type: ignore[assignment]
 

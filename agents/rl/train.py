@@ -41,7 +41,15 @@ from agents.rl.callbacks import (
 from agents.rl.cloning import clone_behaviour, collect_demonstrations
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, WarmStart, load_config
 from agents.rl.envs import evaluation_config, make_env
-from agents.rl.model_file import MODEL, SB3_MODEL, placeholder_env, restore, save, untrusted_model
+from agents.rl.model_file import (
+    MODEL,
+    SB3_MODEL,
+    NoOptimizer,
+    placeholder_env,
+    restore,
+    save,
+    untrusted_model,
+)
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.vec_env import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS
@@ -59,7 +67,9 @@ _EVALUATION_SEED = 10_000
 class AlgorithmSpec(NamedTuple):
     """How the learners of an algorithm are made and loaded."""
 
-    make: Callable[[TrainConfig, Any, VecEnv], BaseAlgorithm]
+    make: Callable[..., BaseAlgorithm]
+    """Called with the configuration, that of the algorithm and the environments; by keyword, with
+    more parameters of the policy."""
     model_class: type[BaseAlgorithm]
     """The class that loads a file of Stable-Baselines3, which may run code in it."""
     needs_mask: bool
@@ -201,7 +211,7 @@ def _warm_start(
     if demonstrations.refused or demonstrations.unread:
         played = len(demonstrations) + demonstrations.refused + demonstrations.unread
         warnings.warn(
-            f"cloning {warm_start.teacher}: of its {played:,} steps {demonstrations.refused:,} "
+            f"cloning {warm_start.teacher}: of {played:,} steps, {demonstrations.refused:,} "
             f"illegal ones and {demonstrations.unread:,} whose text names no action are left out",
             stacklevel=2,
         )
@@ -224,21 +234,20 @@ def prepare_run(config: TrainConfig, run: Path) -> bool:
     file = run / CONFIG
     new = not any((run / name).exists() for name in (MODEL, SB3_MODEL))
     if file.exists() and new and not is_ours(file):
-        raise RunConflict(f"{file} is there, and er-gym did not write it; give another --out")
+        raise RunConflict(f"{file} exists, and er-gym did not write it; give another --out")
     if not file.exists():
         there = [name for name in _OF_A_RUN if (run / name).exists()]
         if there:
             raise RunConflict(
-                f"{run} holds {there[0]} but no {CONFIG} that tells of which run; "
-                "give another --out"
+                f"{run} holds {there[0]} but no {CONFIG} that describes the run; give another --out"
             )
     elif not new:
         before = load_config(file)
         if before.model_copy(update={"total_steps": config.total_steps}) != config:
             differ = _differences(before.model_dump(), config.model_dump())
             raise RunConflict(
-                f"{run} holds a run of another configuration ({differ}); give another --out, "
-                "or the configuration that it was begun with"
+                f"{run} holds a run of another configuration ({differ}); give another --out, or "
+                "the configuration that it started with"
             )
     make_folder(run)
     write_atomic(file, YAML_MARK + dump(config))
@@ -269,12 +278,13 @@ def load_last_checkpoint(run: Path, trust: bool = False) -> BaseAlgorithm | None
     return None if file is None else load_model(file, trust)
 
 
-def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
+def load_model(file: Path, trust: bool = False, *, learns: bool = True) -> BaseAlgorithm:
     """Load the learner of a file, with the ``config.yaml`` beside it.
 
     Args:
         file: ``model.npz``; or, with ``trust``, a file of Stable-Baselines3.
         trust: whether a file of Stable-Baselines3, which can run code, may be loaded.
+        learns: False for a learner that only plays; it is loaded faster, and cannot be trained.
 
     Raises:
         UntrustedModel: ``trust`` is False, and the file can run code. (It is a ValueError.)
@@ -286,9 +296,9 @@ def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
     config = load_config(file.parent / CONFIG)
     spec = ALGORITHMS[config.algorithm.name]
     space = PolicyObservation(config.env, spec.needs_mask).space
-    model = spec.make(
-        config, config.algorithm, placeholder_env(space, len(ACTIONS), config.vec.envs)
-    )
+    env = placeholder_env(space, len(ACTIONS), config.vec.envs)
+    policy = {} if learns else {"optimizer_class": NoOptimizer}
+    model = spec.make(config, config.algorithm, env, **policy)
     if not foreign:
         restore(file, model)
         return model

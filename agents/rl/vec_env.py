@@ -108,7 +108,7 @@ class WorkerVecEnv(VecEnv):
         self._ask_some(indices, lambda rows: ("set", attr_name, rows, value))
 
     def env_is_wrapped(self, wrapper_class: Any, indices: VecEnvIndices = None) -> list[bool]:
-        """Never by Stable-Baselines3's own wrappers."""
+        """Always False: the environments have none of Stable-Baselines3's wrappers."""
         return [False] * len(list(self._get_indices(indices)))
 
     def close(self) -> None:

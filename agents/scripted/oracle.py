@@ -24,4 +24,4 @@ class OracleAgent:
         action, key = self._solver.next(info)
         if key is None:
             return Decision(action, "Everything is done.")
-        return Decision(action, f"To be done next: {key.verb} {key.actual_type}.")
+        return Decision(action, f"The next key action is {key.verb} {key.actual_type}.")

@@ -17,8 +17,8 @@ from agents.vlm.record import (
     PictureRecord,
     RoundRecord,
     ThoughtRecord,
+    reply_fields,
     settings_to_record,
-    token_counts,
 )
 from agents.vlm.settings import AgentSettings
 from er_gym.envs.actions import NO_ACTION, Action, applies
@@ -94,12 +94,7 @@ class VLMAgent:
                 matched=matched,
                 rules=list(parsed.rules),
                 problem=problem,
-                seconds=reply.seconds,
-                cost=reply.cost,
-                finish=reply.finish,
-                model=reply.model,
-                kept=reply.from_cache,
-                **token_counts(reply.usage),
+                **reply_fields(reply),
             )
         )
         thought = "\n".join(f"{each.kind}: {each.text}" for each in parsed.thoughts)

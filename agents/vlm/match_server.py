@@ -105,7 +105,7 @@ def serve(matcher: Matcher, port: int) -> None:
             listening.listen()
         except OSError as error:
             raise ValueError(
-                f"port {port} of {HOST} cannot be had ({error.strerror}); choose another --port, "
+                f"port {port} of {HOST} cannot be used ({error.strerror}); choose another --port, "
                 "or 0 for a free one"
             ) from error
         server = make_server(HOST, port, app, threaded=True, fd=listening.fileno())

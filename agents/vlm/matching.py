@@ -19,8 +19,9 @@ import numpy as np
 
 from agents.vlm.name_embeddings import NameEmbeddings
 from agents.vlm.settings import Matching
-from er_gym.data.names_en import MODIFIERS, NAMES_EN, SHARED_EN
-from er_gym.data.names_zh import NAMES_ZH, SHARED_ZH
+from er_gym.data.names_en import MODIFIERS, NAMES_EN
+from er_gym.data.names_zh import NAMES_ZH
+from er_gym.data.shared_names import SHARED_EN, SHARED_ZH
 from er_gym.thor import OBJECT_TYPES
 
 MatchMethod: TypeAlias = Literal["exact", "alias", "fuzzy", "meaning", "none"]

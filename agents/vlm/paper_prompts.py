@@ -117,8 +117,8 @@ class DerivedPrompts:
         """
         if (decide, sees) != ("tags", "pictures"):
             raise ValueError(
-                f"the words of {self.name} go with decide: tags and sees: pictures, not with "
-                f"{decide} and {sees}; change these, or leave out prompts.dataset"
+                f"the prompts of {self.name} need decide: tags and sees: pictures, not {decide} "
+                f"and {sees}; change these, or leave out prompts.dataset"
             )
         return self.words.system
 
@@ -140,7 +140,7 @@ class DerivedPrompts:
 
 
 def read_prompts(path: Path, fallback: PromptSet) -> DerivedPrompts:
-    """Read the words off a training file; off a large one, off its first :data:`ENOUGH` items.
+    """Read the prompts from a training file; from a large one, from its first :data:`ENOUGH` items.
 
     Args:
         path: the file.
@@ -175,7 +175,7 @@ def read_prompts(path: Path, fallback: PromptSet) -> DerivedPrompts:
     return DerivedPrompts(
         name=path.name,
         digest=digest.hexdigest(),
-        about=f"the words of {len(samples)} conversations of {path}; {odd} items passed over",
+        about=f"the texts of {len(samples)} conversations of {path}; {odd} items skipped",
         after_observe=shown if shown in (1, 3, 4) else None,
         samples=len(samples),
         odd=odd,
@@ -262,8 +262,8 @@ def _words(samples: Sequence[_Sample], path: Path) -> Words:
     first_turns = list(dict.fromkeys(sample.asked[0] for sample in samples))
     if len(first_turns) < 2:
         raise ValueError(
-            f"{path}: all {len(samples)} conversations begin alike, so that the words of the task "
-            "cannot be told from those around them; give a file with several tasks"
+            f"{path}: all {len(samples)} conversations begin alike, so the task cannot be told "
+            "from the text around it; give a file with several tasks"
         )
     before, after = _frame(first_turns)
     turns = [turn for sample in samples for turn in _turns(sample, before, after)]

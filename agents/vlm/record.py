@@ -12,7 +12,7 @@ from urllib.parse import urlsplit, urlunsplit
 
 from pydantic import BaseModel, ConfigDict
 
-from agents.vlm.chat import Role, Usage
+from agents.vlm.chat import Reply, Role, Usage
 from agents.vlm.clients.redaction import Secrets
 from agents.vlm.settings import AgentSettings
 
@@ -154,9 +154,15 @@ def url_without_secrets(address: str) -> str:
     return urlunsplit((url.scheme, url.netloc.rpartition("@")[2], url.path, "", ""))
 
 
-def token_counts(usage: Usage) -> dict[str, Any]:
-    """The token counts of a round, under the names of :class:`RoundRecord`."""
+def reply_fields(reply: Reply) -> dict[str, Any]:
+    """What a round records of its reply, under the names of :class:`RoundRecord`."""
+    usage = reply.usage
     return {
+        "seconds": reply.seconds,
+        "cost": reply.cost,
+        "finish": reply.finish,
+        "model": reply.model,
+        "kept": reply.from_cache,
         "prompt_tokens": usage.prompt,
         "completion_tokens": usage.completion,
         "cached_tokens": usage.cached,

@@ -61,7 +61,7 @@ class BoundedEnvironment(SandboxedEnvironment):
         """Charge this thread's budget; raises SecurityError if it is used up."""
         self._bill.left = getattr(self._bill, "left", BUDGET) - amount
         if self._bill.left < 0:
-            raise SecurityError("a template that does too much; make its loops and texts smaller")
+            raise SecurityError("the template does too much; make its loops and texts smaller")
 
     # -- Jinja's hooks ---------------------------------------------------------------------------
 
@@ -129,7 +129,9 @@ class _Priced(NodeTransformer):
     def visit_For(self, node: nodes.For) -> nodes.Node:
         self.generic_visit(node)
         if node.recursive:
-            raise ValueError(f"line {node.lineno}: no template: loops may not be recursive here")
+            raise ValueError(
+                f"line {node.lineno}: not a valid template: recursive loops are not allowed"
+            )
         node.iter = _filtered(cast(nodes.Expr, node.iter), _EACH)
         return node
 

@@ -214,7 +214,7 @@ def command_for(model: str, options: ServeOptions, machine: Machine) -> Command:
     lacking = engine.needs - machine.packages
     if lacking:
         raise ValueError(
-            f"{model} is for {name} to serve, and {machine.python} lacks "
+            f"{name} should serve {model}, but {machine.python} lacks "
             f"{', '.join(sorted(lacking))}: {machine.python} -m pip install {engine.install}, or "
             "name another Python that has it"
         )

@@ -103,8 +103,8 @@ class Templates:
             )
         if text.count(IMAGE_MARK) != pictures:
             raise ValueError(
-                f"{self.files[template]}: {IMAGE} comes {text.count(IMAGE_MARK)} times, but the "
-                f"pictures are {pictures}; write it once for each of {{{{ pictures }}}}"
+                f"{self.files[template]}: {IMAGE} occurs {text.count(IMAGE_MARK)} times, but "
+                f"{{{{ pictures }}}} is {pictures}; write it once for each picture"
             )
         return text
 
@@ -132,8 +132,8 @@ def directory_of(profile: str, language: str) -> Path:
         )
     if language not in languages:
         raise ValueError(
-            f"the prompts {profile!r} are not there in {language!r}; "
-            f"choose one of: {', '.join(languages)}"
+            f"the prompts {profile!r} do not exist in {language!r}; choose one of: "
+            f"{', '.join(languages)}"
         )
     return root / language
 
@@ -192,10 +192,12 @@ def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> Bound
             environment.get_template(name)
         except TemplateSyntaxError as error:
             problem = " ".join((error.message or "").split())
-            raise ValueError(f"{file}:{error.lineno}: no template: {problem}") from None
+            raise ValueError(f"{file}:{error.lineno}: not a valid template: {problem}") from None
         except Exception as error:  # RecursionError, SyntaxError, OverflowError: nested too deeply
             problem = " ".join(str(error).split())[:200]
-            raise ValueError(f"{file}: no template: {type(error).__name__}: {problem}") from None
+            raise ValueError(
+                f"{file}: not a valid template: {type(error).__name__}: {problem}"
+            ) from None
     return environment
 
 
@@ -207,7 +209,7 @@ def _rows(text: str, file: Path, language: str) -> tuple[ActionRow, ...]:
     added = {verb.name: _meaning(verb, language) for verb in verbs.ADDED}
     if not isinstance(meanings, dict) or not {*own} <= {*meanings} <= {*own, *added}:
         known = ", ".join((*own, *added))
-        raise ValueError(f"{file}: say what each of these means, and no other: {known}")
+        raise ValueError(f"{file}: give the meanings of these actions, and of no others: {known}")
     return tuple(
         ActionRow(
             f"{verb} <object>" if verb in verbs.OBJECT_VERBS else verb, without_marks(str(words))
@@ -226,7 +228,7 @@ def _try_out(templates: Templates) -> None:
     """Render every template once, so that errors show before the first episode."""
     shown: dict[Sees, tuple[int, ...]] = {"pictures": (1, 4), "text": (0,)}
     for decide in get_args(Decide):
-        templates.feedback(problem="It names no action.", decide=decide)
+        templates.feedback(problem="It does not name an action.", decide=decide)
         for sees, numbers in shown.items():
             templates.system(decide=decide, sees=sees)
             turn = TurnContext(task="Find a Mug.", decide=decide, sees=sees, max_steps=20)

@@ -1,1 +1,1 @@
-"""Checks of what er-gym promises, run by hand; not in the wheel."""
+"""Checks of er-gym's guarantees. They are run by hand and are not in the wheel."""

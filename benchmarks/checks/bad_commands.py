@@ -1,4 +1,4 @@
-"""Bad command lines of ``er-gym``: what is wrong with each, and how it should end."""
+"""Bad command lines of ``er-gym``, and how each should end."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class Line:
 
     Attributes:
         words: what follows ``er-gym``; ``{port}`` is a port that is taken.
-        codes: with which it may end.
+        codes: the exit codes that it may have.
         holds: files of ``../files`` that the folder holds, and that must stay as they are.
-        says: what stdin holds.
+        says: the text on stdin.
     """
 
     words: tuple[str, ...]
@@ -145,7 +145,7 @@ def lines() -> Iterator[Line]:
 
 
 def _is_fine(name: str, value: str) -> bool:
-    """What is nothing wrong to give; or leads to the network, or a server."""
+    """Values that are valid, or that lead to the network or a server."""
     return (name, value) in {
         ("--task-ids", ""),
         ("--types", ""),

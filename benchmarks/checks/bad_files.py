@@ -1,4 +1,4 @@
-"""Files that no command should choke on: each has a name by which bad command lines give it."""
+"""Bad files, by the names that the bad command lines use. No command may crash on them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from er_gym.tasks.paper_format import write_tasks as write_paper_tasks
 from er_gym.tasks.suites import config_directory, load_suite
 
 HOSTILE = "\x1b[31mred\x1b]0;title\x07 [bold]x[/] \u202e\u009b31m"
-"""What a terminal obeys, what Rich takes for markup, and what reorders a line."""
+"""Control codes of a terminal, markup of Rich, and a character that reorders a line."""
 
 _LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{after}: &{after} [{', '.join([f'*{before}'] * 9)}]\n"
@@ -47,7 +47,7 @@ YAML: dict[str, str | bytes] = {
     "hostile.yaml": f"{json.dumps(HOSTILE)}: 1",
     "surrogate.yaml": 'a: "\\ud800"',
 }
-"""None is an agent's settings or a training run."""
+"""YAML files that are neither an agent's settings nor a training run."""
 
 _HEADER = json.dumps({"format": FORMAT, "tasks": 1}) + "\n"
 JSON: dict[str, str | bytes] = {
@@ -76,11 +76,11 @@ JSON: dict[str, str | bytes] = {
     "null.json": "null",
     "cut.json": '[{"scene": "FloorPlan1"',
 }
-"""None is a task file that can be used."""
+"""Task files that cannot be used."""
 
 
 def make(folder: Path) -> None:
-    """Write all of them into a folder, with some that are as they should be."""
+    """Write all of them into a folder, with some valid files."""
     folder.mkdir()
     for name, content in {**YAML, **JSON}.items():
         data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")

@@ -1,14 +1,13 @@
-"""Tries ``er-gym`` with command lines that are wrong in hundreds of ways.
+"""Runs ``er-gym`` with hundreds of bad command lines.
 
     python -m benchmarks.checks.command_lines [WORD …]
 
 Each line of :mod:`benchmarks.checks.bad_commands` that holds the given words is run in an empty
-folder of its own. What must hold for all: the exit code is right; a few lines on stderr say why,
-and none of them is a traceback; nothing that a terminal would obey is printed; it ends in time,
-with less than 500 MB of memory; and nothing is left behind or changed. Most lines are run by the
+folder of its own. For each line, the exit code must be right. A few lines on stderr must say why,
+without a traceback or terminal control codes. The command must end in time, with less than 500 MB
+of memory, and it must leave no files or processes and change no file. Most lines are run by the
 command's own entry point in a fork of this process, which has imported the command already; every
-tenth is run as a process from its start. Prints what falls short; the exit code says whether
-anything does.
+tenth is run as a process from its start. Prints the failures. The exit code is 1 if there is one.
 """
 
 from __future__ import annotations
@@ -40,19 +39,20 @@ from benchmarks.cli.main import main as er_gym
 _AT_ONCE = 2
 _REAL_EVERY = 10
 _SECONDS, _CPU_SECONDS = 120.0, 20.0
-"""That a line may take on a busy machine, and of a processor; most take a tenth of one."""
+"""The time limits of a line in seconds, on a busy machine and of processor time; most take 0.1 s.
+"""
 _GRACE = 5.0
-"""Seconds that a command's helpers, such as multiprocessing's, have to follow it."""
+"""Seconds that a command's helper processes, such as multiprocessing's, have to end after it."""
 _MEGABYTES = 500
 _LINES, _CHARACTERS = 3, 2_500
 """That stderr may have."""
 _RAW = re.compile(b"[\x00-\x08\x0b-\x1f\x7f]|\xc2[\x80-\x9f]|\xe2\x80[\xa8-\xae]")
-"""What a terminal obeys, in UTF-8, but for tab and newline."""
+"""Terminal control characters in UTF-8, except tab and newline."""
 _ROOT = Path(__file__).resolve().parents[2]
 
 
 def main(words: Sequence[str]) -> int:
-    """Try all, and print what falls short, and how much."""
+    """Try all lines; print the failures and their number."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     tally = check(words)
     print(tally)
@@ -60,7 +60,9 @@ def main(words: Sequence[str]) -> int:
 
 
 def check(words: Sequence[str], *, at_least: int | None = None) -> Tally:
-    """Try all lines that hold the words, or so many of all kinds, and print what falls short."""
+    """Try all lines that hold the words, or a number of lines of every kind, and print the
+    failures.
+    """
     chosen = [line for line in lines() if all(word in str(line) for word in words)]
     if at_least is not None:
         chosen = _choice(chosen, at_least)
@@ -88,7 +90,7 @@ def check(words: Sequence[str], *, at_least: int | None = None) -> Tally:
 
 
 def _choice(every: Sequence[Line], at_least: int) -> list[Line]:
-    """So many lines or a few more: the same share of each kind, and at least one."""
+    """About this many lines: the same share of each kind, and at least one."""
     kinds: dict[tuple[str, ...], list[Line]] = {}
     for line in every:
         options = (word.partition("=")[0] for word in line.words if word.startswith("--"))
@@ -110,7 +112,7 @@ class _Ended:
         folder: with ``work``, where it was run, its home, ``out`` and ``err``.
         code: of its end; below 0 the signal that ended it.
         seconds, cpu_seconds, megabytes: that it took.
-        left: whether processes of it had to be ended.
+        left: whether some of its processes had to be killed.
     """
 
     line: Line
@@ -180,7 +182,7 @@ def _ends_of(
 
 
 def _left_behind(pid: int) -> bool:
-    """End what is left of a command's session; whether it did not end by itself."""
+    """Kill the remaining processes of a command's session; returns whether there were any."""
     end = time.monotonic() + _GRACE
     while members := _session(pid):
         if time.monotonic() > end:
@@ -193,7 +195,7 @@ def _left_behind(pid: int) -> bool:
 
 
 def _session(leader: int) -> list[int]:
-    """The processes of a session that run, the dead that nobody has fetched left out."""
+    """The running processes of a session, without zombies."""
     found = []
     for file in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
@@ -261,7 +263,7 @@ def _problems(ended: _Ended) -> Iterator[str]:
         yield f"{len(said.splitlines())} lines, {len(said)} characters: {said[:300]!r}"
     for name, data in (("stdout", out), ("stderr", err)):
         if raw := _RAW.search(data):
-            yield f"{name} has {raw[0]!r}, which a terminal obeys"
+            yield f"{name} has {raw[0]!r}, a terminal control character"
     if ended.cpu_seconds > _CPU_SECONDS:
         yield f"took {ended.cpu_seconds:.0f} s of a processor"
     if ended.megabytes > _MEGABYTES:
@@ -273,7 +275,7 @@ def _problems(ended: _Ended) -> Iterator[str]:
 
 
 def _leavings(ended: _Ended) -> Iterator[str]:
-    """What a refused command left or changed."""
+    """The files that a refused command left or changed."""
     work = ended.folder / "work"
     files = ended.folder / "files"
     found = {str(path.relative_to(work)) for path in work.rglob("*")}

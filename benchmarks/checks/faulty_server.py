@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from email.utils import formatdate
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from types import TracebackType
 from typing import Any
 
 SAID = "<DecisionMaking>end</DecisionMaking>"
@@ -24,7 +23,7 @@ _DEEP = 100_000
 
 
 class Exchange(BaseHTTPRequestHandler):
-    """One request; a fault does with it what it likes."""
+    """One request, which a fault answers as it likes."""
 
     protocol_version = "HTTP/1.1"
     faulty: FaultyServer
@@ -47,7 +46,7 @@ class Exchange(BaseHTTPRequestHandler):
                 return
 
     def hang(self) -> None:
-        """Say nothing more until the server closes."""
+        """Send nothing more until the server closes."""
         self.faulty.closing.wait(600)
         self.close_connection = True
 
@@ -172,12 +171,12 @@ def _bomb() -> bytes:
 
 @dataclass(frozen=True)
 class Case:
-    """A fault, and what a client may make of it.
+    """A fault of a server, and how a request to it may end.
 
     Attributes:
         name: of the fault.
-        fault: what the server does.
-        ends: what may come of a request: ``reply``, ``failed`` (its episode is over) or ``stopped``
+        fault: the server's behaviour.
+        ends: how a request may end: ``reply``, ``failed`` (its episode is over) or ``stopped``
             (the run is).
     """
 
@@ -195,21 +194,21 @@ _NO_COUNT: list[Any] = [None, 5, "x", [], {}]
 _LEAK = {"error": {"message": f"Authorization: Bearer {KEY} is wrong"}}
 
 CASES: list[Case] = [
-    # nothing, or nothing for long
+    # no answer, or a slow one
     Case("hangs before the head", Exchange.hang, _NONE),
     Case("hangs after the head", _hang_after_head, _NONE),
     Case("hangs in the body", _hang_in_body, _NONE),
     Case("drips the head", lambda x: x.raw(*_bytes(head(9)), pause=0.1), _NONE),
     Case("drips the body", lambda x: x.raw(head(len(_GOOD)), *_bytes(_GOOD), pause=0.1), _NONE),
     Case("sends chunks without end", _chunks_without_end, _NONE),
-    Case("says 100 Continue without end", _continues, _NONE),
+    Case("sends 100 Continue without end", _continues, _NONE),
     Case("hangs up", lambda x: x.raw(), _NONE),
     Case("resets the connection", _reset, _NONE),
     Case("hangs up in the head", lambda x: x.raw(b"HTTP/1.1 200 OK\r\nContent-"), _NONE),
     Case("hangs up in the body", lambda x: x.raw(head(900), _GOOD[:20]), _NONE),
     Case("promises more than comes", lambda x: x.raw(head(len(_GOOD) + 9) + _GOOD), _NONE),
-    # no HTTP
-    Case("speaks no HTTP", lambda x: x.raw(b"220 mail ready\r\n"), _NONE),
+    # not HTTP
+    Case("does not speak HTTP", lambda x: x.raw(b"220 mail ready\r\n"), _NONE),
     Case("sends zeros", lambda x: x.raw(bytes(5000)), _NONE),
     Case("sends a huge header", lambda x: x.raw(head(2, headers={"X": "x" * 200_000}), b"{}"), _NONE),
     Case("sends a wrong length", lambda x: x.raw(b"HTTP/1.1 200 OK\r\nContent-Length: -5\r\n\r\n"), _NONE),
@@ -222,10 +221,10 @@ CASES: list[Case] = [
     Case("sends HTML", body(b"<html>Welcome</html>", Content_Type="text/html"), _NONE),
     Case("sends good JSON as HTML", body(_GOOD, Content_Type="text/html"), _REPLY),
     Case("sends good JSON as a picture", body(_GOOD, Content_Type="image/png"), _REPLY),
-    Case("sends half of it", body(_GOOD[: len(_GOOD) // 2]), _NONE),
-    Case("sends it twice", body(_GOOD * 2), _NONE),
+    Case("sends half of the body", body(_GOOD[: len(_GOOD) // 2]), _NONE),
+    Case("sends the body twice", body(_GOOD * 2), _NONE),
     Case("sends events", body(b"data: " + _GOOD + b"\n\ndata: [DONE]\n\n"), _NONE),
-    Case("says half a character", body(_GOOD.replace(b"end", rb"\ud800")), _NONE | _REPLY),
+    Case("sends half a character", body(_GOOD.replace(b"end", rb"\ud800")), _NONE | _REPLY),
     Case("sends wrong UTF-8", body(_GOOD.replace(b"end", b"\xff\xfe")), _NONE),
     Case("sends UTF-16", body(_GOOD.decode().encode("utf-16")), _NONE),
     Case("nests deeply", body(b"[" * _DEEP + b"]" * _DEEP), _NONE),
@@ -237,8 +236,8 @@ CASES: list[Case] = [
     # encodings
     Case("compresses", body(gzip.compress(_GOOD), Content_Encoding="gzip"), _REPLY),
     Case("cuts gzip", body(gzip.compress(_GOOD)[:-20], Content_Encoding="gzip"), _NONE),
-    Case("sends no gzip as gzip", body(_GOOD, Content_Encoding="gzip"), _NONE),
-    Case("sends a bomb", body(_bomb(), Content_Encoding="gzip"), _NONE),
+    Case("sends gzip that is not gzip", body(_GOOD, Content_Encoding="gzip"), _NONE),
+    Case("sends a decompression bomb", body(_bomb(), Content_Encoding="gzip"), _NONE),
     Case("sends an unknown encoding", body(_GOOD, Content_Encoding="rot13"), _NONE),
     # wrong types
     *(
@@ -266,7 +265,7 @@ CASES: list[Case] = [
         )
     ),
     # counts of tokens
-    Case("does not count", says(usage=DELETE), _REPLY),
+    Case("sends no token counts", says(usage=DELETE), _REPLY),
     *(Case(f"counts {value!r}", says(usage=value), _REPLY) for value in _NO_COUNT),
     *(
         Case(f"counts {value!r} of both", usage(prompt_tokens=value, completion_tokens=value), _REPLY)
@@ -293,7 +292,7 @@ CASES: list[Case] = [
         for after in ("300", "86400", "1e400", "inf", _date(3600))
     ),
     *(
-        Case(f"sends on to {place}", body(b"", status, Location=place), _STOPPED)
+        Case(f"redirects to {place}", body(b"", status, Location=place), _STOPPED)
         for status in (301, 307, 308)
         for place in ("/v1/chat/completions", "http://127.0.0.1:1/x", "file:///etc/passwd", "")
     ),
@@ -303,7 +302,8 @@ CASES: list[Case] = [
     Case("repeats the key in a call", says(choices__0__message__tool_calls=[{"function": {"arguments": json.dumps({"action": KEY})}}]), _REPLY),
     Case("repeats the key in a header", body(_GOOD, X_Request_Id=KEY, more={KEY: "x"}), _REPLY),
     Case("repeats the key in the status line", lambda x: x.raw(f"HTTP/1.1 500 {KEY}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n".encode()), _NONE),
-    Case("repeats the key in no HTTP", lambda x: x.raw(f"{KEY}: what?\r\n\r\n".encode()), _NONE),
+    Case("repeats the key outside of "
+    "HTTP", lambda x: x.raw(f"{KEY}: what?\r\n\r\n".encode()), _NONE),
     Case("repeats the key in HTML", body(f"<b>{KEY}</b>".encode()), _NONE),
     Case("repeats the key in a Location", body(b"", 302, Location=f"http://x/?key={KEY}"), _STOPPED),
     *(
@@ -325,7 +325,7 @@ class _Listener(ThreadingHTTPServer):
     request_queue_size = 64
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Those who hang up are no news."""
+        """Do not report clients that hang up."""
 
 
 @dataclass
@@ -333,7 +333,7 @@ class FaultyServer:
     """Serves one fault; use it as a context manager.
 
     Attributes:
-        good_first: so many requests are answered well first.
+        good_first: how many requests get a good answer first.
         count: the requests that came.
         accepted: the whole answers of status 2xx that were sent.
         url: for ``server.base_url``.
@@ -354,12 +354,7 @@ class FaultyServer:
         threading.Thread(target=self._listener.serve_forever, args=(0.02,), daemon=True).start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.closing.set()
         self._listener.shutdown()
         self._listener.server_close()

@@ -1,4 +1,4 @@
-"""How far the embedded engine agrees with AI2-THOR: every comparison as one table.
+"""Prints how far the embedded engine agrees with AI2-THOR: all comparisons in one table.
 
     python -m benchmarks.checks.fidelity [--shared ../shared/data] [--json FILE]
 

@@ -1,14 +1,14 @@
-"""Play random actions, sane and absurd, and look for whatever the engine must never do.
+"""Play random actions, valid and absurd, and look for faults of the engine.
 
     python -m benchmarks.checks.fuzz --actions 100000 --seed 0 [--workers 2] [--scenes all|N|names]
     python -m benchmarks.checks.fuzz --actions 100000 --seed 0 --run 17    # one run, step by step
 
-The actions are split into runs of 200 in a scene each. A run depends on its number and the seed
-alone, so that the same seed plays the same whatever the number of workers; the ``fingerprint`` at
-the end, of all requests and answers, shows it. One run in ten goes through the official client's
-face, the others to the engine itself. After each action :mod:`benchmarks.checks.fuzz_checks` looks
-for what is wrong; what it finds is printed with the command to see it again, and makes the exit
-code 1.
+The actions are split into runs of 200 in a scene each. A run depends only on its number and the
+seed, so the same seed plays the same actions with any number of workers. The ``fingerprint`` at the
+end is a digest of all requests and answers; equal ones prove it. One run in ten uses the official
+client's interface, the others use the engine directly. :mod:`benchmarks.checks.fuzz_checks` checks
+the state after each action. Each problem is printed with the command that repeats it, and makes the
+exit code 1.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ from er_gym.sim.errors import CLIENT_ERRORS
 from er_gym.sim.world import World
 
 _THROUGH_THE_CLIENT = 10
-"""One run in so many."""
+"""One run in this many uses the official client's interface."""
 _WIDTH, _HEIGHT = 32, 24
 _INTERRUPTED = 130
 
 
 @dataclass
 class Outcome:
-    """What came back: plain metadata, the pictures drawn, and what is wrong with the call."""
+    """The answer: plain metadata, the pictures, and the problems of the call itself."""
 
     metadata: dict[str, Any]
     pictures: Pictures
@@ -72,7 +72,7 @@ class EngineDriver:
 
 
 class ClientDriver:
-    """Plays the official controller's face, which raises where the official one does."""
+    """Plays through the official client's interface, and raises where the official client does."""
 
     def __init__(self) -> None:
         self._controller = EmbeddedController(width=_WIDTH, height=_HEIGHT)
@@ -80,10 +80,10 @@ class ClientDriver:
     @property
     def world(self) -> World:
         assert self._controller.server is not None
-        return self._controller.server._engine.world  # the fuzz looks behind the face
+        return self._controller.server._engine.world  # the fuzz reads the engine behind the client
 
     def step(self, request: Request) -> Outcome:
-        """Do an action, and see that exactly the failed ones raise what they should."""
+        """Do an action, and check that only failed actions raise, and the right error."""
         raised: Exception | None = None
         try:
             self._controller.step(request, raise_for_failure=True)
@@ -106,7 +106,7 @@ class ClientDriver:
 
 
 class FuzzRun:
-    """A scene being played in: who does it, who looks, and what has been seen there."""
+    """A game in a scene: the player, the checker, and what they know of the scene."""
 
     def __init__(self, by: type[EngineDriver] | type[ClientDriver]) -> None:
         self._player = by()
@@ -116,7 +116,7 @@ class FuzzRun:
         self.seconds = 0.0
 
     def do(self, request: Request) -> list[str]:
-        """Do an action; returns what is wrong after it."""
+        """Do an action; returns the problems after it."""
         start = time.perf_counter()
         answer = self._player.step(request)
         self.seconds = time.perf_counter() - start
@@ -126,14 +126,14 @@ class FuzzRun:
         return [*answer.problems, *seen]
 
     def room(self, random: Random, scenes: Sequence[str]) -> Room:
-        """What the next request is drawn from."""
+        """The knowledge from which the next request is drawn."""
         there = {entry["objectId"] for entry in self.metadata["objects"]}
         gone = [object_id for object_id in self._ids if object_id not in there]
         return Room(random, scenes, self.metadata, floor(scene_of(self.metadata), 0.25), gone)
 
 
 def play(plan: FuzzPlan, run: int) -> Iterator[FuzzStep]:
-    """The steps of a run. A game in which something was raised is begun anew."""
+    """The steps of a run. After an exception, a new game begins."""
     random = Random(f"{plan.seed} {run}")
     scene = random.choice(plan.scenes)
     by = ClientDriver if run % _THROUGH_THE_CLIENT == _THROUGH_THE_CLIENT - 1 else EngineDriver
@@ -151,7 +151,7 @@ def play(plan: FuzzPlan, run: int) -> Iterator[FuzzStep]:
                 request = draw_request(game.room(random, plan.scenes))
                 problems += game.do(request)
                 error, seconds = game.metadata["errorMessage"], game.seconds
-            except Exception as failure:  # nothing whatever may be raised
+            except Exception as failure:  # no exception may be raised
                 error, game = f"{type(failure).__name__}: {failure}", None
                 problems.append(f"raised at {_place(failure)}: {error}")
         problems += [f"warned at {Path(w.filename).name}:{w.lineno}: {w.message}" for w in warned]
@@ -159,7 +159,7 @@ def play(plan: FuzzPlan, run: int) -> Iterator[FuzzStep]:
 
 
 def _place(error: Exception) -> str:
-    """Where it was raised: the last of our own lines."""
+    """The place of an exception: the last of er-gym's own lines."""
     calls = extract_tb(error.__traceback__)
     ours = [call for call in calls if "er_gym" in call.filename] or calls
     return f"{Path(ours[-1].filename).name}:{ours[-1].lineno}"
@@ -178,7 +178,7 @@ def _player(plan: FuzzPlan) -> Callable[[int], FuzzReport]:
 
 
 def fuzz(plan: FuzzPlan, workers: int) -> Iterator[FuzzReport]:
-    """Every run's report, as they are done, in so many processes (1: in this one)."""
+    """The report of every run, as it ends, from ``workers`` processes (1: this process)."""
     for run, report in run_scene_jobs(partial(_player, plan), range(plan.runs), workers):
         if isinstance(report, LostJob):
             died = f"the process died, exit code {report.exitcode}"
@@ -193,7 +193,7 @@ def fuzz(plan: FuzzPlan, workers: int) -> Iterator[FuzzReport]:
 @click.option("--scenes", default="all", show_default=True, help="all, how many, or names.")
 @click.option("--run", type=click.IntRange(0), help="Play only this run, and print every step.")
 def main(actions: int, seed: int, workers: int, scenes: str, run: int | None) -> None:
-    """Play random actions, sane and absurd, and check what must always hold."""
+    """Play random actions, valid and absurd, and check the invariants."""
     try:
         plan = FuzzPlan(seed, actions, tuple(choose_scenes(scenes)))
     except ValueError as error:
@@ -202,7 +202,7 @@ def main(actions: int, seed: int, workers: int, scenes: str, run: int | None) ->
     total, start = FuzzReport(), time.perf_counter()
     if run is not None:
         if run >= plan.runs:
-            raise click.UsageError(f"--run is one of 0 to {plan.runs - 1}, not {run}")
+            raise click.UsageError(f"--run must be from 0 to {plan.runs - 1}, not {run}")
         for step in play(plan, run):
             total.count(step)
             console.print(str(step), markup=False, soft_wrap=True)
@@ -217,7 +217,9 @@ def main(actions: int, seed: int, workers: int, scenes: str, run: int | None) ->
 
 
 def _play_all(plan: FuzzPlan, workers: int, total: FuzzReport) -> None:
-    """Every run, with a bar; what is done is counted at once, for whoever interrupts."""
+    """Play every run and show a bar; each run is counted when it ends, so Ctrl-C loses only the
+    current ones.
+    """
     start = time.perf_counter()
     with bar(Console(stderr=True)) as progress:
         task = progress.add_task("fuzz", total=plan.runs, status="starting")

@@ -1,4 +1,4 @@
-"""What the fuzz looks at after every action, besides :mod:`benchmarks.checks.invariants`."""
+"""The fuzz's checks after every action, besides :mod:`benchmarks.checks.invariants`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LONGEST_MESSAGE = 2000
 OF_THE_ACTION = frozenset(
     {"lastAction", "lastActionSuccess", "errorMessage", "errorCode", "actionReturn", "colors"}
 )
-"""What metadata say of the last action; all the rest is the state of the world."""
+"""The metadata's fields about the last action; all others are the state of the world."""
 QUESTIONS = frozenset(
     {
         *("Pass", "Done", "PausePhysicsAutoSim", "UnpausePhysicsAutoSim", "AdvancePhysicsStep"),
@@ -43,11 +43,11 @@ QUESTIONS = frozenset(
         "ChangeQuality",
     }
 )
-"""Actions that change nothing, done or refused."""
+"""Actions that change nothing, whether they succeed or fail."""
 _TELEPORTS = ("Teleport", "TeleportFull")
 _FLOOR_STEP = 0.05
 _ODD_TIMES = 25
-"""The dear checks are made after every so many actions."""
+"""The expensive checks run once in this many actions."""
 _OF_THE_OBJECTS = [invariant for invariant in INVARIANTS if invariant is not values_are_plain]
 
 
@@ -69,7 +69,7 @@ def scene_of(metadata: Metadata) -> str:
 
 
 def failure_has_a_message(metadata: Metadata) -> Iterator[str]:
-    """What is said of a refusal is one line that can be read, and nothing is returned."""
+    """A refused action has an error message of one readable line, and returns nothing."""
     message = metadata["errorMessage"]
     if len(message) > LONGEST_MESSAGE:
         yield f"errorMessage has {len(message)} characters: {message[:60]!r}…"
@@ -81,14 +81,14 @@ def failure_has_a_message(metadata: Metadata) -> Iterator[str]:
 
 
 def nothing_else_changed(before: Metadata, after: Metadata) -> Iterator[str]:
-    """Nothing in the metadata has changed but what they say of the last action."""
+    """The metadata have changed only in the fields about the last action."""
     for name in sorted({*before, *after} - OF_THE_ACTION):
         if name not in before or name not in after or before[name] != after[name]:
             yield f"{after['lastAction']}, which changes nothing, changed {name}"
 
 
 def can_be_serialised(metadata: Metadata) -> Iterator[str]:
-    """Packs as msgpack and as JSON, of plain types, with no NaN and no infinity anywhere."""
+    """The metadata can be packed as msgpack and as JSON: plain types, no NaN, no infinity."""
     try:
         _packed(metadata)
     except (TypeError, ValueError, OverflowError) as error:
@@ -96,17 +96,20 @@ def can_be_serialised(metadata: Metadata) -> Iterator[str]:
     try:
         json.dumps(metadata, allow_nan=False)
     except (TypeError, ValueError) as error:
-        yield f"the metadata are no JSON: {error}, at {', '.join(_endless('', metadata)) or '?'}"
+        yield (
+            f"the metadata are not valid JSON: {error}, at "
+            f"{', '.join(_endless('', metadata)) or '?'}"
+        )
 
 
 def _packed(metadata: Metadata) -> bytes:
-    """As the player sends it, which replaces what is no Unicode; no tuples, no NumPy numbers."""
+    """Pack as the player does, replacing invalid Unicode; tuples and NumPy numbers are refused."""
     packed: bytes = msgpack.packb(metadata, strict_types=True, unicode_errors="replace")
     return packed
 
 
 def _endless(path: str, value: Any) -> Iterator[str]:
-    """Where there are numbers that are NaN or infinite."""
+    """The paths of numbers that are NaN or infinite."""
     if isinstance(value, float) and not isfinite(value):
         yield f"{path} = {value}"
     elif isinstance(value, Mapping):
@@ -118,9 +121,8 @@ def _endless(path: str, value: Any) -> Iterator[str]:
 
 
 def pictures_fit(pictures: Pictures, metadata: Metadata) -> Iterator[str]:
-    """Every picture has the size that the metadata tell, and no pixel is NaN.
-
-    Depth may be infinite, where the wall is nearer than the near plane.
+    """Every picture has the size in the metadata, and no pixel is NaN. Depth may be infinite where
+    the wall is nearer than the near plane.
     """
     size = metadata["screenHeight"], metadata["screenWidth"]
     for picture in pictures:
@@ -131,20 +133,20 @@ def pictures_fit(pictures: Pictures, metadata: Metadata) -> Iterator[str]:
 
 
 def cache_is_consistent(world: World, metadata: Metadata) -> Iterator[str]:
-    """What the engine keeps of the world is what it would work out without."""
+    """The engine's cached state equals the state that it computes without the cache."""
     untouched = world.untouched
-    world.untouched = False  # an untouched world's entries are those of its scene
+    world.untouched = False  # an unchanged world has the entries of its scene
     world.forget()
     anew = objects_of(world)
     world.untouched = untouched
     for old, new in zip(metadata["objects"], anew, strict=True):
         for name in new:
             if old[name] != new[name]:
-                yield f"{new['objectId']}.{name} is {new[name]}, and {old[name]} was kept"
+                yield f"{new['objectId']}.{name} is {new[name]}, but the cache has {old[name]}"
 
 
 class RoomChecker:
-    """Sees every event of one room, in order, and says what is wrong with each."""
+    """Checks every event of one room, in order."""
 
     def __init__(self) -> None:
         self.seen = 0
@@ -155,13 +157,13 @@ class RoomChecker:
     def sees(
         self, request: Mapping[str, Any], metadata: dict[str, Any], pictures: Pictures, world: World
     ) -> Iterator[str]:
-        """Everything that is wrong after this request."""
+        """All problems after this request."""
         before, self._before = self._before, metadata
         self.seen += 1
         yield from failure_has_a_message(metadata)
         yield from pictures_fit(pictures, metadata)
         if before is None or before["objects"] != metadata["objects"]:
-            # Else they were found to be well the last time.
+            # Otherwise they passed the checks the last time.
             for invariant in _OF_THE_OBJECTS:
                 yield from invariant(metadata)
             yield from values_are_plain({"objects": metadata["objects"]})
@@ -183,13 +185,13 @@ class RoomChecker:
             yield from nothing_else_changed(before, after)
             if self._settings != world.settings:
                 yield f"{name}, which changes nothing, changed {self._settings}"
-        # Whoever forces a teleport may stand in a wall.
+        # A forced teleport may end in a wall.
         forced = name in _TELEPORTS and "forceAction" in request
         if before["agent"]["position"] != after["agent"]["position"] and not forced:
             yield from stands_on_the_floor(after, _floor_points(scene_of(after)))
 
     def _kept_metadata_unchanged(self, metadata: dict[str, Any]) -> Iterator[str]:
-        """Metadata that somebody has kept say what they said."""
+        """Metadata that a caller has kept do not change later."""
         if self._kept is not None and _packed(self._kept[0]) != self._kept[1]:
             yield f"the metadata of {_ODD_TIMES} actions ago have changed since"
         self._kept = metadata, _packed(metadata)

@@ -1,4 +1,4 @@
-"""What the fuzz plays and what came of it: plans, steps, counts, and how they are printed."""
+"""The fuzz's plans, steps, counts and report."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from er_gym.sim.scene import SCENE_NAMES
 STEPS = 200
 """Actions in a run."""
 _SHOWN = 3
-"""Problems of one kind that are printed; of the others only how many there are."""
+"""The most problems of one kind that are printed; the others are only counted."""
 _LONG = 600
 """Characters of a request or a message that are printed."""
 _OTHER = "(none of them)"
@@ -26,7 +26,7 @@ _OTHER = "(none of them)"
 
 @dataclass(frozen=True)
 class FuzzPlan:
-    """What is played; the runs of a plan do not depend on each other."""
+    """The plan of a fuzz; its runs do not depend on each other."""
 
     seed: int = 0
     actions: int = STEPS
@@ -43,7 +43,7 @@ class FuzzPlan:
 
 @dataclass(frozen=True)
 class FuzzStep:
-    """An action of a run, and what came of it."""
+    """An action of a run and its result."""
 
     run: int
     number: int
@@ -66,13 +66,13 @@ class FuzzStep:
 
 
 def _short(text: str) -> str:
-    """The beginning and the end of a text that is too long to read."""
+    """A text, shortened to its beginning and end if it is long."""
     return text if len(text) <= _LONG else f"{text[: _LONG - 100]} … {text[-97:]}"
 
 
 @dataclass
 class ActionCounts:
-    """How it went with the actions of one name."""
+    """The counts and times of the actions of one name."""
 
     tries: int = 0
     successes: int = 0
@@ -81,7 +81,7 @@ class ActionCounts:
     slowest: float = 0.0
 
     def add(self, other: ActionCounts) -> None:
-        """Count another tally too."""
+        """Add another tally."""
         self.tries += other.tries
         self.successes += other.successes
         self.problems += other.problems
@@ -91,14 +91,14 @@ class ActionCounts:
 
 @dataclass
 class FuzzReport:
-    """What came of one or several runs; ``wrong`` are the steps with problems."""
+    """The results of one or several runs; ``wrong`` are the steps with problems."""
 
     tallies: dict[str, ActionCounts] = field(default_factory=dict)
     wrong: list[FuzzStep] = field(default_factory=list)
     fingerprint: int = 0
 
     def add(self, other: FuzzReport) -> None:
-        """Count another report too, in whatever order they come."""
+        """Add another report; the order does not matter."""
         for name, tally in other.tallies.items():
             self.tallies.setdefault(name, ActionCounts()).add(tally)
         self.wrong += other.wrong
@@ -115,7 +115,7 @@ class FuzzReport:
 
     @property
     def total(self) -> ActionCounts:
-        """Of all names together."""
+        """The sum over all names."""
         total = ActionCounts()
         for tally in self.tallies.values():
             total.add(tally)
@@ -146,12 +146,12 @@ def show(report: FuzzReport, plan: FuzzPlan, seconds: float, console: Console) -
 
 
 def _kind(problem: str) -> str:
-    """What is alike in problems of one kind: no numbers, no object ids, no particulars."""
+    """The kind of a problem: its text without numbers, object ids and details."""
     return re.sub(r"\S+\|\S+|\b\d+(?= )", "…", problem).partition(": ")[0][:100]
 
 
 def again(plan: FuzzPlan, run: int) -> str:
-    """The command that plays a run once more."""
+    """The command that repeats a run."""
     every = tuple(plan.scenes) == tuple(SCENE_NAMES)
     scenes = "" if every else f" --scenes {','.join(plan.scenes)}"
     return (

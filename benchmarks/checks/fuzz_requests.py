@@ -1,7 +1,7 @@
-"""Random requests: what a program would ask of the engine, and much that none should.
+"""Random requests to the engine: those of a normal program, and many that are wrong.
 
-A request is drawn sane, parameter by parameter from the table :data:`SANE`, so that a good share of
-them can be done. One in four is then changed by :data:`MUTATIONS`, mostly with a value of
+A valid request is drawn first, parameter by parameter from the table :data:`SANE`, so that many of
+them succeed. One in four is then changed by :data:`MUTATIONS`, mostly with a value of
 :data:`EXTREMES`.
 """
 
@@ -22,29 +22,29 @@ Request = dict[str, Any]
 
 
 def _reset(*, sceneName: str) -> None:
-    """The one action that the engine does itself."""
+    """The one action that the engine handles outside of its registry."""
 
 
 WAYS: dict[str, list[Mapping[str, Parameter]]] = {
     **{name: [way.parameters for way in ways] for name, ways in ACTIONS.items()},
     "Reset": [parameters_of(_reset)],
 }
-"""Every action there is, and what it takes, by each way to call it."""
+"""Every action, with the parameters of each way to call it."""
 PARAMETERS = {
     name: {key: p for way in ways for key, p in way.items()} for name, ways in WAYS.items()
 }
-"""Every action there is, and all that it takes by any way."""
+"""Every action, with the parameters of all ways to call it."""
 NAMES = [
-    # A filter leaves out of the metadata what the checks go by.
+    # A filter removes the metadata that the checks need.
     *(name for name in PARAMETERS if name != "SetObjectFilter"),
-    # Without them most of the others would be refused.
+    # Without these parameters most actions would be refused.
     *3 * ("PickupObject", "OpenObject", "TeleportFull", "GetInteractablePoses"),
 ]
 ODD_NAMES: tuple[Any, ...] = (
     *REFUSED, *("Fly", "openobject", "OpenObject ", "", "step", "__init__", "Öffne|☃", "\ud800"),
     *("a\nb", "MoveAhead" * 500, None, 0, -1, 2.5, float("nan"), True, [], ["Pass"], {}, b"Pass"),
 )  # fmt: skip
-"""What is no action's name."""
+"""Values that are not an action's name."""
 EXTREMES: tuple[Any, ...] = (
     *(float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 1e-320, -1e-320, 0, -0.0, -1, 0.5),
     *(10**30, -(10**30), 10**400, -(10**400), True, False, None),
@@ -53,7 +53,7 @@ EXTREMES: tuple[Any, ...] = (
     *([float("nan")], ["x"] * 1000, {}, {"x": float("nan")}, {"x": 1e308, "y": -1e308, "z": 0}),
     *({"x": 0.5, "z": "far"}, {"objectType": "Apple", "count": 10**30}, {"": {"": []}}),
 )  # fmt: skip
-"""Values that are out of any range, of another type, or nearly right."""
+"""Values that are out of range, of another type, or nearly valid."""
 _ODD_PARAMETERS = (
     *(
         "velocity",
@@ -70,27 +70,27 @@ _ODD_PARAMETERS = (
 )
 _MUTATION_RATE = 0.25
 _FOLLOW_UP_RATE = 0.4
-"""How often the last answer decides which action is next."""
+"""The probability that the last answer decides the next action."""
 _OPTIONAL_RATE = 0.5
-"""How often a parameter is given that need not be."""
+"""The probability that an optional parameter is given."""
 _BY_ID_RATE = 0.8
-"""How often an object is named by its id, not by a point of the picture."""
+"""The probability that an object is named by its id, not by a point of the picture."""
 _PICTURE_RATE = 0.03
-"""How often pictures are asked for, which take most of the time."""
+"""The probability that pictures are requested; they take most of the time."""
 _ANY_OBJECT_RATE = 0.15
-"""How often an object is drawn from all, rather than from those that suit the action."""
+"""The probability that an object is drawn from all, not only from those that suit the action."""
 
 
 @dataclass
 class Room:
-    """What requests are drawn from.
+    """The knowledge from which requests are drawn.
 
     Attributes:
         random: the only source of chance.
         scenes: which ones ``Reset`` may ask for.
         metadata: of the last event.
         positions: where the agent can stand in this scene.
-        gone: ids of objects that were in this scene once.
+        gone: ids of objects that no longer exist in this scene.
     """
 
     random: Random
@@ -106,7 +106,7 @@ class Room:
 
     @property
     def poses(self) -> list[dict[str, Any]]:
-        """Those that the last action told, if it was a question for poses."""
+        """The poses that the last action returned, if it asked for poses."""
         asked = self.metadata["lastAction"] == "GetInteractablePoses"
         return (self.metadata["actionReturn"] or []) if asked else []
 
@@ -130,7 +130,7 @@ def _some(draw: Draw, most: int) -> Draw:
 
 
 def _object(has: str = "", lacks: str = "") -> Draw:
-    """The id of an object: mostly one that is in a state and not in another, best in view."""
+    """The id of an object: usually with some properties and without others, often visible."""
 
     def draw(room: Room) -> str:
         suited = [e for e in room.objects if (not has or e[has]) and not (lacks and e[lacks])]
@@ -145,7 +145,7 @@ def _object(has: str = "", lacks: str = "") -> Draw:
 
 
 def _used_up(room: Room) -> str:
-    """The id of something that can be used up, which AI2-THOR's metadata do not tell."""
+    """The id of an object that can be used up; AI2-THOR's metadata do not say which can."""
     suited = [e for e in room.objects if e["objectType"] in USED_UP] or room.objects
     return str(room.random.choice(suited)["objectId"])
 
@@ -155,7 +155,7 @@ def _object_type(room: Room) -> str:
 
 
 def _position(room: Room) -> dict[str, float]:
-    """Somewhere on the floor, now and then beside it."""
+    """A place on the floor, sometimes beside it."""
     position = dict(room.random.choice(room.positions))
     if room.random.random() < _ANY_OBJECT_RATE:
         position["x"] += room.random.gauss(0.0, 0.5)
@@ -167,7 +167,7 @@ def _coordinate(axis: str) -> Draw:
 
 
 def _middle(room: Room) -> dict[str, float]:
-    """Somewhere over the middle of some object."""
+    """A place above the centre of an object."""
     centre = dict(room.random.choice(room.objects)["axisAlignedBoundingBox"]["center"])
     return {**centre, "y": centre["y"] + room.random.uniform(0.0, 0.5)}
 
@@ -177,7 +177,7 @@ def _rotation(room: Room) -> dict[str, float]:
 
 
 def _pose(room: Room) -> Request:
-    """Where the last question for poses said; else anywhere on the floor."""
+    """A pose from the last answer to a question for poses, else any place on the floor."""
     pose = dict(room.random.choice(room.poses)) if room.poses else {}
     if not pose:
         return {"position": _position(room), "rotation": _rotation(room), "horizon": 30.0}
@@ -190,7 +190,9 @@ def _camera(room: Room) -> int:
 
 
 def _arrangement(room: Room) -> list[Request]:
-    """Poses for what is loose: as they are, but for a few; sometimes some are left out or twice."""
+    """Poses for movable objects: the present ones with a few changes; sometimes one is missing or
+    twice.
+    """
     random = room.random
     loose = [entry for entry in room.objects if entry["pickupable"] or entry["moveable"]]
     if random.random() < _ANY_OBJECT_RATE:
@@ -224,12 +226,12 @@ OBJECT_CONDITIONS = {
     "FillObjectWithLiquid": ("canFillWithLiquid", "isFilledWithLiquid"),
     "EmptyLiquidFromObject": ("isFilledWithLiquid",),
 }
-"""What an object must be for an action, and what it must not be yet."""
+"""The properties that an object must have for an action, and those that it must not have yet."""
 PICTURE_POINT_ACTIONS = (
     *(*OBJECT_CONDITIONS, "UseUpObject", "GetObjectInFrame", "GetCoordinateFromRaycast"),
     *("DirectionalPush", "PushObject", "PullObject", "TouchThenApplyForce"),
 )
-"""What is also done to whatever a point of the picture shows."""
+"""Actions whose object can also be given by a point of the picture."""
 SANE: dict[str, Draw] = {
     **{f"{action}.objectId": _object(*suits) for action, suits in OBJECT_CONDITIONS.items()},
     "UseUpObject.objectId": _used_up,
@@ -289,22 +291,23 @@ SANE: dict[str, Draw] = {
     "thirdPartyCameraId": _camera,
     "objectPoses": _arrangement,
 }
-"""How a parameter is drawn, by its name or that of its action too; others are drawn by type."""
+"""How a parameter is drawn, by its name, or by the action and its name; others are drawn by type.
+"""
 
 
 def _of_type(room: Room, kind: Any) -> Any:
-    """Any value of a parameter's type."""
+    """A random value of a parameter's type."""
     random, inner = room.random, [part for part in get_args(kind) if part is not NoneType]
     if get_origin(kind) is list:
         return [_of_type(room, inner[0]) for _ in range(random.randint(0, 3))]
-    if inner:  # this or that
+    if inner:  # a union of types
         return _of_type(room, random.choice(inner))
     simple = {bool: random.random() < 0.5, int: random.randint(0, 3), float: random.random() * 2}
     return simple.get(kind, "word")
 
 
 def _sane(room: Room, name: str) -> Request:
-    """An action with parameters that make sense."""
+    """An action with valid parameters."""
     request: Request = {"action": name, "renderImage": False}
     if name in ("Teleport", "TeleportFull") and (room.poses or room.random.random() < 0.5):
         return {**request, **_pose(room)}
@@ -327,7 +330,7 @@ def _extreme(room: Room) -> Any:
 
 
 def _another_value(room: Room, request: Request) -> None:
-    """An extreme value for one of the parameters, given or not."""
+    """Give one of the parameters an extreme value, whether it was given or not."""
     name = request.get("action")
     taken = PARAMETERS.get(name) if isinstance(name, str) else None
     names = list(taken) if taken else sorted(_arguments(request))
@@ -336,7 +339,7 @@ def _another_value(room: Room, request: Request) -> None:
 
 
 def _no_such_thing(room: Room, request: Request) -> None:
-    """Ids of what is no more, or the name of another action's thing."""
+    """Use the ids of objects that no longer exist, or an object of another action."""
     ids = [*room.gone[-20:], "Apple|+00.00|+00.00|+00.00", "", room.metadata["sceneName"]]
     request["objectId"] = room.random.choice(ids)
 
@@ -356,12 +359,12 @@ def _for_any_action(room: Room, request: Request) -> None:
 
 
 def _another_action(room: Room, request: Request) -> None:
-    """A name that is none, or the parameters of one action for another."""
+    """Use an invalid name, or the parameters of one action for another."""
     request["action"] = deepcopy(room.random.choice(room.random.choice((ODD_NAMES, NAMES))))
 
 
 def _inside(room: Room, request: Request) -> None:
-    """Something within a list or a vector: an axis gone, a member that does not belong."""
+    """Change a list or a vector: remove an axis, or add a wrong member."""
     holders = list(_holders([request[name] for name in sorted(_arguments(request))]))
     if not holders:
         return _another_value(room, request)
@@ -381,7 +384,7 @@ def _arguments(request: Request) -> set[str]:
 
 
 def _holders(values: Sequence[Any]) -> Iterator[dict[str, Any] | list[Any]]:
-    """Every list and dictionary among these values or within them."""
+    """Every list and dictionary among these values or nested in them."""
     for value in values:
         if isinstance(value, (dict, list)):
             yield value
@@ -396,7 +399,7 @@ MUTATIONS: tuple[Callable[[Room, Request], None], ...] = (
 
 
 def _next(room: Room) -> Sequence[str]:
-    """What a program might do now."""
+    """Actions that a program might do now."""
     if room.poses:
         return ("TeleportFull",)
     if room.metadata["inventoryObjects"]:

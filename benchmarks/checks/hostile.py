@@ -1,11 +1,10 @@
-"""Tries bad command lines, failing servers and misuses of the Gymnasium interface, one after other.
+"""Tries bad command lines, failing servers and misuses of the Gymnasium interface in turn.
 
     python -m benchmarks.checks.hostile [--quick | --all]
 
-Prints what falls short as it is found, then a table: what was tried, how often, how much of it
-falls short, and the seconds that it took. The exit code is 1 if anything falls short. Without
-options it takes less than ten minutes on two processors that have nothing else to do, and tries a
-choice of the command lines, of every command and kind. ``--all`` tries each of them; ``--quick``
+Prints each failure as it is found, then a table: tries, failures and seconds by kind. The exit code
+is 1 if there is a failure. Without options it tries some command lines of every command and kind,
+and takes less than ten minutes on two idle processors. ``--all`` tries each of them; ``--quick``
 fewer, and no whole runs against failing servers.
 """
 
@@ -22,7 +21,7 @@ _LINES, _QUICK_LINES = 420, 60
 
 
 def main() -> int:
-    """Try all, and print what falls short."""
+    """Try everything, and print the failures."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--quick", action="store_true", help="fewer command lines, no whole runs")
@@ -40,7 +39,7 @@ def main() -> int:
 
 
 def _tallies(lines: int | None) -> Iterator[Tally]:
-    # The first one forks, so that the others, which start threads, come after it.
+    # The first check forks, so it runs before the others, which start threads.
     from benchmarks.checks import command_lines
 
     yield command_lines.check((), at_least=lines)

@@ -1,9 +1,9 @@
-"""Whether pip can install every extra under constraints.txt, each into an empty environment.
+"""Checks that pip can install every extra under constraints.txt, each into an empty environment.
 
     python -m benchmarks.checks.installing [--extra rl --extra all] [--python python3.12]
 
-pip resolves and downloads metadata, and installs nothing; it needs a package index. The test of
-the same name reads what is installed and is quick; this is the real thing, some minutes long.
+pip resolves and downloads metadata, and installs nothing; it needs a package index. The test of the
+same name only reads the installed packages and is quick; this check takes some minutes.
 """
 
 from __future__ import annotations
@@ -24,9 +24,14 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @click.command()
 @click.option("--extra", "wanted", multiple=True, help="[default: every extra, and none]")
-@click.option("--python", default=sys.executable, show_default=True, help="Makes the environment.")
+@click.option(
+    "--python",
+    default=sys.executable,
+    show_default=True,
+    help="The Python that makes the environment.",
+)
 def main(wanted: tuple[str, ...], python: str) -> None:
-    """Resolve, and say for each extra how many packages it takes or why it cannot be had."""
+    """Resolve each extra, and print the number of its packages or why it cannot be installed."""
     failed = []
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([python, "-m", "venv", folder], check=True)
@@ -43,7 +48,7 @@ def main(wanted: tuple[str, ...], python: str) -> None:
 
 
 def resolve(python: Path, extra: str) -> str:
-    """What pip says to installing the checkout with an extra ("": none)."""
+    """Pip's answer to a dry installation of the checkout with an extra ("": none)."""
     asked = [str(python), "-m", "pip", "install", "--dry-run", "--constraint", "constraints.txt"]
     done = subprocess.run(
         [*asked, f".[{extra}]" if extra else "."], cwd=ROOT, capture_output=True, text=True

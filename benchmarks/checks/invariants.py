@@ -1,7 +1,7 @@
-"""What must hold of AI2-THOR metadata after any action, as pure functions.
+"""Invariants of AI2-THOR metadata after any action, as pure functions.
 
-Each takes the metadata of one event and yields a sentence for whatever is wrong; an empty answer
-means that it holds. They look at the metadata alone, so they fit either engine.
+Each takes the metadata of one event and yields a sentence for each violation. They read only
+metadata, so they work with either engine.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 Metadata = Mapping[str, Any]
 
 _PART = re.compile(r"(.+)\|(?:\w+Sliced|EggCracked)_\d+")
-"""The id of a slice or a cracked egg begins with that of the whole."""
+"""The id of a slice or a cracked egg begins with the id of the whole object."""
 _OPENS_ELSEWHERE = frozenset({"Toilet"})
-"""Receptacles whose lid is not over their contents: things stand on a toilet's cistern."""
+"""Receptacles whose lid does not cover their contents: objects stand on a toilet's cistern."""
 _TOLERANCE = 0.08
 """How far the agent may be from the nearest point of a 5 cm grid of the floor, metres."""
 
@@ -39,7 +39,7 @@ def ids_are_unique(metadata: Metadata) -> Iterator[str]:
 
 
 def contents_agree(metadata: Metadata) -> Iterator[str]:
-    """parentReceptacles and receptacleObjectIds say the same, and only of what is there."""
+    """parentReceptacles and receptacleObjectIds agree, and name only objects that exist."""
     objects = _by_id(metadata)
     up = {(i, p) for i, entry in objects.items() for p in entry["parentReceptacles"] or ()}
     down = {(c, i) for i, entry in objects.items() for c in entry["receptacleObjectIds"] or ()}
@@ -49,11 +49,11 @@ def contents_agree(metadata: Metadata) -> Iterator[str]:
         yield f"{receptacle} lists {thing}, which does not say so"
     for thing, receptacle in sorted(up | down):
         if thing not in objects or receptacle not in objects:
-            yield f"{thing} is in {receptacle}, and one of them is no more"
+            yield f"{thing} is in {receptacle}, and one of them does not exist"
 
 
 def nothing_contains_itself(metadata: Metadata) -> Iterator[str]:
-    """No receptacle is in itself, directly or through others."""
+    """No receptacle contains itself, directly or through others."""
     parents = {i: entry["parentReceptacles"] or () for i, entry in _by_id(metadata).items()}
     done: set[str] = set()
     for start in parents:
@@ -72,7 +72,7 @@ def nothing_contains_itself(metadata: Metadata) -> Iterator[str]:
 
 
 def hand_agrees(metadata: Metadata) -> Iterator[str]:
-    """The hand holds one thing or none, isPickedUp says which, and it lies nowhere else."""
+    """The hand holds at most one object; isPickedUp says which, and no receptacle contains it."""
     held = [entry["objectId"] for entry in metadata["inventoryObjects"]]
     marked = [entry["objectId"] for entry in metadata["objects"] if entry["isPickedUp"]]
     if len(held) > 1:
@@ -86,7 +86,7 @@ def hand_agrees(metadata: Metadata) -> Iterator[str]:
 
 
 def closed_things_hide_their_contents(metadata: Metadata) -> Iterator[str]:
-    """What lies in a receptacle that opens and is shut is neither visible nor interactable."""
+    """Objects in a closed receptacle are neither visible nor interactable."""
     objects = _by_id(metadata)
     for object_id, entry in objects.items():
         if not (entry["visible"] or entry["isInteractable"]):
@@ -106,7 +106,7 @@ def closed_things_hide_their_contents(metadata: Metadata) -> Iterator[str]:
 
 
 def wholes_are_gone(metadata: Metadata) -> Iterator[str]:
-    """Where there are slices the whole is listed as cut up, and is nowhere."""
+    """If there are slices, the whole object is listed as sliced, and has no place."""
     objects = _by_id(metadata)
     for object_id in objects:
         part = _PART.fullmatch(object_id)
@@ -121,11 +121,11 @@ def wholes_are_gone(metadata: Metadata) -> Iterator[str]:
 
 
 def values_are_plain(metadata: Metadata) -> Iterator[str]:
-    """Everything is a plain value that goes over a wire: no array, no NumPy number, no tuple."""
+    """All values are plain and can be serialised: no arrays, NumPy numbers or tuples."""
     try:
         msgpack.packb(dict(metadata), strict_types=True)
     except TypeError as error:
-        yield f"the metadata hold what is no plain value: {error}"
+        yield f"the metadata hold a value that is not plain: {error}"
 
 
 def _numbers(entry: Metadata) -> Iterator[float]:
@@ -142,7 +142,7 @@ def _numbers(entry: Metadata) -> Iterator[float]:
 def numbers_are_finite(metadata: Metadata) -> Iterator[str]:
     """No number is NaN or infinite."""
     for entry in metadata["objects"]:
-        # A sum is finite when, and unless they are absurdly large only when, all its parts are.
+        # A sum is finite if and only if all its parts are, unless absurdly large parts overflow.
         if not isfinite(sum(_numbers(entry))):
             yield f"{entry['objectId']} has a number that is NaN or infinite"
     agent = metadata["agent"]
@@ -152,7 +152,7 @@ def numbers_are_finite(metadata: Metadata) -> Iterator[str]:
 
 
 def failures_say_why(metadata: Metadata) -> Iterator[str]:
-    """errorMessage is empty when, and only when, the last action succeeded."""
+    """errorMessage is empty if and only if the last action succeeded."""
     if metadata["lastActionSuccess"] is not (metadata["errorMessage"] == ""):
         yield (
             f"lastActionSuccess is {metadata['lastActionSuccess']} and errorMessage is "
@@ -171,11 +171,11 @@ INVARIANTS: tuple[Callable[[Metadata], Iterator[str]], ...] = (
     numbers_are_finite,
     failures_say_why,
 )
-"""Those that need no more than one event."""
+"""The invariants of a single event."""
 
 
 def stands_on_the_floor(metadata: Metadata, floor: NDArray[np.float64]) -> Iterator[str]:
-    """The agent stands where it can stand.
+    """The agent stands on the floor.
 
     Args:
         floor: (P, 2) x and z in metres, the scene's reachable positions on a 5 cm grid.
@@ -187,7 +187,7 @@ def stands_on_the_floor(metadata: Metadata, floor: NDArray[np.float64]) -> Itera
 
 
 def a_refusal_changed_nothing(before: Metadata, after: Metadata) -> Iterator[str]:
-    """Whatever failed has left every object and the agent as they were."""
+    """A failed action has not changed the agent or any object."""
     if after["lastActionSuccess"]:
         return
     if before["agent"] != after["agent"]:
@@ -199,7 +199,7 @@ def a_refusal_changed_nothing(before: Metadata, after: Metadata) -> Iterator[str
 
 
 def broken(metadata: Metadata) -> list[str]:
-    """Everything that :data:`INVARIANTS` find wrong; nothing when all is well."""
+    """All violations of :data:`INVARIANTS`."""
     return [problem for invariant in INVARIANTS for problem in invariant(metadata)]
 
 

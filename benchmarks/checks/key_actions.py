@@ -2,8 +2,8 @@
 
 ``python -m benchmarks.checks.key_actions ../shared/data/paper_tasks_dev.json`` asks the generator
 for a task of the same scene and type about the same objects as each task of the file, and compares
-verbs and object types in order. Long-range tasks, which follow no rule, are left out. It also says
-how many of the tasks the generator makes of its own accord.
+verbs and object types in order. Long-range tasks, which follow no rule, are left out. It also
+counts the tasks that the generator enumerates by itself.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from er_gym.thor import make_controller
 
 @dataclass(frozen=True)
 class Comparison:
-    """A task of the paper beside ours about the same objects.
+    """A task of the paper and ours about the same objects.
 
     Attributes:
         theirs, ours: key actions as ``"verb Type"``.
-        problem: why there is none of ours.
-        enumerated: whether the generator makes the same of its own accord.
+        problem: why there is no task of ours. enumerated: whether the generator enumerates the same
+            task by itself.
     """
 
     task: Task
@@ -41,7 +41,7 @@ class Comparison:
 
     @property
     def same(self) -> bool:
-        """Whether they agree."""
+        """Whether their key actions agree."""
         return self.theirs == self.ours
 
 
@@ -51,7 +51,9 @@ def labels(task: Task) -> tuple[str, ...]:
 
 
 def asked(task: Task) -> list[str]:
-    """Ids of what a task is about: what is taken, filled and switched, else what is looked for."""
+    """Ids of the objects of a task: those that are taken, filled and switched, else those searched
+    for.
+    """
     handled = [
         key.object_id
         for key in task.key_actions
@@ -84,7 +86,7 @@ def compare(tasks: Iterable[Task]) -> list[Comparison]:
 @click.command(help=__doc__)
 @click.argument("path", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 def main(path: Path) -> None:
-    """Print the differences and how many agree."""
+    """Print the differences and the number of tasks that agree."""
     tasks = resolve_tasks(read_tasks(path)).tasks
     compared = compare(t for t in tasks if t.type.group != COMPOSITE or t.type.ordered)
     for one in compared:
@@ -95,7 +97,7 @@ def main(path: Path) -> None:
     same = sum(one.same for one in compared)
     enumerated = sum(one.enumerated for one in compared)
     click.echo(f"{same} of {len(compared)} agree ({100 * same / len(compared):.1f} %)")
-    click.echo(f"{enumerated} of them the generator makes of its own accord")
+    click.echo(f"the generator enumerates {enumerated} of them by itself")
 
 
 if __name__ == "__main__":

@@ -1,12 +1,13 @@
-"""Whether the corrected scorer judges episodes, from their records, as the environment did live.
+"""Checks that the corrected scorer judges episodes, from their records, as the environment did
+live.
 
     python -m benchmarks.checks.one_judge [--suite er-1k] [--per-type N] [--protocol paper]
 
 Several players play every task of a suite (see ``PLAYERS``). Each episode's record goes through its
 JSON and is then judged again. Success, the key actions left and the rewards must be the same.
 
-Prints how many episodes each player played, how many were a success to each judge, and every
-disagreement; exit code 1 if there is one.
+Prints how many episodes each player played, how many succeeded according to each judge, and every
+disagreement; the exit code is 1 if there is one.
 """
 
 from __future__ import annotations
@@ -41,12 +42,14 @@ from er_gym.tasks.task import KeyAction, Task
 
 _UNDOING = frozenset({verbs.PUT, verbs.PICKUP, verbs.TOGGLE})
 _CARELESS = 0.25
-"""How often a careless oracle does any legal thing, ``end`` among them."""
+"""The probability that the careless oracle does a random legal action, possibly ``end``."""
 
 
 def shuffled(keys: Sequence[KeyAction], draw: random.Random) -> tuple[KeyAction, ...]:
-    """Key actions with their transfers in another order: the last two change places, or all are
-    shuffled. What there is only one of stays."""
+    """Key actions with their transfers in another order: the last two swapped, or all shuffled.
+
+    A single transfer stays.
+    """
     parts: list[list[KeyAction]] = [[]]
     for key in keys:
         if key.verb in (verbs.NAVIGATE, verbs.END) and any(
@@ -63,7 +66,7 @@ def shuffled(keys: Sequence[KeyAction], draw: random.Random) -> tuple[KeyAction,
 
 
 def by_the_whole(action: Action, info: Mapping[str, Any]) -> Action:
-    """``put in Sink`` for ``put in SinkBasin`` where that is legal; another action as it is."""
+    """``put in Sink`` for ``put in SinkBasin`` where that is legal; other actions unchanged."""
     for whole, basin in BASIN_OF.items():
         named = Action(action.verb, whole)
         if action == Action(verbs.PUT, basin) and named in info["legal"]:
@@ -72,7 +75,7 @@ def by_the_whole(action: Action, info: Mapping[str, Any]) -> Action:
 
 
 class _SeededOracle:
-    """An oracle with random choices of its own.
+    """An oracle that makes random choices.
 
     Args:
         seed: of these choices.
@@ -89,7 +92,7 @@ class _SeededOracle:
 
 
 class ShuffledOracle(_SeededOracle):
-    """Does the key actions with the transfers in another order, and says Sink for SinkBasin."""
+    """Does the key actions with the transfers in another order, and names Sink for SinkBasin."""
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Choose an order."""
@@ -111,10 +114,10 @@ class ShuffledOracle(_SeededOracle):
 
 
 class CarelessOracle(_SeededOracle):
-    """Does the key actions, and now and then a random legal action."""
+    """Does the key actions, and sometimes a random legal action."""
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """The solver's next step, or any."""
+        """The solver's next step, or a random action."""
         if self._draw.random() < _CARELESS:
             return Decision(self._draw.choice(info["legal"]))
         return Decision(self._solver.next(info)[0])
@@ -153,7 +156,7 @@ PLAYERS: dict[str, Callable[[int], Agent]] = {
 
 
 class _Watched:
-    """An environment whose last ``info`` is kept."""
+    """An environment that keeps the last ``info``."""
 
     def __init__(self, env: EmbodiedEnv) -> None:
         self._env = env
@@ -175,7 +178,7 @@ class Judged:
     Attributes:
         player: one of :data:`PLAYERS`.
         record: read back from its JSON.
-        apart: what the environment and the corrected scorer disagree about, in words.
+        apart: the disagreements of the environment and the corrected scorer, in words.
     """
 
     player: str
@@ -232,7 +235,7 @@ def judge_all(tasks: Sequence[Task], protocol: str = "default", seed: int = 0) -
 
 
 def some_of_each_type(tasks: Sequence[Task], number: int, seed: int = 0) -> list[Task]:
-    """So many tasks of each type, the same for the same seed."""
+    """A number of tasks of each type, the same for the same seed."""
     by_type: dict[str, list[Task]] = defaultdict(list)
     for task in tasks:
         by_type[task.type.name].append(task)
@@ -242,7 +245,7 @@ def some_of_each_type(tasks: Sequence[Task], number: int, seed: int = 0) -> list
 
 @click.command()
 @click.option("--suite", default="er-1k", show_default=True)
-@click.option("--per-type", type=click.IntRange(1), help="So many tasks of each type only.")
+@click.option("--per-type", type=click.IntRange(1), help="Only this many tasks of each type.")
 @click.option("--protocol", default="default", type=click.Choice(list(PROTOCOLS)))
 @click.option("--seed", default=0, show_default=True)
 def main(suite: str, per_type: int | None, protocol: str, seed: int) -> None:

@@ -1,14 +1,14 @@
-"""Whether a picture depends on the state of the world alone, and not on what was drawn before.
+"""Checks that a picture depends only on the state of the world, not on earlier pictures.
 
     python -m benchmarks.checks.one_picture [--states 500] [--processes 3]
 
 A state is a recipe: a room, a random arrangement, things opened, switched, sliced, dirtied, broken,
 filled, moved or held, a pose, and in some a third-party camera. Several histories lead to it in
 this process (see ``HISTORIES``); fresh processes, with other values of PYTHONHASHSEED, reach the
-states straight away and in another order. Each is drawn at 300×300 and 800×450. Pictures, instance
+states directly and in another order. Each is drawn at 300×300 and 800×450. Pictures, instance
 masks, class masks and depth must be equal to the byte wherever the metadata are.
 
-Prints how many pictures were compared and each difference; exit code 1 if there is one.
+Prints the number of pictures compared and each difference; the exit code is 1 if there is one.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from er_gym.thor import SCENE_NAMES
 
 SIZES = ((300, 300), (800, 450))
 _CHANGES = 12
-"""How many changes a recipe tries; some are refused."""
+"""The number of changes that a recipe tries; some are refused."""
 _UNDO = {
     "OpenObject": "CloseObject",
     "CloseObject": "OpenObject",
@@ -44,7 +44,7 @@ _UNDO = {
     "CleanObject": "DirtyObject",
     "FillObjectWithLiquid": "EmptyLiquidFromObject",
 }
-"""What puts things back as they were, by what is done to them."""
+"""The action that undoes each action."""
 _FOR_GOOD = {
     "openable": ("OpenObject",),
     "toggleable": ("ToggleObjectOn", "ToggleObjectOff"),
@@ -55,7 +55,7 @@ _FOR_GOOD = {
     "cookable": ("CookObject",),
     "canBeUsedUp": ("UseUpObject",),
 }
-"""What a recipe does to things, by the property that allows it."""
+"""The actions of a recipe, by the property of an object that allows them."""
 
 Request = dict[str, Any]
 Digests = dict[str, str]
@@ -63,17 +63,17 @@ Digests = dict[str, str]
 
 
 class Replayer:
-    """An engine, and what the check does with it.
+    """Replays requests on an engine and digests its pictures.
 
     Args:
-        engine: may have been used for anything.
+        engine: may have been used before.
     """
 
     def __init__(self, engine: Engine | None = None) -> None:
         self.engine = engine or Engine()
 
     def do(self, request: Request, draw: bool = False) -> bool:
-        """Do an action, drawing what comes of it or not; returns whether it was done."""
+        """Do an action, with or without drawing the result; returns whether it succeeded."""
         metadata, _ = self.engine.step({"renderImage": draw, **request})
         return bool(metadata["lastActionSuccess"])
 
@@ -87,7 +87,7 @@ class Replayer:
         return self.engine.step({"action": "Pass", "renderImage": False})[0]
 
     def state(self) -> str:
-        """A digest of the metadata: all that the world says of itself."""
+        """A digest of all metadata."""
         said = self._said()
         kept = {
             name: said[name]
@@ -133,7 +133,7 @@ def _digest(content: bytes) -> str:
 
 @dataclass(frozen=True)
 class Recipe:
-    """A state: what is asked of a fresh world to reach it.
+    """A state, as the requests that reach it from a fresh world.
 
     Attributes:
         number: of the state. scene: the room. requests: AI2-THOR actions, all of which succeed.
@@ -186,7 +186,7 @@ def recipe(number: int) -> Recipe:
 
 
 def _change(random: np.random.Generator, objects: list[dict[str, Any]]) -> Request:
-    """Something to do to a random thing that allows it."""
+    """A random action on a random object that allows it."""
     able = [p for p in _FOR_GOOD if any(each[p] for each in objects)]
     wanted = str(random.choice(able))
     things = [each["objectId"] for each in objects if each[wanted]]
@@ -220,7 +220,7 @@ def follow(wanted: Recipe, replayer: Replayer, draw: bool = False) -> None:
     for request in ({"action": "Reset", "sceneName": wanted.scene}, *wanted.requests):
         done = replayer.do(request, draw)
         if not done:
-            raise AssertionError(f"state {wanted.number}: {request} was done before, and not now")
+            raise AssertionError(f"state {wanted.number}: {request} succeeded before, but not now")
 
 
 # -- histories -------------------------------------------------------------------------------------
@@ -232,7 +232,7 @@ def straight(wanted: Recipe, replayer: Replayer) -> None:
 
 
 def after_another_room(wanted: Recipe, replayer: Replayer) -> None:
-    """A walk in another room first, with pictures; then each action is drawn."""
+    """First a walk in another room, with pictures; then each action is drawn."""
     random = np.random.default_rng([1, wanted.number])
     replayer.do({"action": "Reset", "sceneName": str(random.choice(SCENE_NAMES))}, draw=True)
     for _ in range(4):
@@ -243,7 +243,7 @@ def after_another_room(wanted: Recipe, replayer: Replayer) -> None:
 
 
 def after_another_arrangement(wanted: Recipe, replayer: Replayer) -> None:
-    """The same room in another arrangement first, with pictures."""
+    """First the same room in another arrangement, with pictures."""
     random = np.random.default_rng([2, wanted.number])
     replayer.do({"action": "Reset", "sceneName": wanted.scene}, draw=True)
     seed = int(random.integers(1000))
@@ -299,10 +299,9 @@ HISTORIES: tuple[Callable[[Recipe, Replayer], None], ...] = (
 def set_down(
     wanted: Recipe, replayer: Replayer, by: Callable[[Recipe, Replayer], None], away: float
 ) -> None:
-    """A state, then all that can be carried ``away`` metres, turned, and back where it was.
-
-    What has been set down is in another state than what was recorded there: AI2-THOR's boxes are
-    not quite those of its own poses. So two ways there are compared with each other.
+    """A state; then all pickupable objects go ``away`` metres, turn, and return. An object that has
+    been set down differs from the recorded one, since AI2-THOR's boxes do not quite fit its own
+    poses. So two such ways are compared with each other.
     """
     by(wanted, replayer)
     poses = [
@@ -320,7 +319,7 @@ def set_down(
     ]
     for several in (moved, poses):
         if not replayer.do({"action": "SetObjectPoses", "objectPoses": several}, draw=True):
-            raise AssertionError(f"state {wanted.number}: things cannot be set down")
+            raise AssertionError(f"state {wanted.number}: objects cannot be set down")
         replayer.do({"action": "RotateRight"}, draw=True)
         replayer.do({"action": "RotateLeft"}, draw=True)
 
@@ -337,7 +336,7 @@ class Snapshot:
 
     @staticmethod
     def by(replayer: Replayer) -> Snapshot:
-        """Where a replayer is."""
+        """The present state of a replayer."""
         return Snapshot(replayer.state(), replayer.pictures())
 
     @property
@@ -357,7 +356,7 @@ class Snapshot:
 
 
 def _fresh(states: list[int], hash_seed: int) -> dict[int, Digests]:
-    """What a fresh process says of some states, which it reaches in an order of its own."""
+    """The digests of some states from a fresh process, which reaches them in another order."""
     order = np.random.default_rng(hash_seed).permutation(states).tolist()
     result = subprocess.run(
         [sys.executable, "-m", "benchmarks.checks.one_picture", "--say"],
@@ -371,7 +370,7 @@ def _fresh(states: list[int], hash_seed: int) -> dict[int, Digests]:
 
 
 class Differences:
-    """What has been compared, and what differed."""
+    """The number of comparisons, and the differences."""
 
     def __init__(self, console: Console) -> None:
         self.console = console
@@ -379,7 +378,7 @@ class Differences:
         self.apart = 0
 
     def compare(self, what: str, wanted: Recipe, one: Snapshot, other: Snapshot) -> None:
-        """Two ways to a state; where they led to different ones, the pictures may differ."""
+        """Compare two ways to a state; if they led to different states, the pictures may differ."""
         if one.state != other.state:
             self.counts[f"{what}: another state"] += 1
             return
@@ -389,7 +388,7 @@ class Differences:
             self.differs(f"state {wanted.number} ({wanted.scene}), {what}: {name}: {pixels} pixels")
 
     def differs(self, what: str) -> None:
-        """A difference."""
+        """Add a difference."""
         self.apart += 1
         self.console.print(what, markup=False, highlight=False)
 
@@ -433,7 +432,7 @@ def main(states: int, processes: int, say: bool) -> None:
 
 
 def _say() -> None:
-    """What a fresh process is for: states by number in, their digests out, as JSON."""
+    """The work of a fresh process: reads numbers of states, and prints their digests as JSON."""
     found, replayer = {}, Replayer()
     for number in json.load(sys.stdin):
         follow(recipe(number), replayer)

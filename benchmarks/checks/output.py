@@ -1,4 +1,4 @@
-"""Where scripts write figures to."""
+"""The output files of scripts."""
 
 from __future__ import annotations
 
@@ -15,13 +15,15 @@ FORMAT = "er-gym/figures/1"
 
 
 class Output(click.Path):
-    """A file to write, looked at before anything is measured; one of others is not replaced."""
+    """A file to write, checked before anything is measured; files of other programs are not
+    replaced.
+    """
 
     def __init__(self) -> None:
         super().__init__(dir_okay=False, path_type=Path)
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """The path; click ends the script with exit code 2 where it cannot be written to."""
+        """The path; click ends the script with exit code 2 if it cannot be written."""
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
         try:
             check_output(path)

@@ -1,12 +1,12 @@
-"""Whether ``protocol="paper"`` plays and scores as the paper's own evaluation program does.
+"""Compares ``protocol="paper"`` with the paper's own evaluation program, in play and in scores.
 
     python -m benchmarks.checks.paper_agreement --theirs DIR --tasks-file FILE --poses FILE
         [--episodes 300] [--seed 0] [--json FILE]
 
-DIR is the folder ``evaluate`` of a checkout of Embodied-Reasoner; its code is imported from there
-and none of it is here. Both sides play the same scripted replies on the embedded engine, in the
-same process and without pictures; a reply that names nothing in the scene stands for nothing on
-either side, since what is closest in meaning is for a model to say. Printed are
+DIR is the folder ``evaluate`` of a checkout of Embodied-Reasoner; its code is imported from there,
+and er-gym contains none of it. Both sides play the same scripted replies on the embedded engine, in
+the same process and without pictures; a reply that names nothing in the scene matches no object on
+either side, since only a model could choose the closest in meaning. Printed are
 
 - steps: of all steps that theirs took, the share before an episode's first difference. A step is
   its action, object, success, and what could be gone to and interacted with after it;
@@ -66,7 +66,7 @@ _NO_ACTIONS = ("dance", "Navigate to Fridge", "pick up Apple", "slice Bread", " 
 
 
 def scripted(task: Task, types_there: Sequence[str], draw: random.Random) -> list[str]:
-    """Replies for a task: its key actions in their order, with more or less noise among them."""
+    """Replies for a task: its key actions in order, with some noise among them."""
     noise = draw.choice((0.0, 0.3, 0.6, 0.9))
     replies: list[str] = []
     for key in task.key_actions:
@@ -93,7 +93,7 @@ def _noise(types_there: Sequence[str], draw: random.Random) -> str:
 
 
 class ScriptedAgent:
-    """An agent that says what is written; then that it is done."""
+    """An agent that gives scripted replies, then ``end``."""
 
     obs_mode = "text"
 
@@ -112,7 +112,7 @@ class ScriptedAgent:
 
 
 class PaperProgram:
-    """The paper's program, imported from its folder, with scripted replies for a model.
+    """The paper's program, imported from its folder, with scripted replies instead of a model.
 
     Args:
         folder: ``evaluate`` of a checkout.
@@ -142,7 +142,7 @@ class PaperProgram:
         )  # fmt: skip
         self._controller.stop = lambda: None  # their runner stops it after each episode
         reset = self._controller.reset
-        # In one process there is no platform to choose, nor a quality of pictures.
+        # One process has no platform to choose and no picture quality.
         self._controller.reset = lambda scene, platform=None, quality=None, **rest: reset(
             scene, **rest
         )
@@ -154,10 +154,10 @@ class PaperProgram:
         return sorted({entry["objectType"] for entry in event.metadata["objects"]})
 
     def play(self, task: dict[str, Any], replies: Sequence[str]) -> list[dict[str, Any]] | None:
-        """Their trajectory; None where their program does not get to the end."""
+        """Their trajectory; None if their program does not finish."""
         self._replies = iter(replies)
         here = os.getcwd()
-        os.chdir(self._home)  # where their program looks for its pose file
+        os.chdir(self._home)  # their program expects its pose file there
         try:
             with contextlib.redirect_stdout(io.StringIO()):
                 result = self._run.get_trajectory(self._controller, task, "scripted")
@@ -166,7 +166,7 @@ class PaperProgram:
         return result[0] if result else None
 
     def score(self, task: dict[str, Any], trajectory: list[dict[str, Any]]) -> dict[str, float]:
-        """What their program makes of a trajectory."""
+        """Their program's scores of a trajectory."""
         actions = task["task_metadata"]["actions"]
         keys = [f"{action['action']} {action['objectType']}".strip() for action in actions]
         with contextlib.redirect_stdout(io.StringIO()):
@@ -174,7 +174,7 @@ class PaperProgram:
         return {ours: found[theirs] for theirs, ours in METRICS.items()}
 
     def close(self) -> None:
-        """Remove what it wrote."""
+        """Remove the files that it wrote."""
         shutil.rmtree(self._home, ignore_errors=True)
 
     def _reply(self, messages: Any, port: int) -> str:
@@ -187,7 +187,7 @@ class PaperProgram:
 
 
 def _match(description: str, objects: Sequence[str], *_: Any) -> str | None:
-    """What a name stands for where no model is asked: the type of that name, whatever the case."""
+    """The type that a name matches without a model: the type of that name, in any case."""
     if description.startswith(("observe", "move forward")):
         return None
     name = description.split(" ")[-1].lower()
@@ -199,15 +199,13 @@ def _match(description: str, objects: Sequence[str], *_: Any) -> str | None:
 
 @dataclass
 class PaperAgreement:
-    """What was counted.
+    """The counts.
 
-    Attributes:
-        episodes: that both sides finished; unfinished: that theirs did not.
-        alike: of these, those without any difference.
-        steps, equal: that theirs took, and those before an episode's first difference.
-        scored, equal_scores: episodes that their program could score, and those with our scores.
-        equal_rescored: those in which our scorer agrees on their own trajectory.
-        differences: in what the first one lies, and after which verb.
+    Attributes: episodes: that both sides finished; unfinished: that theirs did not. alike: the
+        finished ones without any difference. steps, equal: that theirs took, and those before an
+        episode's first difference. scored, equal_scores: episodes that their program could score,
+        and those with our scores. equal_rescored: those in which our scorer agrees on their own
+        trajectory. differences: in what the first one lies, and after which verb.
     """
 
     episodes: int = 0
@@ -244,11 +242,11 @@ def _differing(theirs: dict[str, Any], ours: StepRecord) -> Iterator[str]:
         yield "object"
     if bool(theirs["success"]) != ours.success:
         yield "success"
-    # Their runner has None or nothing after a walk that found no way and after the last of four.
+    # Their runner has None or nothing after a failed walk and after the last of four.
     if theirs["legal_objects"] and {*theirs["legal_objects"]} != {*ours.interactable}:
-        yield "what can be interacted with"
+        yield "the interactable objects"
     if theirs["legal_locations"] and {*theirs["legal_locations"]} != {*ours.navigable}:
-        yield "what can be gone to"
+        yield "the navigable objects"
 
 
 def as_record(ours: EpisodeRecord, theirs: list[dict[str, Any]]) -> EpisodeRecord:
@@ -318,7 +316,7 @@ _file = click.Path(exists=True, dir_okay=False, path_type=Path)
 def main(
     theirs: Path, tasks_file: Path, poses: Path, episodes: int, seed: int, file: Path | None
 ) -> None:
-    """Compare, and print the shares."""
+    """Compare, and print the results."""
     records = json.loads(tasks_file.read_text(encoding="utf-8"))
     tasks = with_every_pose(read_tasks(tasks_file), read_poses(poses))
     program = PaperProgram(theirs, poses)

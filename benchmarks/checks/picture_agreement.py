@@ -1,4 +1,4 @@
-"""Whether the picture shows what the metadata calls visible, and the other way round.
+"""Compares the objects that a picture shows with those that the metadata call visible.
 
     python -m benchmarks.checks.picture_agreement [--poses 300] [--seed 0] [--opened 0.3]
                                                   [--json FILE]
@@ -34,12 +34,12 @@ from er_gym.thor import SCENE_NAMES, make_controller
 
 SIZES = ((300, 300), (800, 450))
 LEAST = 20
-"""So few pixels still show an object."""
+"""The least pixels that show an object."""
 DISTANCES = (1.5, 20.0)
 TURNS = (1, 45, 90)
 """Headings are multiples of one of these, degrees."""
 SHOWN, TOLD = 0.95, 0.97
-"""What is wanted of both shares."""
+"""The targets of both shares."""
 _OPEN = 0.5
 """The share of the doors and drawers of a pose that are open, where some are."""
 _ROWS = 20
@@ -47,12 +47,12 @@ _ROWS = 20
 
 @dataclass(frozen=True)
 class Sighting:
-    """One object from one pose, visible or in the picture.
+    """One object seen from one pose, according to the metadata or the picture.
 
     Attributes:
         kind: its object type. size: of the picture, pixels.
         reach: the visibilityDistance, metres. near: whether its ``distance`` is within that.
-        visible: what the metadata say. pixels: how many it takes.
+        visible: according to the metadata. pixels: how many it covers.
     """
 
     kind: str
@@ -65,7 +65,7 @@ class Sighting:
 
 @dataclass(frozen=True)
 class Shares:
-    """What was counted of some sightings."""
+    """The counts of some sightings."""
 
     visible: int
     shown: int
@@ -110,7 +110,7 @@ def _share(part: int, whole: int) -> str:
 def sightings(
     poses: int, seed: int, opened: float, console: Console | None = None
 ) -> Iterator[Sighting]:
-    """What is seen from random poses; ``opened``: the share of them with some doors open.
+    """Sightings from random poses; ``opened``: the share of poses with some doors open.
 
     The poses are the same at both sizes.
     """
@@ -154,7 +154,7 @@ def _seen(event: Any, size: tuple[int, int], reach: float) -> Iterator[Sighting]
 
 
 def _pixels(event: Any) -> Mapping[str, int]:
-    """Object id to how many pixels it takes of an event's instance segmentation."""
+    """The pixels of each object id in an event's instance segmentation."""
     frame = event.instance_segmentation_frame.astype(np.int64)
     colours, counts = np.unique(frame @ (1 << 16, 1 << 8, 1), return_counts=True)
     found = dict(zip(colours.tolist(), counts.tolist(), strict=True))
@@ -190,7 +190,7 @@ def _tables(found: list[Sighting]) -> Iterator[Table]:
 
 
 def by_type(found: Iterable[Sighting]) -> dict[str, Shares]:
-    """Object type to what was counted of it, those first that disagree most."""
+    """The counts of each object type, those with most disagreements first."""
     kinds: dict[str, list[Sighting]] = {}
     for seen in found:
         kinds.setdefault(seen.kind, []).append(seen)

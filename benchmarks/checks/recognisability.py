@@ -1,13 +1,13 @@
-"""Whether things can be told apart in the pictures, as far as that can be measured.
+"""Measures how well objects can be told apart in the pictures.
 
     python -m benchmarks.checks.recognisability [--seed 0] [--epochs 10] [--json FILE]
                                                 [--sheet FILE.png]
 
 A small convolutional network learns the 40 commonest object types from crops of the pictures of 90
-scenes, and is asked about crops of the 30 others. It needs torch: pip install -e '.[rl]'.
+scenes, and is tested on crops of the 30 others. It needs torch: pip install -e '.[rl]'.
 
-A crop is the square around what an instance shows in a picture, surroundings included, as a person
-sees them. Half of the poses are anywhere, half look at a thing from 0.5 to 2.5 m away.
+A crop is the square around an instance in a picture, with its surroundings, as a person sees it.
+Half of the poses are anywhere, half look at a thing from 0.5 to 2.5 m away.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Crops:
 
 @dataclass(frozen=True, eq=False)
 class Classification:
-    """What the network said of the held-out crops.
+    """The network's predictions for the held-out crops.
 
     Attributes:
         types: the names of the types, by number.
@@ -84,11 +84,11 @@ class Classification:
 
     @property
     def top1(self) -> float:
-        """Share of the crops whose type is told correctly."""
+        """The share of the crops whose type is predicted correctly."""
         return float((self.said == self.truth).mean())
 
     def share_correct(self, kind: int) -> float:
-        """The same of the crops of one type."""
+        """The same for the crops of one type."""
         return float((self.said[self.truth == kind] == kind).mean())
 
     @property
@@ -99,7 +99,7 @@ class Classification:
         return sorted(set(self.truth.tolist()), key=self.share_correct)
 
     def taken_for(self, kind: int) -> list[tuple[str, float]]:
-        """What a type is wrongly taken for and how often, most often first."""
+        """The wrong predictions for a type and their numbers, the most frequent first."""
         said = self.said[self.truth == kind]
         wrong = Counter(said[said != kind].tolist())
         return [(self.types[other], count / len(said)) for other, count in wrong.most_common()]
@@ -148,7 +148,7 @@ def crops_of(name: str, types: Sequence[str], most: int, random: np.random.Gener
 
 
 def poses(world: World, types: Sequence[str], random: np.random.Generator) -> list[Camera]:
-    """Where to look from: anywhere, and at some things of each type."""
+    """Camera poses: random ones, and some that look at objects of each type."""
     places = world.scene.reachable
     height = float(world.agent.camera[1])
     found = []
@@ -211,7 +211,9 @@ def crop(picture: NDArray[np.uint8], box: Sequence[int]) -> NDArray[np.uint8]:
 def train_and_classify(
     learnt: Crops, asked: Crops, classes: int, epochs: int, seed: int, console: Console
 ) -> NDArray[np.int64]:
-    """Train a network of 0.4 million weights on some crops; what it says of others, (N,)."""
+    """Train a network of 0.4 million weights on some crops; returns its predictions for others,
+    (N,).
+    """
     import torch
     import torch.nn.functional as F
     from torch import Tensor, nn
@@ -315,7 +317,7 @@ def draw_sheet(result: Classification, images: NDArray[np.uint8], file: Path) ->
 @click.option("--json", "file", type=Output())
 @click.option("--sheet", type=Output(), help="Wrong crops.")
 def main(seed: int, epochs: int, most: int, file: Path | None, sheet: Path | None) -> None:
-    """Draw crops, train the network, and print what it cannot tell apart."""
+    """Draw crops, train the network, and print the types that it confuses."""
     if importlib.util.find_spec("torch") is None:
         raise click.ClickException("this needs torch: pip install -e '.[rl]'")
     start, console, parts = time.perf_counter(), Console(stderr=True), dict[str, Crops]()
@@ -330,10 +332,10 @@ def main(seed: int, epochs: int, most: int, file: Path | None, sheet: Path | Non
     figures: dict[str, float] = {
         "top-1": result.top1,
         "top-1, mean of the types": result.mean_of_types,
-        "crops learnt from": len(learnt.labels),
-        "crops asked about": len(asked.labels),
+        "crops for training": len(learnt.labels),
+        "crops for testing": len(asked.labels),
         "seconds to draw": drawn - start,
-        "seconds to learn": time.perf_counter() - drawn,
+        "seconds to train": time.perf_counter() - drawn,
     }
     Console(width=None if sys.stdout.isatty() else 110).print(_table(result, figures))
     if sheet is not None:

@@ -1,4 +1,4 @@
-"""What the long random plays share: which scenes, and how many processes."""
+"""Options of the fuzz and the soak: which scenes, and how many processes."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ Result = TypeVar("Result")
 
 
 def choose_scenes(asked: str) -> list[str]:
-    """Scenes by number, spread over the room kinds; "all"; or names with commas between them.
+    """Scenes by number, spread over the kinds of room; "all"; or names separated by commas.
 
-    Raises:
-        ValueError: it is none of these.
+    Raises: ValueError: the text has another form.
     """
     if asked == "all":
         return list(SCENE_NAMES)
@@ -38,7 +37,7 @@ def choose_scenes(asked: str) -> list[str]:
 def run_scene_jobs(
     make: Callable[[], Callable[[Job], Result]], jobs: Sequence[Job], workers: int
 ) -> Iterator[tuple[Job, Result | LostJob]]:
-    """Do every job once, each whole in one of so many processes (1: in this one)."""
+    """Do every job once in ``workers`` processes (1: in this process)."""
     if workers == 1:
         do = make()
         return ((job, do(job)) for job in jobs)

@@ -1,11 +1,11 @@
-"""Play at random for long, in every scene, and look for what must never happen.
+"""Play random actions for a long time in every scene, and check the invariants.
 
     python -m benchmarks.checks.soak [--scenes all|N] [--actions 2000] [--level env|engine]
 
 ``env`` plays random legal actions through the environment; ``engine`` sends random AI2-THOR
 actions, legal or not, to the controller. After each step the invariants of
-:mod:`benchmarks.checks.invariants` are checked. It ends with one line, and with exit code 1 if one
-of them is broken; what is printed says how to see that again.
+:mod:`benchmarks.checks.invariants` are checked. It ends with one line. If an invariant is broken,
+the exit code is 1 and the output has the command that repeats it.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ from er_gym.thor import SCENE_NAMES, make_controller
 
 _FLOOR_STEP = 0.05
 _ANY_OBJECT = 0.2
-"""How often an object is drawn from all, rather than from those that suit the action."""
+"""The probability that an object is drawn from all, not only from those that suit the action."""
 
 
 @dataclass(frozen=True)
 class SoakReport:
-    """What came of a scene.
+    """The result of a scene.
 
     Attributes:
         scene: its name.
         actions: how many actions were done.
-        succeeded: how many of them did what they say.
+        succeeded: how many of them succeeded.
         seconds: how long that took.
-        problem: the first thing that was wrong, after which nothing more was done; "" if none.
+        problem: the first problem, which ends the scene's play; "" if there was none.
     """
 
     scene: str
@@ -62,7 +62,7 @@ class SoakReport:
 
 
 Step = tuple[str, Metadata, list[str]]
-"""What was done, the metadata after it, and what is wrong besides the invariants."""
+"""An action, the metadata after it, and problems besides the invariants."""
 
 
 def _random(scene: str, seed: int) -> np.random.Generator:
@@ -79,7 +79,7 @@ def _floor(controller: Any) -> np.ndarray:
 
 
 def free_play(scene: str) -> Task:
-    """A task that asks for nothing, so that an environment can be made in any scene."""
+    """A task without a goal, so that an environment can be made in any scene."""
     return Task(
         id=f"soak-{scene}",
         type=TASK_TYPES[-1],
@@ -95,7 +95,7 @@ def play_env(scene: str, seed: int) -> Iterator[Step]:
     env = EmbodiedEnv([free_play(scene)], obs_mode="state", instances="explore")
     try:
         _, info = env.reset(seed=seed)
-        controller = env._controller  # the soak looks behind the environment's face
+        controller = env._controller  # the soak reads the environment's internals
         floor, over = _floor(controller), False
         while True:
             if over:
@@ -131,7 +131,7 @@ def _one_of(name: str, values: Sequence[float | None]) -> Parameters:
 
 
 def _object(prop: str, **more: Sequence[Any]) -> Parameters:
-    """An object, mostly one with a property; and sometimes force."""
+    """An object, usually one with a property; sometimes with force."""
 
     def draw(random: np.random.Generator, metadata: Metadata, positions: Any) -> dict[str, Any]:
         objects = metadata["objects"]
@@ -148,7 +148,7 @@ def _object(prop: str, **more: Sequence[Any]) -> Parameters:
 def _anywhere(
     random: np.random.Generator, metadata: Metadata, positions: Sequence[dict[str, float]]
 ) -> dict[str, Any]:
-    """A pose on the floor, or somewhere about it."""
+    """A pose on the floor or near it."""
     position = dict(positions[int(random.integers(len(positions)))])
     if random.random() < _ANY_OBJECT:
         position["x"] += float(random.normal())
@@ -200,14 +200,14 @@ REPERTOIRE: dict[str, Parameters] = {
     "BreakObject": _object("breakable", **_FORCE),
     "UseUpObject": _object("pickupable", **_FORCE),
 }
-"""Actions, and how their parameters are drawn."""
+"""How each action's parameters are drawn."""
 
 _OFTEN = ("PickupObject", "PutObject", "OpenObject", "TeleportFull")
-"""Without them most of the others would be refused."""
+"""Without these actions most of the others would be refused."""
 
 
 def play_engine(scene: str, seed: int) -> Iterator[Step]:
-    """Random AI2-THOR actions with parameters that make sense, and no care for what is legal."""
+    """Random AI2-THOR actions with valid parameters; the actions need not be legal."""
     random = _random(scene, seed)
     names = [*REPERTOIRE, *3 * _OFTEN]
     controller = make_controller(scene=scene, headless=True, snapToGrid=False, gridSize=0.25)
@@ -234,7 +234,7 @@ LEVELS: dict[str, Callable[[str, int], Iterator[Step]]] = {
 
 
 def soak_scene(scene: str, *, level: str, actions: int, seed: int) -> SoakReport:
-    """Play in one scene until the actions are done or something is wrong."""
+    """Play in one scene until all actions are done or there is a problem."""
     start = time.perf_counter()
     done = succeeded = 0
     problem = ""
@@ -247,7 +247,7 @@ def soak_scene(scene: str, *, level: str, actions: int, seed: int) -> SoakReport
             problems = [*broken(metadata), *problems]
             if problems:
                 problem = f"after action {done}, {what}: {'; '.join(problems)}"
-    except Exception as error:  # nothing whatever may be raised
+    except Exception as error:  # no exception may be raised
         problem = f"at action {done + 1}: {type(error).__name__}: {error}"
     finally:
         player.close()  # type: ignore[attr-defined]  # a generator, which an Iterator need not be
@@ -261,7 +261,7 @@ def _player(level: str, actions: int, seed: int) -> Callable[[str], SoakReport]:
 def soak(
     scenes: Sequence[str], *, level: str, actions: int, seed: int, workers: int
 ) -> Iterator[SoakReport]:
-    """Play in all scenes, each whole in one of so many processes (1: in this one)."""
+    """Play in all scenes in ``workers`` processes (1: in this process)."""
     for scene, report in run_scene_jobs(partial(_player, level, actions, seed), scenes, workers):
         if isinstance(report, LostJob):
             report = SoakReport(scene, 0, 0, 0.0, f"the process died, exit code {report.exitcode}")
@@ -275,7 +275,7 @@ def soak(
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
 @click.option("--level", default="env", show_default=True, type=click.Choice(list(LEVELS)))
 def main(scenes: str, actions: int, seed: int, workers: int, level: str) -> None:
-    """Play random actions in the scenes and check what must always hold."""
+    """Play random actions in the scenes and check the invariants."""
     try:
         chosen = choose_scenes(scenes)
     except ValueError as error:
@@ -296,7 +296,7 @@ def main(scenes: str, actions: int, seed: int, workers: int, level: str) -> None
 
 
 def verdict(reports: Sequence[SoakReport], *, level: str, actions: int, seed: int) -> int:
-    """Say what came of it in one line, after a line for each scene that is not well."""
+    """Print a line for each scene with a problem, then a summary in one line."""
     bad = sorted((r for r in reports if r.problem), key=lambda r: SCENE_NAMES.index(r.scene))
     for report in bad:
         click.echo(

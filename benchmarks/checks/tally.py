@@ -1,4 +1,4 @@
-"""What came of a check that tries many things."""
+"""The result of a check that tries many things."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Tally:
-    """How often something was tried.
+    """Counts tries and failures.
 
     Attributes:
-        what: was tried, in the plural.
-        tried, short: how many, and how many of them fall short.
-        seconds: that it took.
+        what: the name of what was tried, in the plural. tried, short: the numbers of tries and of
+            failures. seconds: the time that they took.
     """
 
     what: str
@@ -21,7 +20,7 @@ class Tally:
     seconds: float = 0.0
 
     def __add__(self, other: Tally) -> Tally:
-        """Both, under the first one's name."""
+        """The sum, under the first one's name."""
         return Tally(
             self.what,
             self.tried + other.tried,
@@ -30,4 +29,4 @@ class Tally:
         )
 
     def __str__(self) -> str:
-        return f"{self.tried} {self.what} in {self.seconds:.0f} s: {self.short} fall short"
+        return f"{self.tried} {self.what} in {self.seconds:.0f} s: {self.short} failed"

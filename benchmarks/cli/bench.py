@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass, replace
-from functools import reduce
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,12 +20,10 @@ from benchmarks.cli.errors import (
     report_set_aside,
 )
 from benchmarks.cli.options import (
-    Finite,
+    EXISTING_FILE,
     Place,
     Words,
-    agent_config_option,
     faults_option,
-    overrides_option,
     protocol_option,
     scorer_option,
     seed_option,
@@ -35,6 +32,7 @@ from benchmarks.cli.options import (
     workers_type,
 )
 from benchmarks.cli.terminal import stdout, terminal
+from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
 
 if TYPE_CHECKING:
     from benchmarks.cli.progress import Progress
@@ -46,76 +44,25 @@ if TYPE_CHECKING:
     from er_gym.tasks.suites import Suite
     from er_gym.tasks.task import Task
 
-_existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 _directory = Place(file_okay=False, path_type=Path)
-
-
-@dataclass(frozen=True)
-class VLMOptions:
-    """The options of ``er-gym bench`` for vision-language agents."""
-
-    agent_config: str | None
-    overrides: tuple[str, ...]
-    base_url: str | None
-    prompts_from: Path | None
-    concurrency: int | None
-    max_usd: float | None
-    max_tokens: int | None
-    max_minutes: float | None
-
-
-_VLM_OPTIONS = (
-    agent_config_option,
-    overrides_option("sampling.temperature=0.7"),
-    click.option(
-        "--base-url", type=Words(), metavar="URL", help="The address of the model's server."
-    ),
-    click.option(
-        "--prompts-from",
-        type=_existing_file,
-        metavar="DATASET",
-        help="Take the prompts from a training file in the paper's format.",
-    ),
-    click.option(
-        "--concurrency",
-        type=click.IntRange(1, 1000),
-        help="How many conversations at once.  [default: 8]",
-    ),
-    click.option("--max-usd", type=Finite(), help="Stop after spending this much."),
-    click.option("--max-tokens", type=int, help="Stop after this many tokens."),
-    click.option(
-        "--max-minutes", type=Finite(), help="Stop after this many minutes, even within a request."
-    ),
-)
-"""For vision-language agents. The budgets limit the whole run, however often it is continued; the
-minutes limit this command."""
-
-
-def _with_vlm_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add these options to a command, which gets them as one argument ``vlm_options``."""
-
-    def with_options(**given: Any) -> Any:
-        vlm_options = VLMOptions(
-            **{name: given.pop(name) for name in VLMOptions.__dataclass_fields__}
-        )
-        return command(vlm_options=vlm_options, **given)
-
-    with_options.__doc__ = command.__doc__
-    return reduce(lambda made, option: option(made), reversed(_VLM_OPTIONS), with_options)
 
 
 @click.command(name="bench")
 @click.option("--suite", help="A bundled suite; `er-gym suites` lists them.")
-@click.option("--tasks-file", type=_existing_file, help="A task file in the paper's format.")
-@click.option("--poses", type=_existing_file, help="Exact poses, a file in the paper's format.")
+@click.option("--tasks-file", type=EXISTING_FILE, help="A task file in the paper's format.")
+@click.option(
+    "--poses", type=EXISTING_FILE, help="A file of exact object poses in the paper's format."
+)
 @click.option(
     "--agent",
     type=Words(),
     required=True,
-    help="Who plays: oracle, random, searcher, rl:RUN, openai:MODEL, package.module:Class …",
+    help="The agent: oracle, random, searcher, rl:RUN, openai:MODEL, package.module:Class …",
 )
 @click.option("--out", type=_directory, help="The run directory.  [default: runs/SUITE-AGENT]")
-@click.option("--workers", type=workers_type, default=1, show_default=True)
+@click.option(
+    "--workers", type=workers_type, default=1, show_default=True, help="The number of processes."
+)
 @click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
 @click.option(
     "--task-ids", multiple=True, metavar="ID,…", help="Play these tasks; may be repeated."
@@ -125,12 +72,12 @@ def _with_vlm_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--backend", help="The engine: embedded or unity.  [default: the suite's]")
 @trust_option
 @click.option(
-    "--instances", help="Which object a name means: target, explore.  [default: the suite's]"
+    "--instances", help="Which object a type name means: target or explore.  [default: the suite's]"
 )
 @protocol_option
 @faults_option
 @scorer_option
-@_with_vlm_options
+@with_vlm_options
 def bench(
     suite: str | None,
     tasks_file: Path | None,
@@ -152,9 +99,9 @@ def bench(
 ) -> int:
     """Play a suite with an agent and print the result table.
 
-    The same command continues a run: it plays only the episodes that are missing. A task that
-    cannot be played is set aside and named; the others are played. The options from --agent-config
-    on are for vision-language agents, such as openai:MODEL.
+    The same command continues a run: it plays only the episodes that are missing. If a task cannot
+    be played, the command names it and plays the others. The options from --agent-config on are for
+    vision-language agents, such as openai:MODEL.
     """
     from agents import RL_PREFIX
     from benchmarks.cli.progress import Progress
@@ -315,7 +262,7 @@ def _load_suite(
         raise BadInput(f"give either --suite (one of: {', '.join(suite_names())}) or --tasks-file")
     if name is not None:
         if poses is not None:
-            raise BadInput("--poses goes with --tasks-file; a suite has its own")
+            raise BadInput("--poses needs --tasks-file; a suite has its own poses")
         suite = load_suite(name)
     else:
         assert tasks_file is not None
@@ -375,7 +322,7 @@ def _vlm_run(agent: str, vlm_options: VLMOptions) -> VLMRun | None:
     from benchmarks.cli.vlm_run import VLMRun
 
     if is_model_agent(agent):
-        return VLMRun.of(agent, **vars(vlm_options))
+        return VLMRun.of(agent, vlm_options)
     given = [name for name, value in vars(vlm_options).items() if value not in (None, ())]
     if given:
         option = "--set" if given[0] == "overrides" else f"--{given[0].replace('_', '-')}"

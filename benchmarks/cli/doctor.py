@@ -9,9 +9,9 @@ from benchmarks.cli.terminal import echo
 
 @click.command()
 def doctor() -> int:
-    """Say what works on this machine, and how to fix the rest.
+    """Check what works on this machine, and say how to fix the rest.
 
-    Exit code 1 if a part does not work that er-gym needs for everything.
+    The exit code is 1 if a part that er-gym always needs does not work.
     """
     from benchmarks.cli.doctor_checks import run_checks
 

@@ -80,7 +80,7 @@ def _frame(controller: Any) -> str:
     frame = controller.step("RotateRight", degrees=10).frame
     took = time.perf_counter() - start
     if frame.min() == frame.max():
-        raise RuntimeError("the picture is of one colour")
+        raise RuntimeError("the picture has only one colour")
     height, width = frame.shape[:2]
     return f"{width}×{height} in {1000 * took:.0f} ms, on the CPU"
 
@@ -124,7 +124,7 @@ def _programs() -> Iterator[Check]:
     for platform, call in calls.items():
         yield _program(call, Release(platform), missing[platform])
     if GpuMapping().is_ours:
-        yield Check("gpu_device=…", True, "any number will do")
+        yield Check("gpu_device=…", True, "any number works")
     elif GpuMapping().path.exists():
         yield Check("gpu_device=…", True, f"the numbers in {GpuMapping().path}")
     else:
@@ -145,7 +145,7 @@ def _program(call: str, release: Release, missing: list[str]) -> Check:
         fix = "" if not missing else _FIXES[release.platform]
         return Check(call, not missing, "starts Unity's build", fix)
     if not release.is_ours:
-        return Check(call, False, "no build is there", "er-gym player install")
+        return Check(call, False, "no build is installed", "er-gym player install")
     if missing:
         detail = f"the player is installed, but AI2-THOR's client needs more: {missing[0]}"
         here = "er-gym player install in this Python, or in a virtual environment"
@@ -178,7 +178,7 @@ def _unity() -> Check:
     works = (cloud.is_unity and vulkan) or (desktop.is_unity and display)
     fixes = []
     if cloud.is_ours or desktop.is_ours:
-        fixes.append("er-gym's player is in its place: er-gym player uninstall")
+        fixes.append("er-gym's player replaces it: er-gym player uninstall")
     if not (cloud.is_unity or desktop.is_unity):
         fixes.append("AI2-THOR's client downloads the build at first use, from the network")
     if not vulkan and not display:
@@ -233,7 +233,7 @@ def _packages() -> Iterator[Check]:
             detail = f"{others} has a package of this name too: the one installed last overwrites"
             yield Check(f"package {name}", False, detail, _APART)
         else:
-            yield Check(f"package {name}", True, "er-gym's, and of no other distribution")
+            yield Check(f"package {name}", True, "er-gym's, and no other distribution's")
 
 
 _HOME = Path(er_gym.__file__).parents[1]

@@ -23,7 +23,7 @@ CRASHED, STOPPED, INTERRUPTED = 1, 3, 130
 
 
 class BadInput(click.ClickException):
-    """Bad input of the user; the message says what was given, what is allowed and what to do."""
+    """Invalid input; the message says what was given, what is allowed and what to do."""
 
     exit_code = 2
 
@@ -40,8 +40,9 @@ def bad_input(*more: type[Exception]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def interrupted_by_sigterm() -> Iterator[None]:
-    """Take SIGTERM, with which schedulers end jobs, for Ctrl-C: what has been done is kept, and a
-    start that has done nothing leaves nothing."""
+    """Treat SIGTERM, with which schedulers end jobs, like Ctrl-C: finished work is kept, and a run
+    that has done nothing leaves no files.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return

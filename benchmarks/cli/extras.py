@@ -1,8 +1,8 @@
-"""What the extras of er-gym require, and what of it this Python lacks.
+"""The requirements of er-gym's extras, and those that this Python lacks.
 
-The package's own metadata is read, so there is no second list to keep. What the required packages
-require in turn is followed to the end: pip can leave a package there whose own requirements are
-no longer met.
+They are read from the package's own metadata, so there is no second list to maintain. Requirements
+of requirements are checked too: pip can leave a package installed whose own requirements are no
+longer met.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class ExtraState:
         name: the extra.
         packages: what is installed of the packages that er-gym names for it, with versions.
         missing: what is not installed.
-        wrong: what is installed in a version that somebody does not accept, in words.
+        wrong: sentences about packages whose version another package does not accept.
         unsupported: what this Python or machine cannot have, with the condition.
     """
 

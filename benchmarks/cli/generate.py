@@ -25,22 +25,26 @@ _DEFAULT_TOTAL = 100
 
 
 @click.command()
-@click.option("--suite", help="Make this suite, as its configuration says.")
+@click.option("--suite", help="Generate this suite as its configuration says.")
 @click.option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
     help="The task file, .jsonl or .jsonl.gz.  [default: where er-gym looks for the suite]",
 )
 @click.option(
-    "--total", type=click.IntRange(min=1), help=f"How many tasks.  [default: {_DEFAULT_TOTAL}]"
+    "--total", type=click.IntRange(min=1), help=f"The number of tasks.  [default: {_DEFAULT_TOTAL}]"
 )
 @click.option(
     "--scenes", metavar="NAMES", help="all, training, evaluation, or scenes separated by commas."
 )
 @click.option("--types", metavar="NAMES", help="Task types, separated by commas.  [default: all]")
-@click.option("--layouts", type=click.IntRange(0, 10_000), help="Rearrangements of each room.")
 @click.option(
-    "--per-layout", type=click.IntRange(min=1), help="Tasks of each type in each arrangement."
+    "--layouts", type=click.IntRange(0, 10_000), help="The number of rearrangements of each room."
+)
+@click.option(
+    "--per-layout",
+    type=click.IntRange(min=1),
+    help="The number of tasks of each type in each arrangement.",
 )
 @click.option("--hidden-depth", type=Span(), help="How many containers must be opened.")
 @click.option(
@@ -51,7 +55,8 @@ _DEFAULT_TOTAL = 100
 @click.option(
     "--paraphraser",
     metavar="MODULE:FUNCTION",
-    help="A function from a prompt to a language model's reply; adds to the templates' wordings.",
+    help="A function that takes a prompt and returns a language model's reply; it adds wordings "
+    "to the templates'.",
 )
 @force_option
 @workers_option
@@ -79,7 +84,7 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
         made, verified = _build(order, parts, workers, console)
         chosen = made.tasks
         if not chosen:
-            raise click.ClickException(f"no task could be made: {_drop_reasons(made)}")
+            raise click.ClickException(f"no task could be generated: {_drop_reasons(made)}")
         if paraphrase:
             chosen = tuple(_paraphrased(task, paraphrase) for task in chosen)
         _write(order, chosen, force)
@@ -99,13 +104,13 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
     echo(f"{len(chosen)} tasks of {verified} verified: {order.out}")
     echo(f"sha256 of the tasks {jsonl_format.digest(chosen)}; card: {order.card}")
     if len(chosen) < order.spec.total:
-        console.print(f"{order.spec.total} were asked for; more layouts or rooms give more")
+        console.print(f"{order.spec.total} were requested; more layouts or rooms give more")
     return 0
 
 
 @dataclass(frozen=True)
 class _Order:
-    """What is to be made.
+    """What to generate.
 
     Attributes:
         name, description: for the card.
@@ -129,7 +134,7 @@ class _Order:
 def _order(
     *, suite: str | None, out: Path | None, seed: int | None, paraphraser: str | None, **given: Any
 ) -> _Order:
-    """Work out what is to be made: as the suite says, overruled by the options that were given."""
+    """Work out what to generate: the suite's configuration, overridden by the given options."""
     from er_gym.tasks.files import validated
     from er_gym.tasks.splits import SCENES
     from er_gym.tasks.suite_spec import SuiteSpec
@@ -144,9 +149,13 @@ def _order(
             raise BadInput("give --out, or --suite to make one that er-gym knows")
         out = suite_file(suite)
         if out.parent != suite_home():
-            raise BadInput(f"the suite {suite!r} comes with er-gym; give --out to make it anew")
+            raise BadInput(
+                f"the suite {suite!r} comes with er-gym; give --out to generate it again"
+            )
     if not out.name.endswith((".jsonl", ".jsonl.gz")):
-        raise BadInput(f"--out {out}: a task file that is made ends in .jsonl or .jsonl.gz")
+        raise BadInput(
+            f"--out {out}: the name of a generated task file must end in .jsonl or .jsonl.gz"
+        )
     stem = out.name.removesuffix(".gz").removesuffix(".jsonl")
     parts = ["er-gym", "tasks", "generate", *(["--suite", suite] if suite else ["--out", out.name])]
     for name, value in told.items():
@@ -236,8 +245,7 @@ def _paraphraser(spec: str, order: _Order) -> Any:
             raise RuntimeError(f"{spec} raised {type(error).__name__}: {error}") from error
         if not isinstance(reply, str):
             raise RuntimeError(
-                f"{spec} returned {type(reply).__name__}, not a text; let it return its reply, "
-                "as str"
+                f"{spec} returned {type(reply).__name__}; it must return the reply as str"
             )
         return reply
 

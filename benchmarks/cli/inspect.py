@@ -15,14 +15,16 @@ if TYPE_CHECKING:
 
 
 @click.command(name="inspect")
-@click.option("--suite", default="mini", show_default=True, help="`er-gym suites` lists them.")
+@click.option(
+    "--suite", default="mini", show_default=True, help="The suite; `er-gym suites` lists them."
+)
 @click.option(
     "--model",
     required=True,
     type=Words(),
-    help="As Inspect names it: openai/gpt-4o, vllm/…, mockllm/model.",
+    help="The model, as Inspect names it: openai/gpt-4o, vllm/…, mockllm/model.",
 )
-@click.option("--model-base-url", metavar="URL", help="Where the model's server is.")
+@click.option("--model-base-url", metavar="URL", help="The address of the model's server.")
 @agent_config_option
 @overrides_option("sees=text")
 @click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
@@ -32,9 +34,13 @@ if TYPE_CHECKING:
     type=click.IntRange(1, 256),
     default=4,
     show_default=True,
-    help="How many conversations at once, each with an engine in a process of its own.",
+    help="The number of simultaneous conversations. Each has an engine in its own process.",
 )
-@click.option("--log-dir", metavar="DIRECTORY", help="[default: Inspect's, ./logs]")
+@click.option(
+    "--log-dir",
+    metavar="DIRECTORY",
+    help="Where Inspect writes its logs.  [default: Inspect's, ./logs]",
+)
 def inspect(
     suite: str,
     model: str,

@@ -50,7 +50,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         print_problem(error.format_message())
         sys.exit(error.exit_code)
     except ValueError as error:
-        # Not imported here: where a package that adds to er-gym is broken, er_gym cannot be.
+        # Not imported at the top: a broken plugin package would make er_gym fail to import.
         plugins = sys.modules.get("er_gym.plugins")
         if plugins is None or not isinstance(error, plugins.PluginError):
             raise
@@ -63,7 +63,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         print_problem(str(error))
         sys.exit(1)
     except MemoryError as error:
-        print_problem(f"the memory does not suffice: {error}".rstrip(": "))
+        print_problem(f"there is not enough memory: {error}".rstrip(": "))
         sys.exit(1)
     sys.exit(code if isinstance(code, int) else 0)
 

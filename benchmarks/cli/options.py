@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from pathlib import Path
 from typing import Any
 
 import click
@@ -17,19 +18,19 @@ scorer_option = click.option(
     type=click.Choice(SCORER_CHOICES),
     default="both",
     show_default=True,
-    help="Which scorer the table shows; both: each where they differ.",
+    help="The table's scorer; both shows each where they differ.",
 )
 
 PROTOCOL_CHOICES = ("default", "paper")
-"""As in ``er_gym.envs.protocol``, likewise."""
+"""As in ``er_gym.envs.protocol``, for the same reason."""
 
 protocol_option = click.option(
     "--protocol",
     type=click.Choice(PROTOCOL_CHOICES),
     default=PROTOCOL_CHOICES[0],
     show_default=True,
-    help="The rules of an episode; paper: those of the paper's own evaluation program, for figures "
-    "that stand beside its table.",
+    help="The rules of an episode; paper uses those of the paper's evaluation program, to compare "
+    "results with its table.",
 )
 
 
@@ -57,12 +58,16 @@ faults_option = click.option(
 )
 
 _MOST_WORKERS = 256
-"""Each takes a hundred megabytes and more."""
+"""Each worker takes 100 MB or more."""
 MOST_SEED = 2**32 - 1
-"""NumPy's and PyTorch's generators take no larger one."""
+"""The largest seed that NumPy's and PyTorch's generators accept."""
 
 seed_option = click.option(
-    "--seed", type=click.IntRange(0, MOST_SEED), default=0, show_default=True
+    "--seed",
+    type=click.IntRange(0, MOST_SEED),
+    default=0,
+    show_default=True,
+    help="The seed of all random choices.",
 )
 
 workers_type = click.IntRange(1, _MOST_WORKERS)
@@ -71,32 +76,34 @@ workers_option = click.option(
     "--workers",
     type=workers_type,
     default=os.cpu_count() or 1,
-    help="How many processes.  [default: one for each processor]",
+    help="The number of processes.  [default: one for each processor]",
 )
 
 force_option = click.option(
-    "--force", is_flag=True, help="Replace also files that er-gym did not write."
+    "--force", is_flag=True, help="Also replace files that er-gym did not write."
 )
 
 agent_config_option = click.option(
-    "--agent-config", metavar="FILE", help="An agent's settings, in YAML, or their name."
+    "--agent-config",
+    metavar="FILE",
+    help="The agent's settings: a YAML file, or the name of one that comes with er-gym.",
 )
 
 trust_option = click.option(
     "--trust",
     is_flag=True,
-    help="Read a policy from a file of Stable-Baselines3 too, which runs whatever code is in it.",
+    help="Also load policies from files of Stable-Baselines3. Loading runs any code in the file.",
 )
 
 
 def overrides_option(example: str) -> Any:
-    """``--set NAME=VALUE``, which overrules settings of a file."""
+    """``--set NAME=VALUE``, which overrides settings of a file."""
     return click.option(
         "--set",
         "overrides",
         multiple=True,
         metavar="NAME=VALUE",
-        help=f"Overrule a setting, such as {example}; again and again.",
+        help=f"Override a setting, such as {example}; may be repeated.",
     )
 
 
@@ -127,13 +134,16 @@ class Words(click.ParamType):
         return str(value)
 
 
+EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
 class Finite(click.FloatRange):
-    """A number in a range, or any, but neither NaN nor infinite."""
+    """A finite number, optionally in a range."""
 
     def convert(self, value: Any, param: Any, ctx: Any) -> float:
         number = super().convert(value, param, ctx)
         if not math.isfinite(number):
-            self.fail(f"{value!r} is no finite number", param, ctx)
+            self.fail(f"{value!r} is not a finite number", param, ctx)
         return float(number)
 
 
@@ -148,4 +158,4 @@ class Span(click.ParamType):
             start = float(low)
             return start, (float(high) if high else None) if dash else start
         except ValueError:
-            self.fail(f"{value!r} is no range; give a number, A-B, or A- for no end", param, ctx)
+            self.fail(f"{value!r} is not a range; give a number, A-B, or A- for no end", param, ctx)

@@ -1,8 +1,8 @@
-"""Runs a command, and ends it with all that it started once standard input ends.
+"""Runs a command, and ends it and all its child processes once standard input ends.
 
-``python guard.py COMMAND…``: whoever starts this holds the other end of a pipe as its input.
-However the holder ends, SIGKILL included, the kernel closes that end, so that nothing stays behind.
-Run by its path, it needs nothing but the standard library.
+``python guard.py COMMAND…``: the starting process holds the other end of a pipe as the guard's
+input. However that process ends, SIGKILL included, the kernel closes its end of the pipe, so no
+process is left behind. The guard is run by its path and needs only the standard library.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import threading
 import time
 
 GRACE = 15.0
-"""Seconds that the command has for ending by itself."""
+"""Seconds that the command has to end by itself."""
 
 
 def main(argv: list[str]) -> int:
-    """Run the command until it ends or is to end.
+    """Run the command until it ends or standard input ends.
 
     Returns:
         Its exit code; 128 and the signal's number if a signal ended it; 127 if it cannot be run.

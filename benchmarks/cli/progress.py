@@ -1,9 +1,8 @@
-"""What a run shows of itself while it plays: a live bar on a terminal, a few lines elsewhere."""
+"""Shows a run's progress: a live bar on a terminal, a few lines elsewhere."""
 
 from __future__ import annotations
 
 import time
-from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
@@ -12,11 +11,11 @@ from rich.progress import Progress as Bar
 from er_gym.rollout.events import Cost, EpisodeEnded, Event
 
 _LINES = 10
-"""How many lines a whole run prints where there is no terminal."""
+"""The number of lines that a whole run prints without a terminal."""
 
 
 def bar(console: Console) -> Bar:
-    """A bar that says how many are done and, in the field ``status``, how it goes."""
+    """A progress bar: the number of finished items and, in the field ``status``, the results."""
     return Bar(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -29,7 +28,7 @@ def bar(console: Console) -> Bar:
 
 
 class Progress:
-    """A context manager that listens to a run's events, or is told of each :meth:`episode`.
+    """A context manager that follows a run by its events, or by calls of :meth:`episode`.
 
     Args:
         console: where to, a :func:`~benchmarks.cli.terminal.terminal`.
@@ -62,16 +61,11 @@ class Progress:
         self._bar.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        where: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._bar.stop()
 
     def __call__(self, event: Event) -> None:
-        """Hear of an event of the run."""
+        """Take an event of the run."""
         if isinstance(event, Cost):
             self._cost = str(event)
         elif isinstance(event, EpisodeEnded):

@@ -1,4 +1,4 @@
-"""``er-gym render`` and ``er-gym play``: look at a room, and play a task in it oneself."""
+"""``er-gym render`` and ``er-gym play``: look at a room, and play a task yourself."""
 
 from __future__ import annotations
 
@@ -19,23 +19,39 @@ if TYPE_CHECKING:
 WHAT = ("rgb", "depth", "ids", "map")
 _ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 _ENDINGS_OF_DEPTH = (".png", ".tif", ".tiff")
-"""Those that hold 16 bits."""
+"""The formats that hold 16 bits."""
 _DEPTH_UNIT = 1000.0
-"""Depth pictures are 16 bit, so many steps a metre."""
+"""Steps per metre in a depth picture, which has 16 bits."""
 _TOP_VIEW_FOV = 60.0
-"""Vertical field of view of the camera that looks down on the whole room, degrees."""
+"""Vertical field of view of the camera of ``map``, which looks down on the whole room; degrees."""
 
 
 @click.command()
-@click.option("--scene", required=True, help="Such as FloorPlan1.")
-@click.option("--pose", metavar="X,Z,ROTATION[,HORIZON]", help="Metres and degrees.")
-@click.option("--what", type=click.Choice(WHAT), default="rgb", show_default=True)
-@click.option("--width", type=click.IntRange(64, 1920), default=800, show_default=True)
-@click.option("--height", type=click.IntRange(64, 1280), default=450, show_default=True)
-@click.option("--fov", type=Finite(30, 150), default=90, show_default=True)
-@click.option("--annotate", is_flag=True, help="Write the types of things into the picture.")
+@click.option("--scene", required=True, help="The scene, such as FloorPlan1.")
 @click.option(
-    "--out", default=Path("room.png"), show_default=True,
+    "--pose",
+    metavar="X,Z,ROTATION[,HORIZON]",
+    help="The agent's pose, metres and degrees.  [default: the start of the scene]",
+)
+@click.option(
+    "--what", type=click.Choice(WHAT), default="rgb", show_default=True, help="The kind of picture."
+)
+@click.option(
+    "--width", type=click.IntRange(64, 1920), default=800, show_default=True, help="Pixels."
+)
+@click.option(
+    "--height", type=click.IntRange(64, 1280), default=450, show_default=True, help="Pixels."
+)
+@click.option(
+    "--fov",
+    type=Finite(30, 150),
+    default=90,
+    show_default=True,
+    help="The vertical field of view, degrees.",
+)
+@click.option("--annotate", is_flag=True, help="Label objects with their types.")
+@click.option(
+    "--out", default=Path("room.png"), show_default=True, help="The picture's file.",
     type=click.Path(dir_okay=False, path_type=Path),
 )  # fmt: skip
 @force_option
@@ -45,8 +61,8 @@ def render(
 ) -> None:  # fmt: skip
     """Write a picture of a room.
 
-    rgb: what the agent sees; depth: the same in 16 bit, millimetres; ids: a colour for each object;
-    map: the whole room from above.
+    rgb shows what the agent sees. depth shows the same view in millimetres, with 16 bits a pixel.
+    ids gives each object a colour of its own. map shows the whole room from above.
     """
     from PIL import Image
 
@@ -57,7 +73,7 @@ def render(
         raise BadInput(str(UnknownSceneError(scene)))
     endings = _ENDINGS_OF_DEPTH if what == "depth" else _ENDINGS
     if out.suffix.lower() not in endings:
-        raise BadInput(f"--out {out}: such a picture's name ends in one of: {', '.join(endings)}")
+        raise BadInput(f"--out {out}: the file name must end in one of: {', '.join(endings)}")
     with bad_input():
         check_output(out, force=force)
     stand = None if pose is None else _pose(pose)
@@ -97,7 +113,7 @@ def render(
 
 
 def _pose(text: str) -> tuple[float, float, float, float]:
-    """X, z, rotation and horizon of a pose given in words; metres and degrees."""
+    """Parse a pose from text: x, z, rotation and horizon; metres and degrees."""
     found: tuple[float, ...]
     try:
         found = tuple(float(number) for number in text.split(","))
@@ -105,7 +121,7 @@ def _pose(text: str) -> tuple[float, float, float, float]:
         found = ()
     if len(found) not in (3, 4) or not all(map(math.isfinite, found)):
         raise BadInput(
-            f"{text!r:.80} is no pose; say X,Z,ROTATION or X,Z,ROTATION,HORIZON, such as "
+            f"{text!r:.80} is not a pose; give X,Z,ROTATION or X,Z,ROTATION,HORIZON, such as "
             "1.0,-0.5,90"
         )
     x, z, rotation, tilt = (*found, 0.0)[:4]
@@ -125,7 +141,7 @@ def _teleport(controller: Any, pose: tuple[float, float, float, float]) -> None:
 
 
 def _top_view(controller: Any) -> Any:
-    """An event with a picture of the whole room from above, which has no ceiling from there."""
+    """An event with a picture of the whole room from above; the ceiling is not drawn from there."""
     from math import radians, tan
 
     bounds = controller.last_event.metadata["sceneBounds"]
@@ -141,21 +157,28 @@ def _top_view(controller: Any) -> Any:
 
 
 @click.command()
-@click.option("--suite", default="mini", show_default=True, help="Where the task is from.")
-@click.option("--task", "task_id", help="Its id.  [default: one by chance]")
-@click.option("--scene", help="A task by chance in this scene.")
+@click.option("--suite", default="mini", show_default=True, help="The suite of the task.")
+@click.option("--task", "task_id", help="The id of the task.  [default: a random task]")
+@click.option("--scene", help="Choose among the tasks in this scene.")
 @seed_option
 @click.option(
     "--frames", default=Path("frames"), show_default=True,
-    type=Place(file_okay=False, path_type=Path), help="Where each step's picture goes.",
+    type=Place(file_okay=False, path_type=Path), help="The folder for each step's picture.",
 )  # fmt: skip
 @force_option
-@click.option("--window/--no-window", default=None, help="Show it in a window.  [default: if any]")
+@click.option(
+    "--window/--no-window",
+    default=None,
+    help="Show the pictures in a window.  [default: if possible]",
+)
 def play(
     suite: str, task_id: str | None, scene: str | None, seed: int, frames: Path,
     force: bool, window: bool | None,
 ) -> None:  # fmt: skip
-    """Play a task oneself, in words; each step's picture is written, and shown if it can be."""
+    """Play a task yourself by typing actions.
+
+    Each step's picture is written to a file, and shown in a window if possible.
+    """
     from er_gym.envs.embodied_env import EmbodiedEnv
     from er_gym.tasks.suites import load_suite
     from er_gym.writing import check_output, make_folder
@@ -209,7 +232,7 @@ def _write_frame(frame: NDArray[np.uint8], file: Path, show: Any, force: bool) -
 
 
 def _window(wanted: bool | None) -> Any:
-    """What shows a picture in a window, None where there is none or none is wanted."""
+    """A function that shows a picture in a window; None if a window is impossible or not wanted."""
     if wanted is False:
         return None
     try:
@@ -222,7 +245,7 @@ def _window(wanted: bool | None) -> Any:
         Exception
     ) as error:  # no Tk, no display: tkinter.TclError is no class where it is missing
         if wanted:
-            raise BadInput(f"there is no window here: {error}") from None
+            raise BadInput(f"no window can be opened here: {error}") from None
         return None
     root.title("er-gym")
     label = tkinter.Label(root)

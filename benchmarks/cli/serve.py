@@ -29,24 +29,34 @@ _TERMINATED = 143
 @click.command(epilog="Arguments after -- go to the server unchanged.")
 @click.argument("model")
 @click.argument("more", nargs=-1, metavar="[-- ARGUMENTS...]", type=click.UNPROCESSED)
-@click.option("--engine", type=click.Choice(ENGINE_CHOICES), help="[default: the one that fits]")
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="0: a free one."
+    "--engine",
+    type=click.Choice(ENGINE_CHOICES),
+    help="The server program.  [default: chosen by model and machine]",
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=8000,
+    show_default=True,
+    help="The port; 0 for a free one.",
 )
 @click.option("--name", default="", help="The model's name in requests.")
 @click.option(
     "--context",
     type=click.IntRange(min=1),
-    help="Tokens of a conversation; not for transformers.",
+    help="The most tokens in a conversation; not for transformers.",
 )
 @click.option(
     "--pictures",
     type=click.IntRange(min=0),
     default=40,
     show_default=True,
-    help="Pictures of a conversation at most; vllm only.",
+    help="The most pictures in a conversation; vllm only.",
 )
-@click.option("--gpus", type=click.IntRange(min=0), help="How many GPUs to use.  [default: all]")
+@click.option(
+    "--gpus", type=click.IntRange(min=0), help="The number of GPUs to use.  [default: all]"
+)
 @click.option(
     "--python",
     default=sys.executable,
@@ -78,9 +88,9 @@ def serve(
 ) -> int:
     """Start a server for a model, for `er-gym bench --agent openai:MODEL` to play with.
 
-    MODEL is a directory, a .gguf file or a name on a model hub. vLLM serves it where that is
-    installed and there is a GPU, otherwise transformers; llama.cpp serves .gguf files. The server
-    listens on 127.0.0.1 only, and ends when this command does.
+    MODEL is a directory, a .gguf file or a name on a model hub. llama.cpp serves .gguf files. vLLM
+    serves other models if it is installed and there is a GPU; otherwise transformers does. The
+    server listens on 127.0.0.1 only, and ends when this command does.
     """
     from agents.vlm.serving import ServeOptions, command_for, inspect_machine
 
@@ -108,7 +118,7 @@ def serve(
     type=click.IntRange(0, 65535),
     default=8001,
     show_default=True,
-    help="0: a free one.",
+    help="The port; 0 for a free one.",
 )
 @agent_config_option
 @overrides_option("matching.fuzzy=90")
@@ -198,9 +208,9 @@ def _must_be_there(model: str) -> None:
     """Refuse a model that can only be a path and does not exist."""
     path = Path(model)
     if model.lower().endswith(".gguf") and not path.is_file():
-        raise BadInput(f"{model} is no file; give the path of one, or another kind of model")
+        raise BadInput(f"{model} is not a file; give the path of one, or another kind of model")
     if model.startswith(("/", "./", "../", "~")) and not path.exists():
-        raise BadInput(f"{model} is not there; give a model's directory, or its name on a hub")
+        raise BadInput(f"{model} does not exist; give a model's directory, or its name on a hub")
 
 
 def _usable_port(port: int) -> int:

@@ -1,4 +1,4 @@
-"""A server in a process of its own: started, waited for, and never left behind."""
+"""Starts a server in its own process, waits until it is ready, and always ends it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import time
 import urllib.request
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from types import TracebackType
 
 from benchmarks.cli import process_guard as guard
 
@@ -23,19 +22,19 @@ _BETWEEN = 0.25  # seconds between two looks whether it is ready
 _ONE_LOOK = 5.0  # seconds that an answer may take
 _REST = 2.0  # seconds in which what was written by an ended server is read
 
-# A proxy for the internet knows nothing of this machine's own addresses.
+# A proxy for the internet cannot reach this machine's own addresses.
 _DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 
 class ServerError(Exception):
-    """The server is not there: it ended, or did not get ready in time."""
+    """The server ended, or was not ready in time."""
 
 
 class ServerProcess:
     """A context manager that runs a server; it has ended when the context has.
 
-    It runs under :mod:`benchmarks.cli.process_guard`: if this process is killed, it ends too, with
-    all that it has started.
+    It runs under :mod:`benchmarks.cli.process_guard`: if this process is killed, the server ends
+    too, with all its child processes.
 
     Args:
         argv: the command.
@@ -68,17 +67,12 @@ class ServerProcess:
     def __enter__(self) -> ServerProcess:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        where: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.stop()
 
     @property
     def last_lines(self) -> list[str]:
-        """What it wrote last, empty lines left out."""
+        """The last lines that it wrote, without empty ones."""
         return list(self._lines)
 
     def wait_until_ready(
@@ -136,7 +130,7 @@ class ServerProcess:
         for line in self._process.stdout:
             if line.strip():
                 self._lines.append(line.rstrip())
-                with contextlib.suppress(OSError):  # nobody listens; the server is not to wait
+                with contextlib.suppress(OSError):  # nobody listens; the server must not wait
                     self._on_line(line.rstrip())
 
 

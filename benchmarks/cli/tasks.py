@@ -1,4 +1,4 @@
-"""``er-gym tasks``: make tasks, check them, read them, count them."""
+"""``er-gym tasks``: generate, verify, show, count and convert tasks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @click.group()
 def tasks() -> None:
-    """Make tasks, check that they can be done, read them, count them."""
+    """Generate, verify, show, count and convert tasks."""
 
 
 tasks.add_command(generate)
@@ -29,11 +29,11 @@ tasks.add_command(generate)
 @click.argument("suites", nargs=-1, required=True, metavar="SUITE|FILE...")
 @workers_option
 def verify(suites: tuple[str, ...], workers: int) -> int:
-    """Play every task with the solver, and say which cannot be done.
+    """Play every task with the solver, and list those that cannot be done.
 
-    Exit code 1 if there is one, or one that is set aside since it does not fit its scene. The
-    solver knows the key actions; it must succeed from the task's own start, within the step limit,
-    and earn the whole reward.
+    The exit code is 1 if there is such a task, or one that is set aside because it does not fit its
+    scene. The solver knows the key actions; it must succeed from the task's own start, within the
+    step limit, and earn the whole reward.
     """
     from contextlib import closing
 
@@ -82,11 +82,13 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
     type=click.IntRange(min=1),
     default=3,
     show_default=True,
-    help=("Without ids: how many of each type."),
+    help=("Without ids: the number of tasks of each type."),
 )
-@click.option("--types", metavar="NAMES", help="Without ids: of these types, with commas.")
+@click.option(
+    "--types", metavar="NAMES", help="Without ids: only these types, separated by commas."
+)
 def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> None:
-    """Print tasks as a person would want to read them."""
+    """Print tasks in readable form."""
     from dataclasses import fields
 
     from er_gym.tasks.describe import describe
@@ -119,7 +121,7 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
     names = [field.name for field in fields(Difficulty)]
     pages = []
     for task in fitted.tasks:
-        told = task.extra.get("difficulty")  # whoever wrote the file may mean something else by it
+        told = task.extra.get("difficulty")  # the file's author may mean something else by it
         figures = None
         if isinstance(told, Mapping) and all(
             type(told.get(name)) in (int, float) for name in names
@@ -157,11 +159,14 @@ def stats(suite: str, out: Path | None, force: bool) -> None:
 @click.argument("out", metavar="FILE|FOLDER", type=Place(path_type=Path))
 @force_option
 def convert(suite: str, out: Path, force: bool) -> None:
-    """Write tasks in another format, without loss; one that cannot be read is left out and named.
+    """Convert tasks to another format without loss.
 
-    FILE.json is the paper's test file, FILE.jsonl or FILE.jsonl.gz our own; a folder holds the
-    paper's generator files, one for each scene and type, and is read and written as a whole. The
-    paper's files do not say who wrote them: another one is replaced with --force only.
+    If a task cannot be read, the command names it and converts the others.
+
+    FILE.json is the paper's test file. FILE.jsonl and FILE.jsonl.gz are er-gym's own format. A
+    folder holds the paper's generator files, one for each scene and type, and is read and written
+    as a whole. The paper's files do not say who wrote them, so an existing one is replaced only
+    with --force.
     """
     from er_gym.tasks import jsonl_format, paper_format
     from er_gym.tasks.errors import summarise_set_aside

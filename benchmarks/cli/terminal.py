@@ -1,6 +1,6 @@
-"""What the command prints: text as it is, never what a terminal or Rich would do at its bidding.
+"""Prints text literally: no control codes for the terminal, no markup for Rich.
 
-Names, paths, instructions, replies of servers and errors are anybody's words. All that the command
+Names, paths, instructions, replies of servers and errors can hold either. All that the command
 prints goes through :func:`echo` or a :class:`Terminal`.
 """
 
@@ -24,7 +24,7 @@ _UNSEEN = re.compile(
 
 
 def plain(text: str) -> str:
-    r"""Text that a terminal shows as it is: ``\x1b`` for the character that begins its commands."""
+    r"""Text without terminal control codes: ``\x1b`` in place of the escape character."""
     return _UNSEEN.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
@@ -34,14 +34,14 @@ def echo(message: object = "", *, nl: bool = True, err: bool = False) -> None:
 
 
 def use_any_encoding() -> None:
-    """Have what an output's encoding lacks printed as escapes, where it would be an error."""
+    """Print characters that an output's encoding lacks as escapes, instead of raising an error."""
     for stream in (sys.stdout, sys.stderr):
         if reconfigure := getattr(stream, "reconfigure", None):
             reconfigure(errors="backslashreplace")
 
 
 def terminal(*, stderr: bool = False, width: int | None = None) -> Console:
-    """A console of Rich's that shows texts as they are: no markup, no emoji, no escapes in them."""
+    """A console of Rich that prints text literally: without markup, emoji or escape codes."""
     from rich.console import Console, ConsoleOptions
     from rich.segment import Segment
 

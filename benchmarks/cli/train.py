@@ -17,7 +17,7 @@ from benchmarks.cli.terminal import echo
     "--config",
     required=True,
     metavar="FILE",
-    help="A training run in YAML, or the name of one that comes with er-gym.",
+    help="The training run: a YAML file, or the name of one that comes with er-gym.",
 )
 @overrides_option("total_steps=20000 or env.types=[single_search]")
 @click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the configuration's]")
@@ -33,7 +33,7 @@ def train_rl(
     """Train a policy by reinforcement learning; needs the extra rl.
 
     The same command again continues from the last checkpoint. `er-gym bench --agent rl:RUN` plays a
-    suite with what has been learnt.
+    suite with the trained policy.
     """
     from agents.rl.config import config_file, load_config
 

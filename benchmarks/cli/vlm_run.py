@@ -1,4 +1,4 @@
-"""Runs of vision-language agents: what the command line says of them, and how they are played."""
+"""Runs of vision-language agents: their command-line options, and how they are played."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from agents.vlm.clients.budget import Budget
 from agents.vlm.factory import AgentFactory, comparable_settings, load_settings
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import AgentSettings
+from benchmarks.cli.vlm_options import VLMOptions
 from er_gym.rollout.events import EventListener
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.run_directory import RunDirectory
@@ -38,32 +39,23 @@ class VLMRun:
     concurrency: int
 
     @staticmethod
-    def of(
-        name: str,
-        *,
-        agent_config: str | None = None,
-        overrides: Sequence[str] = (),
-        base_url: str | None = None,
-        prompts_from: Path | None = None,
-        concurrency: int | None = None,
-        max_usd: float | None = None,
-        max_tokens: int | None = None,
-        max_minutes: float | None = None,
-    ) -> VLMRun:
+    def of(name: str, options: VLMOptions) -> VLMRun:
         """From the options of the command line.
 
         Raises:
             ValueError: a setting does not fit.
         """
-        given = {"server.base_url": base_url, "prompts.dataset": prompts_from}
+        given = {"server.base_url": options.base_url, "prompts.dataset": options.prompts_from}
         more = (f"{name}={json.dumps(str(value))}" for name, value in given.items() if value)
-        settings = load_settings(agent_config, (*overrides, *more))
-        budget = Budget(max_usd=max_usd, max_tokens=max_tokens, max_minutes=max_minutes)
-        return VLMRun(name, settings, budget, concurrency or _CONCURRENCY)
+        settings = load_settings(options.agent_config, (*options.overrides, *more))
+        budget = Budget(
+            max_usd=options.max_usd, max_tokens=options.max_tokens, max_minutes=options.max_minutes
+        )
+        return VLMRun(name, settings, budget, options.concurrency or _CONCURRENCY)
 
     @property
     def comparable_settings(self) -> dict[str, Any]:
-        """What decides what it says."""
+        """The settings that decide its replies."""
         return comparable_settings(self.settings, load_prompts(self.settings.prompts).digest)
 
     @property
@@ -88,7 +80,7 @@ class VLMRun:
     ) -> RunSummary:
         """Play the tasks that the run directory has no finished episode of.
 
-        ``say`` is called with what a user should hear of the server, from any thread; without it,
+        ``say`` is called, from any thread, with messages about the server for the user; without it,
         a logger warns.
         """
         if say is not None:

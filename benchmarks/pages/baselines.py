@@ -55,9 +55,7 @@ _SCRIPTED = ("random", "searcher", "oracle")
 class TrainedRun:
     """A run directory.
 
-    Attributes:
-        path: of it.
-        config: what it was trained with.
+    Attributes: path: the directory. config: the configuration of the training.
     """
 
     path: Path
@@ -68,7 +66,7 @@ class TrainedRun:
         """Read it.
 
         Raises:
-            ValueError: it is none, or its training is not at its end.
+            ValueError: it is not a run directory, or its training is not complete.
         """
         if not any((path / name).exists() for name in (MODEL, SB3_MODEL)):
             raise ValueError(f"{path} has no {MODEL}; give run directories of er-gym train-rl")
@@ -82,22 +80,22 @@ class TrainedRun:
 
     @property
     def name(self) -> str:
-        """That of the configuration: the directory's without the seed."""
+        """The configuration's name: the directory's name without the seed."""
         return re.sub(r"-\d+$", "", self.path.name)
 
     @cached_property
     def curve(self) -> list[dict[str, float]]:
-        """What was logged."""
+        """The learning curve."""
         return read_curve(self.path)
 
     @property
     def steps(self) -> int:
-        """How many it has made."""
+        """The number of steps."""
         return int(self.curve[-1]["steps"]) if self.curve else 0
 
     @property
     def minutes(self) -> float:
-        """How long that took."""
+        """The duration of the training."""
         return self.curve[-1]["seconds"] / 60
 
 
@@ -151,7 +149,7 @@ class Evaluator:
 
 
 def _picture_size(agent: str) -> dict[str, int]:
-    """A policy that sees is shown pictures of the size that it was trained with."""
+    """A policy that sees pictures gets them in the size that it was trained with."""
     if not agent.startswith("rl:"):
         return {}
     options = load_config(Path(agent.removeprefix("rl:")) / "config.yaml").env
@@ -160,7 +158,7 @@ def _picture_size(agent: str) -> dict[str, int]:
 
 
 def sample_of_types(tasks: Iterable[Task], types: Sequence[str], each: int) -> list[Task]:
-    """So many tasks of each type, drawn the same way every time; all types where none is named."""
+    """A number of tasks of each type, the same every time; all types if none is named."""
     by_type = defaultdict(list)
     for task in tasks:
         if not types or task.type.name in types:
@@ -183,7 +181,7 @@ def rates(scores: Sequence[Score]) -> dict[str, tuple[int, int]]:
 
 
 def _percent(runs: Sequence[Mapping[str, tuple[int, int]]], part: str) -> str:
-    """The mean over seeds and their span; of one seed, with Wilson's interval."""
+    """The mean over seeds and their range; for one seed, Wilson's interval."""
     pairs = [each[part] for each in runs if part in each]
     if not pairs:
         return ""
@@ -195,7 +193,7 @@ def _percent(runs: Sequence[Mapping[str, tuple[int, int]]], part: str) -> str:
 
 
 def machine() -> str:
-    """The processor and how many there are."""
+    """The processor's name and the number of cores."""
     text = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
     names = re.findall(r"^model name\s*: (.*)$", text, re.MULTILINE) or [platform.processor()]
     return f"{len(names)} cores of an {names[0]}"

@@ -45,9 +45,9 @@ _ROOM = (640, 400)
 _ROOMS = {"kitchens": (1, 27), "living_rooms": (212, 227), "bedrooms": (301, 315),
           "bathrooms": (403, 413)}  # fmt: skip
 _IN_FRONT = {"kitchens": 0, "living_rooms": 2, "bedrooms": 0, "bathrooms": 0}
-"""Which of a kind's views is in the README's picture."""
+"""The view of each kind of room that is in the README's picture."""
 _CUT = {"Sliced": "SliceObject", "Cracked": "BreakObject"}
-"""Ends of types that come to be by an action, and the action."""
+"""Endings of types that an action creates, and the action."""
 
 
 def looks(kind: str, count: int = 1) -> list[Appearance]:
@@ -64,7 +64,7 @@ def looks(kind: str, count: int = 1) -> list[Appearance]:
 
 
 def _world_with(kind: str, scene_name: str) -> World | None:
-    """A scene that has a type, after what it takes to get it; None where that cannot be."""
+    """A scene with an object of a type, made by an action if needed; None if impossible."""
     scene = load_scene(scene_name)
     if kind in scene.types:
         return World.load(scene, Settings())
@@ -79,7 +79,7 @@ def _world_with(kind: str, scene_name: str) -> World | None:
 
 
 def states(look: Appearance) -> Iterator[tuple[str, Appearance]]:
-    """The look in each of the states that change its triangles."""
+    """A picture of each state that changes the object's triangles."""
     plain = replace(look, openness=0.0, on=False, filled="", dirty=False, cooked=False)
     yield "", plain
     drawn = build(plain)
@@ -141,7 +141,7 @@ def sheet(pictures: Sequence[tuple[str, NDArray[np.uint8]]], columns: int) -> Im
 
 
 def room_views(scene_name: str) -> list[NDArray[np.uint8]]:
-    """Two views of a room: those from which most different things are seen."""
+    """The two views of a room that show the most different objects."""
     world = World.load(load_scene(scene_name), Settings())
     y = world.agent.position[1]
     found: list[tuple[int, int, float, Camera]] = []
@@ -200,8 +200,10 @@ def make_gallery() -> None:
 
 
 @click.command()
-@click.option("--kinds", default="", help="Object types, with commas, for one contact sheet.")
-@click.option("--states", "with_states", is_flag=True, help="Each state that can be seen.")
+@click.option(
+    "--kinds", default="", help="Object types, separated by commas, for one contact sheet."
+)
+@click.option("--states", "with_states", is_flag=True, help="Show each visible state.")
 @click.option("--count", default=2, show_default=True, help="Objects of each type.")
 @click.option("--columns", default=8, show_default=True)
 @click.option("--yaw", default=30.0, show_default=True, help="Degrees from the front.")

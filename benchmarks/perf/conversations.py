@@ -1,10 +1,10 @@
-"""How many decisions a second agents make that ask a server, with pictures.
+"""Measures the decisions per second of agents that send pictures to a server.
 
     python -m benchmarks.perf.conversations [--concurrency 8 --workers 2 --latency 0.1]
 
 The server runs in a process of its own on the same machine: it replies after the given time with
-the tasks' key actions. Nothing but this machine's cores and that time is in the
-figure, whose upper bound is concurrency / latency.
+the tasks' key actions. So the figure depends only on this machine's cores and on that time; its
+upper bound is concurrency / latency.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from typing import Any
 
 import click
 
+from benchmarks.cli.vlm_options import VLMOptions
 from benchmarks.cli.vlm_run import VLMRun
 from er_gym import __version__
 from er_gym.rollout.events import EpisodeEnded, Event
@@ -30,7 +31,7 @@ from er_gym.tasks import Task, load_suite
 
 
 class KeyActionReplies:
-    """Says the next key action of the task that a conversation is about."""
+    """Replies with the next key action of a conversation's task."""
 
     def __init__(self, tasks: list[Task]) -> None:
         self._actions = {
@@ -62,7 +63,7 @@ class Server(ThreadingHTTPServer):
 
     @property
     def url(self) -> str:
-        """What goes into ``--base-url``."""
+        """The address for ``--base-url``."""
         return f"http://127.0.0.1:{self.server_port}/v1"
 
 
@@ -99,7 +100,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: object) -> None:
-        """Say nothing."""
+        """Log nothing."""
 
 
 def serve(pipe: Connection, tasks: list[Task], latency: float) -> None:
@@ -108,7 +109,7 @@ def serve(pipe: Connection, tasks: list[Task], latency: float) -> None:
     threading.Thread(target=server.serve_forever, daemon=True).start()
     pipe.send(server.url)
     with suppress(EOFError):
-        pipe.recv()  # until nobody holds the other end
+        pipe.recv()  # until the other end is closed
 
 
 @click.command()
@@ -127,12 +128,12 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
     )
     process.start()
     theirs.close()
-    vlm_run = VLMRun.of(
-        "openai:answering-server",
+    options = VLMOptions(
         base_url=ours.recv(),
         overrides=[f"pictures.width={size}", f"pictures.height={size}"],
         concurrency=concurrency,
     )
+    vlm_run = VLMRun.of("openai:answering-server", options)
     env = {**suite.env, **vlm_run.env}
     ended: list[tuple[float, int]] = []
     with tempfile.TemporaryDirectory() as place:

@@ -1,4 +1,4 @@
-"""How many pictures a second one process draws, beside MuJoCo's renderers in the same run.
+"""Measures the pictures per second of one process, and of MuJoCo's renderers in the same run.
 
     python -m benchmarks.perf.frames [--seconds 3] [--rounds 3] [--soak] [--json FILE]
 
@@ -7,11 +7,10 @@ environment with random legal actions. MuJoCo draws, at poses of the same kind i
 box for each object that our renderer draws and a textured plane for the floor: colours alone,
 without the instances that ours come with, and Mesa may use all cores, where ours uses one.
 
-MuJoCo is only for comparing: pip install mujoco. What its renderers need besides is said where one
-does not run.
-
-What is compared is timed in turns, round after round, and the median of the rounds is printed.
-``--soak`` plays 10,000 steps and changes the scene 200 times, and prints how memory grows.
+MuJoCo is only for the comparison: pip install mujoco. If one of its renderers does not run, the
+output says what it needs. The candidates take turns, round after round, and the median of the
+rounds is printed. ``--soak`` plays 10,000 steps and changes the scene 200 times, and prints how
+memory grows.
 """
 
 from __future__ import annotations
@@ -110,7 +109,7 @@ class FrameRate:
 
 @dataclass(frozen=True)
 class Memory:
-    """How much memory the process took up at some point, megabytes (RSS)."""
+    """The memory of the process at some point, megabytes (RSS)."""
 
     name: str
     megabytes: float
@@ -249,7 +248,7 @@ def _first_error(said: str) -> str:
 
 
 def available_renderers(scenes: list[str], console: Console) -> list[MuJoCo]:
-    """MuJoCo's renderers that run here; of the others it is said why not."""
+    """MuJoCo's renderers that run here; prints why the others do not."""
     if importlib.util.find_spec("mujoco") is None:
         console.print("nothing to compare with: pip install mujoco", style="yellow")
         return []
@@ -286,7 +285,7 @@ def rates(scenes: list[str], rounds: int, seconds: float, console: Console) -> l
                 timers[renderer.name, size] = partial(renderer.per_second, scenes, size)
         found: dict[tuple[str, tuple[int, int]], list[float]] = {what: [] for what in timers}
         for (name, _), timer in timers.items():
-            if "MuJoCo" not in name:  # what is loaded once is loaded now
+            if "MuJoCo" not in name:  # load everything that is loaded only once
                 timer(seconds)
         turns = [turn for _ in range(rounds) for turn in timers.items()]
         for what, timer in track(turns, "rates", console=console, disable=not console.is_terminal):
@@ -356,7 +355,7 @@ def show(figures: list[FrameRate], memory: list[Memory], console: Console) -> No
 @click.command()
 @click.option("--seconds", default=3.0, show_default=True, type=click.FloatRange(0.1))
 @click.option("--rounds", default=3, show_default=True, type=click.IntRange(1))
-@click.option("--soak", "soaked", is_flag=True, help="Look for memory that grows, too.")
+@click.option("--soak", "soaked", is_flag=True, help="Also check whether memory grows.")
 @click.option("--json", "file", type=Output())
 def main(seconds: float, rounds: int, soaked: bool, file: Path | None) -> None:
     """Measure, and print two tables."""

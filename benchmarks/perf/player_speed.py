@@ -1,11 +1,11 @@
-"""How fast the player answers the official client, and what bounds it.
+"""Measures how fast the player answers the official client, and what limits the speed.
 
     python -m benchmarks.perf.player_speed [--seconds 2] [--rounds 3] [--width 300] [--height 300]
                                         [--server fifo|wsgi]
 
-Each sort of step is timed through the official client, which is then asked how much of the time its
-own work took; the player's is read from the kernel. What neither took is waiting: the pipes, the
-scheduler, other programs.
+Each sort of step is timed through the official client. The client reports the processor time of its
+own work; the player's is read from the kernel. The rest is waiting: pipes, the scheduler, other
+programs.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ STEPS: dict[str, list[dict[str, Any]]] = {
 
 @dataclass(frozen=True)
 class Rate:
-    """What one sort of step costs.
+    """The cost of one sort of step.
 
     Attributes:
         per_second: steps, over the whole of a round.
@@ -58,7 +58,7 @@ class Rate:
 
     @property
     def bound(self) -> str:
-        """Whose time it mostly is."""
+        """The process that takes most of the time."""
         shares = {"the client": self.client, "the player": self.player, "waiting": self.waiting}
         most = max(shares, key=shares.__getitem__)
         return f"{most}, {100 * shares[most] * self.per_second / 1000:.0f} %"
@@ -149,7 +149,7 @@ def _show(medians: dict[str, Rate], ready: float, server: str, size: str) -> Non
         table.add_row(name, f"{rate.per_second:.0f}", *times, rate.bound)
     console.print(table)
     console.print(f"ready to step {ready:.2f} s after launch")
-    if server == "fifo":  # WSGI is bounded by the client
+    if server == "fifo":  # the client limits WSGI
         first = next(iter(medians.values()))
         verdict = "reached" if first.per_second >= _GOAL else "MISSED"
         console.print(f"goal of {_GOAL:.0f} Pass/s: {verdict}")

@@ -1,9 +1,9 @@
-"""How fast the environment steps, resets and starts, beside MiniGrid's in the same run.
+"""Measures how fast the environment steps, resets and starts, and MiniGrid in the same run.
 
     python -m benchmarks.perf.steps [--seconds 4] [--rounds 3] [--json FILE]
 
-Random legal actions, over all registered environments. What is compared is timed in turns, round
-after round, and the median of the rounds is printed: a busy machine then slows all of it alike.
+Random legal actions, over all registered environments. The candidates take turns, round after
+round, and the median of the rounds is printed, so a busy machine slows all alike.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class RandomPlayer:
         return self._envs[self._turn % len(self._envs)]
 
     def steps_per_second(self, seconds: float) -> float:
-        """Play for so long; time spent in ``reset`` is kept apart."""
+        """Play for a time; time spent in ``reset`` is counted separately."""
         steps, stepping = 0, 0.0
         while stepping < seconds:
             if self._over:
@@ -120,7 +120,7 @@ class RandomPlayer:
         self._legal = info.get("action_mask")
 
     def _actions(self) -> np.ndarray:
-        """Legal actions; all of them where the environment does not say which are."""
+        """The legal actions; all actions if the environment has no mask."""
         if self._legal is None:
             return np.arange(self._env.action_space.n)  # type: ignore[attr-defined]
         return np.flatnonzero(self._legal)
@@ -154,7 +154,7 @@ def step_rates(rounds: int, seconds: float, console: Console) -> list[Measuremen
             players[MINIGRID] = RandomPlayer([env], seed=0)
         rates: dict[str, list[float]] = {name: [] for name in players}
         for player in players.values():
-            player.steps_per_second(min(0.3, seconds))  # what is loaded once is loaded now
+            player.steps_per_second(min(0.3, seconds))  # load everything that is loaded only once
             player.resets.clear()
         turns = [(name, player) for _ in range(rounds) for name, player in players.items()]
         for name, player in track(turns, "steps", console=console, disable=not console.is_terminal):
@@ -203,7 +203,7 @@ def fresh_start(rounds: int) -> list[Measurement]:
 
 
 def resident_memory() -> list[Measurement]:
-    """What a new process with one environment, after 50 steps, keeps in memory."""
+    """The memory of a new process with one environment after 50 steps."""
     figures = []
     for obs_mode in ("state", "rgb"):
         result = subprocess.run(

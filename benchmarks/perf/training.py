@@ -1,10 +1,10 @@
-"""How many environment steps a second there are inside the PPO loop, and where the time goes.
+"""Measures the environment steps per second inside the PPO loop, and where the time goes.
 
 
     python -m benchmarks.perf.training [--config single_search --steps 200000]
 
-Beside it, in the same run, a peer: PPO of Stable-Baselines3 on MiniGrid, as many environments, the
-same rollouts and updates, its own default network.
+The same run also measures PPO of Stable-Baselines3 on MiniGrid, with as many environments, the same
+rollouts and updates, and its default network.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Rates(BaseCallback):
 
 
 def measure(model: OnPolicyAlgorithm, env: VecEnv, steps: int, threads: int) -> tuple[Clock, Rates]:
-    """Learn for so many steps; what took the time, and the rate of each tenth."""
+    """Learn for some steps; returns the time of each part, and the rate of each tenth."""
     clock, rates = Clock(), Rates(steps)
     env.step = clock.around("environments", env.step)  # type: ignore[method-assign]
     choose = clock.around("choosing actions", model.policy.forward)
@@ -134,7 +134,9 @@ def main(config: str, steps: int, peer_steps: int, overrides: tuple[str, ...]) -
     """Measure, and print."""
     asked = load_config(config_file(config), overrides)
     if not isinstance(asked.algorithm, PPO):
-        raise click.BadParameter(f"{config} is of {asked.algorithm.name}; give one of ppo")
+        raise click.BadParameter(
+            f"{config} uses {asked.algorithm.name}; give a configuration of ppo"
+        )
     with fast_arithmetic():
         show(config, *ours(asked, steps), steps)
         show("PPO on MiniGrid", *minigrid(asked, peer_steps), peer_steps)

@@ -24,7 +24,7 @@ _DPI = 100
 _BAR = 0.27
 """Inches from one bar to the next, wide enough for a name beside each."""
 _TOP = 40
-"""How many bars a chart of object types has at most."""
+"""The most bars in a chart of object types."""
 _INK, _MUTED, _GRID = "#222222", "#666666", "#e4e4e4"
 
 # Each chart keeps to one hue; steps differ in lightness, which every kind of eye tells apart.
@@ -147,7 +147,7 @@ def _rooms(tasks: Sequence[Task], summary: Summary, title: str) -> Figure:
 
 
 def _group_colors() -> dict[str, str]:
-    """A step of the hue for each group, light to dark."""
+    """A shade for each group, light to dark."""
     from matplotlib.colors import LinearSegmentedColormap, to_hex
 
     shades = LinearSegmentedColormap.from_list("groups", _GROUPS)

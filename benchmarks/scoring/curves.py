@@ -23,17 +23,18 @@ _PANELS = {
 
 
 class HasCurve(Protocol):
-    """What has a learning curve."""
+    """A run with a learning curve."""
 
     @property
     def curve(self) -> list[dict[str, float]]:
-        """Lines with ``steps`` and what was logged."""
+        """Lines with ``steps`` and the logged values."""
 
 
 def draw_curves(
     families: Mapping[str, Sequence[HasCurve]], out: Path, *, force: bool = True
 ) -> list[Path]:
-    """Draw success over steps and over minutes, a line a family: mean, least and most of its seeds.
+    """Draw success over steps and over minutes. Each family has a line: mean, minimum and maximum
+    of its seeds.
 
     Returns:
         The files.

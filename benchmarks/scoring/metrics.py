@@ -1,4 +1,4 @@
-"""What an episode is worth: pure functions over :class:`~er_gym.rollout.records.EpisodeRecord`.
+"""The metrics of an episode: pure functions over :class:`~er_gym.rollout.records.EpisodeRecord`.
 
 The definitions are those of the Embodied-Reasoner benchmark (arXiv 2503.21696) as its released
 program computes them, so the numbers compare with its table. A scorer
@@ -146,7 +146,7 @@ def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean with its 95 % interval; ``low`` and ``high`` are None where n says nothing of it."""
+    """A mean with its 95 % interval; ``low`` and ``high`` are None if n is too small for one."""
 
     mean: float
     low: float | None

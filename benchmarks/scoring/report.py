@@ -26,14 +26,14 @@ from er_gym.tasks.errors import describe_substitutions
 from er_gym.tasks.types import BY_NAME, GROUPS
 
 BOTH = "both"
-"""The choice of scorer that shows each where they differ and one line where they do not."""
+"""The choice that shows both scorers where they differ, and one line where they agree."""
 
 SCORER_CHOICES = (BOTH, *SCORERS)
 
 
 @dataclass(frozen=True)
 class Miss:
-    """An episode that is no success under the ``corrected`` scorer, and why.
+    """An episode that failed under the ``corrected`` scorer, and why.
 
     Attributes:
         task_id, task_type, scene: what was played.
@@ -58,7 +58,7 @@ class RunReport:
         path: the directory.
         manifest: what was played.
         episodes: in the order of their file names.
-        unusable: what else is among their files, in words; it is not counted.
+        unusable: descriptions of other files among them, which are not counted.
         scores: for each scorer's name, one score per episode, in the same order.
     """
 
@@ -86,7 +86,9 @@ class RunReport:
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """In words: what the figures do not count, and what was taken for what a scene lacks."""
+        """Sentences about what the figures do not count, and about objects that replaced missing
+        ones.
+        """
         aside = [
             f"{len(self.manifest.set_aside)} of the suite's tasks set aside and not counted"
         ] * bool(self.manifest.set_aside)
@@ -120,7 +122,7 @@ def load_run(path: Path) -> RunReport:
     """Read and score a run directory.
 
     Raises:
-        RunDirectoryError: there is no run.
+        RunDirectoryError: the directory holds no run.
     """
     run_directory = RunDirectory.open(path)
     found = run_directory.read()
@@ -166,8 +168,9 @@ def by_type(scores: Sequence[Score]) -> dict[str, Summary]:
 
 
 def as_json(runs: Sequence[RunReport]) -> str:
-    """Everything: manifests, which tell what was set aside, every slice's means and intervals,
-    every episode's scores, misses."""
+    """Everything: manifests with the tasks that were set aside, means and intervals of every slice,
+    scores of every episode, and misses.
+    """
     return json.dumps({"format": "er-gym/report/1", "runs": [_run(run) for run in runs]}, indent=2)
 
 
@@ -203,7 +206,8 @@ def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = Fal
     """One line per run, scorer and slice (overall and groups; task types if asked for).
 
     Rates are fractions; a missing interval is empty. A task that was set aside, or an object that
-    stands for one that a scene lacks, has a line without figures; so has a file that is no episode.
+    stands for one that a scene lacks, has a line without figures; so does a file that is not an
+    episode.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

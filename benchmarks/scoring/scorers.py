@@ -114,7 +114,7 @@ def _paper(episode: EpisodeRecord) -> Tally:
                 points += 1
             elif last in keys:
                 points += 1
-                break  # the program looks no further, at what follows there neither
+                break  # the program looks no further there either
         elif step.object_type:
             label = _label(_PUT if verb.startswith(_PUT) else verb, step.object_type)
             if left[label] > 0:
@@ -137,7 +137,7 @@ def _paper(episode: EpisodeRecord) -> Tally:
 
 
 def judged(episode: EpisodeRecord) -> Progress:
-    """What the environment's judge says of an episode, from its record alone.
+    """The verdict of the environment's judge on an episode, from its record alone.
 
     A record can lack the search targets (:func:`lacks_search_targets`). Whether the agent could
     interact with them at ``end`` then follows from what the environment said, whose rule for that
@@ -158,17 +158,17 @@ def judged(episode: EpisodeRecord) -> Progress:
 
 
 def lacks_search_targets(episode: EpisodeRecord) -> bool:
-    """Whether the episode was a search and its record, an old one, does not say for what."""
+    """Whether the episode is a search with an old record, which lacks the search targets."""
     return episode.search_targets is None and task_type(episode.task_type).search
 
 
 def _corrected(episode: EpisodeRecord) -> Tally:
-    """Count what the judge says."""
+    """Count by the judge's verdict."""
     progress = judged(episode)
     named = progress.criteria.named
 
     def labels(keys: tuple[KeyAction, ...]) -> tuple[str, ...]:
-        """Of the key actions that score; with the id where only one object will do."""
+        """The labels of the scoring key actions, with the object's id if only one object counts."""
         ids = (key.object_id if key.object_id in named else "" for key in keys)
         return tuple(
             f"{_label(key.verb, key.actual_type)} {object_id}".rstrip()

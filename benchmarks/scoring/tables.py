@@ -34,7 +34,7 @@ class Table:
         rows: as wide as ``head``; where there are none, only the title is shown.
         text_columns: how many columns, from the left, hold words; the rest are figures.
         notes: lines below it.
-        may_turn: whether rows and columns may change places where the terminal is narrow.
+        may_turn: whether the table may be transposed on a narrow terminal.
     """
 
     title: str
@@ -76,8 +76,8 @@ def tables(
 def _overview(runs: Sequence[RunReport], scorer: str) -> Table:
     """The columns of the paper's result table, in its order.
 
-    Suite, protocol and scorer are columns only where they differ, else part of the title, in which
-    the default protocol goes without saying.
+    Suite, protocol and scorer are columns only where they differ, else part of the title. The title
+    omits the default protocol.
     """
     head = (
         *("Agent", "Suite", "Protocol", "Scorer", "n", "Success", "95 %"),
@@ -138,8 +138,8 @@ def _notes(run: RunReport) -> list[str]:
         )
     if run.without_targets:
         notes.append(
-            f"{run.path}: {run.without_targets} of {len(run.episodes)} episodes are searches whose "
-            "old records do not say for what; whether it was found is taken from the environment"
+            f"{run.path}: {run.without_targets} of {len(run.episodes)} episodes are searches "
+            "whose old records lack the search targets; the environment's own verdict is used"
         )
     if run.crashed:
         notes.append(
@@ -227,8 +227,9 @@ def _markdown(table: Table) -> str:
 
 
 def print_tables(found: Sequence[Table], console: Console) -> None:
-    """Print the tables as the terminal's width allows: a table that may be turned is turned where
-    that makes it fit, words are folded, figures never."""
+    """Print the tables in the terminal's width: a table that may be transposed is transposed if it
+    then fits; words are folded, figures never.
+    """
     for table in map(_plain, found):
         if table.may_turn and _width(table) > console.width > _width(_turned(table)):
             table = _turned(table)
@@ -252,7 +253,7 @@ def _turned(table: Table) -> Table:
 
 
 def _widths(table: Table) -> list[int]:
-    """How narrow each column can get: figures and the words over them are left whole."""
+    """The least width of each column: figures and their column names stay whole."""
     widths = []
     for column, cells in enumerate(zip(table.head, *table.rows, strict=True)):
         if column < table.text_columns:
@@ -273,7 +274,7 @@ def _rich(table: Table, room: int) -> RichTable:
         show_edge=False,
         pad_edge=False,
         padding=(0, _GAP - 1, 0, 0),  # the box draws one more
-        # Too wide even so: the terminal breaks the lines, but nothing is lost.
+        # Still too wide: the terminal breaks the lines, but nothing is lost.
         width=needed if needed > room else None,
     )
     for column, (name, width) in enumerate(zip(table.head, _widths(table), strict=True)):

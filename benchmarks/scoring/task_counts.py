@@ -1,4 +1,4 @@
-"""How many tasks there are of what, as tables."""
+"""Tables of task counts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from er_gym.tasks.types import BY_NAME
 def print_counts(
     chosen: Sequence[Task], dropped: Mapping[str, int], by_scene: bool = False
 ) -> None:
-    """Print how many tasks there are of each type in each kind of room, and why some are not.
+    """Print the number of tasks of each type in each kind of room, and the reasons for dropped
+    ones.
 
     Args:
         dropped: reason to how many tasks were not taken for it.

@@ -125,9 +125,7 @@ class Decided:
 def decision(thought: Thought) -> Iterator[Refusal]:
     """Decides on another action than the one that is taken."""
     known, phrases = thought.known, thought.phrases
-    decided = [
-        each for each in _decided(thought) if each.act != "look around" or each.clause.last
-    ]
+    decided = [each for each in _decided(thought) if each.act != "look around" or each.clause.last]
     fitting = [each for each in decided if _fits(thought, each)]
     others = [each for each in decided if each not in fitting and not each.later]
     wrong = None

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Literal
 
-from er_gym.data.names_en import MODIFIERS, NAMES_EN, SHARED_EN
-from er_gym.data.names_zh import NAMES_ZH, SHARED_ZH
+from er_gym.data.names_en import MODIFIERS, NAMES_EN
+from er_gym.data.names_zh import NAMES_ZH
+from er_gym.data.shared_names import SHARED_EN, SHARED_ZH
 from er_gym.envs.observations import goal
 from er_gym.tasks.equivalence import same_type
 from er_gym.thor import OBJECT_TYPES
@@ -232,7 +233,9 @@ def _in_english(text: str) -> Iterator[Mention]:
         if exact:
             found = frozenset({written})
         elif any(a <= start < b for a, b in barred) or (
-            last == k and not _WEAK.isdisjoint((lower[k], lower[k].removesuffix("s"))) and not _after_article(lower, spans, text, k)
+            last == k
+            and not _WEAK.isdisjoint((lower[k], lower[k].removesuffix("s")))
+            and not _after_article(lower, spans, text, k)
         ):
             k += 1
             continue

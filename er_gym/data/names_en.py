@@ -125,40 +125,6 @@ NAMES_EN: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Object type to other names. Case, spaces and plurals do not matter."""
 
-SHARED_EN: Mapping[str, tuple[str, ...]] = {
-    "table": ("DiningTable", "CoffeeTable", "SideTable"),
-    "lamp": ("DeskLamp", "FloorLamp"),
-    "light": ("LightSwitch", "FloorLamp", "DeskLamp"),
-    "computer": ("Laptop", "Desktop"),
-    "screen": ("Television", "Desktop"),
-    "soap": ("SoapBar", "SoapBottle"),
-    "paper": ("ToiletPaper", "Newspaper", "PaperTowelRoll"),
-    "decorative item": ("TableTopDecor", "RoomDecor"),
-    "bookshelf": ("ShelvingUnit", "Shelf"),
-    "bookcase": ("ShelvingUnit", "Shelf"),
-    "stove": ("StoveBurner", "StoveKnob"),
-    "towel rack": ("TowelHolder", "HandTowelHolder"),
-    "towel bar": ("TowelHolder", "HandTowelHolder"),
-    "curtain": ("Curtains", "ShowerCurtain"),
-    "shower": ("ShowerHead", "ShowerDoor", "ShowerCurtain"),
-    "basin": ("SinkBasin", "BathtubBasin"),
-    "tub": ("Bathtub", "BathtubBasin"),
-    "bath": ("Bathtub", "BathtubBasin"),
-    "picture": ("Painting", "Poster"),
-    "decoration": ("TableTopDecor", "RoomDecor"),
-    "decor": ("TableTopDecor", "RoomDecor"),
-    "figurine": ("Statue", "TableTopDecor"),
-    "glass": ("Cup", "Mug"),
-    "teacup": ("Mug", "Cup"),
-    "recliner": ("ArmChair", "Sofa"),
-    "trash": ("GarbageCan", "GarbageBag"),
-    "garbage": ("GarbageCan", "GarbageBag"),
-    "nightstand": ("SideTable", "Dresser"),
-    "footrest": ("Footstool", "Ottoman"),
-    "chest": ("Dresser", "Safe"),
-}
-"""Names of several types. One that is at hand is meant, else the first."""
-
 MODIFIERS = frozenset(
     {
         "the", "a", "an", "this", "that", "my", "some", "any", "another", "other", "same", "one",
@@ -173,4 +139,4 @@ MODIFIERS = frozenset(
         "living", "room", "office",
     }
 )  # fmt: skip
-"""Words before a name that say which one, or what it is like."""
+"""Words before a name that choose among objects or describe them."""

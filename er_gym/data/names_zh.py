@@ -148,25 +148,4 @@ NAMES_ZH: Mapping[str, tuple[str, ...]] = {
     "Window": ("窗户", "窗"),
     "WineBottle": ("酒瓶", "红酒", "葡萄酒", "红酒瓶", "葡萄酒瓶"),
 }
-"""Object type to its names, the usual one first; all types are there."""
-
-SHARED_ZH: Mapping[str, tuple[str, ...]] = {
-    "桌子": ("DiningTable", "CoffeeTable", "SideTable", "Desk"),
-    "灯": ("LightSwitch", "FloorLamp", "DeskLamp"),
-    "电脑": ("Laptop", "Desktop"),
-    "杯子": ("Cup", "Mug"),
-    "纸": ("ToiletPaper", "Newspaper", "PaperTowelRoll"),
-    "纸巾": ("TissueBox", "PaperTowelRoll"),
-    "水池": ("SinkBasin", "Sink"),
-    "书架": ("ShelvingUnit", "Shelf"),
-    "炉灶": ("StoveBurner", "StoveKnob"),
-    "炉子": ("StoveBurner", "StoveKnob"),
-    "淋浴": ("ShowerHead", "ShowerDoor", "ShowerCurtain"),
-    "装饰品": ("TableTopDecor", "RoomDecor"),
-    "锅": ("Pot", "Pan"),
-    "勺": ("Spoon", "Ladle"),
-    "毛巾": ("Towel", "HandTowel"),
-    "毛巾架": ("TowelHolder", "HandTowelHolder"),
-    "笔": ("Pen", "Pencil"),
-}
-"""Names of several types. One that is at hand is meant, else the first."""
+"""The names of each object type, the usual one first; every type has an entry."""

@@ -47,6 +47,21 @@ class EpisodeSetup:
     instances: str
 
 
+@dataclass(frozen=True)
+class Moment:
+    """What an action handler knows when the agent acts.
+
+    Attributes:
+        perception: what the agent perceives.
+        available: the objects that it can navigate to and interact with.
+        left: the key actions that are not done yet.
+    """
+
+    perception: Perception
+    available: AvailableObjects
+    left: Sequence[KeyAction]
+
+
 class ActionHandler(Protocol):
     """How actions are judged and carried out in one episode."""
 
@@ -63,14 +78,8 @@ class ActionHandler(Protocol):
     def legal(self, available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
 
-    def execute(
-        self,
-        action: Action,
-        perception: Perception,
-        available: AvailableObjects,
-        left: Sequence[KeyAction],
-    ) -> ExecutedAction:
-        """Carry out a legal action; ``left`` are the key actions not done yet."""
+    def execute(self, action: Action, now: Moment) -> ExecutedAction:
+        """Carry out a legal action."""
 
 
 class DefaultActionHandler:
@@ -97,15 +106,9 @@ class DefaultActionHandler:
         """See :func:`~er_gym.envs.legality.legal_actions`."""
         return legality.legal_actions(available, known)
 
-    def execute(
-        self,
-        action: Action,
-        perception: Perception,
-        available: AvailableObjects,
-        left: Sequence[KeyAction],
-    ) -> ExecutedAction:
+    def execute(self, action: Action, now: Moment) -> ExecutedAction:
         """Carry out a legal action by the skills of :mod:`er_gym.envs.skills`."""
-        setup, objects = self._setup, perception.objects
+        setup, objects = self._setup, now.perception.objects
         if action.verb == verbs.OBSERVE:
             return "", skills.observe(setup.controller)
         if action.verb == verbs.MOVE_FORWARD:
@@ -115,24 +118,27 @@ class DefaultActionHandler:
         if action.verb in verbs.BARE_VERBS:
             return "", skills.act_without_object(setup.controller, action.verb)
         if action.verb == verbs.NAVIGATE:
-            return self._navigate(action.object_type, perception, left)
-        able = legality.candidate_rows(action, available)
+            return self._navigate(action.object_type, now)
+        able = legality.candidate_rows(action, now.available)
         if setup.instances == object_selection.TARGET:
-            chosen = object_selection.select_for_task(setup.task, left, action.verb, able, objects)
+            chosen = object_selection.select_for_task(
+                setup.task, now.left, action.verb, able, objects
+            )
         else:
-            chosen = object_selection.select_nearest(able, objects, perception.pose)
+            chosen = object_selection.select_nearest(able, objects, now.perception.pose)
         done = skills.interact(setup.controller, action.verb, objects, chosen)
         return objects.ids[chosen], done
 
-    def _navigate(
-        self, object_type: str, perception: Perception, left: Sequence[KeyAction]
-    ) -> ExecutedAction:
-        setup, objects = self._setup, perception.objects
+    def _navigate(self, object_type: str, now: Moment) -> ExecutedAction:
+        setup, perception = self._setup, now.perception
+        objects = perception.objects
         able = objects.of_type(object_type)
         if not able:
             return "", Outcome(None, False, f"there is no {object_type} any more")
         if setup.instances == object_selection.TARGET:
-            goal = object_selection.select_for_task(setup.task, left, verbs.NAVIGATE, able, objects)
+            goal = object_selection.select_for_task(
+                setup.task, now.left, verbs.NAVIGATE, able, objects
+            )
             aim = object_selection.navigation_target(setup.task, goal, objects)
         else:
             visited = self._visited.setdefault(object_type, [])

@@ -36,7 +36,7 @@ AnyAction: TypeAlias = Action | str | int | np.integer[Any] | NDArray[np.integer
 """What ``step`` accepts: an action, its text, or its index in :data:`ACTIONS`. The index may be an
 array of one element, shape () or (1,), as learners' ``predict`` returns it."""
 NO_ACTION = "(no action) "
-"""A text that begins with this names no action."""
+"""A text that begins with this never names an action."""
 
 
 def applies(verb: str, object_type: str) -> bool:
@@ -66,7 +66,7 @@ _VERBS_LONGEST_FIRST = sorted(
 
 
 def parse(text: str) -> Action | None:
-    """The action that a text names, None if it names none. Case and spacing are ignored."""
+    """The action that a text names, None if it names no action. Case and spacing are ignored."""
     words = " ".join(text.lower().split())
     alone = _BY_TEXT.get(words) or _BY_TEXT.get(verbs.canonical_verb(words))
     if alone is not None:
@@ -78,7 +78,7 @@ def parse(text: str) -> Action | None:
 
 
 def understand(action: AnyAction) -> tuple[Action | None, str]:
-    """The action that is meant (None if a text names none), and its text.
+    """The action that a value means (None if a text names no action), and its text.
 
     Raises:
         gymnasium.error.InvalidAction: see :func:`text_of`.
@@ -93,7 +93,7 @@ def text_of(action: AnyAction) -> str:
     """The text of an action.
 
     Raises:
-        gymnasium.error.InvalidAction: the value is no text, no action and no index of an action.
+        gymnasium.error.InvalidAction: the value is not an action, its text or its index.
     """
     if isinstance(action, str | Action):
         return str(action)
@@ -101,8 +101,8 @@ def text_of(action: AnyAction) -> str:
     if 0 <= index < len(ACTIONS):
         return str(ACTIONS[index])
     raise gymnasium.error.InvalidAction(
-        f"{short_repr(action)} is no action: give an index from 0 to {len(ACTIONS) - 1} (an int or "
-        "an array with one integer), an Action, or text such as 'navigate to Fridge'"
+        f"{short_repr(action)} is not an action: give an index from 0 to {len(ACTIONS) - 1} "
+        "(an int or an array with one integer), an Action, or text such as 'navigate to Fridge'"
     )
 
 

@@ -244,7 +244,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         Raises:
             ValueError: an option does not fit, or there is no such task. The episode under way goes
                 on.
-            gymnasium.error.Error: the seed is no whole number from 0.
+            gymnasium.error.Error: the seed is not a whole number of at least 0.
         """
         checked = checked_options({} if options is None else options)
         with self._lock:
@@ -267,8 +267,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
         Raises:
             ResetNeeded: there is no episode, or it is over.
-            gymnasium.error.InvalidAction: the index is out of range, or the value is no action at
-                all. The episode goes on. (Text that names no known action, such as a number, raises
+            gymnasium.error.InvalidAction: the index is out of range, or the value is not an action.
+                The episode goes on. (Text that names no known action, such as a number, raises
                 nothing: models write it, and the feedback answers it.)
         """
         with self._lock:

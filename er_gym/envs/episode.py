@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs import skills
-from er_gym.envs.action_handler import ActionHandler, EpisodeSetup
+from er_gym.envs.action_handler import ActionHandler, EpisodeSetup, Moment
 from er_gym.envs.actions import Action, AnyAction
 from er_gym.envs.faults import FaultPlan, FaultyActionHandler
 from er_gym.envs.info import Info, LegalActions
@@ -73,9 +73,9 @@ class Episode:
     """An episode of one task; :meth:`begin` it, then :meth:`step` until it has an ``end_reason``.
 
     Args:
-        settings: of the environment.
+        settings: the environment's settings.
         task: what is asked.
-        controller: in any scene; the episode resets it to the task's.
+        controller: a controller in any scene; the episode resets it to the task's scene.
         backend: the name of the controller's backend.
         faults: which actions go wrong; None for none.
 
@@ -134,10 +134,10 @@ class Episode:
         return self.perception.pose, self._steps, self.end_reason, self._known.names
 
     def understand(self, action: AnyAction) -> tuple[Action | None, str]:
-        """The action that is meant, None if none is; and its text.
+        """The action that a reply means (None if it names no action), and its text.
 
         Raises:
-            gymnasium.error.InvalidAction: it is no action at all; nothing has changed.
+            gymnasium.error.InvalidAction: the reply is not an action; nothing has changed.
         """
         return self._protocol.understand(action, self.perception.objects)
 
@@ -158,7 +158,9 @@ class Episode:
         if understood == self._memory.last and self._memory.repeats >= MAX_REPEATS:
             self.end_reason = "repeated action"
             times = self._memory.repeats + 1
-            feedback = f"You have tried to {understood} {times} times in a row; that is it."
+            feedback = (
+                f"You have tried to {understood} {times} times in a row, so the episode ends."
+            )
             said = self._protocol.repeated or understood
             return self._reply(said, text, False, "", feedback, 0.0)
         self._steps += understood.verb != verbs.END or self._protocol.end_is_step
@@ -167,7 +169,7 @@ class Episode:
             object_id, outcome = "", skills.Outcome(None, False, refused)
         else:
             object_id, outcome = self._handler.execute(
-                understood, self.perception, self._available, self._progress.left
+                understood, Moment(self.perception, self._available, self._progress.left)
             )
             self._fault = "" if self._faulty is None else self._faulty.fault
         self._memory.act(understood, outcome.success)
@@ -280,7 +282,7 @@ class Episode:
         info: Info,
         views: Mapping[str, Perception] = MappingProxyType({}),
     ) -> dict[str, Any]:
-        """The observation; what explains it is added to ``info``."""
+        """Build the observation, and add to ``info`` what explains it."""
         situation = Situation(
             perception=self.perception,
             available=self._available,

@@ -23,7 +23,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.action_handler import ActionHandler, ExecutedAction
+from er_gym.envs.action_handler import ActionHandler, ExecutedAction, Moment
 from er_gym.envs.actions import Action
 from er_gym.envs.arguments import number, short_repr
 from er_gym.envs.legality import AvailableObjects, KnownTypes
@@ -31,7 +31,7 @@ from er_gym.envs.perception import Perception
 from er_gym.envs.skills import Outcome
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import is_among
-from er_gym.tasks.task import KeyAction, type_of_id
+from er_gym.tasks.task import type_of_id
 from er_gym.thor.objects import ObjectTable
 
 NAVIGATE = "navigate"
@@ -191,13 +191,7 @@ class FaultyActionHandler:
         """The protocol's."""
         return self._inner.legal(available, known)
 
-    def execute(
-        self,
-        action: Action,
-        perception: Perception,
-        available: AvailableObjects,
-        left: Sequence[KeyAction],
-    ) -> ExecutedAction:
+    def execute(self, action: Action, now: Moment) -> ExecutedAction:
         """Carry out a legal action, or let it go wrong.
 
         Where a navigation arrives elsewhere, the id is that of the object arrived at.
@@ -207,29 +201,20 @@ class FaultyActionHandler:
         if not goes_wrong or self._in_a_row[action] >= MOST_IN_A_ROW:
             self.fault = ""
             self._in_a_row[action] = 0
-            return self._inner.execute(action, perception, available, left)
+            return self._inner.execute(action, now)
         self.fault = kind
         self._in_a_row[action] += 1
         if kind == NAVIGATE:
-            return self._arrive_elsewhere(action, perception, available, left)
+            return self._arrive_elsewhere(action, now)
         return "", Outcome(None, False, _ARM_FAILED[kind])
 
-    def _arrive_elsewhere(
-        self,
-        action: Action,
-        perception: Perception,
-        available: AvailableObjects,
-        left: Sequence[KeyAction],
-    ) -> ExecutedAction:
-        places = other_places(
-            action.object_type, self._known.names, perception.objects, self.navigated_to
-        )
+    def _arrive_elsewhere(self, action: Action, now: Moment) -> ExecutedAction:
+        objects = now.perception.objects
+        places = other_places(action.object_type, self._known.names, objects, self.navigated_to)
         if not places:
             return "", Outcome(None, False, _NOWHERE_ELSE)
         place = places[int(self._random.integers(len(places)))]
-        object_id, arrived = self._inner.execute(
-            Action(verbs.NAVIGATE, place), perception, available, left
-        )
+        object_id, arrived = self._inner.execute(Action(verbs.NAVIGATE, place), now)
         problem = f"you arrived at {place} instead" if arrived.success else _NOWHERE_ELSE
         return object_id if arrived.success else "", Outcome(arrived.perception, False, problem)
 

@@ -34,9 +34,8 @@ class GeneratedSource:
 
     Args:
         env: the environment in which tasks are verified; the source closes it.
-        spec: in which rooms, of which types, how many arrangements of a room there are to draw
-            beside the recorded one, how difficult; its ``total`` and ``per_layout`` mean nothing
-            here.
+        spec: the rooms, the task types, the number of arrangements of a room to draw from beside
+            the recorded one, and the difficulty; its ``total`` and ``per_layout`` are ignored.
     """
 
     def __init__(self, env: PlayableEnv, spec: SuiteSpec = TRAINING) -> None:

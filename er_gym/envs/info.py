@@ -87,11 +87,11 @@ class _Always(TypedDict):
     steps: int
     """The number of steps taken; placing the agent is the first."""
     max_steps: int
-    """The step limit of this episode, the placing included."""
+    """The step limit of this episode; placing the agent counts as the first step."""
     key_actions_done: tuple[KeyAction, ...]
-    """In the order in which they were done (:mod:`er_gym.tasks.judge`)."""
+    """The key actions done, in the order in which they were done (:mod:`er_gym.tasks.judge`)."""
     key_actions_left: tuple[KeyAction, ...]
-    """In the order of the task."""
+    """The key actions not done yet, in the order of the task."""
     success: bool
     """Whether the task is done; decided at ``end``, False before."""
     goal_unmet: tuple[Condition, ...]

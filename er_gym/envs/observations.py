@@ -35,16 +35,18 @@ FEATURES = (
     *("goal", "found", "last"),
     *_DID,
 )
-"""What ``state`` says of each object type, 0 to 1:
+"""The features of each object type in ``state``, from 0 to 1:
 
-- ``visible`` now, ``seen`` ever in this episode, ``navigable`` and ``interactable`` as the action
-  mask has it;
-- ``open``, ``on``: one was when last seen; ``held``: in the hand; ``at``: last navigated to;
-- ``goal``: the instruction names it, 1 for the first it names, then 1/2, 1/3 …;
-- ``found``: the greatest ``goal`` of what was in view, and not in the hand, on arriving there or
-  since;
-- ``last``: the last action named it;
-- ``did`` and a verb: how often that was done to it in this episode, 4 times or more being 1.
+- ``visible``: the agent sees one now; ``seen``: it has seen one in this episode;
+- ``navigable``, ``interactable``: as in the action mask;
+- ``open``, ``on``: one was open, or switched on, when the agent last saw it;
+- ``held``: one is in the hand; ``at``: the agent last navigated to this type;
+- ``goal``: the instruction names this type: 1 for the first type that it names, then 1/2, 1/3 …;
+- ``found``: the greatest ``goal`` of the types that the agent has seen since it arrived at this
+  type; this type itself and the type in the hand do not count;
+- ``last``: the last action named this type;
+- ``did`` and a verb: how often the agent did the verb to this type in this episode, divided by 4,
+  at most 1.
 """
 _POSE = ("right", "ahead", "sin", "cos", "horizon", "standing")
 _EPISODE = ("steps", "success", "holding", "repeats")
@@ -58,24 +60,24 @@ GOAL_VERBS: Mapping[str, str] = {
     "then": r"then|after|before|first",
     **{verb.name: "|".join(map(re.escape, verb.said)) for verb in verbs.ADDED},
 }
-"""Words of an instruction that say what to do, by what they say; those of the verbs that other
-packages add as well."""
+"""The words of an instruction that say what to do, by their meaning. The words of the verbs that
+other packages add are included."""
 SCALARS = (
     *_POSE,
     *_EPISODE,
     *(f"last {verb}" for verb in (*verbs.BARE_VERBS, *verbs.OBJECT_VERBS)),
     *GOAL_VERBS,
 )
-"""What ``state`` says of the agent and the episode:
+"""The features of the agent and the episode in ``state``:
 
-- ``right``, ``ahead``: how far from where it began, tens of metres, -1 to 1, in the frame of the
-  view it began with; ``sin``, ``cos`` of how far it has turned since, clockwise; ``horizon``,
-  right angles downwards; ``standing`` 0 or 1;
-- ``steps``: the share of the step limit that is used up; ``success`` of the last action; whether it
-  is ``holding`` something; ``repeats``: how often in a row the last action was done, 1 being the
-  most that is let pass;
-- ``last`` and a verb: what the last action was, 0 or 1;
-- :data:`GOAL_VERBS`, 0 or 1: what the words of the instruction ask for.
+- ``right``, ``ahead``: the agent's offset from its start position, in tens of metres, -1 to 1, in
+  the frame of its first view; ``sin``, ``cos``: of the angle that it has turned clockwise since the
+  start; ``horizon``: in right angles downwards; ``standing``: 0 or 1;
+- ``steps``: the share of the step limit that is used up; ``success``: whether the last action
+  succeeded; ``holding``: whether the agent holds something; ``repeats``: how often in a row the
+  last action was done, as a share of :data:`MAX_REPEATS`;
+- ``last`` and a verb: whether the last action had this verb, 0 or 1;
+- :data:`GOAL_VERBS`: whether the words of the instruction ask for this, 0 or 1.
 """
 STATE_LAYOUT = (*SCALARS, *(f"{feature}:{name}" for feature in FEATURES for name in TYPES))
 """What each entry of the ``state`` vector means, in order: :data:`SCALARS`, then a row of types for
@@ -84,14 +86,14 @@ _LAST = {verb: SCALARS.index(f"last {verb}") for verb in (*verbs.BARE_VERBS, *ve
 _ROW = {feature: row for row, feature in enumerate(FEATURES)}
 _FIRST_DID = _ROW[_DID[0]]
 _OFTEN = 4
-"""What has been done so often need not be counted further."""
+"""``did`` counts no further than this."""
 _ROOM_SCALE = 10.0
-"""Offsets from the start are divided by so many metres."""
+"""The offsets from the start are divided by this many metres."""
 _TEXT_LENGTH = 20_000
 _MOST_OBJECTS = 2**31 - 1
-"""No scene has more: AI2-THOR sets no limit."""
+"""The bound that the space gives for the number of objects; AI2-THOR sets no limit."""
 MAX_REPEATS = 3
-"""The same action once more than this in a row ends the episode, unexecuted."""
+"""The number of times in a row that the same action is executed; one more ends the episode."""
 
 
 def _nothing() -> NDArray[np.float32]:
@@ -104,14 +106,17 @@ def _no_types() -> NDArray[np.bool_]:
 
 @dataclass(eq=False)
 class Memory:
-    """What an agent that pays attention remembers of an episode, by object type: (T,) bool.
+    """What an attentive agent remembers of an episode. Arrays have one entry for each object type.
 
     Attributes:
-        start: where it began.
+        start: the agent's start pose.
         wanted: (T,) float32, the weight of each type in the instruction, see :func:`goal`.
-        found: (T,) float32, the greatest weight of what was in view at each type gone to.
-        did: (len(OBJECT_VERBS), T) how often each was done.
-        last, repeats: the last action, and how often in a row.
+        seen: (T,) bool, the types that the agent has seen.
+        is_open, is_on: (T,) bool, whether one was open, or switched on, when last seen.
+        found: (T,) float32, the greatest weight of the types in view at each type navigated to.
+        did: (len(OBJECT_VERBS), T) how often the agent did each verb to each type.
+        last: the last action; None at first.
+        repeats: how often in a row the last action was done.
     """
 
     start: AgentPose
@@ -125,7 +130,7 @@ class Memory:
     repeats: int = 0
 
     def look(self, perception: Perception, at: int | None = None) -> None:
-        """Take in what is visible now; ``at``: the type of what was last navigated to."""
+        """Remember what is visible now; ``at`` is the type last navigated to."""
         objects, visible = perception.objects, perception.visible
         self.seen |= perception.visible_types
         out_of_sight = ~perception.visible_types
@@ -141,11 +146,11 @@ class Memory:
             self.found[at] = max(self.found[at], weights.max())
 
     def forget_last(self) -> None:
-        """Something came in between: the next action is no repetition."""
+        """Forget the last action: the next action then does not count as a repetition."""
         self.last, self.repeats = None, 0
 
     def act(self, action: Action, success: bool) -> None:
-        """Remember what was done, or tried."""
+        """Remember an action that the agent did or tried."""
         self.repeats = self.repeats + 1 if action == self.last else 1
         self.last = action
         if success and action.object_type:
@@ -158,8 +163,8 @@ class Situation:
     """Everything that observations are made from.
 
     Attributes:
-        at: index of the type of what was last navigated to, None before that.
-        annotate: whether the types of things are written into pictures.
+        at: index of the type last navigated to, None before that.
+        annotate: whether object types are written into pictures.
         views: after ``observe``, what the agent perceived in each direction.
     """
 
@@ -188,9 +193,9 @@ def goal(instruction: str) -> tuple[tuple[float, ...], tuple[tuple[str, float], 
     """What an instruction asks for, read from its words alone.
 
     Returns:
-        A 0 or 1 for each of :data:`GOAL_VERBS`; and the object types that it names with a weight
-        each, 1 for the first named, then 1/2, 1/3 and so on. ``credit card`` names a CreditCard;
-        a type whose name is part of a longer one that is named there is not meant.
+        A 0 or 1 for each of :data:`GOAL_VERBS`; and a weight for each object type that the
+        instruction names: 1 for the first, then 1/2, 1/3 and so on. ``credit card`` names a
+        CreditCard. A name inside a longer name in the same place does not count.
     """
     mentions = []
     taken = np.zeros(len(instruction) + 1, dtype=bool)
@@ -211,7 +216,7 @@ def goal(instruction: str) -> tuple[tuple[float, ...], tuple[tuple[str, float], 
 
 @lru_cache(maxsize=4096)
 def goal_row(instruction: str) -> NDArray[np.float32]:
-    """(T,) float32, the weight of each type in what an instruction asks for; not to be written."""
+    """(T,) float32, the weight of each type in an instruction, see :func:`goal`; read-only."""
     row = np.zeros(len(TYPES), dtype=np.float32)
     for name, weight in goal(instruction)[1]:
         row[KIND_OF[name]] = weight
@@ -219,7 +224,7 @@ def goal_row(instruction: str) -> NDArray[np.float32]:
 
 
 def _relative_pose(situation: Situation) -> tuple[float, ...]:
-    """The agent's pose in the frame of where it began."""
+    """The agent's pose in the frame of its start pose."""
     pose, start = situation.perception.pose, situation.memory.start
     dx, dz = pose.x - start.x, pose.z - start.z
     heading = radians(start.rotation)
@@ -341,12 +346,13 @@ class Observation:
     """A kind of observation.
 
     Attributes:
-        space: its space, given the width and height of frames, pixels.
-        build: makes it; the array must be its own, because images are shared.
+        space: returns the space of the observation, given the width and height of frames, pixels.
+        build: makes the observation; it must return a new array, because images are shared.
         needs: the sensors that it reads, keys of :data:`er_gym.envs.perception.SENSORS`:
             ``"frame"`` (``situation.picture``), ``"depth"``, ``"instances"``, ``"classes"`` (each
-            an attribute of ``situation.perception``). Without them nothing is drawn.
-        info: what it adds to ``info``, such as what its numbers mean.
+            an attribute of ``situation.perception``). Nothing is drawn for an observation without
+            sensors.
+        info: returns what the observation adds to ``info``, such as what its numbers mean.
 
     Raises:
         ValueError: there is no such sensor.
@@ -412,14 +418,14 @@ OBSERVATIONS: Registry[Observation] = Registry(
     expected=f"an {__name__}.Observation",
     fits=lambda row: isinstance(row, Observation),
 )
-"""By name, which is also the key in the dictionary that the environment returns."""
+"""The kinds of observation by name. The name is also the key in the observation."""
 
 
 def parse_obs_mode(obs_mode: str) -> dict[str, Observation]:
     """The kinds of observation that a mode such as ``"rgb+text"`` asks for, by name.
 
     Raises:
-        ValueError: it names something that is no kind of observation, or nothing, or one twice.
+        ValueError: the mode names an unknown kind, nothing, or one kind twice.
     """
     names = obs_mode.split("+") if isinstance(obs_mode, str) else [""]
     try:

@@ -1,17 +1,15 @@
 """The paper's protocol: what its evaluation program understands, allows and does.
 
-The rules are those of Embodied-Reasoner's runner and agent (arXiv 2503.21696, ``evaluate/``). Where
-they look odd they are kept: numbers that stand beside the paper's table must be made alike.
+The rules are those of Embodied-Reasoner's runner and agent (arXiv 2503.21696, ``evaluate/``). Odd
+rules are kept, too, so that numbers compare with the paper's table.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.action_handler import EpisodeSetup, ExecutedAction
+from er_gym.envs.action_handler import EpisodeSetup, ExecutedAction, Moment
 from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
 from er_gym.envs.legality import AvailableObjects, KnownTypes, navigable_within
 from er_gym.envs.paper_approach import ObjectSnapshot, approach, current_snapshot, snapshot_of
@@ -19,11 +17,10 @@ from er_gym.envs.paper_skills import interact, move_forward, observe, start_agai
 from er_gym.envs.perception import Perception, type_mask
 from er_gym.envs.skills import Outcome
 from er_gym.tasks import verbs
-from er_gym.tasks.task import KeyAction
 from er_gym.thor.objects import KIND_OF, TYPES, ObjectTable
 
 NO_OBJECT = "No Suitable Object"
-"""The type of what a reply names that is not in the scene."""
+"""The object type of a reply that names something that the scene does not have."""
 _PUT_IN = "put in"
 _BARE = (verbs.OBSERVE, verbs.MOVE_FORWARD, verbs.END)
 _SPOKEN = {
@@ -31,25 +28,26 @@ _SPOKEN = {
     "put": verbs.PUT,
     **{verb: verb for verb in (verbs.TOGGLE, verbs.OPEN, verbs.CLOSE, *_BARE)},
 }
-"""What a reply may begin with, in the order in which it is looked for, and the verb meant."""
+"""The words that a reply may begin with, each with the verb that it means. The first match
+counts."""
 _NAMELESS = (*_BARE, "error")
 _INTERACTIONS = (verbs.PICKUP, verbs.PUT, verbs.OPEN, verbs.CLOSE, verbs.TOGGLE)
 _NOT_BARE = [INDEX[Action(verb)] for verb in verbs.BARE_VERBS if verb not in _BARE]
 _SECOND_WHEN_HOLDING = frozenset({"84", "85"})
-"""Identities of the paper's tasks in which going to a type means the second of the targets when
-something is held: both places are of one type."""
+"""Identities of the paper's tasks that have two places of one type. There, ``navigate to`` that
+type means the second target while the hand holds something."""
 
 
 def understand_as_paper(action: AnyAction, objects: ObjectTable) -> tuple[Action | None, str]:
-    """The action that the paper's runner reads in a text, None if none; and the text.
+    """The action that the paper's runner reads in a text (None if it reads none), and the text.
 
-    A text is read as it is written: its case and leading spaces matter to the verb. The object is
-    its last word, whatever the verb; a word that names no type in the scene, in any case, stands
-    for :data:`NO_OBJECT`. (The paper asks a model which type is closest in meaning. Here this is
-    for the agent.)
+    Case and leading spaces of the text matter for the verb. The object is the last word of the
+    text, whatever the verb. The case of the object does not matter. A word that names no type in
+    the scene stands for :data:`NO_OBJECT`. (The paper's runner then asks a model which type is
+    closest in meaning. Here the agent has to do that.)
 
     Raises:
-        gymnasium.error.InvalidAction: it is neither text nor an action nor its index.
+        gymnasium.error.InvalidAction: the value is not an action, its text or its index.
     """
     text = text_of(action)
     if text.startswith(NO_ACTION):
@@ -72,16 +70,17 @@ def understand_as_paper(action: AnyAction, objects: ObjectTable) -> tuple[Action
 class PaperActionHandler:
     """The paper's way to judge and carry out actions.
 
-    - A type may be gone to once it has been plain to see, or where the task lists it.
-    - A type may be interacted with in any way while one of its objects is plain to see, or visible
-      and of a type that lay in the receptacle last gone to. Whether the object's state and the hand
-      allow it, AI2-THOR says. What is in the hand counts too.
-    - A type stands for the task's first target object of that type, or for the first in the scene,
-      as that was when the episode began: where it has been moved to since, or whether it has been
-      switched on, is not heeded.
+    - The agent may navigate to a type that has been clearly visible, or that the task lists.
+    - The agent may interact with a type in any way while one of its objects is clearly visible, or
+      is visible and of a type that lay in the receptacle last navigated to. The object in the hand
+      counts too. AI2-THOR decides whether the state of the object and of the hand allows the
+      action.
+    - A type stands for the task's first target object of that type. If the task has none, it stands
+      for the first object of the type in the scene, as that was when the episode began: the handler
+      ignores that the object has been moved or switched on since.
 
     Args:
-        setup: of the episode; its ``instances`` means nothing here.
+        setup: the episode's setup; its ``instances`` is ignored.
     """
 
     def __init__(self, setup: EpisodeSetup) -> None:
@@ -98,7 +97,7 @@ class PaperActionHandler:
                 self._first[entry["objectType"]] = snapshot_of(entry)
 
     def available_objects(self, perception: Perception) -> AvailableObjects:
-        """What is plain to see, what is in the hand included; and what lay in the receptacle."""
+        """Clearly visible objects are navigable; these and the receptacle's are interactable."""
         table, visible = perception.objects, perception.visible
         away = np.hypot(
             table.centre[:, 0] - perception.pose.x, table.centre[:, 2] - perception.pose.z
@@ -109,11 +108,11 @@ class PaperActionHandler:
             objects=table,
             navigable=plain.nonzero()[0],
             interactable=(plain | inside).nonzero()[0],
-            covered=np.array([], np.intp),  # AI2-THOR refuses what a pan hides
+            covered=np.array([], np.intp),  # AI2-THOR refuses a burner that a pan hides
         )
 
     def illegal_reason(self, action: Action, available: AvailableObjects, known: KnownTypes) -> str:
-        """A type must be known to go there, and at hand to do anything else to it."""
+        """The agent navigates only to known types, and interacts only with types within reach."""
         name = action.object_type
         if action.verb in (verbs.INIT, *_BARE):
             return ""
@@ -124,7 +123,7 @@ class PaperActionHandler:
         return f"You cannot {action.verb} {name or 'nothing'}: it is not available for interaction."
 
     def legal(self, available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
-        """(len(ACTIONS),) int8: the paper's interactions with what is at hand are legal."""
+        """(len(ACTIONS),) int8: 1 for the paper's interactions with all types within reach."""
         legal = known.legal.copy()
         legal[_NOT_BARE] = 0
         for verb in _INTERACTIONS:
@@ -132,13 +131,7 @@ class PaperActionHandler:
             legal[indices[indices >= 0]] = 1
         return legal
 
-    def execute(
-        self,
-        action: Action,
-        perception: Perception,
-        available: AvailableObjects,
-        left: Sequence[KeyAction],
-    ) -> ExecutedAction:
+    def execute(self, action: Action, now: Moment) -> ExecutedAction:
         """Carry out a legal action."""
         setup, controller = self._setup, self._setup.controller
         if action.verb == verbs.OBSERVE:
@@ -149,7 +142,7 @@ class PaperActionHandler:
             return "", Outcome(None, True)
         if action.verb == verbs.INIT:
             return "", start_again(controller, setup.start)
-        target = self._choose(action, perception.objects)
+        target = self._choose(action, now.perception.objects)
         if target is None:
             return "", Outcome(None, False, f"there is no such {action.object_type}")
         if action.verb != verbs.NAVIGATE:
@@ -164,7 +157,7 @@ class PaperActionHandler:
         return target.object_id, outcome
 
     def _choose(self, action: Action, objects: ObjectTable) -> ObjectSnapshot | None:
-        """The object that a type stands for; None if a task names one that the scene lacks."""
+        """The object that a type stands for; None if the scene lacks the object of the task."""
         targets = self._targets.get(action.object_type)
         if targets is None:
             return self._first.get(action.object_type)
@@ -174,8 +167,11 @@ class PaperActionHandler:
         return current_snapshot(self._setup.controller, targets[1 if second else 0])
 
     def _on_it(self, target: ObjectSnapshot) -> ObjectSnapshot:
-        """Where going to an object leads: to the first of the task's related objects that lies in
-        it, if it is a receptacle that does not open."""
+        """The object that the agent approaches when it navigates to ``target``.
+
+        If ``target`` is a receptacle that does not open and holds some of the task's related
+        objects, it is the first of these.
+        """
         if target.receptacle and not target.openable:
             for object_id in self._setup.task.related_objects:
                 if object_id in target.contents:
@@ -187,7 +183,7 @@ _FLOOR = type_mask(np.array([KIND_OF[name] for name in verbs.NOWHERE]))
 
 
 def _within(table: ObjectTable) -> NDArray[np.float64]:
-    """(N,) how near each object is plain to see, metres; 0 for the floor."""
+    """(N,) the distance below which each object is clearly visible, metres; 0 for the floor."""
     found = table.derived.get("paper_within")
     if not isinstance(found, np.ndarray):
         found = navigable_within(table.volume, table.face)

@@ -1,8 +1,9 @@
 """Where the paper's agent stands to reach an object, and how it then looks at it.
 
-It picks one of AI2-THOR's interactable poses within 1.5 m: for a small object the nearest; for
-others one in front of the object, judged by which way the object faces, or, where there is none,
-behind it. It then crouches or stands, tilts its head and turns towards the object.
+The agent picks one of AI2-THOR's interactable poses within 1.5 m. For a small object it picks the
+nearest. For other objects it picks a pose in front of the object, judged by the direction that the
+object faces. Where there is none, it picks a pose behind the object. The agent then crouches or
+stands, tilts its head and turns towards the object.
 """
 
 from __future__ import annotations
@@ -20,23 +21,27 @@ from er_gym.tasks.task import AgentPose
 from er_gym.thor.objects import is_present
 
 _FARTHEST, _NEAR = 1.5, 1.0
-"""How far from an object the agent may stand, and may if the object is large; metres."""
+"""The greatest distance between the agent and an object; and between an agent that stands in front
+of (or behind) an object and that object, if it is larger than :data:`_LITTLE`; metres."""
 _SMALL = (0.1, 1.0)
-"""Of a small object: the largest volume (m³) and face (m²); the agent stands as near as it can."""
+"""The largest volume (m³) and face (m²) of a small object. The agent stands as near to it as it
+can."""
 _LITTLE, _MIDDLING = (0.2, 0.5), (1.0, 1.0)
-"""The same where the agent stands in front: as near as it can, or halfway; else far off."""
+"""The largest volume and face of a little and of a middling object. In front of a little object the
+agent takes the nearest place, in front of a middling one the middle one of the places by distance,
+in front of any other the farthest."""
 _TOLERANCES = (0.1, 0.2, 0.3, 0.4, 0.5)
 _GAP = 0.1
 _HEADINGS = (0, 45, 90, 135, 180, 225, 270, 315, 360)
 _UP, _DOWN = 30, -60
-"""How far the head tilts, degrees upwards."""
+"""The limits of the head's tilt, degrees upwards."""
 _BELOW = 0.44
 """The agent crouches if the object's top is this far below the agent's centre, metres."""
 _HORIZON = 60.0
 
 _CORNERS = ((2, 225.0), (3, 315.0), (6, 135.0), (7, 45.0))
-"""The lower corners among AI2-THOR's eight, in the order in which they are tried, and which way the
-agent looks from each."""
+"""The lower ones of AI2-THOR's eight corners, in the order of the search, each with the direction
+in which the agent looks from there, degrees."""
 
 Pose = Mapping[str, Any]
 """An entry of GetInteractablePoses's ``actionReturn``."""
@@ -44,14 +49,16 @@ Pose = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class ObjectSnapshot:
-    """An object as the paper's agent knows it: now, or when the episode began.
+    """What the paper's agent knows of an object: its state now, or when the episode began.
 
     Attributes:
-        object_id, object_type: AI2-THOR's.
-        x, z, rotation: where its origin is, metres, and which way it faces, degrees.
-        centre: x, y and z of its axis-aligned box, metres; ``top``: y of the box's top.
+        object_id, object_type: AI2-THOR's ``objectId`` and ``objectType``.
+        x, z, rotation: the position of its origin, metres, and the direction that it faces,
+            degrees.
+        centre: x, y and z of the middle of its axis-aligned box, metres.
+        top: y of the box's top, metres.
         receptacle, openable, is_toggled: as AI2-THOR has them.
-        contents: ids of what lies in it.
+        contents: ids of the objects that lie in it.
     """
 
     object_id: str
@@ -86,7 +93,7 @@ def snapshot_of(entry: Mapping[str, Any]) -> ObjectSnapshot:
 
 
 def current_snapshot(controller: Any, object_id: str) -> ObjectSnapshot | None:
-    """An object as it is now, None if there is none of that id."""
+    """An object in its present state, None if no object has that id."""
     entry = _entry(controller, object_id)
     return None if entry is None else snapshot_of(entry)
 
@@ -138,7 +145,8 @@ def approach(controller: Any, target: ObjectSnapshot, stated: AgentPose | None) 
     """Go to an object and look at it.
 
     Args:
-        stated: the pose that a pose file states for the object; the agent stays in it as it is.
+        stated: the pose that a pose file states for the object, None if it states none; the agent
+            goes there and neither crouches nor turns.
     """
     refused: list[Pose] = []
     pose = stated or _choose(controller, target, refused)
@@ -153,7 +161,7 @@ def approach(controller: Any, target: ObjectSnapshot, stated: AgentPose | None) 
         _adjust_height(controller, target)
         _look_at(controller, target)
     if not controller.headless:
-        controller.step(action="Pass")  # for the one picture that is wanted
+        controller.step(action="Pass")  # to draw the one picture needed
     return Outcome(perceive(controller.last_event), True)
 
 
@@ -162,14 +170,14 @@ def approach(controller: Any, target: ObjectSnapshot, stated: AgentPose | None) 
 
 @dataclass(frozen=True)
 class _Sides:
-    """Where to look for a place in front of an object that faces some way.
+    """The sides on which the agent looks for a place, for one direction that an object faces.
 
     Attributes:
-        axis: places are taken whose offset along it is small; ``""`` for all.
-        sides: the signs of the place's offsets along x and z, 0 for any, with the rotation to face
+        axis: only places with a small offset along this axis count; ``""`` for all places.
+        sides: the signs of a place's offsets along x and z (0 for any), and the rotation that faces
             the object from there; in order of preference.
-        skips: whether the second side counts only where the first has no place at all. Else it
-            counts also where the first has none that is near enough.
+        skips: whether the second side counts only if the first has no place at all. Otherwise it
+            also counts if the first has no place that is near enough.
     """
 
     axis: str
@@ -186,11 +194,12 @@ _FACING = {
     270: _Sides("z", ((-1, 0, 90.0), (1, 0, 270.0))),
     315: _Sides("", ((-1, 1, 135.0), (1, -1, 315.0))),
 }
-"""By the direction that the object faces; 0 has its own rule, :func:`_for_facing_north`."""
+"""The sides by the direction that the object faces, degrees. 0 has its own rule,
+:func:`_for_facing_north`."""
 
 
 def _choose(controller: Any, target: ObjectSnapshot, refused: Sequence[Pose]) -> AgentPose | None:
-    """The pose from which to reach an object; None where there is none within reach.
+    """The pose from which the agent reaches an object; None if there is none.
 
     Args:
         refused: positions to which AI2-THOR refused to teleport the agent.
@@ -223,7 +232,7 @@ def _choose(controller: Any, target: ObjectSnapshot, refused: Sequence[Pose]) ->
 
 
 def _heading(degrees: float) -> int:
-    """The nearest of eight directions; the first of two that are as near."""
+    """The nearest of eight directions; the first of two that are equally near."""
     return min(_HEADINGS, key=lambda heading: abs(heading - round(degrees))) % 360
 
 
@@ -250,19 +259,21 @@ def _by_sides(
 def _for_facing_north(
     target: ObjectSnapshot, poses: Sequence[Pose], _: object, size: _Size
 ) -> _Found:
-    """Of the best places on both sides, the nearer. The agent looks north wherever there is a
-    place behind the object, even if it then stands in front of it."""
+    """The nearer one of the best places on both sides, and the rotation there.
+
+    The agent looks north if there is any place behind the object, even if it stands in front.
+    """
     line = _in_line(target, poses, "z")
     front, back = _on_side(target, line, 0, 1), _on_side(target, line, 0, -1)
     best = [_straight_ahead(target, there, size) for there in (back, front)]
     there_is = [pose for pose in best if pose is not None]
-    # Where both are as near, the place behind is taken: min returns the first.
+    # min returns the first of two places that are equally near: the one behind the object.
     found = min(there_is, key=lambda pose: _away(pose, target)) if there_is else None
     return found, 0.0 if back else 180.0
 
 
 def _in_line(target: ObjectSnapshot, poses: Sequence[Pose], axis: str) -> Sequence[Pose]:
-    """The poses whose offset along an axis is least, to within a tolerance that grows."""
+    """The poses with a small offset along an axis, by the first tolerance that any pose meets."""
     if not axis:
         return poses
     origin = {"x": target.x, "z": target.z}[axis]
@@ -282,9 +293,9 @@ def _on_side(target: ObjectSnapshot, poses: Sequence[Pose], x: int, z: int) -> l
 
 
 def _straight_ahead(target: ObjectSnapshot, poses: Sequence[Pose], size: _Size) -> Pose | None:
-    """Of the poses close to the line in which an object faces, one as far off as its size asks.
+    """Choose among the poses close to the line in which an object faces, by the object's size.
 
-    The paper's equation of the line has x and z the wrong way round; so has this.
+    The paper's equation of the line swaps x and z. This one swaps them, too.
     """
     slope = -tan(radians(target.rotation))
     offset = -target.x - slope * target.z
@@ -310,7 +321,7 @@ def _straight_ahead(target: ObjectSnapshot, poses: Sequence[Pose], size: _Size) 
 
 
 def _adjust_height(controller: Any, target: ObjectSnapshot) -> None:
-    """Crouch for a low object, and stand up again if the object is then out of sight."""
+    """Crouch for a low object, otherwise stand; stand up again if the object is out of sight."""
     low = controller.last_event.metadata["agent"]["position"]["y"] > target.top + _BELOW
     step_undrawn(controller, "Crouch" if low else "Stand")
     entry = _entry(controller, target.object_id)

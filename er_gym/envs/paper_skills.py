@@ -75,14 +75,14 @@ def interact(controller: Any, verb: str, target: ObjectSnapshot) -> Outcome:
 
 
 def move_forward(controller: Any, related: Sequence[str]) -> Outcome:
-    """Walk half a metre ahead; where that is blocked, to a side, and only then back.
+    """Walk half a metre ahead; if that is blocked, to a side; if that is blocked, too, back.
 
-    A side step is a turn, a step ahead and a turn back. The paper takes it for done when the turn
-    back was, so that the step itself may be blocked, too.
+    A side step is a turn, a step ahead and a turn back. The paper counts it as done when the turn
+    back succeeds, even if the step itself is blocked.
 
     Args:
-        related: ids of the task's related objects; of two free sides the agent takes the one that
-            brings it nearest to one of them that it sees.
+        related: ids of the task's related objects. If both sides are free, the agent takes the side
+            that brings it nearest to a related object that it sees.
     """
     if not _walk(controller, "MoveAhead"):
         _go_round(controller, related)
@@ -111,9 +111,9 @@ def _go_round(controller: Any, related: Sequence[str]) -> None:
 
 
 def _tried(controller: Any, side: str, other: str) -> tuple[bool, tuple[float, float]]:
-    """Step to a side and back to the other: whether that went, and where (x, z) the step led.
+    """Step to a side and back again; return whether that succeeded, and the (x, z) of the side.
 
-    The step back leads elsewhere if the step aside was blocked, as in the paper's program.
+    If the step aside was blocked, the step back leads elsewhere, as in the paper's program.
     """
     went = _side_step(controller, side)
     position = controller.last_event.metadata["agent"]["position"]
@@ -133,7 +133,8 @@ def _side_step(controller: Any, side: str) -> bool:
 
 
 def _back_off(controller: Any) -> None:
-    """Walk back; where that is blocked too, turn right and walk, or left and walk."""
+    """Walk back; if that is blocked, too, turn right and walk; if that is blocked, turn left and
+    walk."""
     if _walk(controller, "MoveBack"):
         return
     turned = step_undrawn(controller, "RotateRight", degrees=90)

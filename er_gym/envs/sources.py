@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from er_gym.envs.verify import PlayableEnv
 
 _LONGEST_NAME = 80
-"""No message quotes more of a name."""
+"""A message quotes at most this many characters of a name."""
 GENERATE = "generate"
 """The name of the endless source."""
 
@@ -66,7 +66,7 @@ class TaskList:
 
     @cached_property
     def _fitting(self) -> dict[tuple[str, str], list[Task]]:
-        """The tasks by name of their type and by scene, ``""`` standing for any."""
+        """The tasks by type name and scene; ``""`` stands for any."""
         found: defaultdict[tuple[str, str], list[Task]] = defaultdict(list)
         for task in self.tasks:
             for kind in (task.type.name, ""):
@@ -75,7 +75,7 @@ class TaskList:
         return found
 
     def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
-        """One of the tasks that fit."""
+        """Draw one of the tasks that fit."""
         kind = task_type.name if task_type else ""
         fitting = self._fitting.get((kind, scene or ""))
         if not fitting:
@@ -133,7 +133,7 @@ def make_source(source: Source, make_env: Callable[[], PlayableEnv]) -> EpisodeS
         path = Path(name).resolve()
         if name in suite_names():
             path = suite_file(name)
-        # os.path's takes a name that is too long for one of no file.
+        # os.path's function treats a name that is too long as a file that does not exist.
         changed = path.stat().st_mtime_ns if os.path.isfile(path) else 0
         found, remarks = _read(str(path) if is_file else name, is_file, changed)
         if remarks:
@@ -146,7 +146,7 @@ def make_source(source: Source, make_env: Callable[[], PlayableEnv]) -> EpisodeS
         if len(tasks) == len(source):
             return TaskList(tasks)
     raise ValueError(
-        f"{short_repr(source)} is no source of episodes; give a suite's name, a task file, "
+        f"{short_repr(source)} is not a source of episodes; give a suite's name, a task file, "
         f"{GENERATE!r}, a list of tasks, or an EpisodeSource"
     )
 

@@ -49,7 +49,7 @@ class Decision:
 
 
 class CannotGoOn(Exception):
-    """The agent can play no further episode, nor finish this one: a budget is spent, a key refused.
+    """The agent can neither finish this episode nor play another: a budget is spent, a key refused.
 
     The run stops and shows the message. The episodes played before stay in the run directory.
     """
@@ -76,7 +76,7 @@ class MakeAgent(Protocol):
 
 
 Attachments: TypeAlias = Mapping[str, bytes]
-"""Files that an agent leaves beside an episode's record: bytes by path in the run directory."""
+"""Files that an agent leaves beside an episode's record: path in the run directory to bytes."""
 
 
 @runtime_checkable
@@ -84,15 +84,15 @@ class LeavesAttachments(Protocol):
     """An agent that leaves files of its own, such as its conversation and the pictures it saw."""
 
     attachment_folders: Sequence[str]
-    """Folders of the run directory that its files go to: plain names, none of them er-gym's own.
-    In each folder, the files of an episode are ``STEM.SUFFIX``, or lie in the folder ``STEM/``."""
+    """The folders of the run directory for its files: plain names other than er-gym's own. In each
+    folder, the files of an episode are ``STEM.SUFFIX``, or lie in the folder ``STEM/``."""
 
     def attachments(self, episode: EpisodeRecord, stem: str) -> Attachments:
         """The files of an episode that is over or has crashed.
 
         Args:
             episode: its record.
-            stem: what the names of its files begin with (:func:`.run_directory.file_stem`).
+            stem: the beginning of the names of its files (:func:`.run_directory.file_stem`).
         """
 
 
@@ -104,14 +104,14 @@ def check_attachments(files: Attachments, folders: Sequence[str], stem: str) -> 
     """Check where an agent wants its files.
 
     Raises:
-        ValueError: a folder is no plain name or one of er-gym's own, or a path is not
-            ``FOLDER/STEM.SUFFIX`` or within ``FOLDER/STEM/``.
+        ValueError: a folder is not a plain name, or is one of er-gym's own; or a path is neither
+            ``FOLDER/STEM.SUFFIX`` nor within ``FOLDER/STEM/``.
         TypeError: a file's content is not bytes.
     """
     for folder in folders:
         if folder in ("", ".", "..") or "/" in folder or folder in _RESERVED:
             raise ValueError(
-                f"attachment folder {folder!r} is not allowed; give a plain name that is none of: "
+                f"attachment folder {folder!r} is not allowed; give a plain name other than: "
                 f"{', '.join(sorted(_RESERVED))}"
             )
     for path, data in files.items():

@@ -44,7 +44,7 @@ class RunBegun(_Event):
         suite: the suite's name.
         agent: the agent's spec.
         tasks: the number of episodes that the run is to have.
-        done: the number of these that an earlier start finished.
+        done: the number of these that earlier starts finished.
     """
 
     kind: Literal["run_begun"] = "run_begun"
@@ -191,7 +191,7 @@ class EventLog:
         listeners: called with each event that this log is given, in the thread that gives it.
 
     Raises:
-        ValueError: the file is a link or no regular file.
+        ValueError: the file is a link, or not a regular file.
         OSError: the file cannot be opened.
     """
 
@@ -202,7 +202,7 @@ class EventLog:
     def __call__(self, event: Event) -> None:
         """Append an event, and call the listeners.
 
-        A failure to write the event is ignored: only a lost result may end a run.
+        A failure to write the event is ignored, since only a lost result may end a run.
         """
         with contextlib.suppress(OSError):
             self._lines.add(event.model_dump_json())
@@ -226,8 +226,8 @@ def read_events(directory: Path) -> Iterator[Event]:
 def parse_events(lines: Iterable[bytes]) -> Iterator[Event]:
     """The events in the lines of a stream.
 
-    Lines that are no event are skipped: a killed process leaves half a line, and a later version
-    may write kinds of events unknown here.
+    Lines that are not events are skipped: a killed process leaves half a line, and a later version
+    may write unknown kinds of events.
 
     Raises:
         ValueError: a run has begun in another format, so its events might be misread.

@@ -1,4 +1,4 @@
-"""What all executors share: the played episode, who takes it, and how much runs at once."""
+"""What all executors share: the played episode, the sink for it, and how much runs at once."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class PlayedEpisode:
             check_attachments(files, folders, stem)
         except CannotGoOn:
             raise
-        except Exception as error:  # agents are anybody's code; one must not end the run
+        except Exception as error:  # agents are other people's code and must not end the run
             problem = record.error or one_line(error)
             crashed = {"success": False, "end_reason": "", "error": problem}
             return cls(record.model_copy(update=crashed))
@@ -100,18 +100,30 @@ class Parallelism:
             raise ValueError(f"deadline is {self.deadline}; give seconds above 0")
 
 
+@dataclass(frozen=True)
+class Assignment:
+    """What an executor is to play.
+
+    Attributes:
+        directory: the run directory.
+        tasks: one episode is played of each.
+        make_agent: makes the agent of an episode.
+        sink: takes the episodes.
+        parallelism: how much runs at once.
+    """
+
+    directory: RunDirectory
+    tasks: Sequence[Task]
+    make_agent: MakeAgent
+    sink: EpisodeSink
+    parallelism: Parallelism
+
+
 class Executor(Protocol):
     """Plays tasks; a row of :data:`er_gym.rollout.runner.EXECUTORS`."""
 
-    def __call__(
-        self,
-        directory: RunDirectory,
-        tasks: Sequence[Task],
-        make_agent: MakeAgent,
-        sink: EpisodeSink,
-        parallelism: Parallelism,
-    ) -> None:
-        """Play every task, and hand each episode to ``sink`` before looking at the next.
+    def __call__(self, assigned: Assignment) -> None:
+        """Play every task, and hand each episode to the sink before looking at the next.
 
         Raises:
             CannotGoOn: an agent said that no further episode can be played.

@@ -18,8 +18,8 @@ class JsonLines:
         path: the file.
 
     Raises:
-        ValueError: the path is a link, or no regular file. er-gym does not write to what may be
-            somebody else's.
+        ValueError: the path is a link, or not a regular file. er-gym does not write to a file that
+            may be another program's.
         OSError: the file cannot be written.
     """
 
@@ -54,11 +54,11 @@ class JsonLines:
             data = b"\n" * self._half_written + line.encode() + b"\n"
             written = os.write(self._file, data)
             self._half_written = written != len(data)
-            if self._half_written:  # the disk is full; the next line begins on a line of its own
+            if self._half_written:  # the disk is full; the next call begins a new line
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
 
     def new(self) -> list[bytes]:
-        """The whole lines that any process has added since the last call; all at the first."""
+        """The whole lines that any process has added since the last call, or at all."""
         with self._lock:
             if self._file == _CLOSED:
                 return []
@@ -77,6 +77,6 @@ class JsonLines:
 
 def _not_ours(path: Path) -> ValueError:
     return ValueError(
-        f"{path} is a link or no regular file, so it is not written to; remove it, or choose "
-        "another --out"
+        f"{path} is a link, or not a regular file, so er-gym does not write to it; remove it, "
+        "or choose another --out"
     )

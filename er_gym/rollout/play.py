@@ -18,7 +18,7 @@ from er_gym.tasks.verbs import END, INIT
 
 
 class Playable(Protocol):
-    """What :func:`play_episode` needs; an ``EmbodiedEnv`` has it, and so has a ``RemoteEnv``."""
+    """What :func:`play_episode` needs; ``EmbodiedEnv`` and ``RemoteEnv`` have it."""
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -84,7 +84,7 @@ def play_episode(
                 steps.append(_appended(steps[-1]))
     except (CannotGoOn, Terminated):
         raise
-    except (Exception, SystemExit) as caught:  # anybody's code must not end the run
+    except (Exception, SystemExit) as caught:  # other people's code must not end the run
         error = one_line(caught)
     return record_episode(
         task,
@@ -108,7 +108,7 @@ def one_line(error: BaseException) -> str:
 
 
 def _encodable(text: str) -> str:
-    """The text with lone surrogates escaped: models write them, and no UTF-8 file holds them."""
+    """The text with lone surrogates escaped: models write them, but UTF-8 cannot hold them."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -13,31 +12,25 @@ from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
 from er_gym.rollout.events import EventLog
 from er_gym.rollout.executor import (
-    EpisodeSink,
-    Parallelism,
+    Assignment,
     PlayedEpisode,
     lost_episode,
     unbegun_episode,
 )
 from er_gym.rollout.play import episode_seed, one_line, play_episode
 from er_gym.rollout.processes import Terminated
-from er_gym.rollout.run_directory import Manifest, RunDirectory
+from er_gym.rollout.run_directory import Manifest
 from er_gym.rollout.worker_pool import LostJob, run_jobs
 from er_gym.tasks.task import Task
 
 
-def play_in_processes(
-    directory: RunDirectory,
-    tasks: Sequence[Task],
-    make_agent: MakeAgent,
-    sink: EpisodeSink,
-    parallelism: Parallelism,
-) -> None:
+def play_in_processes(assigned: Assignment) -> None:
     """Play each task in one of ``parallelism.workers`` processes. See :class:`.Executor`."""
-    manifest = directory.manifest
+    make_agent, directory = assigned.make_agent, assigned.directory
+    manifest, workers = directory.manifest, assigned.parallelism.workers
     _check_picklable(make_agent)
     worker = partial(EpisodeWorker, make_agent, manifest, directory.path)
-    with closing(run_jobs(worker, tasks, workers=parallelism.workers)) as results:
+    with closing(run_jobs(worker, assigned.tasks, workers=workers)) as results:
         for task, result in results:
             if isinstance(result, _Stop):
                 raise CannotGoOn(result.message)
@@ -45,12 +38,12 @@ def play_in_processes(
                 played = PlayedEpisode(lost_episode(task, result, manifest))
             else:
                 played = result
-            sink.save(played)
-            sink.ended(played)
+            assigned.sink.save(played)
+            assigned.sink.ended(played)
 
 
 def _check_picklable(make_agent: MakeAgent) -> None:
-    """Raise ValueError if worker processes cannot be sent what makes agents."""
+    """Raise ValueError if ``make_agent`` cannot be sent to worker processes."""
     try:
         pickle.dumps(make_agent)
     except Exception as error:  # pickle raises PicklingError, AttributeError, TypeError and others
@@ -75,7 +68,7 @@ class EpisodeWorker:
 
     Args:
         make_agent: makes the agent of an episode.
-        manifest: the run's.
+        manifest: the run's manifest.
         directory: the run directory; events are appended to its stream.
     """
 
@@ -98,7 +91,7 @@ class EpisodeWorker:
             return _Stop(str(stop))
         except Terminated:
             raise
-        except (Exception, SystemExit) as error:  # as in play_episode, one must not end the run
+        except (Exception, SystemExit) as error:  # it must not end the run, as in play_episode
             return PlayedEpisode(unbegun_episode(task, self._manifest, one_line(error)))
         try:
             record = play_episode(

@@ -20,7 +20,7 @@ ERROR = "error"
 """The verb recorded for a reply that named no known action."""
 
 Words: TypeAlias = Annotated[str, AfterValidator(writable)]
-"""What an agent, a model or an exception said: it may hold what UTF-8 does not."""
+"""A text of an agent, a model or an exception: it may hold characters that UTF-8 cannot hold."""
 
 
 class _Record(BaseModel):
@@ -34,10 +34,10 @@ class KeyActionRecord(_Record):
         verb: canonical (see :mod:`er_gym.tasks.verbs`).
         object_id: the AI2-THOR id of its object, ``""`` for ``end``.
         object_type: the type that the task file states, which may be empty or wrong.
-        reward: what doing it is worth.
-        exact: whether it must be done to that object, not just to one of its type.
-        spelled: the verb as the task's file spells it, ``""`` where it spells it as the paper's
-            files do.
+        reward: the reward for doing it.
+        exact: whether it must be done to that object, not just to any object of its type.
+        spelled: the verb as the task's file spells it, ``""`` for the spelling of the paper's
+            files.
     """
 
     verb: str
@@ -62,7 +62,7 @@ class StepRecord(_Record):
         reward: what the step earned.
         thought: the agent's reasoning.
         text: the action as the agent gave it.
-        appended: whether the protocol took the step and not the agent: the ``end`` that the
+        appended: whether the protocol took the step instead of the agent: the ``end`` that the
             paper's runner appends (:data:`er_gym.envs.protocol.PAPER`).
     """
 
@@ -84,15 +84,16 @@ class EpisodeRecord(_Record):
 
     Attributes:
         format: the version of this layout.
-        task_id, task_type, scene, instruction, name, key_actions: the task's; ``task_type`` is the
-            paper's name for it and ``name`` the instruction before paraphrase.
+        task_id, task_type, scene, instruction, name, key_actions: attributes of the task;
+            ``task_type`` is the paper's name of the type and ``name`` the instruction before
+            paraphrase.
         max_steps: the episode's step limit; placing the agent counts as the first step.
         agent: the agent's spec.
         seed: the seed of this episode (not of the run).
         steps: from ``init`` to the last.
         success: the environment's verdict; scores are computed from the steps.
         goal_unmet: the conditions of the task's goal that did not hold at ``end``, in words.
-        search_targets: the types that the task searches for, empty if it is no search; None in a
+        search_targets: the types that the task searches for, empty if it is not a search; None in a
             record that was written before records had this field.
         end_reason: why it ended, in the environment's words; ``""`` if it crashed.
         total_reward: the sum over the steps.
@@ -129,7 +130,7 @@ class EpisodeRecord(_Record):
 
     @property
     def num_steps(self) -> int:
-        """How many steps were recorded, ``init`` and ``end`` included, :data:`ERROR` left out."""
+        """The number of recorded steps, including ``init`` and ``end`` but not :data:`ERROR`."""
         return sum(step.verb != ERROR for step in self.steps)
 
 

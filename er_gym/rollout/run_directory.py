@@ -1,12 +1,12 @@
-"""The run directory: a manifest that says what is played, and one file per episode.
+"""The run directory: a manifest of what is played, and one file per episode.
 
 ::
 
     runs/x/run.json                      the manifest
-    runs/x/events.jsonl                  what happened when, see er_gym.rollout.events
+    runs/x/events.jsonl                  the events in order, see er_gym.rollout.events
     runs/x/episodes/<task id>.json       the record of each episode
-    runs/x/conversations/<task id>.json  with a vision-language agent: what was said,
-    runs/x/pictures/<task id>/           and the pictures that were shown
+    runs/x/conversations/<task id>.json  the messages of a vision-language agent
+    runs/x/pictures/<task id>/           the pictures that the agent was shown
 
 An agent may leave other files beside the records (:class:`.agent.LeavesAttachments`). A file is
 written under a temporary name and then moved, so each file is whole. Readers ignore the temporary
@@ -45,12 +45,12 @@ PICTURES = "pictures"
 SPENDING = "spending.jsonl"
 REPLIES = "replies"
 _DATABASE = "cache.db"
-"""diskcache's, in the folder of replies."""
+"""The file of diskcache in the folder of replies."""
 SERVER_EVENTS = "server-events.jsonl"
 _KEPT = (EPISODES, CONVERSATIONS, PICTURES, SPENDING, SERVER_EVENTS, REPLIES, EVENTS)
 """The files and folders of a run directory beside its manifest."""
 _LOST_WITH_IT = (EPISODES, SPENDING, REPLIES)
-"""What makes a run worth keeping."""
+"""A run is worth keeping if one of these holds something."""
 
 
 class RunDirectoryError(ValueError):
@@ -63,15 +63,15 @@ class Manifest(BaseModel):
     Attributes:
         format: the version of this layout.
         suite: the suite's name.
-        suite_digest: of its tasks' content.
-        suite_size: how many tasks it has that can be played; a run need not have played them all.
+        suite_digest: the digest of the suite's tasks.
+        suite_size: the number of the suite's tasks that can be played; a run may have played fewer.
         agent: the agent's spec.
-        agent_settings: of an agent that speaks, what decides what it says.
+        agent_settings: the settings of a model agent that determine its replies.
         env: the keyword arguments of the environment.
-        seed: the run's; every episode's is derived from it.
+        seed: the run's seed; the seed of every episode is derived from it.
         er_gym: the version of the package.
-        set_aside: the suite's tasks that cannot be played, and why; they are not in its size.
-        taken: what stands for objects that tasks name and their scenes lack.
+        set_aside: the suite's tasks that cannot be played, and why; ``suite_size`` leaves them out.
+        taken: the substitutes for objects that the tasks name and their scenes lack.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -90,20 +90,20 @@ class Manifest(BaseModel):
 
     @property
     def protocol(self) -> str:
-        """By which rules episodes are played, see :mod:`er_gym.envs.protocol`."""
+        """The rules by which episodes are played, see :mod:`er_gym.envs.protocol`."""
         return str(self.env.get("protocol", DEFAULT.name))
 
     @property
     def digest(self) -> str:
-        """What the run's episodes know it by: 16 hex digits of a sha256. Fields that it does not
-        state, later ones too, do not change it."""
+        """The id of the run in its episodes: 16 hex digits of a sha256. Fields at their default do
+        not change it, so later versions can add fields."""
         told = self.model_dump(mode="json", exclude_defaults=True)
         return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
 class UnusableFile:
-    """A file in the folder of episodes that is no episode of this run.
+    """A file in the folder of episodes that is not an episode of this run.
 
     Attributes:
         path: the file.
@@ -136,7 +136,7 @@ class RunDirectory:
 
     Attributes:
         path: the directory.
-        manifest: what is played in it.
+        manifest: the manifest of its run.
     """
 
     def __init__(self, path: Path, manifest: Manifest) -> None:
@@ -169,7 +169,7 @@ class RunDirectory:
                     )
         elif there := [name for name in _KEPT if _holds_something(path / name)]:
             raise RunDirectoryError(
-                f"{path} holds {there[0]} but no {MANIFEST} that tells of which run; "
+                f"{path} holds {there[0]} but no {MANIFEST} that says which run it is; "
                 "choose another --out"
             )
         else:
@@ -182,20 +182,19 @@ class RunDirectory:
         """Open a run directory to read it.
 
         Raises:
-            RunDirectoryError: there is no run.
+            RunDirectoryError: the directory holds no run.
         """
         try:
             text = read_text(path / MANIFEST)
         except TaskFileError as error:
             raise RunDirectoryError(
-                f"{path} is no run directory: {error}; give the directory that was "
-                "er-gym bench's --out"
+                f"{path} is not a run directory: {error}; give the --out directory of er-gym bench"
             ) from error
         try:
             return cls(path, Manifest.model_validate_json(text))
         except ValidationError as error:
             raise RunDirectoryError(
-                f"{path / MANIFEST} is no run manifest: {_first_problem(error)}"
+                f"{path / MANIFEST} is not a run manifest: {_first_problem(error)}"
             ) from error
 
     def write(self, episode: EpisodeRecord) -> Path:
@@ -212,9 +211,9 @@ class RunDirectory:
         """Write the files that an agent leaves; they replace earlier ones of the same task.
 
         Args:
-            task_id: of the episode.
-            attachments: bytes by path in the run directory, written in this order.
-            folders: the folders that such files go to. The task's earlier files there are removed.
+            task_id: the task of the episode.
+            attachments: path in the run directory to bytes, written in this order.
+            folders: the folders for such files. The task's earlier files in them are removed.
         """
         stem = file_stem(task_id)
         played_before = self._file(task_id).exists()
@@ -244,10 +243,10 @@ class RunDirectory:
         yield from self.read().episodes
 
     def move_aside(self, task_ids: Iterable[str]) -> list[str]:
-        """Move what is none of this run's episodes out of the way of those of some tasks.
+        """Rename unusable files that have the file name of an episode of these tasks.
 
         Returns:
-            In a line each, what was moved and why, and what else is no episode of this run's.
+            One line for each unusable file: the reason, and whether the file was renamed.
         """
         ways = {self._file(task_id) for task_id in task_ids}
         told = []
@@ -261,7 +260,7 @@ class RunDirectory:
         return told
 
     def _withdraw(self) -> None:
-        """Remove the run; first what it keeps, so that a kill leaves a run, not a riddle."""
+        """Remove the run, the manifest last: a kill meanwhile then leaves a valid run directory."""
         for name in _KEPT:
             path = self.path / name
             if path.is_dir() and not path.is_symlink():
@@ -274,9 +273,9 @@ class RunDirectory:
         return self.path / EPISODES / f"{file_stem(task_id)}.json"
 
     def _episode(self, path: Path) -> EpisodeRecord:
-        """The episode in a file; a ValueError says in one line why there is none of this run's."""
-        if not path.is_file():  # a pipe would be waited for
-            raise ValueError("no file")
+        """The episode in a file; a ValueError says in one line why it is not one of this run's."""
+        if not path.is_file():  # reading a pipe would block
+            raise ValueError("not a regular file")
         try:
             episode = EpisodeRecord.model_validate_json(read_bytes(path))
         except ValidationError as error:
@@ -289,7 +288,7 @@ class RunDirectory:
         manifest = self.manifest
         if episode.run:
             told: list[tuple[str, str | int, str | int]] = [("run", episode.run, manifest.digest)]
-        else:  # written before episodes told of their run
+        else:  # written before episodes named their run
             seed = episode_seed(manifest.seed, episode.task_id)
             told = [("agent", episode.agent, manifest.agent), ("seed", episode.seed, seed)]
         for what, its, ours in told:
@@ -303,8 +302,8 @@ def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirector
     """A run directory to play in, locked against other processes.
 
     If the block raises before there is anything to lose (an episode that did not crash, a reply
-    that was paid for), a run that was begun here is removed. A mistyped command thus leaves nothing
-    in the way of the right one. A run that was killed that early is replaced, too.
+    that was paid for), a run that began here is removed. A mistyped command thus does not block the
+    corrected one. A run that was killed that early is replaced, too.
 
     Raises:
         Locked: another process plays in it.
@@ -327,7 +326,7 @@ def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirector
             yield run_directory
         except BaseException as error:  # Ctrl-C too
             paid = _holds_something(path / SPENDING)
-            # What crashed since nobody answered says no more than the error does.
+            # Episodes that crashed because the model refused tell no more than the error.
             refused = isinstance(error, CannotGoOn)
             if new and not paid and all(one.error and refused for one in run_directory.episodes()):
                 run_directory._withdraw()
@@ -335,14 +334,14 @@ def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirector
 
 
 def _first_problem(error: ValidationError) -> str:
-    """Pydantic's first complaint, in one line."""
+    """The first problem that pydantic found, in one line."""
     first = error.errors(include_url=False, include_input=False)[0]
     where = ".".join(map(str, first["loc"])) or "the file"
     return f"{where}: {first['msg']}"
 
 
 def _holds_something(path: Path) -> bool:
-    """Whether a file has content, or a folder files; of replies, whether there is any."""
+    """Whether a file has content, a folder has files, or the folder of replies has a reply."""
     if path.is_dir():
         there = any(path.iterdir())
         return there and not (path.name == REPLIES and _has_no_rows(path / _DATABASE))
@@ -350,7 +349,7 @@ def _holds_something(path: Path) -> bool:
 
 
 def _has_no_rows(file: Path) -> bool:
-    """Whether the database of replies is empty, as it is until the first; False in doubt."""
+    """Whether the database of replies is empty, as before the first reply; False if unknown."""
     try:
         with contextlib.closing(
             sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)
@@ -361,7 +360,8 @@ def _has_no_rows(file: Path) -> bool:
 
 
 def _free_name(path: Path) -> Path:
-    """A name beside a file that is not taken, and that no reader takes for an episode's."""
+    """A free name beside a file. It does not end in ``.json``, so readers do not take it for an
+    episode."""
     number = 1
     while (aside := path.with_name(f"{path.name}.aside-{number}")).exists():
         number += 1

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
 from er_gym.rollout.events import Cost, EpisodeEnded, EventListener, EventLog, RunBegun, RunEnded
-from er_gym.rollout.executor import Executor, Parallelism, PlayedEpisode
+from er_gym.rollout.executor import Assignment, Executor, Parallelism, PlayedEpisode
 from er_gym.rollout.process_executor import play_in_processes
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import RunDirectory
@@ -32,8 +32,8 @@ class RunSummary:
 
     Attributes:
         played: the number of episodes played.
-        already_done: how many were finished before it started.
-        crashed: of those played, the episodes that crashed or whose worker died three times. They
+        already_done: the number of episodes that were finished before it started.
+        crashed: those of the played episodes that crashed or whose worker died three times. They
             are in the run directory and count as failures. The next run plays them again.
     """
 
@@ -43,11 +43,11 @@ class RunSummary:
 
 
 class Stopped(CannotGoOn):
-    """An agent could not go on, so the run has stopped; ``outcome`` says what was played before."""
+    """The run has stopped because an agent could not go on; ``summary`` says what was played."""
 
-    def __init__(self, message: str, outcome: RunSummary) -> None:
+    def __init__(self, message: str, summary: RunSummary) -> None:
         super().__init__(message)
-        self.outcome = outcome
+        self.summary = summary
 
 
 def finished(directory: RunDirectory, tasks: Iterable[Task]) -> list[EpisodeRecord]:
@@ -66,7 +66,7 @@ def run(
     listeners: Iterable[EventListener] = (),
     cost: Callable[[], Cost | None] = lambda: None,
 ) -> RunSummary:
-    """Play the tasks that the run directory has no finished episode of.
+    """Play the tasks without a finished episode in the run directory.
 
     Each episode is written before the next result is looked at. A run that is interrupted or killed
     thus loses no more than the episodes under way. If a worker process dies, its episode is played
@@ -103,7 +103,7 @@ def run(
         stopped = ""
         try:
             if todo:
-                EXECUTORS[executor](directory, todo, make_agent, sink, parallelism)
+                EXECUTORS[executor](Assignment(directory, todo, make_agent, sink, parallelism))
         except CannotGoOn as stop:
             stopped = str(stop)
             raise Stopped(stopped, sink.summary(len(done))) from stop

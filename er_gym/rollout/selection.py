@@ -27,7 +27,7 @@ class Shard:
         index, slash, count = text.partition("/")
         if slash and index.isdecimal() and count.isdecimal() and 1 <= int(index) <= int(count):
             return cls(int(index), int(count))
-        raise ValueError(f"{text!r} is no shard: give i/n with 1 <= i <= n, such as 2/8")
+        raise ValueError(f"{text!r} is not a shard: give i/n with 1 <= i <= n, such as 2/8")
 
     def __contains__(self, task_id: str) -> bool:
         """Whether a task is in the shard. A hash of its id decides, the same on every machine."""
@@ -45,8 +45,8 @@ def select(
 ) -> list[Task]:
     """The tasks to play, in the suite's order.
 
-    Of the named tasks (all if none is named), the shard's are chosen, and of these the first
-    ``limit``. Tasks that were set aside are never played.
+    The selection starts from the named tasks (all tasks if none is named). It keeps those in the
+    shard, and of these the first ``limit``. Tasks that were set aside are never played.
 
     Raises:
         ValueError: the suite has no task of a given id, or all that were named are set aside.

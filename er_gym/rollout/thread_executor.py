@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,8 +17,7 @@ from er_gym.rollout.agent import Agent, CannotGoOn, Decision, MakeAgent
 from er_gym.rollout.env_pool import EnvLost, EnvPool, RemoteEnv
 from er_gym.rollout.events import EventLog
 from er_gym.rollout.executor import (
-    EpisodeSink,
-    Parallelism,
+    Assignment,
     PlayedEpisode,
     lost_episode,
     unbegun_episode,
@@ -33,20 +32,15 @@ _TRIES = 3
 """The number of tries at an episode whose process dies."""
 
 
-def play_in_threads(
-    directory: RunDirectory,
-    tasks: Sequence[Task],
-    make_agent: MakeAgent,
-    sink: EpisodeSink,
-    parallelism: Parallelism,
-) -> None:
+def play_in_threads(assigned: Assignment) -> None:
     """Play ``parallelism.concurrency`` tasks at once; see :class:`.executor.Executor`.
 
     Each agent is made, and acts, in the thread of its episode. If an agent cannot go on, the run
     waits for the replies under way. Episodes that these replies do not finish leave no record. At
     Ctrl-C the run waits for nothing.
     """
-    todo = deque(tasks)
+    directory, parallelism, sink = assigned.directory, assigned.parallelism, assigned.sink
+    todo = deque(assigned.tasks)
     slots = talking = min(parallelism.concurrency, len(todo))
     stopped: CannotGoOn | None = None
     env = directory.manifest.env
@@ -54,7 +48,7 @@ def play_in_threads(
         EnvPool(parallelism.workers, slots, env, deadline=parallelism.deadline) as pool,
         closing(EventLog(directory.path)) as events,
     ):
-        threads = _ThreadedRun(directory, pool, make_agent, events, todo)
+        threads = _ThreadedRun(directory, pool, assigned.make_agent, events, todo)
         try:
             for slot in range(slots):
                 # Daemon threads: one that waits for a reply must not keep the process from ending.
@@ -94,7 +88,7 @@ class _ThreadedRun:
         results: the queue from the threads to the main thread: an episode, an exception that ends
             the run, or None from a thread that has ended. The main thread removes a result once it
             has handled it.
-        unhandled: counts the results that the main thread has not taken up.
+        unhandled: counts the results that the main thread has not handled yet.
         stopping: set when no agent may act any more.
     """
 
@@ -162,7 +156,7 @@ class _ThreadedRun:
             player = _Stoppable(agent, self.stopping)
         except CannotGoOn:
             raise
-        except (Exception, SystemExit) as error:  # as in play_episode, one must not end the run
+        except (Exception, SystemExit) as error:  # it must not end the run, as in play_episode
             return None, unbegun_episode(task, manifest, one_line(error))
         record = play_episode(
             env,

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-import ai2thor.controller
-import ai2thor.server
 from numpy.typing import NDArray
 
+from er_gym.sim.client_import import import_client
 from er_gym.sim.copy_on_read import CopyOnReadDict
 from er_gym.sim.engine import Engine
 from er_gym.sim.errors import CLIENT_ERRORS
@@ -15,6 +14,11 @@ from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.sim.object_metadata import writable_objects
 from er_gym.sim.protocol import rgba
 from er_gym.sim.render.view import View
+
+import_client()
+
+import ai2thor.controller  # noqa: E402
+import ai2thor.server  # noqa: E402
 
 _TAKEN = frozenset(
     {"server_class", "start_unity", "local_executable_path", "local_build", "platform", "host"}

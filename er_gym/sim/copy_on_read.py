@@ -7,14 +7,16 @@ at only a few of them.
 
 from __future__ import annotations
 
-from collections.abc import ItemsView, Iterator, KeysView, Mapping, ValuesView
+from collections.abc import Mapping
 from typing import Any
+
+from er_gym.sim.incomplete_dict import IncompleteDict
 
 _NOTHING: Mapping[str, Any] = {}
 _CONTAINERS = (dict, list)
 
 
-class CopyOnReadDict(dict[str, Any]):
+class CopyOnReadDict(IncompleteDict):
     """A dict that copies a nested value when somebody asks for it.
 
     It is created with the values that need no copy. Its creator then sets :attr:`shared`.
@@ -28,7 +30,7 @@ class CopyOnReadDict(dict[str, Any]):
 
     shared: Mapping[str, Any]
 
-    def settle(self) -> None:
+    def read_whole(self) -> None:
         """Copy every value that has not been copied yet."""
         shared, self.shared = self.shared, _NOTHING
         for key, value in shared.items():
@@ -43,90 +45,9 @@ class CopyOnReadDict(dict[str, Any]):
     def __contains__(self, key: object) -> bool:
         return dict.__contains__(self, key) or key in self.shared
 
-    def get(self, key: str, default: Any = None) -> Any:
-        """As ``dict.get``."""
-        return self[key] if key in self else default  # noqa: SIM401  (this is that method)
-
-    # All other methods look at the whole dictionary.
-
     def __len__(self) -> int:
-        self.settle()
+        self.read_whole()
         return super().__len__()
-
-    def __iter__(self) -> Iterator[str]:
-        self.settle()
-        return super().__iter__()
-
-    def __reversed__(self) -> Iterator[str]:
-        self.settle()
-        return super().__reversed__()
-
-    def __delitem__(self, key: str) -> None:
-        self.settle()
-        super().__delitem__(key)
-
-    def keys(self) -> KeysView[str]:  # type: ignore[override]
-        """As ``dict.keys``."""
-        self.settle()
-        return super().keys()
-
-    def items(self) -> ItemsView[str, Any]:  # type: ignore[override]
-        """As ``dict.items``."""
-        self.settle()
-        return super().items()
-
-    def values(self) -> ValuesView[Any]:  # type: ignore[override]
-        """As ``dict.values``."""
-        self.settle()
-        return super().values()
-
-    def pop(self, key: str, *default: Any) -> Any:
-        """As ``dict.pop``."""
-        self.settle()
-        return super().pop(key, *default)
-
-    def popitem(self) -> tuple[str, Any]:
-        """As ``dict.popitem``."""
-        self.settle()
-        return super().popitem()
-
-    def setdefault(self, key: str, default: Any = None) -> Any:
-        """As ``dict.setdefault``."""
-        self.settle()
-        return super().setdefault(key, default)
-
-    def clear(self) -> None:
-        """As ``dict.clear``."""
-        self.settle()
-        super().clear()
-
-    def copy(self) -> dict[str, Any]:
-        """A plain dict with the same values."""
-        return dict(self)
-
-    def __or__(self, other: Any) -> Any:
-        return dict(self) | other
-
-    def __ror__(self, other: Any) -> Any:
-        return other | dict(self)
-
-    def __eq__(self, other: object) -> bool:
-        if isinstance(other, CopyOnReadDict):
-            other.settle()
-        self.settle()
-        return super().__eq__(other)
-
-    def __ne__(self, other: object) -> bool:
-        return not self == other
-
-    __hash__ = None
-
-    def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
-        return dict, (dict(self),)
-
-    def __repr__(self) -> str:
-        self.settle()
-        return super().__repr__()
 
 
 def copied(value: Any) -> Any:

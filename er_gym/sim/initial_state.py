@@ -1,4 +1,4 @@
-"""What every world of a scene starts with. It is computed once for each recently used scene."""
+"""The initial state of every world of a scene, computed once for each recently used scene."""
 
 from __future__ import annotations
 

@@ -5,11 +5,13 @@ Most programs look at few values in most steps, and the objects are nine tenths 
 
 from __future__ import annotations
 
-from collections.abc import Callable, ItemsView, Iterator, KeysView, Mapping, ValuesView
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
+from er_gym.sim.incomplete_dict import IncompleteDict
 
-class LazyMetadata(dict[str, Any]):
+
+class LazyMetadata(IncompleteDict):
     """A dict that computes some values when somebody asks for them.
 
     Code that is about to change the source has to call :meth:`settle` first.
@@ -56,55 +58,3 @@ class LazyMetadata(dict[str, Any]):
     def __setitem__(self, key: str, value: Any) -> None:
         self._later.pop(key, None)
         super().__setitem__(key, value)
-
-    def get(self, key: str, default: Any = None) -> Any:
-        """As ``dict.get``."""
-        return self[key] if key in self else default  # noqa: SIM401  (this is that method)
-
-    def pop(self, key: str, *default: Any) -> Any:
-        """As ``dict.pop``."""
-        self.read_whole()
-        return super().pop(key, *default)
-
-    def setdefault(self, key: str, default: Any = None) -> Any:
-        """As ``dict.setdefault``."""
-        self.read_whole()
-        return super().setdefault(key, default)
-
-    # dict(x), {**x}, json and msgpack use one of these.
-
-    def __iter__(self) -> Iterator[str]:
-        self.read_whole()
-        return super().__iter__()
-
-    def keys(self) -> KeysView[str]:  # type: ignore[override]
-        """As ``dict.keys``."""
-        self.read_whole()
-        return super().keys()
-
-    def items(self) -> ItemsView[str, Any]:  # type: ignore[override]
-        """As ``dict.items``."""
-        self.read_whole()
-        return super().items()
-
-    def values(self) -> ValuesView[Any]:  # type: ignore[override]
-        """As ``dict.values``."""
-        self.read_whole()
-        return super().values()
-
-    def copy(self) -> dict[str, Any]:
-        """A plain dict with the same values."""
-        return dict(self)
-
-    def __eq__(self, other: object) -> bool:
-        self.read_whole()
-        return super().__eq__(other)
-
-    __hash__ = None
-
-    def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
-        return dict, (dict(self),)
-
-    def __repr__(self) -> str:
-        self.read_whole()
-        return super().__repr__()

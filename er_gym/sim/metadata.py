@@ -135,7 +135,7 @@ def metadata(
         "visibleRange": None,
         "actionReturn": action_return,
         "depthFormat": "Meters",
-        # Old fields for answers, from before there was actionReturn.
+        # Old fields for answers, older than actionReturn.
         "actionFloatReturn": 0.0,
         "actionFloatsReturn": [],
         "actionIntReturn": 0,

@@ -81,7 +81,7 @@ _ACCEPTED_BY: dict[str, str] = {
 
 @lru_cache(maxsize=1)
 def placement_table() -> dict[str, frozenset[str]]:
-    """For each object type the receptacle types that accept it."""
+    """The receptacle types that accept each object type."""
     return {
         object_type: frozenset(receptacles.split())
         for family, receptacles in _ACCEPTED_BY.items()

@@ -28,7 +28,7 @@ from er_gym.sim.transports import TRANSPORTS, Message, Transport
 NOT_BY_THE_CLIENT = 2
 """The exit code if anything but AI2-THOR's client has started the player."""
 _SECONDS_TO_CONNECT = 300
-"""The player waits as long for the client as the client waits for a player."""
+"""The player waits for the client as long as the client waits for a player."""
 _QUESTIONS = frozenset(
     {
         *("GetReachablePositions", "GetInteractablePoses", "GetObjectInFrame"),

@@ -32,7 +32,7 @@ PROPERTIES = (
     "isHeatSource",
     "isColdSource",
 )
-"""What an object can do, by AI2-THOR's metadata names: the columns of ``Scene.properties``."""
+"""The properties of an object, by AI2-THOR's names: the columns of ``Scene.properties``."""
 
 STATES = (
     "isOpen",
@@ -44,7 +44,7 @@ STATES = (
     "isFilledWithLiquid",
     "isUsedUp",
 )
-"""What state an object starts in, by AI2-THOR's names: the columns of ``Scene.states``."""
+"""The states in which an object can start, by AI2-THOR's names: the columns of ``Scene.states``."""
 
 SCENE_NUMBERS: Mapping[str, range] = {
     "kitchens": range(1, 31),
@@ -69,7 +69,7 @@ _SCENES = Path(__file__).parent / "data" / "scenes"
 
 
 class UnknownSceneError(ValueError):
-    """The name given names no packaged scene."""
+    """No packaged scene has the given name."""
 
     def __init__(self, name: str) -> None:
         kinds = ", ".join(
@@ -101,8 +101,8 @@ class Scene:
 
     Attributes:
         name: such as ``"FloorPlan1"``.
-        object_ids: N unique AI2-THOR ids, ``"Apple|-00.47|+01.15|+00.48"``. The coordinates are
-            those the object was authored at; physics may have settled it elsewhere.
+        object_ids: N unique AI2-THOR ids, ``"Apple|-00.47|+01.15|+00.48"``. An id has the
+            coordinates at which the object was authored; physics may have settled it elsewhere.
         names: N names in the Unity scene, unique too.
         types: N object types.
         asset_ids: N names of the asset drawn, ``""`` where the record has none.
@@ -111,21 +111,22 @@ class Scene:
         aabb_center, aabb_size: (N, 3) float64, the box aligned with the world's axes.
         obb: (N, 4, 3) float64, the box aligned with the object's own axes, in the object's own
             frame: corner 0 relative to the pivot, then the edges along x, y and z that lead away
-            from it (signed, and off their axis by a millimetre where AI2-THOR's record is). NaN
-            for what can neither be picked up nor moved: AI2-THOR records no such box there.
+            from corner 0. Edges are signed, and in AI2-THOR's record some are off their axis by a
+            millimetre. NaN for an object that can neither be picked up nor moved, since AI2-THOR
+            records no such box for it.
         properties: (N, len(PROPERTIES)) bool.
         states: (N, len(STATES)) bool.
         openness: (N,) float64, 0 closed to 1 open.
-        mass: (N,) float64, kilograms; 0 for what is fixed.
+        mass: (N,) float64, kilograms; 0 for fixed objects.
         temperature: N of ``"RoomTemp"``, ``"Cold"``, ``"Hot"``.
         salient_materials: N tuples such as ``("Metal", "Plastic")``, None where none is recorded.
         parents: per object the indices of the receptacles it lies in, as recorded; often empty.
-        controlled: per object the indices of what it switches (a StoveKnob its StoveBurner), None
-            for what cannot be toggled.
+        controlled: per object the indices of the objects that it switches (a StoveKnob switches its
+            StoveBurner), None for an object that cannot be toggled.
         reachable: (P, 2) float64, the x and z of each place on the 0.25 m grid where the agent can
             stand, sorted by z, then x.
-        openable_poses: for some objects, by index, a reachable pose from which it can be used as
-            an openable thing or a receptacle. Not every openable object has one.
+        openable_poses: for some objects, by index, a reachable pose from which the agent can open
+            the object or use it as a receptacle. Not every openable object has one.
     """
 
     name: str
@@ -169,7 +170,7 @@ def load_scene(name: str) -> Scene:
         name: ``"FloorPlan1"``, or AI2-THOR's file name for the same room, ``"FloorPlan1_physics"``.
 
     Raises:
-        UnknownSceneError: ``name`` is none of :data:`SCENE_NAMES`.
+        UnknownSceneError: ``name`` is not one of :data:`SCENE_NAMES`.
     """
     plain = name.removesuffix("_physics")
     if plain not in SCENE_NAMES:
@@ -183,7 +184,7 @@ def _load_packaged(name: str) -> Scene:
 
 
 def write_scene(path: Path, scene: Scene) -> None:
-    """Write a scene as one compressed ``.npz``; with one numpy, one scene gives the same bytes.
+    """Write a scene as one compressed ``.npz``. The same numpy version writes the same bytes.
 
     Vectors are stored as float32, which is what Unity computes with: no recorded value changes. A
     text column is one block of UTF-8 with a line per object, which loads faster than an array of
@@ -218,7 +219,7 @@ def write_scene(path: Path, scene: Scene) -> None:
 
 
 def read_scene(path: Path) -> Scene:
-    """Read what :func:`write_scene` wrote."""
+    """Read a file that :func:`write_scene` wrote."""
     with np.load(path) as archive:
         stored = {key: archive[key] for key in archive.files}
     vectors = stored["vectors"].astype(np.float64)

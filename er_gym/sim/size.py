@@ -1,4 +1,4 @@
-"""Which sizes pictures may have."""
+"""The allowed sizes of pictures."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import numpy as np
 
 LARGEST_SIDE = 8192
 MOST_PIXELS = 1 << 24
-"""4096 by 4096. Drawing takes some thirty bytes for each."""
+"""4096 by 4096 pixels. Drawing takes some thirty bytes for each pixel."""
 
 
 def check_size(width: int, height: int) -> None:
-    """Refuse a size that no picture can have.
+    """Refuse a size that a picture cannot have.
 
     Args:
         width, height: pixels.
 
     Raises:
-        ValueError: a side is no whole number from 1 to :data:`LARGEST_SIDE`, or both together make
-            more than :data:`MOST_PIXELS`.
+        ValueError: a side is not a whole number from 1 to :data:`LARGEST_SIDE`, or the picture has
+            more than :data:`MOST_PIXELS` pixels.
     """
     for name, side in (("width", width), ("height", height)):
         whole = isinstance(side, (int, np.integer)) and not isinstance(side, bool)

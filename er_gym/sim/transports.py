@@ -128,7 +128,7 @@ class Wsgi:
         if response.status != OK:
             raise ConnectionError(f"AI2-THOR's client answered {response.status} {response.reason}")
         request: dict[str, Any] = json.loads(body)
-        return request if "action" in request else None  # the client says in this way that it stops
+        return request if "action" in request else None  # the client's way to say that it stops
 
     def _head(self, disposition: str, kind: str) -> bytes:
         # The client's parser wants these two names in exactly this spelling.
@@ -140,4 +140,4 @@ class Wsgi:
 
 
 TRANSPORTS: dict[str, type[Fifo] | type[Wsgi]] = {"FIFO": Fifo, "WSGI": Wsgi}
-"""For each value of ``AI2THOR_SERVER_TYPE`` the class that implements it."""
+"""The class of each transport, by the value of ``AI2THOR_SERVER_TYPE``."""

@@ -130,7 +130,7 @@ class World(SceneObjects):
             self.cache.object_changed(i)
 
     def _displace(self, rows: Iterable[int]) -> None:
-        """Forget that, and the values that depend on where the objects are and what they are in."""
+        """Forget the cached values of some objects that depend on their states or places."""
         rows = list(rows)
         self._touch(rows)
         self._displaced.update(rows)
@@ -149,7 +149,7 @@ class World(SceneObjects):
         self.cache.arrangement_changed()
 
     def state_changed(self) -> None:
-        """Note that an object has another state, in the same place."""
+        """Note that the state of an object has changed, but not its place."""
         self.untouched = False
         self.cache.state_changed()
 

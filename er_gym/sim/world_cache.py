@@ -88,7 +88,7 @@ class WorldCache:
         self.state.clear()
 
     def arrangement_changed(self) -> None:
-        """Forget these, and the values that depend on where objects are."""
+        """Forget the values that depend on the whole state or on the places of objects."""
         self.state_changed()
         self.arrangement = Cache()
 

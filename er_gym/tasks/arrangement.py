@@ -75,7 +75,7 @@ def _check(event: Any, scene: str, arrangement: Arrangement) -> None:
 
 
 _recorded: dict[tuple[type, str], Mapping[str, ObjectPose]] = {}
-"""By the class of the controller, that is by engine, and by scene."""
+"""The recorded poses by the class of the controller (one class per engine) and by scene."""
 
 
 def _recorded_poses(controller: Any, scene: str, event: Any) -> Mapping[str, ObjectPose]:

@@ -157,7 +157,7 @@ def _name(action: KeyAction) -> str:
 
 def _claims(task: Task, names: _Names) -> list[str]:
     order = "in this order" if task.type.ordered else "in any order"
-    done = f"all that the plan does, but for going about, has been done {order}"
+    done = f"all steps of the plan, except navigation, have been done {order}"
     return [done, *(_claim(condition, names) for condition in _goal(task))]
 
 

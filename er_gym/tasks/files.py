@@ -84,31 +84,6 @@ def known_verb(name: str, where: str) -> str:
 
 
 @dataclass(frozen=True)
-class TaskFile:
-    """The content of a task file.
-
-    Attributes:
-        tasks: the usable tasks in the file's order; their ids are unique and usable as file names.
-        places: the number of each of them among all tasks of the file, from 1.
-        set_aside: the other tasks, and why they cannot be used.
-    """
-
-    tasks: tuple[Task, ...]
-    places: tuple[int, ...] = ()
-    set_aside: tuple[SetAsideTask, ...] = ()
-
-    def all_or_none(self, path: Path) -> list[Task]:
-        """The tasks, if none was set aside.
-
-        Raises:
-            TaskFileError: a task was set aside; the message gives the reason of the first.
-        """
-        if self.set_aside:
-            raise TaskFileError(f"{path}: {self.set_aside[0].reason}")
-        return list(self.tasks)
-
-
-@dataclass(frozen=True)
 class UnreadTask:
     """A task in a file before it is read.
 
@@ -123,40 +98,65 @@ class UnreadTask:
     read: Callable[[], Task]
 
 
-def read_entries(entries: Iterable[UnreadTask]) -> TaskFile:
-    """Read tasks one after another; a faulty task is set aside and the others are used.
+@dataclass(frozen=True)
+class TaskFile:
+    """The content of a task file.
 
-    If several tasks have the same id, the first is used.
-
-    Raises:
-        TaskFileError: there are more than :data:`MOST_TASKS`.
+    Attributes:
+        tasks: the usable tasks in the file's order; their ids are unique and usable as file names.
+        places: the number of each of them among all tasks of the file, from 1.
+        set_aside: the other tasks, and why they cannot be used.
     """
-    tasks: dict[str, Task] = {}
-    places: list[int] = []
-    set_aside: list[SetAsideTask] = []
-    first: dict[str, str] = {}
-    for place, entry in enumerate(entries, 1):
-        if place > MOST_TASKS:
-            raise TaskFileError(f"more than {MOST_TASKS:,} tasks; give them in several files")
-        try:
-            task = entry.read()
-        except TaskFileError as error:
-            set_aside.append(SetAsideTask(entry.id or entry.where, str(error)))
-            continue
-        problem = ""
-        if not _FILE_NAME_SAFE.fullmatch(task.id):
-            problem = (
-                f"has the task id {task.id!r}, which cannot be a file name; "
-                "use letters, digits and any of + = . _ -"
-            )
-        elif task.id in tasks:
-            problem = f"has the id {task.id!r}, as {first[task.id]} has; it must be unique"
-        if problem:
-            set_aside.append(SetAsideTask(entry.where, f"{entry.where} {problem}"))
-        else:
-            tasks[task.id], first[task.id] = task, entry.where
-            places.append(place)
-    return TaskFile(tuple(tasks.values()), tuple(places), tuple(set_aside))
+
+    tasks: tuple[Task, ...]
+    places: tuple[int, ...] = ()
+    set_aside: tuple[SetAsideTask, ...] = ()
+
+    @classmethod
+    def of(cls, entries: Iterable[UnreadTask]) -> TaskFile:
+        """Read tasks one after another; a faulty task is set aside and the others are used.
+
+        If several tasks have the same id, the first is used.
+
+        Raises:
+            TaskFileError: there are more than :data:`MOST_TASKS`.
+        """
+        tasks: dict[str, Task] = {}
+        places: list[int] = []
+        set_aside: list[SetAsideTask] = []
+        first: dict[str, str] = {}
+        for place, entry in enumerate(entries, 1):
+            if place > MOST_TASKS:
+                raise TaskFileError(f"more than {MOST_TASKS:,} tasks; give them in several files")
+            try:
+                task = entry.read()
+            except TaskFileError as error:
+                set_aside.append(SetAsideTask(entry.id or entry.where, str(error)))
+                continue
+            problem = ""
+            if not _FILE_NAME_SAFE.fullmatch(task.id):
+                problem = (
+                    f"has the task id {task.id!r}, which cannot be a file name; "
+                    "use letters, digits and any of + = . _ -"
+                )
+            elif task.id in tasks:
+                problem = f"has the id {task.id!r}, as {first[task.id]} has; it must be unique"
+            if problem:
+                set_aside.append(SetAsideTask(entry.where, f"{entry.where} {problem}"))
+            else:
+                tasks[task.id], first[task.id] = task, entry.where
+                places.append(place)
+        return cls(tuple(tasks.values()), tuple(places), tuple(set_aside))
+
+    def all_or_none(self, path: Path) -> list[Task]:
+        """The tasks, if none was set aside.
+
+        Raises:
+            TaskFileError: a task was set aside; the message gives the reason of the first.
+        """
+        if self.set_aside:
+            raise TaskFileError(f"{path}: {self.set_aside[0].reason}")
+        return list(self.tasks)
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -28,7 +28,6 @@ from er_gym.tasks.files import (
     known_scene,
     known_type,
     known_verb,
-    read_entries,
     validated,
 )
 from er_gym.tasks.goal import Condition
@@ -138,16 +137,16 @@ def read_tasks(path: str | Path) -> list[Task]:
     Raises:
         TaskFileError: the file or one of its tasks cannot be used; one line says where and why.
     """
-    return read_file(path).all_or_none(Path(path))
+    path = Path(path)
+    return read_file(path).all_or_none(path)
 
 
-def read_file(path: str | Path) -> TaskFile:
+def read_file(path: Path) -> TaskFile:
     """Read the usable tasks of a task file.
 
     Raises:
         TaskFileError: the file as a whole cannot be used.
     """
-    path = Path(path)
     lines = read_json_lines(path)
     header = _header(lines, path)
     entries = list(_entries(lines, path))
@@ -156,7 +155,7 @@ def read_file(path: str | Path) -> TaskFile:
             f"{path}: cut short or edited: its header says {header.tasks} tasks, "
             f"and it has {len(entries)}"
         )
-    return read_entries(entries)
+    return TaskFile.of(entries)
 
 
 def write_tasks(

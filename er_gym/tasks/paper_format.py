@@ -21,28 +21,9 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from er_gym.tasks import paper_records
 from er_gym.tasks.errors import TaskFileError
-from er_gym.tasks.files import (
-    TaskFile,
-    UnreadTask,
-    known_scene,
-    known_type,
-    read_entries,
-    validated,
-)
-from er_gym.tasks.paper_records import (
-    PaperTask,
-    as_json,
-    extra_action_fields,
-    extra_fields,
-    json_kind,
-    key_actions,
-    metadata_record,
-    own_fields,
-    with_own_fields,
-    without_fields_of,
-)
-from er_gym.tasks.reading import parse_json, read_text
+from er_gym.tasks.files import TaskFile, UnreadTask, known_scene, known_type, validated
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.writing import write_output
 
@@ -86,22 +67,18 @@ def read_tasks(path: str | Path) -> list[Task]:
     Raises:
         TaskFileError: the file or one of its tasks cannot be used; one line says where and why.
     """
-    return read_file(path).all_or_none(Path(path))
+    path = Path(path)
+    return read_file(path).all_or_none(path)
 
 
-def read_file(path: str | Path) -> TaskFile:
+def read_file(path: Path) -> TaskFile:
     """Read the usable tasks of a test file of the paper; see :func:`read_tasks`.
 
     Raises:
         TaskFileError: the file as a whole cannot be used.
     """
-    path = Path(path)
-    data = parse_json(read_text(path), path)
-    if not isinstance(data, list):
-        raise TaskFileError(
-            f"{path}: not a list of tasks but {json_kind(data)}; "
-            'the paper\'s task files look like [{"scene": …, "tasktype": …}, …]'
-        )
+    example = 'the paper\'s task files look like [{"scene": …, "tasktype": …}, …]'
+    data = paper_records.read_json(path, list, "tasks", example)
     if data and all(
         isinstance(item, dict) and {"scene", "task_metadata"}.isdisjoint(item) for item in data
     ):
@@ -109,7 +86,7 @@ def read_file(path: str | Path) -> TaskFile:
             f"{path}: not a test file: no task has a scene or task_metadata; if the paper's "
             "generator wrote it, read it with er_gym.tasks.paper_generator.read_generator_tasks"
         )
-    return read_entries(_entry(item, number) for number, item in enumerate(data, 1))
+    return TaskFile.of(_entry(item, number) for number, item in enumerate(data, 1))
 
 
 def _entry(data: object, number: int) -> UnreadTask:
@@ -139,7 +116,7 @@ def write_tasks(path: str | Path, tasks: Iterable[Task], *, force: bool = True) 
         _task_record(task, identity, path, number)
         for number, (task, identity) in enumerate(_with_identities(tasks), 1)
     ]
-    write_output(path, as_json(path, records), force=force)
+    write_output(path, paper_records.as_json(path, records), force=force)
 
 
 def read_poses(path: str | Path) -> dict[str, dict[str, AgentPose]]:
@@ -151,13 +128,8 @@ def read_poses(path: str | Path) -> dict[str, dict[str, AgentPose]]:
     Raises:
         TaskFileError: the file cannot be used; one line says where and why.
     """
-    path = Path(path)
-    data = parse_json(read_text(path), path)
-    if not isinstance(data, dict):
-        raise TaskFileError(
-            f"{path}: not an object of poses but {json_kind(data)}; "
-            'the paper\'s pose files look like {"57": {"scene": …, …}, …}'
-        )
+    example = 'the paper\'s pose files look like {"57": {"scene": …, …}, …}'
+    data = paper_records.read_json(Path(path), dict, "poses", example)
     entries = {
         identity: validated(PaperPoses, entry, f"{path}: the poses of task {identity!r}:")
         for identity, entry in data.items()
@@ -189,7 +161,7 @@ def write_poses(path: str | Path, tasks: Iterable[Task]) -> None:
         for task, identity in _with_identities(list(tasks))
         if task.poses
     }
-    write_output(path, as_json(Path(path), entries), force=True)
+    write_output(path, paper_records.as_json(Path(path), entries), force=True)
 
 
 def with_poses(
@@ -241,7 +213,7 @@ def _with_identities(
 
 
 def _read_task(data: object, where: str) -> Task:
-    paper = validated(PaperTask, data, where)
+    paper = validated(paper_records.PaperTask, data, where)
     actions = paper.task_metadata.actions
     task = Task(
         id=f"paper-{paper.identity}",
@@ -249,28 +221,28 @@ def _read_task(data: object, where: str) -> Task:
         scene=known_scene(paper.scene, where),
         instruction=paper.taskquery or paper.taskname,
         name=paper.taskname,
-        key_actions=key_actions(actions, where),
+        key_actions=paper_records.key_actions(actions, where),
         target_objects=tuple(paper.target_objects),
         related_objects=tuple(paper.related_objects),
         navigable_objects=tuple(paper.navigable_objects),
         extra={
             "identity": paper.identity,
-            **extra_fields(paper),
-            "task_metadata": extra_fields(paper.task_metadata),
-            "actions": [extra_action_fields(action) for action in actions],
+            **paper_records.extra_fields(paper),
+            "task_metadata": paper_records.extra_fields(paper.task_metadata),
+            "actions": [paper_records.extra_action_fields(action) for action in actions],
         },
     )
-    return with_own_fields(task, paper.er_gym, where)
+    return paper_records.with_own_fields(task, paper.er_gym, where)
 
 
 def _task_record(task: Task, identity: object, path: Path, number: int) -> dict[str, Any]:
-    extra = without_fields_of(task.extra, PaperTask)
+    extra = paper_records.without_fields_of(task.extra, paper_records.PaperTask)
     extra.pop("actions", None)
     record = {
         "scene": task.scene,
         "tasktype": task.type.name,
         "taskname": task.name,
-        "task_metadata": metadata_record(task),
+        "task_metadata": paper_records.metadata_record(task),
         "taskquery": task.instruction,
         "identity": identity,
         "target_objects": list(task.target_objects),
@@ -279,7 +251,7 @@ def _task_record(task: Task, identity: object, path: Path, number: int) -> dict[
         **extra,
     }
     plain = _read_task(record, f"{path}: task {number} (identity {identity})")
-    return record | own_fields(replace(task, poses={}), plain)
+    return record | paper_records.own_fields(replace(task, poses={}), plain)
 
 
 def _agent_pose(pose: PaperPose) -> AgentPose:

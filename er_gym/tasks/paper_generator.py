@@ -16,27 +16,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from er_gym.tasks import paper_records
 from er_gym.tasks.errors import TaskFileError
-from er_gym.tasks.files import (
-    TaskFile,
-    UnreadTask,
-    known_scene,
-    known_type,
-    read_entries,
-    validated,
-)
-from er_gym.tasks.paper_records import (
-    PaperGeneratedTask,
-    as_json,
-    extra_action_fields,
-    extra_fields,
-    json_kind,
-    key_actions,
-    metadata_record,
-    own_fields,
-    with_own_fields,
-)
-from er_gym.tasks.reading import parse_json, read_text
+from er_gym.tasks.files import TaskFile, UnreadTask, known_scene, known_type, validated
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TASK_TYPES, TaskType
@@ -59,7 +41,8 @@ def read_generator_tasks(path: str | Path) -> list[Task]:
     Raises:
         TaskFileError: there is no file, or one cannot be used; one line says where and why.
     """
-    return read_generated(path).all_or_none(Path(path))
+    path = Path(path)
+    return read_generated(path).all_or_none(path)
 
 
 def read_generated(path: str | Path) -> TaskFile:
@@ -75,7 +58,7 @@ def read_generated(path: str | Path) -> TaskFile:
             f"{path}: no file of the paper's generator in this folder or below; "
             f"their names end in {_ENDING}"
         )
-    return read_entries(entry for file in files for entry in _entries(file, path))
+    return TaskFile.of(entry for file in files for entry in _entries(file, path))
 
 
 def write_generator_tasks(
@@ -103,7 +86,9 @@ def write_generator_tasks(
         file = Path(folder, _room(task.scene), task.scene, _slug(task.type) + _ENDING)
         groups.setdefault(file, []).append(task)
     content = {
-        file: as_json(file, [_record(task, file, number) for number, task in enumerate(group, 1)])
+        file: paper_records.as_json(
+            file, [_record(task, file, number) for number, task in enumerate(group, 1)]
+        )
         for file, group in sorted(groups.items(), key=lambda item: _order(item[0]))
     }
     for file, data in content.items():
@@ -116,13 +101,11 @@ def write_generator_tasks(
 
 
 def _entries(path: Path, top: Path) -> list[UnreadTask]:
-    data = parse_json(read_text(path), path)
-    if not isinstance(data, list):
-        raise TaskFileError(
-            f"{path}: not a list of tasks but {json_kind(data)}; "
-            "the files of the paper's generator look like "
-            '[{"taskname": …, "tasktype": …, "actions": …}, …]'
-        )
+    example = (
+        "the files of the paper's generator look like "
+        '[{"taskname": …, "tasktype": …, "actions": …}, …]'
+    )
+    data = paper_records.read_json(path, list, "tasks", example)
     if any(isinstance(item, dict) and "task_metadata" in item for item in data):
         raise TaskFileError(
             f"{path}: this is a test file; read it with er_gym.tasks.paper_format.read_tasks"
@@ -137,9 +120,9 @@ def _entries(path: Path, top: Path) -> list[UnreadTask]:
 
 
 def _read_task(data: object, path: Path, number: int, where: str) -> Task:
-    paper = validated(PaperGeneratedTask, data, where)
+    paper = validated(paper_records.PaperGeneratedTask, data, where)
     scene, kind = _scene(paper.metadatapath, path, where), known_type(paper.tasktype, where)
-    metadata = extra_fields(paper)
+    metadata = paper_records.extra_fields(paper)
     if paper.metadatapath:
         metadata["metadatapath"] = paper.metadatapath
     task = Task(
@@ -148,13 +131,13 @@ def _read_task(data: object, path: Path, number: int, where: str) -> Task:
         scene=scene,
         instruction=paper.taskname,
         name=paper.taskname,
-        key_actions=key_actions(paper.actions, where),
+        key_actions=paper_records.key_actions(paper.actions, where),
         extra={
             "task_metadata": metadata,
-            "actions": [extra_action_fields(action) for action in paper.actions],
+            "actions": [paper_records.extra_action_fields(action) for action in paper.actions],
         },
     )
-    return with_own_fields(task, paper.er_gym, where)
+    return paper_records.with_own_fields(task, paper.er_gym, where)
 
 
 def _record(task: Task, path: Path, number: int) -> dict[str, Any]:
@@ -162,12 +145,14 @@ def _record(task: Task, path: Path, number: int) -> dict[str, Any]:
         "taskname": task.name,
         "tasktype": task.type.name,
         "metadatapath": f"taskgenerate/{_room(task.scene)}/{task.scene}/metadata.json",
-        **metadata_record(task),
+        **paper_records.metadata_record(task),
     }
     # The copies in a test file may contradict the task: in one task of the paper they do.
     record["tasktype"] = task.type.name
     record.pop("er_gym", None)
-    return record | own_fields(task, _read_task(record, path, number, f"{path}: task {number}"))
+    return record | paper_records.own_fields(
+        task, _read_task(record, path, number, f"{path}: task {number}")
+    )
 
 
 def _scene(metadatapath: str, path: Path, where: str) -> str:

@@ -17,24 +17,28 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, astuple, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.tasks import verbs
 from er_gym.tasks.arrangement import Arrangement, ObjectPose
+from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import as_utf8, known_scene, known_type, known_verb
 from er_gym.tasks.jsonl_format import ConditionRecord, PoseRecord
+from er_gym.tasks.reading import parse_json, read_text
 from er_gym.tasks.task import AgentPose, KeyAction, Task
 
 _SPELLED = {verbs.PUT: "put"}
 """Verbs that the paper's task files and its agents' replies spell differently."""
+_KINDS = {dict: "an object", list: "a list", str: "a string", type(None): "null"}
+Kind = TypeVar("Kind", list[Any], dict[str, Any])
 
 
 class OwnFields(BaseModel):
     """The attributes of a task that the paper's fields do not state.
 
-    Each attribute overrides the paper's fields. One that is left out is as they say.
+    Each attribute overrides the paper's fields. If it is left out, the paper's fields decide.
 
     Attributes:
         id: also stated where ``extra`` differs from what the paper's fields give. A task that
@@ -155,7 +159,7 @@ def metadata_record(task: Task) -> dict[str, Any]:
 
 
 def without_fields_of(fields: object, model: type[BaseModel]) -> dict[str, Any]:
-    """The fields that a model does not declare; none if ``fields`` is no mapping."""
+    """The fields that a model does not declare; empty if ``fields`` is not a mapping."""
     if not isinstance(fields, Mapping):
         return {}
     return {name: value for name, value in fields.items() if name not in model.model_fields}
@@ -213,10 +217,23 @@ def with_own_fields(plain: Task, own: OwnFields, where: str) -> Task:
     )
 
 
-def json_kind(data: object) -> str:
-    """The kind of a parsed JSON value, for a message."""
-    kinds = {dict: "an object", list: "a list", str: "a string", type(None): "null"}
-    return kinds.get(type(data), "a number or a truth value")
+def read_json(path: Path, kind: type[Kind], of: str, example: str) -> Kind:
+    """Read a JSON file of the paper.
+
+    Args:
+        path: the file.
+        kind: list or dict.
+        of: what it holds, for messages.
+        example: a sentence that shows such a file, for messages.
+
+    Raises:
+        TaskFileError: the file cannot be read, or holds another kind of value.
+    """
+    data = parse_json(read_text(path), path)
+    if isinstance(data, kind):
+        return data
+    found = _KINDS.get(type(data), "a number or a truth value")
+    raise TaskFileError(f"{path}: not {_KINDS[kind]} of {of} but {found}; {example}")
 
 
 def as_json(path: Path, data: object) -> bytes:

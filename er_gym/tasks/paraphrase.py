@@ -201,7 +201,7 @@ def _read(cache: Path) -> dict[str, str]:
         except ValueError:  # not JSON, or not even text
             if line[: len(_BEGINS)] != _BEGINS[: len(line)]:
                 raise ValueError(
-                    f"{where} is none, and no beginning of one: er-gym did not write this file; "
+                    f"{where} is not a reply, nor a part of one: er-gym did not write this file; "
                     "move it, or choose another --out"
                 ) from None
             continue

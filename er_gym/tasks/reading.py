@@ -74,7 +74,7 @@ def open_file(path: Path) -> BinaryIO:
     except OSError as error:
         raise TaskFileError(f"{path}: {error.strerror}") from None
     except ValueError as error:  # a path with a zero byte
-        raise TaskFileError(f"{str(path)!r}: no path: {error}") from None
+        raise TaskFileError(f"{str(path)!r}: not a path: {error}") from None
     try:
         _must_be_regular(os.fstat(handle).st_mode, path)
     except TaskFileError:
@@ -96,7 +96,7 @@ def read_bytes(path: Path, most: int = LARGEST) -> bytes:
     with open_file(path) as file:
         try:
             data = file.read(most + 1)
-            if data is None:  # a file of the kernel's, which would be waited for
+            if data is None:  # reading such a file of the kernel would block
                 raise TaskFileError(f"{path}: nothing to read now; give a regular file")
             if path.suffix.lower() == ".gz" and len(data) <= most:
                 with gzip.GzipFile(fileobj=io.BytesIO(data)) as packed:

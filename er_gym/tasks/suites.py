@@ -120,7 +120,7 @@ def _own_suite(name: str) -> Suite:
     config, file = suite_config(name), suite_file(name)
     if not file.exists():
         raise TaskFileError(
-            f"the suite {name!r} is made, not shipped, and is not in {file.parent} yet; "
+            f"the suite {name!r} does not come with er-gym and is not in {file.parent} yet; "
             f"run: er-gym tasks generate --suite {name}"
         )
     tasks = tuple(jsonl_format.read_tasks(file))

@@ -28,7 +28,7 @@ GROUPS = (SEARCH, MANIPULATE, TRANSPORT, COMPOSITE)
 class GenerationRule(Protocol):
     """A rule that generates tasks: an :class:`~er_gym.tasks.generate.task_plan.TaskRule`.
 
-    The table knows no more of it, since rules are made of the table's types.
+    The table knows nothing else about rules, since rules are made from the table's types.
     """
 
     @property
@@ -84,21 +84,21 @@ TASK_TYPES = (
 """The rows that come with er-gym."""
 
 BY_NAME = {task_type.name: task_type for task_type in TASK_TYPES}
-"""Every row, those of other packages too: these come last."""
+"""Every row. The rows of other packages come last."""
 BY_ENV_ID = {task_type.env_id: task_type for task_type in TASK_TYPES}
 _listeners: list[Callable[[TaskType], None]] = []
 _ENV_ID = re.compile(r"[\w.-]+-v\d+")
 
 
 def listen(tell: Callable[[TaskType], None]) -> None:
-    """Tell of every row: now of those there are, later of those that are added."""
+    """Call ``tell`` with every present row now, and with every added row later."""
     for row in tuple(BY_NAME.values()):
         tell(row)
     _listeners.append(tell)
 
 
 def register(row: TaskType) -> TaskType:
-    """Add a type of task in this process, with its Gymnasium id; again is harmless.
+    """Add a type of task in this process, with its Gymnasium id; repeating this is harmless.
 
     Raises:
         PluginError: the row cannot be used; the message says why.
@@ -119,7 +119,7 @@ def load_added() -> None:
     """Register the rows of other packages.
 
     Raises:
-        PluginError: one cannot be loaded or used.
+        PluginError: a row cannot be loaded or used.
     """
     expected = f"an {__name__}.TaskType"
     for found, origin in added("task type", GROUP, VARIABLE, expected, registers=True):
@@ -129,7 +129,7 @@ def load_added() -> None:
 
 
 def _problem(row: TaskType) -> str:
-    """What is wrong with a row, "" if nothing."""
+    """The first problem of a row, "" if there is none."""
     for name in ("name", "title", "env_id"):
         text = getattr(row, name)
         if not isinstance(text, str) or not text.strip() or not text.isprintable():

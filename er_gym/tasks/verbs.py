@@ -278,7 +278,7 @@ def register(verb: Verb) -> None:
     """
     if table.cache_info().currsize:
         raise PluginError(
-            f"verb {verb.name!r} comes too late: the action space has been built. Register "
+            f"verb {verb.name!r} is registered too late: the action space has been built. Register "
             f"it before er_gym.envs or agents are imported, or name it in ${VARIABLE}"
         )
     _merged(_merged({each.name: each for each in OWN}, _registered), [verb])
@@ -337,11 +337,11 @@ def _problem(verb: Verb, taken: Mapping[str, str]) -> str:
         if not _PHRASE.fullmatch(phrase) or phrase != phrase.lower():
             return f"{phrase!r} is not a phrase; write lower-case words with single spaces"
         if phrase in {*taken, INIT}:
-            return f"{phrase!r} is a way to say {taken.get(phrase, INIT)!r} already; choose another"
+            return f"{phrase!r} already means {taken.get(phrase, INIT)!r}; choose another phrase"
     if not verb.thor_action:
         return "it has no thor_action; give the AI2-THOR action that does it"
     if taken_over := {"action", "objectId"} & verb.parameters.keys():
-        return f"parameters has {min(taken_over)!r}, which er-gym gives itself; leave it out"
+        return f"parameters has {min(taken_over)!r}, which er-gym sets itself; leave it out"
     try:
         verb.in_plan.format_map(dict.fromkeys(_SLOTS, ""))
     except (KeyError, ValueError, AttributeError, IndexError):
@@ -352,7 +352,7 @@ def _problem(verb: Verb, taken: Mapping[str, str]) -> str:
 def _problem_of_object(verb: Verb) -> str:
     about = [name for name in _ABOUT_OBJECTS if getattr(verb, name)]
     if verb.alone and about:
-        return f"it takes no object (alone), so {about[0]} has no meaning; leave one of them out"
+        return f"alone means no object, so {about[0]} has no effect; leave one of them out"
     properties = sorted({name for kind in OBJECT_TYPES.values() for name in kind.properties})
     if verb.object_property not in ("", *properties):
         return (

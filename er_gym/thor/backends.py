@@ -50,7 +50,7 @@ def _unity(arguments: dict[str, Any]) -> Controller:
             )
     try:
         return Controller(**arguments)
-    except Exception as error:  # whatever the client raises here means: no Unity on this machine
+    except Exception as error:  # any exception means that Unity cannot run on this machine
         reason = (str(error).strip().splitlines() or [""])[0]
         raise BackendError(
             "backend 'unity' could not start AI2-THOR's Unity build "

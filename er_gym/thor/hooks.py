@@ -1,4 +1,4 @@
-"""Installs :mod:`er_gym.thor.client_hook` where a Python loads it at its start, and removes it."""
+"""Installs :mod:`er_gym.thor.client_hook` where Python loads it at its start, and removes it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def hook_folders(python: str) -> list[Path]:
     except (OSError, ValueError, subprocess.SubprocessError) as error:
         reason = str(error) if isinstance(error, OSError) else "it cannot import ai2thor._builds"
         raise PlayerError(
-            f"{python} runs no AI2-THOR programs: {reason}; pip install ai2thor=="
+            f"{python} cannot run AI2-THOR programs: {reason}; pip install ai2thor=="
             f"{version('ai2thor')} there, or name another Python"
         ) from error
     if told["commit"] != COMMIT_ID:
@@ -53,7 +53,7 @@ def hook_folders(python: str) -> list[Path]:
 
 
 def write_hook(folders: Sequence[Path]) -> Path | None:
-    """Make sure that one of the folders has the hook; return its path, None if none can."""
+    """Make sure that one of the folders has the hook; return its path, None if none can have it."""
     for folder in folders:
         if all(_has_text(folder / name, text) for name, text in _hook_files().items()):
             return folder / f"{_HOOK}.pth"  # another user may own it; only the owner removes it

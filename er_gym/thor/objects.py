@@ -36,36 +36,39 @@ PROPERTY_OF_STATE: Mapping[str, str] = {
     "isDirty": "dirtyable",
     "isFilledWithLiquid": "canFillWithLiquid",
 }
-"""AI2-THOR's states, and the property of the objects that can have each. ``isUsedUp`` is left out:
-AI2-THOR's metadata says it of no object."""
+"""AI2-THOR's states, each with the property of the objects that can have it. ``isUsedUp`` is left
+out, since it is False for every object in AI2-THOR's metadata."""
 _STATES = tuple(PROPERTY_OF_STATE)
 ENTRY_KEYS = frozenset(
     {"objectId", "objectType", "isPickedUp", "parentReceptacles", "isOpen", "isToggled"}
 )
-"""What :meth:`ObjectTable.entries` tells of an object."""
+"""The keys of the entries that :meth:`ObjectTable.entries` returns."""
 
 
 @dataclass(frozen=True, eq=False)
 class ObjectTable:
-    """The N objects of a scene in one state, in scene order; where the agent is does not matter.
+    """The N objects of a scene in one state, in scene order. The agent's pose does not matter.
 
-    The engine hands out the same table as long as nothing but the agent has changed. Arrays are
-    read-only by agreement. Objects of types that are not in :data:`OBJECT_TYPES` are left out, and
-    wholes of which there are only parts (:func:`is_present`).
+    The engine returns the same table until something other than the agent changes. Arrays are
+    read-only by agreement. Two kinds of objects are left out: objects of types that are not in
+    :data:`OBJECT_TYPES`, and whole objects of which only parts are left (:func:`is_present`).
 
     Attributes:
-        ids: ``objectId`` of each. row: the row of each id.
-        kinds: (N,) index of each one's type in :data:`TYPES`.
-        has: (N,) bool for each of AI2-THOR's properties and of :data:`PROPERTY_OF_STATE`, by its
-            name in the metadata: ``"pickupable"``, ``"isOpen"``. ``canBeUsedUp`` is told by the
-            type, since the metadata says it of no object.
-        centre, size: (N, 3) of each one's axis-aligned box, world frame, metres.
-        parents: rows of the receptacles that each lies in, innermost first.
-        contents: rows of what lies in each.
-        controlled: rows of what each controls, as a stove knob does its burner.
-        held: row of what is in the agent's hand, -1 when that is empty.
-        derived: what has been worked out from all but ``centre``. Tables that differ in nothing but
-            where the hand has carried things share it.
+        ids: the ``objectId`` of each object.
+        row: object id to row.
+        kinds: (N,) the index of each object's type in :data:`TYPES`.
+        has: (N,) bool for each of AI2-THOR's properties and each state of
+            :data:`PROPERTY_OF_STATE`, by its name in the metadata: ``"pickupable"``, ``"isOpen"``.
+            ``canBeUsedUp`` comes from the type, since it is False for every object in the metadata.
+        centre: (N, 3) the centre of each object's axis-aligned box, world frame, metres.
+        size: (N, 3) the size of each object's axis-aligned box, metres.
+        parents: the rows of the receptacles in which each object lies, innermost first.
+        contents: the rows of the objects that lie in each object.
+        controlled: the rows of the objects that each object controls, as a stove knob controls its
+            burner.
+        held: the row of the object in the agent's hand, -1 if the hand is empty.
+        derived: a cache of what follows from all attributes except ``centre``. Two tables share it
+            if they differ only in the position of what the agent carries.
     """
 
     ids: tuple[str, ...]
@@ -93,9 +96,9 @@ class ObjectTable:
         return np.flatnonzero(self.kinds == kind).tolist()
 
     def entries(self, object_types: Iterable[str]) -> list[dict[str, Any]]:
-        """What the metadata says of the objects of some types and of what those lie in, in part.
+        """Parts of the metadata of the objects of some types, and of the receptacles they lie in.
 
-        :data:`ENTRY_KEYS` has the keys. The whole metadata takes a hundred times as long to make.
+        :data:`ENTRY_KEYS` lists the keys. The whole metadata takes a hundred times as long to make.
         """
         rows = [row for name in set(object_types) for row in self.of_type(name)]
         holders = {holder for k in rows for holder in self.parents[k]}
@@ -113,12 +116,12 @@ class ObjectTable:
 
     @cached_property
     def volume(self) -> NDArray[np.float64]:
-        """(N,) volume of each one's axis-aligned box, m³."""
+        """(N,) the volume of each object's axis-aligned box, m³."""
         return np.asarray(self.size[:, 0] * self.size[:, 1] * self.size[:, 2])
 
     @cached_property
     def face(self) -> NDArray[np.float64]:
-        """(N,) area of the largest face of each one's axis-aligned box, m²."""
+        """(N,) the area of the largest face of each object's axis-aligned box, m²."""
         x, y, z = self.size.T
         return np.asarray(np.maximum(np.maximum(x * y, y * z), x * z))
 
@@ -126,7 +129,7 @@ class ObjectTable:
 def is_present(entry: Mapping[str, Any]) -> bool:
     """Whether an object of the metadata can be found in the scene.
 
-    AI2-THOR goes on listing a whole that was sliced, or an egg that was broken; its parts are
+    AI2-THOR still lists an object that was sliced, and an egg that was broken. The parts are
     objects of their own.
     """
     if entry.get("isSliced"):
@@ -139,9 +142,10 @@ _Seen = tuple[ObjectTable, NDArray[np.bool_], NDArray[np.bool_]]
 
 
 def objects_of(event: Any) -> _Seen:
-    """The objects of an event, and (N,) which of them are visible to the agent, and interactable.
+    """The objects of an event, (N,) whether each is visible, and (N,) whether it is interactable.
 
-    Unity has things that are seen but out of reach, behind glass; the embedded engine has not.
+    In Unity an object behind glass is visible but not interactable. The embedded engine has no such
+    objects: there, the two are the same.
     """
     metadata = event.metadata
     if isinstance(metadata, LazyMetadata):
@@ -191,7 +195,7 @@ def _of_entries(metadata: Mapping[str, Any]) -> _Seen:
 
 @dataclass(frozen=True, eq=False)
 class _Names:
-    """What in a table is the same however the objects are."""
+    """The part of a table that does not depend on the state of the objects."""
 
     ids: tuple[str, ...]
     row: Mapping[str, int]
@@ -216,7 +220,7 @@ def _recorded_names(scene: Scene) -> _Names:
 
 def _names(world: World) -> _Names:
     recorded = _recorded_names(world.scene)
-    # Equal tuples of the same strings are compared by identity: this costs next to nothing.
+    # Tuples of the same string objects are compared by identity, so this costs next to nothing.
     return recorded if tuple(world.object_ids) == recorded.ids else _Names.of(world)
 
 
@@ -224,11 +228,11 @@ _TABLE: CacheKey[ObjectTable] = CacheKey("object table")
 
 
 def _of_world(world: World) -> ObjectTable:
-    """The table of the world as it is; kept until the world changes."""
+    """The table of the world's present state; cached until the world changes."""
     found = world.cache.state.get(_TABLE)
     if found is None:
         found = world.cache.state.put(_TABLE, _table(world))
-    elif world.held >= 0:  # what is carried moves with the agent
+    elif world.held >= 0:  # the held object moves with the agent
         low, high = boxes_with_doors(world)
         found = replace(found, centre=(low + high) / 2)
     return found

@@ -1,7 +1,7 @@
 """The places in the client's folder that ``er-gym player install`` fills.
 
-A place is empty, or holds a file or folder of er-gym or of somebody else. A foreign file is moved
-aside by one rename and restored by one rename, so that a kill in between loses nothing.
+A place is empty, or it holds a file or folder of er-gym or of another program. One rename moves a
+foreign file aside and one rename restores it, so that a kill in between loses nothing.
 """
 
 from __future__ import annotations
@@ -71,12 +71,13 @@ class Place(ABC):
                 self.set_aside.parent.mkdir(exist_ok=True)
                 self.path.rename(self.set_aside)
             elif self.is_ours:
-                self.path.rename(drafts / "old")  # deleted where it is, it might be left in halves
+                # Not deleted in place, since a kill meanwhile would leave half of it.
+                self.path.rename(drafts / "old")
             self.path.parent.mkdir(exist_ok=True)
             (drafts / "new").rename(self.path)
 
     def clear(self) -> bool:
-        """Remove er-gym's file and restore a foreign one; return whether there was either."""
+        """Remove er-gym's file and restore a foreign one; return whether either was there."""
         ours = self.is_ours
         if ours:
             with _drafts() as drafts:
@@ -84,7 +85,7 @@ class Place(ABC):
         back = os.path.lexists(self.set_aside) and not os.path.lexists(self.path)
         if back:
             self.set_aside.rename(self.path)
-            with contextlib.suppress(OSError):  # others wait there
+            with contextlib.suppress(OSError):  # other foreign files are set aside there
                 self.set_aside.parent.rmdir()
         return ours or back
 
@@ -102,7 +103,7 @@ def _drafts() -> Iterator[Path]:
 
 
 def sweep() -> bool:
-    """Remove drafts, also those that a kill has left; return whether there were any."""
+    """Remove drafts, including those that a killed process left; return whether there were any."""
     folder = _drafts_folder()
     left = folder.exists()
     shutil.rmtree(folder, ignore_errors=True)
@@ -147,18 +148,18 @@ class Release(Place):
     def write(self, path: Path) -> None:
         path.mkdir()
         write_atomic(path / self.name, launcher(), mode=EXECUTABLE)
-        # How the build can be spoken to; without this file the client goes to the network for it.
+        # The servers that the build supports; without this file the client asks the network.
         (path / "metadata.json").write_text(json.dumps({"server_types": ["FIFO", "WSGI"]}) + "\n")
         (path / MARKER).write_text(json.dumps({"python": sys.executable}) + "\n")
 
 
 @dataclass(frozen=True)
 class GpuMapping(Place):
-    """The file in which the client notes which Vulkan device a CUDA device is.
+    """The file in which the client stores which Vulkan device belongs to a CUDA device.
 
-    Where it is missing and a program asks for a GPU (``gpu_device``, ``CUDA_VISIBLE_DEVICES``), the
-    client runs vulkaninfo and nvidia-smi. The player uses no GPU, so every number is mapped; those
-    that the user's own file maps keep their values, for real builds beside the player.
+    If the file is missing and a program asks for a GPU (``gpu_device``, ``CUDA_VISIBLE_DEVICES``),
+    the client runs vulkaninfo and nvidia-smi. The player uses no GPU, so the file maps every
+    number. Numbers in the user's own file keep their values, for real builds beside the player.
     """
 
     @property
@@ -172,7 +173,7 @@ class GpuMapping(Place):
     def write(self, path: Path) -> None:
         devices: dict[str, Any] = {str(number): number for number in range(_GPUS)}
         theirs = _devices(self.path if self.is_foreign else self.set_aside)
-        # The client reads every key as a number, and fails where one is none.
+        # The client reads every key as a number, and fails if a key is not a number.
         devices |= {number: device for number, device in theirs.items() if number.isdecimal()}
         path.write_text(json.dumps(_OURS | devices) + "\n")
 

@@ -24,9 +24,9 @@ class Installed:
     """The result of :func:`install`.
 
     Attributes:
-        releases: the builds whose place the player has taken.
-        hook: the file that spares Python's programs the client's test of the machine; None
-            where it cannot be written.
+        releases: the builds that the player replaces.
+        hook: the file by which Python programs skip the client's test of the machine; None if it
+            could not be written.
         pruned: other builds that the client, which keeps three, deletes at its next start.
     """
 
@@ -98,8 +98,8 @@ def uninstall() -> tuple[Release, ...]:
         PlayerError: er-gym has installed nothing.
     """
     unity = [str(release.path) for release in RELEASES if release.is_unity]
-    others = f", but builds that er-gym did not put there: {', '.join(unity)}" if unity else ""
-    nothing = PlayerError(f"nothing of er-gym's is in {client_home()}{others}")
+    others = f"; other builds are there: {', '.join(unity)}" if unity else ""
+    nothing = PlayerError(f"er-gym has installed nothing in {client_home()}{others}")
     if not client_home().is_dir():
         raise nothing
     with _installation_lock():
@@ -113,13 +113,13 @@ def uninstall() -> tuple[Release, ...]:
 
 
 def still_aside() -> list[Path]:
-    """What :func:`install` set aside and could not be restored, since its place is taken."""
+    """Files that :func:`install` set aside and whose place is taken, so that they stay there."""
     return [place.set_aside for place in _PLACES if os.path.lexists(place.set_aside)]
 
 
 @contextlib.contextmanager
 def _installation_lock() -> Iterator[None]:
-    """Lock out another er-gym that installs, and turn errors of the disk into a PlayerError."""
+    """Keep other installations of er-gym out meanwhile, and turn disk errors into a PlayerError."""
     try:
         client_home().mkdir(parents=True, exist_ok=True)
         folder = os.open(client_home(), os.O_RDONLY)
@@ -130,13 +130,13 @@ def _installation_lock() -> Iterator[None]:
             os.close(folder)
     except OSError as error:
         raise PlayerError(
-            f"er-gym cannot change what it has to ({error}); AI2-THOR's client keeps everything in "
+            f"er-gym cannot write its files ({error}); AI2-THOR's client keeps everything in "
             f"{client_home()}: make that writable, or set HOME to a folder that is"
         ) from error
 
 
 def _soon_pruned() -> list[Path]:
-    """Others' builds that the client, which keeps the newest three, deletes at its next start."""
+    """Other builds that the client, which keeps the newest three, deletes at its next start."""
     folders = [path for path in RELEASES[0].path.parent.iterdir() if path.is_dir()]
     newest_last = sorted(folders, key=lambda path: path.stat().st_mtime)
     return [path for path in newest_last[:-3] if not (path / client_hook.MARKER).is_file()]

@@ -1,7 +1,8 @@
 """Starts the player: the launcher that ``player_install`` writes runs this file by its path.
 
-It is no module to import. Importing ``er_gym`` would register the environments, which takes as long
-as all else; so a bare package of that name goes first, in which only the engine is looked up.
+Do not import this module. Importing ``er_gym`` would register the environments, which takes as long
+as the rest of the start. This file therefore puts an empty package of that name in its place, in
+which only the engine is found.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""The ceiling and the floor: the oracle solves what can be solved, the random agent very little."""
+"""The bounds of comparisons: the oracle solves every solvable task, the random agent very few."""
 
 from __future__ import annotations
 

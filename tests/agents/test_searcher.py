@@ -1,4 +1,4 @@
-"""The searcher reads instructions, knows no more than any agent may, and beats chance by far."""
+"""The searcher reads instructions, uses no privileged knowledge, and beats the random agent."""
 
 from __future__ import annotations
 
@@ -194,7 +194,7 @@ def test_nonsense_ends_at_once(env: EmbodiedEnv) -> None:
     assert [step.verb for step in record.steps] == [verbs.INIT, verbs.END]
 
 
-def test_what_the_room_lacks_is_given_up_in_time(env: EmbodiedEnv) -> None:
+def test_the_searcher_gives_up_on_missing_objects_in_time(env: EmbodiedEnv) -> None:
     scene = load_suite("mini").tasks[0].scene
     task = Task("lacking", TASK_TYPES[0], scene, "Find the ShowerGlass in the Safe.", ())
     record = play_episode(env, make_agent("searcher"), task, 0)

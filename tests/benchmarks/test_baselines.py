@@ -47,7 +47,7 @@ def test_the_page_says_what_was_played(tmp_path: Path) -> None:
     assert "er-gym train-rl --config tiny --seed 1" in page
     assert "4 tasks in training rooms, 4 in unseen ones" in page
     assert (out.parent / "images" / "learning_steps.png").exists()
-    # Again, nothing is played: every result is there.
+    # The second time nothing is played: every result exists.
     episodes = sorted((tmp_path / "work").rglob("*.json"))
     times = [file.stat().st_mtime_ns for file in episodes if file.parent.name == "episodes"]
     assert CliRunner().invoke(main, command).exit_code == 0
@@ -55,7 +55,7 @@ def test_the_page_says_what_was_played(tmp_path: Path) -> None:
     assert out.read_text() == page
 
 
-def test_a_run_that_is_none_is_refused(tmp_path: Path) -> None:
+def test_a_directory_without_a_run_is_refused(tmp_path: Path) -> None:
     result = CliRunner().invoke(main, [str(tmp_path)])
     assert isinstance(result.exception, ValueError)
     assert "give run directories of er-gym train-rl" in str(result.exception)

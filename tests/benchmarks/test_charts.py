@@ -39,7 +39,7 @@ def test_the_bundled_suite(matplotlib, tmp_path: Path) -> None:
     for width, height in sizes(paths):
         assert 700 <= width <= 1500
         assert 450 <= height <= 1200
-    # Nothing of what others draw with has changed.
+    # The drawing settings of other code have not changed.
     assert dict(matplotlib.rcParams) == settings
     assert sys.modules.get("matplotlib.pyplot") is pyplot
 

@@ -1,4 +1,4 @@
-"""``er-gym player`` and ``er-gym doctor`` as a user gives them."""
+"""``er-gym player`` and ``er-gym doctor`` as a user runs them."""
 
 from __future__ import annotations
 

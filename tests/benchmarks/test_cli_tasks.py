@@ -1,4 +1,4 @@
-"""``er-gym tasks`` as a user gives it: tasks are made, checked, read, counted, converted."""
+"""``er-gym tasks`` as a user runs it: generate, verify, show, stats and convert."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from typing import Any
 
 import pytest
 from PIL import Image
+from support import run_python, with_ids
 
-from benchmarks.cli import main as cli
 from er_gym.tasks import TASK_TYPES, Task, TaskFileError, load_suite, suite_from_file
 from er_gym.tasks.describe import describe
 from er_gym.tasks.goal import Condition
@@ -35,20 +35,11 @@ Command = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def er_gym(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> Command:
-    """Runs the command in this process, in ``tmp_path``; returns exit code, stdout and stderr."""
+def er_gym(er_gym: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Command:
+    """Runs the command in ``tmp_path``."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("ER_GYM_HOME", str(tmp_path / "home"))
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as left:
-            cli.main([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        return left.value.code, out, err
-
-    return run
+    return er_gym
 
 
 def columns(out: str) -> list[list[str]]:
@@ -122,7 +113,7 @@ def test_fewer_than_were_asked_for_is_said(er_gym: Command, tmp_path: Path) -> N
     )
     assert code == 0
     assert "1 tasks of 1 verified" in shown
-    assert err.splitlines()[-1] == "100 were asked for; more layouts or rooms give more"
+    assert err.splitlines()[-1] == "100 were requested; more layouts or rooms give more"
     assert len(read_tasks(out)) == 1
     assert files_in(tmp_path) == ["not/there/few.jsonl", "not/there/few.md"]
 
@@ -506,20 +497,7 @@ def elsewhere(task: Task, metres: float) -> Task:
     def moved(object_id: str) -> str:
         return off if object_id == first else object_id
 
-    keys = tuple(
-        replace(
-            key,
-            object_id=moved(key.object_id),
-            related_objects=tuple(map(moved, key.related_objects)),
-        )
-        for key in task.key_actions
-    )
-    return replace(
-        task,
-        key_actions=keys,
-        target_objects=tuple(map(moved, task.target_objects)),
-        related_objects=tuple(map(moved, task.related_objects)),
-    )
+    return with_ids(task, moved)
 
 
 @pytest.fixture
@@ -615,8 +593,6 @@ def test_help_imports_nothing_heavy(group: list[str]) -> None:
         "heavy = ('numpy', 'gymnasium', 'pydantic', 'rich', 'ai2thor', 'er_gym', 'matplotlib')\n"
         "print([name for name in heavy if name in sys.modules])"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program], env=ENVIRONMENT, capture_output=True, text=True
-    )
+    done = run_python(program)
     assert done.stdout.splitlines()[-1] == "[]", done.stderr
     assert done.stdout.startswith(f"Usage: er-gym {' '.join(['tasks', *group])} ")

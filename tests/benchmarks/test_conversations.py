@@ -93,7 +93,7 @@ def test_two_hundred_episodes_with_a_server_that_misbehaves(tmp_path: Path) -> N
     assert result.return_value == 0, result.output
     assert_whole(tmp_path, len(TASKS))
     entries = ledger(tmp_path)
-    assert server.count > len(entries)  # what went wrong was asked again
+    assert server.count > len(entries)  # failed requests were sent again
     rejected = [entry for entry in entries if entry["rejected"]]
     assert len(rejected) > 5
     assert all(entry["cost"] > 0 for entry in rejected)
@@ -118,7 +118,7 @@ def test_a_budget_stops_within_the_replies_under_way(tmp_path: Path) -> None:
         assert server.count == len(entries)
         again = bench(server.url, tmp_path, *more, *PRICES, "--max-usd", "0.01")
         assert again.return_value == 3
-        assert server.count == len(entries)  # nothing was asked
+        assert server.count == len(entries)  # no request was sent
 
         done = bench(server.url, tmp_path, *more, *PRICES, "--max-usd", "10")
         assert done.return_value == 0, done.output
@@ -197,16 +197,16 @@ def test_a_recorded_run_is_played_again_without_a_server(tmp_path: Path) -> None
         for x in "ab"
     ]
     assert played[0] == played[1]
-    assert ledger(tmp_path / "b") == []  # what is replayed has been paid for
+    assert ledger(tmp_path / "b") == []  # replayed replies have been paid for
 
 
-def test_a_server_that_hangs_is_told_of_and_left_in_time(tmp_path: Path) -> None:
+def test_a_hanging_server_is_reported_and_left_in_time(tmp_path: Path) -> None:
     with naughty.NaughtyServer(script=["stall"] * 50) as server:
         began = time.monotonic()
         hangs = bench(server.url, tmp_path, "--limit", "6", "--set", "server.timeout=0.5")
         assert hangs.return_value == 3
         assert "no whole answer within 0.5 s (try 1 of 2); trying again in" in hangs.output
-        assert "(tried 2 times); nothing has answered yet: see whether the server" in hangs.output
+        assert "(tried 2 times); nothing has answered yet: check that the server" in hangs.output
         over = bench(server.url, tmp_path, "--limit", "6", "--max-minutes", "0.01")
         assert over.return_value == 3
         assert "the 0.01 minutes are over" in over.output
@@ -299,7 +299,7 @@ def test_a_key_that_is_repeated_is_nowhere(tmp_path: Path, monkeypatch: Any) -> 
         (("--agent", "openai:m", "--set", "prompts.profile=x"), "there are no prompts 'x'"),
     ],
 )
-def test_what_is_given_wrongly_is_told(
+def test_wrong_options_are_reported(
     arguments: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("OPENAI_API_KEY", raising=False)

@@ -1,4 +1,4 @@
-"""Learning curves are drawn from what a run logged."""
+"""Learning curves are drawn from a run's log."""
 
 from __future__ import annotations
 

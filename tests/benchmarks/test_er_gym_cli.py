@@ -1,4 +1,4 @@
-"""The command as a user gives it."""
+"""The command as a user runs it."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
+from support import run_python
 
-from benchmarks.cli import main as cli
 from er_gym.rollout import runner
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.runner import RunSummary
@@ -27,19 +27,6 @@ NOTHING = RunSummary(0, 0, ())
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "benchmarks.cli"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
-
-
-@pytest.fixture
-def er_gym(capsys):
-    """Runs the command in this process; returns exit code, stdout and stderr."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as left:
-            cli.main([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        return left.value.code, out, err
-
-    return run
 
 
 def episode_times(out: Path) -> dict[str, int]:
@@ -191,9 +178,7 @@ def test_help_imports_nothing_heavy():
         "heavy = {'gymnasium', 'numpy', 'pydantic', 'rich', 'ai2thor', 'er_gym', 'agents'}\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, text=True
-    )
+    done = run_python(code)
     assert done.stderr == ""
     assert "--suite" in done.stdout
 
@@ -374,7 +359,7 @@ def test_crashes_give_exit_code_1(tasks_file, tmp_path, er_gym, monkeypatch, epi
     )
 
 
-def test_a_full_disk_is_told_in_one_line(tasks_file, tmp_path, er_gym, monkeypatch):
+def test_a_full_disk_is_reported_in_one_line(tasks_file, tmp_path, er_gym, monkeypatch):
     def run(run_directory, tasks, make_agent, **how):
         raise OSError(28, "No space left on device")
 

@@ -1,4 +1,4 @@
-"""What extras require, read from metadata; and that all of them resolve under constraints.txt."""
+"""The requirements of extras are read from metadata, and all resolve under constraints.txt."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inspect plays suites with a model that says what it is told; ``make test-inspect`` runs these."""
+"""Inspect plays suites with a scripted model; ``make test-inspect`` runs these tests."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_an_episode_is_played_scored_and_shown(play, right):
 
     asked = [event for event in sample.events if event.event == "model"]
     assert [len(event.input) for event in asked] == [2 * n + 2 for n in range(len(right))]
-    # What was said once is the same message ever after.
+    # An earlier message keeps its object.
     assert asked[0].input[0].id == asked[-1].input[0].id == sample.messages[0].id
     assert asked[1].input[2].id == sample.messages[2].id
 

@@ -342,7 +342,7 @@ def test_one_value_has_no_interval():
 
 
 @pytest.mark.parametrize("estimate", [lambda: wilson(0, 0), lambda: normal([])])
-def test_nothing_has_no_mean(estimate):
+def test_no_values_have_no_mean(estimate):
     with pytest.raises(ValueError, match="at least one"):
         estimate()
 

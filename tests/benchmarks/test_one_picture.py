@@ -1,4 +1,4 @@
-"""The check that a picture depends on the state alone, for a state or two."""
+"""The check that a picture depends only on the state, tried on one or two states."""
 
 from __future__ import annotations
 

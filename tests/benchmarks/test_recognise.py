@@ -1,4 +1,4 @@
-"""The recognition benchmark, as far as it needs no torch: its scenes, its crops, its sums."""
+"""The parts of the recognition benchmark without torch: scenes, crops and sums."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Suites that are made: the same every time, whatever happens on the way; and those we ship."""
+"""Generated suites are the same every time, even after interruptions; and the shipped suites."""
 
 from __future__ import annotations
 

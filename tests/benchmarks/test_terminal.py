@@ -1,4 +1,4 @@
-"""What the command prints is text, whoever wrote it."""
+"""The command prints every text literally, without control codes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from benchmarks.cli.terminal import plain, terminal
 from benchmarks.scoring.tables import Table, print_tables
 
 
-def test_what_a_terminal_obeys_is_shown_as_an_escape():
+def test_terminal_control_characters_are_shown_as_escapes():
     assert plain("a\x1b[31m\x07\x9b\u202e\ud800\r") == r"a\x1b[31m\x07\x9b\u202e\ud800\r"
     assert plain("kept: ä 中 😀\t\n") == "kept: ä 中 😀\t\n"
 

@@ -180,7 +180,11 @@ class _Scene:
                 for other in view
                 if other.type in alike(each.type)
             ]
-            if len(same) != 1 or not each.on or "pickupable" not in OBJECT_TYPES[each.type].properties:
+            if (
+                len(same) != 1
+                or not each.on
+                or "pickupable" not in OBJECT_TYPES[each.type].properties
+            ):
                 continue
             holders = [
                 one
@@ -196,7 +200,13 @@ class _Scene:
         return found
 
 
-_GENERAL = {"Floor", "Window", "RoomDecor", "TableTopDecor", *(t for t in OBJECT_TYPES if "Sliced" in t)}
+_GENERAL = {
+    "Floor",
+    "Window",
+    "RoomDecor",
+    "TableTopDecor",
+    *(t for t in OBJECT_TYPES if "Sliced" in t),
+}
 """Types of which a lie would not be plain."""
 _DOORS = {"ShowerCurtain", "ShowerDoor", "Blinds", "Book", "Toilet", "Laptop", "Curtains", "Box"}
 """They open, but nobody would look for things in them."""
@@ -253,13 +263,20 @@ def _is_vague(scene: _Scene, sort: str) -> bool:
 def _other_act(scene: _Scene) -> str:
     """An action that is not the decision, and no step towards it."""
     known = scene.known
-    types = [each for each in scene.types if each not in all_alike([known.decision.object_type or "Floor"])]
-    lies_on = {each.type for each in known.view if each.on in alike(known.decision.object_type or "Floor")}
+    types = [
+        each
+        for each in scene.types
+        if each not in all_alike([known.decision.object_type or "Floor"])
+    ]
+    lies_on = {
+        each.type for each in known.view if each.on in alike(known.decision.object_type or "Floor")
+    }
     act = scene.draw.choice((verbs.NAVIGATE, verbs.OPEN, verbs.PICKUP))
     takes = [
         each
         for each in types
-        if each not in lies_on and (act == verbs.NAVIGATE or verbs.verb_named(act).takes(each))
+        if each not in lies_on
+        and (act == verbs.NAVIGATE or verbs.verb_named(act).takes(each))
         and known.seen.get(each) not in alike(known.decision.object_type or "Floor")
     ]
     return scene.act(Action(act, scene.pick(takes))) if takes else ""

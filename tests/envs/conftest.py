@@ -1,4 +1,4 @@
-"""An environment to play in, and a way to play a list of actions."""
+"""Fixtures: an environment, and a function that plays a list of actions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verbs of another package, a row each, in everything that knows of verbs."""
+"""Verbs of another package, one row each, work in every part that uses verbs."""
 
 from __future__ import annotations
 

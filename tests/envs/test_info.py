@@ -1,4 +1,4 @@
-"""``info`` is the documented record, and says the same as the observation and the simulator."""
+"""``info`` is as documented, and agrees with the observation and the simulator."""
 
 from __future__ import annotations
 

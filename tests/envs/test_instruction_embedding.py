@@ -10,6 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from floor_plan_1 import FRIDGE
 from gymnasium.utils.env_checker import check_env
 from support import make_task
 
@@ -17,7 +18,6 @@ from er_gym.envs.actions import ACTIONS, INDEX, parse
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.wrappers import InstructionEmbedding, KeyActionShaping, make_encoder
 
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 OPEN = make_task("single_pickup", ("open", FRIDGE), instruction="Open the Fridge.")
 CLOSE = make_task("single_pickup", ("close", FRIDGE), instruction="Close the Fridge.")
 ID = "ER-SinglePickup-v0"
@@ -78,7 +78,7 @@ def test_action_masks(wrapped: InstructionEmbedding) -> None:
 
 
 @pytest.mark.parametrize("obs_mode", ["state", "text", "rgb+state"])
-def test_check_env_has_nothing_to_say(obs_mode: str) -> None:
+def test_check_env_finds_no_problem(obs_mode: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         # It warns of wrappers as such.
@@ -133,7 +133,7 @@ class Bare(gymnasium.Env[Any, Any]):
         return self.observation_space.sample(), {}
 
 
-def test_what_cannot_be_wrapped(wrapped: InstructionEmbedding) -> None:
+def test_invalid_uses_of_the_wrapper(wrapped: InstructionEmbedding) -> None:
     box = gymnasium.spaces.Box(0.0, 1.0, (2,))
     with pytest.raises(ValueError, match=r"cannot add 'instruction' to .*Box.* is a Dict"):
         InstructionEmbedding(Bare(box))

@@ -1,4 +1,4 @@
-"""What is asked out of turn, what an environment cannot be made with, and copies of it."""
+"""Calls in the wrong order, invalid arguments, and copies of environments."""
 
 from __future__ import annotations
 
@@ -71,10 +71,10 @@ def test_wrappers_and_vectors_ask_as_well() -> None:
         ("backend", ["unity"], "unknown backend .*; choose one of: embedded, unity"),
         ("protocol", None, "unknown protocol None; choose one of: default, paper"),
         ("obs_mode", 3, "unknown obs_mode 3; join any of"),
-        ("episode_source", np.arange(3), "is no source of episodes"),
+        ("episode_source", np.arange(3), "is not a source of episodes"),
     ],
 )
-def test_what_an_environment_cannot_be_made_with(name: str, value: Any, allowed: str) -> None:
+def test_invalid_arguments_of_an_environment(name: str, value: Any, allowed: str) -> None:
     with pytest.raises(ValueError, match=allowed):
         EmbodiedEnv(**{name: value})
 
@@ -134,7 +134,7 @@ def test_an_episode_of_unity_says_that_it_cannot_be_copied() -> None:
         copy.deepcopy(env)
 
 
-def test_what_is_handed_out_is_the_callers_own() -> None:
+def test_returned_values_belong_to_the_caller() -> None:
     env, twin = (
         EmbodiedEnv(obs_mode="rgb", width=64, height=36, render_mode="rgb_array") for _ in range(2)
     )

@@ -1,9 +1,10 @@
-"""State and text say what the agent could know, and nothing else."""
+"""The state and text observations hold only what the agent could know."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from floor_plan_1 import FRIDGE
 from support import make_task
 
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -16,8 +17,6 @@ from er_gym.envs.observations import (
     parse_obs_mode,
 )
 from er_gym.tasks.task import AgentPose
-
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 
 
 def entry(obs: dict[str, np.ndarray], name: str) -> float:

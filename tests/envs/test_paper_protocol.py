@@ -9,6 +9,7 @@ from typing import Any
 
 import gymnasium
 import pytest
+from floor_plan_1 import APPLE, BREAD, CABINET, FRIDGE, ISLAND
 from support import make_task
 
 from benchmarks.scoring.metrics import score_episode
@@ -25,11 +26,6 @@ from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.paper_format import with_every_pose
 from er_gym.tasks.task import AgentPose, Task
 
-CABINET = "Cabinet|+00.68|+02.02|-02.46"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
-ISLAND = "CounterTop|-00.08|+01.15|00.00"
-APPLE = "Apple|-00.47|+01.15|+00.48"
-BREAD = "Bread|-00.52|+01.17|-00.03"
 TAKE_APPLE = make_task(
     "single_pickup",
     ("navigate to", ISLAND),

@@ -1,4 +1,4 @@
-"""What is perceived, judged and remembered is what the metadata says, whoever made the columns."""
+"""Perception, judging and memory agree with the metadata, for any source of the columns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Observations say which sensors they need; these are asked for, and nothing else is drawn."""
+"""Observations state the sensors that they need; only these are requested and drawn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shaping tells how far a task has come, and adds up to nothing that could be gamed."""
+"""Shaping rewards progress in a task, and its sum cannot be exploited."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any
 
 import gymnasium
 import pytest
+from floor_plan_1 import EGG, FRIDGE
 from support import make_task
 
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -15,8 +16,6 @@ from er_gym.envs.wrappers.shaping import potential
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
 
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
-EGG = "Egg|-02.04|+00.81|+01.24"
 FETCH = make_task("single_pickup_from_closerep", ("open", FRIDGE), ("pickup", EGG))
 GAMMA = 0.9
 FULL = ("navigate to Fridge", "open Fridge", "pickup Egg", "end")

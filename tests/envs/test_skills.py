@@ -1,4 +1,4 @@
-"""Where skills lead."""
+"""The poses to which skills take the agent."""
 
 from __future__ import annotations
 

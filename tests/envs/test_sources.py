@@ -1,4 +1,4 @@
-"""Where episodes come from: each registered id, what reset may be told, every kind of source."""
+"""Sources of episodes: every registered id, the options of reset, every kind of source."""
 
 from __future__ import annotations
 

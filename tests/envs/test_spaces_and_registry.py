@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from support import run_python
 
 import er_gym
 from er_gym.envs.actions import ACTIONS
@@ -23,7 +24,7 @@ SMALL = {"width": 96, "height": 64}
 
 @pytest.mark.parametrize("obs_mode", ["rgb", "state", "text", "rgb+state+text"])
 @pytest.mark.parametrize("env_id", IDS)
-def test_check_env_has_nothing_to_say(env_id: str, obs_mode: str) -> None:
+def test_check_env_finds_no_problem(env_id: str, obs_mode: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         env = gymnasium.make(env_id, obs_mode=obs_mode, **SMALL)
@@ -102,16 +103,7 @@ print(digest.hexdigest())
 
 
 def test_a_seed_gives_the_same_bytes_in_any_process() -> None:
-    runs = [
-        subprocess.run(
-            [sys.executable, "-c", ROLLOUT],
-            capture_output=True,
-            text=True,
-            check=True,
-            env={"PYTHONHASHSEED": hashseed, "PATH": ""},
-        ).stdout
-        for hashseed in ("1", "2")
-    ]
+    runs = [run_python(ROLLOUT, PYTHONHASHSEED=hashseed).stdout for hashseed in ("1", "2")]
     assert runs[0] == runs[1]
 
 

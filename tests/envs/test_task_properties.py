@@ -1,4 +1,4 @@
-"""What has to be true of every task, played in the benchmark's own rooms."""
+"""Properties that hold for every task, tested in the benchmark's own rooms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the real simulator reported, where the shared data is there."""
+"""Recordings of the real simulator, if the shared data is available."""
 
 from __future__ import annotations
 

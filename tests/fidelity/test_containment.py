@@ -1,4 +1,4 @@
-"""In which receptacles things lie, worked out from boxes, beside what is recorded."""
+"""The receptacles of objects, computed from boxes, agree with the recorded ones."""
 
 from __future__ import annotations
 

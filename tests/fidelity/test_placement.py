@@ -1,4 +1,4 @@
-"""What is put down is put where there is room, in AI2-THOR's order."""
+"""Objects are put down where there is room, in AI2-THOR's order."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_gap_is_found_wherever_there_is_one() -> None:
         high = low + random.uniform(0.02, 0.3, (13, 2))
         boxes = np.zeros((13, 2, 3))
         boxes[:, 0, [0, 2]], boxes[:, 1, [0, 2]], boxes[:, 1, 1] = low, high, 0.2
-        spots = _tight_spots(world, [(0.0, half)], place, 0.0, 0.1, boxes, none)[:, 1:]
+        spots = _tight_spots(world, [(0.0, half)], place, boxes, none)[:, 1:]
 
         def clear(points: np.ndarray, low=low, high=high) -> np.ndarray:
             apart = (points[..., None, :] + half + 0.005 <= low) | (

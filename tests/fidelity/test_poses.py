@@ -1,4 +1,4 @@
-"""From where things can be handled, beside poses from which AI2-THOR opened them."""
+"""Interactable poses agree with the poses from which AI2-THOR opened objects."""
 
 from __future__ import annotations
 

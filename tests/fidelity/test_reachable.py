@@ -1,4 +1,4 @@
-"""Where the agent can stand, beside the recorded positions and AI2-THOR's own."""
+"""Reachable positions agree with the recorded ones and with AI2-THOR's own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The agent's and the camera's height and the room's bounds, beside the recorded ones."""
+"""The heights of agent and camera and the room's bounds agree with the recorded ones."""
 
 from __future__ import annotations
 

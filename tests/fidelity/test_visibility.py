@@ -1,4 +1,4 @@
-"""What is visible, beside what the real simulator reported from the same poses."""
+"""Visible objects agree with the real simulator's reports from the same poses."""
 
 from __future__ import annotations
 

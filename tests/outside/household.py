@@ -1,4 +1,4 @@
-"""What another package may add to er-gym, besides verbs: docs/extending.md."""
+"""Another package's additions to er-gym, besides verbs: docs/extending.md."""
 
 from __future__ import annotations
 

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import ai2thor.controller
 import pytest
+from floor_plan_1 import APPLE, FRIDGE
 
 import er_gym
-
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
-APPLE = "Apple|-00.47|+01.15|+00.48"
 
 
 @pytest.fixture

@@ -8,10 +8,10 @@ import json
 import ai2thor.controller
 import numpy as np
 import pytest
+from floor_plan_1 import FRIDGE
 
 import er_gym
 
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 BASIN = "Sink|-01.90|+00.97|-01.50|SinkBasin"
 LISTS = (
     *("actionFloatsReturn", "actionStringsReturn", "actionVector3sReturn", "distances", "normals"),

@@ -1,4 +1,4 @@
-"""What the workers of ``test_worker_pool`` do; a module, for spawned processes to import."""
+"""The jobs of the workers in ``test_worker_pool``; a module that spawned processes can import."""
 
 from __future__ import annotations
 

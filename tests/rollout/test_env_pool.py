@@ -1,4 +1,4 @@
-"""Real environments in real processes, which are really killed."""
+"""Real environments in real processes, some of which are killed."""
 
 from __future__ import annotations
 

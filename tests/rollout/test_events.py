@@ -1,4 +1,4 @@
-"""The event stream: its lines, what readers skip, and who hears of events."""
+"""The event stream: its lines, the lines that readers skip, and its listeners."""
 
 from __future__ import annotations
 
@@ -146,6 +146,6 @@ def test_a_link_is_not_written_to(tmp_path, hard):
     other = tmp_path / "other"
     other.write_text("theirs")
     (tmp_path / EVENTS).hardlink_to(other) if hard else (tmp_path / EVENTS).symlink_to(other)
-    with pytest.raises(ValueError, match="is a link or no regular file"):
+    with pytest.raises(ValueError, match="is a link, or not a regular file"):
         EventLog(tmp_path)
     assert other.read_text() == "theirs"

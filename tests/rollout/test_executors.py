@@ -1,4 +1,4 @@
-"""What every executor does alike: events, attachments, agents that cannot go on, bad input."""
+"""The common behaviour of all executors: events, attachments, agents that stop, bad input."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_the_events_of_a_run_and_of_its_continuation(new, tasks, executor):
 def test_an_agent_that_cannot_go_on_stops_the_run(new, tasks, executor):
     with pytest.raises(Stopped, match="the budget is spent") as stopped:
         play(new, tasks, by_hand.broke_at_last, executor)
-    assert stopped.value.outcome == RunSummary(2, 0, ())
+    assert stopped.value.summary == RunSummary(2, 0, ())
     assert [each.task_id for each in new.episodes()] == ["paper-0", "paper-1"]
     last = list(read_events(new.path))[-1]
     assert (last.played, last.stopped) == (2, "the budget is spent")

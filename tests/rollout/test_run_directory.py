@@ -142,13 +142,13 @@ def test_episodes_of_unknown_origin_are_refused(run_directory, manifest, episode
 
 
 def test_what_is_no_run(tmp_path, run_directory):
-    with pytest.raises(RunDirectoryError, match="is no run directory"):
+    with pytest.raises(RunDirectoryError, match="is not a run directory"):
         RunDirectory.open(tmp_path / "nowhere")
     (run_directory.path / "run.json").write_text('{"format": "er-gym/run/1"}')
-    with pytest.raises(RunDirectoryError, match="is no run manifest: suite: Field required"):
+    with pytest.raises(RunDirectoryError, match="is not a run manifest: suite: Field required"):
         RunDirectory.open(run_directory.path)
     (run_directory.path / "run.json").write_text("{")
-    with pytest.raises(RunDirectoryError, match="is no run manifest: the file: Invalid JSON"):
+    with pytest.raises(RunDirectoryError, match="is not a run manifest: the file: Invalid JSON"):
         RunDirectory.open(run_directory.path)
 
 
@@ -197,7 +197,7 @@ def odd_files(run_directory, manifest, episode, tmp_path):
         "task-3.json": "broken: the file: Invalid JSON: EOF while parsing",
         "task-4.json": "broken: the file: Invalid JSON",
         "task-5.json": "broken: the file: Input should be an object",
-        "task-6.json": "no file",
+        "task-6.json": "not a regular file",
         "task-7.json": "broken: steps.0: Input should be an object",
         "task-8.json": "of another run: its run is ",
         "task-9.json": "of another run: its agent is 'random', not 'oracle'",

@@ -107,7 +107,7 @@ def test_a_shard_is_read(text):
 
 @pytest.mark.parametrize("text", ["0/8", "9/8", "1/0", "2", "2/", "/8", "a/b", "-1/8", "1/2/3"])
 def test_what_is_no_shard(text):
-    with pytest.raises(ValueError, match="is no shard: give i/n"):
+    with pytest.raises(ValueError, match="is not a shard: give i/n"):
         Shard.parse(text)
 
 

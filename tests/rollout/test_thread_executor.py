@@ -368,7 +368,7 @@ def test_an_agent_that_cannot_go_on_stops_the_run(new_run_directory, tasks):
             concurrency=3,
             keep=lambda episode, agent: talks.append(episode.task_id),
         )
-    assert stopped.value.outcome == RunSummary(2, 0, ())
+    assert stopped.value.summary == RunSummary(2, 0, ())
     assert talks == ["paper-0", "paper-2"]
     assert kept(run_directory) == ["paper-0", "paper-2"]
     assert agents == {"paper-0", "paper-1", "paper-2", "paper-3"}

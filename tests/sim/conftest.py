@@ -1,4 +1,4 @@
-"""A room to act in: one headless controller for all tests, reset for each."""
+"""Fixtures: one headless controller for all tests, reset for each."""
 
 from __future__ import annotations
 

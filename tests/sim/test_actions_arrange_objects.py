@@ -6,15 +6,12 @@ import json
 from math import cos, hypot, radians, sin
 
 import pytest
+from floor_plan_1 import APPLE, FRIDGE, ISLAND
 
 from benchmarks.checks.invariants import broken
 from er_gym.sim.actions.arrange_objects import id_of_place
 from er_gym.sim.placement_restrictions import accepts
 from er_gym.sim.scene import SCENE_NAMES, load_scene
-
-APPLE = "Apple|-00.47|+01.15|+00.48"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
-ISLAND = "CounterTop|-00.08|+01.15|00.00"
 
 
 def loose(room):

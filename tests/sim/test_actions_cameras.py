@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from floor_plan_1 import FRIDGE
 
 from er_gym.sim.controller import EmbeddedController
 
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 ACROSS = {"x": 1.0, "z": 1.25, "rotation": 270, "horizon": 0}
 """From here one faces the fridge, whose front is at x = -1.653."""
 EYE = {"position": {"x": 1.0, "y": 1.576, "z": 1.25}, "rotation": {"x": 0, "y": 270, "z": 0}}

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from floor_plan_1 import APPLE, ISLAND
 
-ISLAND = "CounterTop|-00.08|+01.15|00.00"
 ISLAND_NAME = "CounterTop_bafd4140"
-APPLE = "Apple|-00.47|+01.15|+00.48"
 HEIGHT = 0.900999
 """Of the agent's centre in FloorPlan1, whose floor is at 0."""
 CLEAR = {"x": 0.5, "y": HEIGHT, "z": 1.5}

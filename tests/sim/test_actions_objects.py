@@ -1,12 +1,10 @@
-"""What every action on an object asks of it, whatever the action."""
+"""The conditions that all actions on objects share."""
 
 from __future__ import annotations
 
 import pytest
+from floor_plan_1 import APPLE, EGG, FRIDGE
 
-APPLE = "Apple|-00.47|+01.15|+00.48"
-EGG = "Egg|-02.04|+00.81|+01.24"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 FLOOR = "Floor|+00.00|+00.00|+00.00"
 
 ACTIONS = [

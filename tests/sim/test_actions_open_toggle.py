@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from floor_plan_1 import EGG, FRIDGE
 
 BURNER = "StoveBurner|-00.04|+00.92|-02.37"
-EGG = "Egg|-02.04|+00.81|+01.24"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 KNOB = "StoveKnob|-00.02|+00.88|-02.19"
 MICROWAVE = "Microwave|-00.24|+01.69|-02.53"
 

@@ -1,4 +1,4 @@
-"""Taking and putting in FloorPlan1's kitchen: who lies in what, before and after."""
+"""PickupObject and PutObject in FloorPlan1's kitchen: containment before and after."""
 
 from __future__ import annotations
 

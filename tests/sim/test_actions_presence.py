@@ -1,4 +1,4 @@
-"""Things that leave the scene and come back, points, pushes and shortest ways, in FloorPlan1."""
+"""Removed and restored objects, points, pushes and shortest paths, in FloorPlan1."""
 
 from __future__ import annotations
 
@@ -6,11 +6,8 @@ from itertools import pairwise
 from math import dist
 
 import pytest
+from floor_plan_1 import APPLE, BOWL, FRIDGE, ISLAND
 
-APPLE = "Apple|-00.47|+01.15|+00.48"
-BOWL = "Bowl|+00.27|+01.10|-00.75"
-ISLAND = "CounterTop|-00.08|+01.15|00.00"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 CABINET = "Cabinet|+00.68|+00.50|-02.20"
 
 

@@ -1,4 +1,4 @@
-"""What follows from what: water, flames and cold do their work on what lies there."""
+"""Consequences of actions: water, flames and cold change the objects there."""
 
 from __future__ import annotations
 
@@ -33,17 +33,23 @@ def switch(room, thing, on=True):
     room.do("ToggleObjectOn" if on else "ToggleObjectOff", thing, forceAction=True)
 
 
+def put_where_it_runs(kitchen, thing, place, control, running_first, change):
+    """Move a thing and switch on its place, in either order; only both make the change."""
+    changed, state, value = change
+    if running_first:
+        switch(kitchen, control)
+        move(kitchen, thing, place)
+    else:
+        move(kitchen, thing, place)
+        assert kitchen[changed][state] != value
+        switch(kitchen, control)
+    assert kitchen[changed][state] == value
+
+
 @pytest.mark.parametrize("running_first", [False, True])
 def test_a_running_faucet_cleans_and_fills_what_lies_in_the_basin(kitchen, running_first):
     kitchen.do("DirtyObject", MUG, forceAction=True)
-    if running_first:
-        switch(kitchen, FAUCET)
-        move(kitchen, MUG, SINK)
-    else:
-        move(kitchen, MUG, SINK)
-        assert kitchen[MUG]["isDirty"]
-        switch(kitchen, FAUCET)
-    assert not kitchen[MUG]["isDirty"]
+    put_where_it_runs(kitchen, MUG, SINK, FAUCET, running_first, (MUG, "isDirty", False))
     assert kitchen[MUG]["isFilledWithLiquid"]
     assert kitchen[MUG]["fillLiquid"] == "water"
 
@@ -92,14 +98,7 @@ def test_each_bathroom_faucet_feeds_its_own_basin(enter):
 @pytest.mark.parametrize("lit_first", [False, True])
 def test_a_lit_burner_cooks_what_is_in_the_vessel_on_it(kitchen, vessel, lit_first):
     move(kitchen, POTATO, vessel)
-    if lit_first:
-        switch(kitchen, KNOB)
-        move(kitchen, vessel, BURNER)
-    else:
-        move(kitchen, vessel, BURNER)
-        assert not kitchen[POTATO]["isCooked"]
-        switch(kitchen, KNOB)
-    assert kitchen[POTATO]["isCooked"]
+    put_where_it_runs(kitchen, vessel, BURNER, KNOB, lit_first, (POTATO, "isCooked", True))
     assert kitchen[POTATO]["temperature"] == "Hot"
 
 
@@ -157,15 +156,9 @@ def test_a_fridge_cools(kitchen):
 
 @pytest.mark.parametrize("running_first", [False, True])
 def test_a_coffee_machine_fills_a_mug(kitchen, running_first):
-    if running_first:
-        switch(kitchen, COFFEE_MACHINE)
-        move(kitchen, MUG, COFFEE_MACHINE)
-    else:
-        move(kitchen, MUG, COFFEE_MACHINE)
-        assert not kitchen[MUG]["isFilledWithLiquid"]
-        switch(kitchen, COFFEE_MACHINE)
+    filled = (MUG, "isFilledWithLiquid", True)
+    put_where_it_runs(kitchen, MUG, COFFEE_MACHINE, COFFEE_MACHINE, running_first, filled)
     assert kitchen[MUG]["fillLiquid"] == "coffee"
-    assert kitchen[MUG]["isFilledWithLiquid"]
 
 
 def test_coffee_does_not_turn_into_water(kitchen):

@@ -5,14 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 import multiprocessing
+import subprocess
+import sys
 
 import numpy as np
 import pytest
+from floor_plan_1 import APPLE, FRIDGE
 
 from er_gym.sim.controller import EmbeddedController
 
-APPLE = "Apple|-00.47|+01.15|+00.48"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 ACROSS = {"x": 1.0, "z": 1.25, "rotation": 270, "horizon": 0}
 """From here one faces the fridge, 2.65 m away: its box ends at x = -1.653."""
 
@@ -193,3 +194,27 @@ def test_the_same_actions_give_the_same_metadata_in_another_process(monkeypatch)
     context = multiprocessing.get_context("spawn")
     with context.Pool(1) as pool:
         assert pool.apply(played) == played()
+
+
+WITHOUT = """
+import sys
+from er_gym.sim.controller import EmbeddedController
+controller = EmbeddedController(scene="FloorPlan1", headless=True)
+assert not {"botocore", "flask", "requests"} & sys.modules.keys()
+import ai2thor.build, ai2thor.controller
+assert issubclass(ai2thor.build.requests.exceptions.ConnectionError, OSError)
+import requests
+assert ai2thor.build.requests.head is requests.head
+assert ai2thor.controller.ai2thor.wsgi_server.WsgiServer.server_type == "WSGI"
+import ai2thor.wsgi_server
+assert ai2thor.wsgi_server is sys.modules["ai2thor.wsgi_server"]
+assert "flask" in sys.modules
+from aws_requests_auth.boto_utils import get_credentials
+import os
+os.environ.update(AWS_ACCESS_KEY_ID="mine", AWS_SECRET_ACCESS_KEY="secret")
+assert ai2thor.build.boto_auth().aws_host == "s3-us-west-2.amazonaws.com"
+"""
+
+
+def test_the_client_comes_without_what_talks_to_unity_and_with_it_when_it_is_used():
+    subprocess.run([sys.executable, "-c", WITHOUT], check=True)

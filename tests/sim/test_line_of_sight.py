@@ -1,4 +1,4 @@
-"""What is kept about lines of sight is what one would find anew."""
+"""Cached lines of sight equal newly computed ones."""
 
 from __future__ import annotations
 

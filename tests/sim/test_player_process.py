@@ -30,8 +30,6 @@ THIRD_PARTY = (
     "third_party_instance_segmentation_frames",
     "third_party_semantic_segmentation_frames",
 )
-APPLE = "Apple|-00.47|+01.15|+00.48"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 SMALL = {"width": 64, "height": 48}
 CORNER = {"position": {"x": 1.5, "y": 2.2, "z": -1.5}, "rotation": {"x": 30, "y": -45, "z": 5}}
 

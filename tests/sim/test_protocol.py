@@ -1,4 +1,4 @@
-"""What the official client is told: keys, types, errors, and events that stay as they were."""
+"""The answers to the official client: keys, types, errors, and events that do not change later."""
 
 from __future__ import annotations
 
@@ -8,13 +8,10 @@ import pickle
 
 import msgpack
 import pytest
+from floor_plan_1 import APPLE, FRIDGE, ISLAND
 from support import in_one_test
 
 from er_gym.sim.scene import SCENE_NAMES
-
-APPLE = "Apple|-00.47|+01.15|+00.48"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
-ISLAND = "CounterTop|-00.08|+01.15|00.00"
 
 AGENT_KEYS = [
     "screenWidth",

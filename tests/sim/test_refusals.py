@@ -1,4 +1,4 @@
-"""Whatever is asked, a refusal is one line of a length that can be read, and nothing is raised."""
+"""Every refusal is one line of readable length, and nothing is raised."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What one sees of counters, cabinets and drawers, and whether the pictures show the same."""
+"""The visibility of counters, cabinets and drawers agrees with the pictures."""
 
 from __future__ import annotations
 

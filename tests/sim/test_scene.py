@@ -1,4 +1,4 @@
-"""The packaged scenes: all there, consistent, and quick to load."""
+"""The packaged scenes are complete, consistent and quick to load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What things are made of, which way they face, and drawers that slide."""
+"""The solid parts of objects, the directions that they face, and sliding drawers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where one can stand, what hides what, what is in the picture, and from where a thing is seen."""
+"""Geometry: walkable positions, occlusion, the camera's view, and interactable poses."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from math import hypot, sqrt, tan
 
 import numpy as np
 import pytest
+from floor_plan_1 import APPLE, EGG, FRIDGE
 from support import in_one_test
 
 from benchmarks.checks.comparisons.reachable import pieces
@@ -21,10 +22,7 @@ from er_gym.sim.space.visibility import NEAR_PLANE, in_frustum, visible
 from er_gym.sim.space.walkable_floor import standing_places
 from er_gym.sim.world import World
 
-APPLE = "Apple|-00.47|+01.15|+00.48"
-EGG = "Egg|-02.04|+00.81|+01.24"
 FAUCET = "Faucet|-02.15|+00.91|-01.50"
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 WINDOW = "Window|-02.23|+01.43|-01.20"
 
 # -- the floor -------------------------------------------------------------------------------------

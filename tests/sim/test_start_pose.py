@@ -1,4 +1,4 @@
-"""Where the agent is after a scene is loaded, and what Initialize makes of that."""
+"""The agent's pose after a scene is loaded, and after Initialize."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a world keeps of its readers' work, and for how long."""
+"""A world's caches: their contents, and when they are discarded."""
 
 from __future__ import annotations
 
@@ -74,6 +74,6 @@ def test_a_solid_follows_its_object_and_comes_back_with_it(world: World) -> None
     moved = solid_of(world, apple)
     np.testing.assert_allclose(moved.middle - recorded.middle, offset)
     other = World.load(load_scene("FloorPlan1"), Settings())
-    assert solid_of(other, apple) is recorded  # worlds of a scene share what is as recorded
+    assert solid_of(other, apple) is recorded  # worlds of a scene share the recorded state
     world.forget()
     np.testing.assert_array_equal(solid_of(world, apple).boxes, moved.boxes)

@@ -3,6 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from floor_plan_1 import EGG, FRIDGE
 from support import make_task
 
 from er_gym.tasks import load_suite, verbs
@@ -12,10 +13,8 @@ from er_gym.tasks.difficulty import Difficulty
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.task import KeyAction
 
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
-EGG = "Egg|-02.04|+00.81|+01.24"
 CABINETS = ("Cabinet|+00.68|+02.02|-02.46", "Cabinet|-01.85|+02.02|+00.38")
-DONE = "all that the plan does, but for going about, has been done"
+DONE = "all steps of the plan, except navigation, have been done"
 
 
 def claims(*goal: Condition) -> list[str]:

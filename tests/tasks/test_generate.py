@@ -1,4 +1,4 @@
-"""What is generated of rooms made by hand, where every rule shows."""
+"""Tasks generated for rooms made by hand, each of which shows a rule."""
 
 from __future__ import annotations
 

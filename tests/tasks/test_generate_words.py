@@ -1,11 +1,8 @@
-"""Tasks on request, their words, and what recorded rooms give."""
+"""Requested tasks, their wording, and the tasks of recorded rooms."""
 
 from __future__ import annotations
 
 import hashlib
-import os
-import subprocess
-import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -29,6 +26,7 @@ from rooms_by_hand import (
     steps,
     thing,
 )
+from support import run_python
 
 from benchmarks.checks.key_actions import compare
 from er_gym.tasks import TASK_TYPES, verbs
@@ -246,18 +244,11 @@ print(hashlib.sha256(text.encode()).hexdigest())
 
 
 def test_another_process_makes_the_same_tasks_in_the_same_words(
-    repository: Path, scene_objects: Callable[[str], Objects]
+    scene_objects: Callable[[str], Objects],
 ) -> None:
     tasks = generate_tasks(scene_objects("FloorPlan10"), "FloorPlan10")
     text = "\n".join(f"{task.id} {task.instruction}" for task in tasks)
-    there = subprocess.run(
-        [sys.executable, "-c", DIGEST],
-        cwd=repository,
-        env={**os.environ, "PYTHONHASHSEED": "4242"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    there = run_python(DIGEST, PYTHONHASHSEED="4242")
     assert there.stdout.strip() == hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -1,4 +1,4 @@
-"""When a goal holds."""
+"""The conditions under which a goal holds."""
 
 from __future__ import annotations
 

@@ -7,27 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tasks_by_hand import MUG, SINK, wash_mug
 
 from er_gym.tasks import AgentPose, KeyAction, Task, TaskFileError, load_suite, task_type, verbs
 from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.paper_format import read_poses, read_tasks, with_poses, write_poses, write_tasks
 
-MUG = "Mug|-00.38|+01.09|+03.19"
-SINK = "Sink|-01.39|+00.98|+00.44|SinkBasin"
-OWN = Task(
-    id="FloorPlan4-wash-Mug",
-    type=task_type("long-range tasks with dependency relationships"),
-    scene="FloorPlan4",
-    instruction="Wash that café’s Mug.",
-    name="wash the Mug",
-    key_actions=(
-        KeyAction(verbs.PICKUP, MUG, "", reward=0.5),
-        KeyAction(verbs.PUT, SINK, "SinkBasin", (SINK, MUG)),
-        KeyAction(verbs.END),
-    ),
-    target_objects=(SINK,),
-    related_objects=(MUG,),
+OWN = wash_mug(
+    "FloorPlan4",
     goal=(
         Condition(
             "Mug", MUG, inside="SinkBasin", state=(("isDirty", False), ("fillLiquid", "water"))

@@ -7,31 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tasks_by_hand import LONG, MUG, SINK, wash_mug
 
-from er_gym.tasks import AgentPose, KeyAction, Task, TaskFileError, load_suite, task_type, verbs
+from er_gym.tasks import AgentPose, Task, TaskFileError, load_suite, task_type, verbs
 from er_gym.tasks import paper_format as test_file
 from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.paper_generator import read_generator_tasks, write_generator_tasks
 
-MUG = "Mug|-00.38|+01.09|+03.19"
-SINK = "Sink|-01.39|+00.98|+00.44|SinkBasin"
-LONG = "long-range tasks with dependency relationships"
 LONG_FILE = "long-range_tasks_with_dependency_relationships_task_metadata.json"
 ROOMS = {0: "kitchens", 2: "living_rooms", 3: "bedrooms", 4: "bathrooms"}
-OWN = Task(
-    id="FloorPlan204-wash-Mug",
-    type=task_type(LONG),
-    scene="FloorPlan204",
-    instruction="Wash that café’s Mug.",
-    name="wash the Mug",
-    key_actions=(
-        KeyAction(verbs.PICKUP, MUG, "", reward=0.5),
-        KeyAction(verbs.PUT, SINK, "SinkBasin", (SINK, MUG)),
-        KeyAction(verbs.END),
-    ),
-    target_objects=(SINK,),
-    related_objects=(MUG,),
+OWN = wash_mug(
+    "FloorPlan204",
     navigable_objects=("Fridge", "Fridge"),
     goal=(Condition("Mug", MUG, inside="SinkBasin", state=(("isDirty", False),)),),
     arrangement=Arrangement("FloorPlan204-7", {"Mug_1": ObjectPose(-0.3799, 1.1, 3.1868)}, (MUG,)),

@@ -1,4 +1,4 @@
-"""Tasks acted out on paper: what is done, and how things are in the end."""
+"""Plans of tasks: their actions, and the final states of objects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the steps of recipes do, and who may take part in them."""
+"""The steps of recipes: their effects, and the objects that fit them."""
 
 from __future__ import annotations
 

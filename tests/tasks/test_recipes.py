@@ -139,40 +139,32 @@ FAULTS = {
     "no recipe": ("- tidy", "recipe 1 is 'tidy'"),
     "no steps": ("- name: tidy\n  roles: {}", "recipe 1 lacks field 'steps'"),
     "second has no name": (f"{GOOD}- roles: {{}}\n  steps: []", "recipe 2 lacks field 'name'"),
-    "misspelled": (GOOD.replace("roles", "rolls"), "recipe 1 lacks field 'roles'"),
     "more": (f"{GOOD}  cast: 3", "recipe 1 has a wrong field 'cast'"),
-    "name": (GOOD.replace("tidy", "tidy up"), "recipe 1 has a wrong field 'name'"),
     "kind": (
         GOOD.replace("loose", "lost"),
         "recipe 'tidy': role 'thing' is of unknown kind 'lost'; give a list of object types or "
         "one of: loose, furniture, locker, switch",
     ),
-    "step": (
-        GOOD.replace("put", "throw"),
-        "recipe 'tidy': a step is ['throw']; it must be one of: put, wash, ",
-    ),
-    "no step": (
-        GOOD.replace("- put: [thing, place]", "[]"),
-        "recipe 'tidy': it has no steps",
-    ),
-    "too few roles": (
-        GOOD.replace("[thing, place]", "[thing]"),
-        "recipe 'tidy': the step 'put' is about 1 roles; it takes 2",
-    ),
-    "no such type": (
-        GOOD.replace("loose", "[Potatoe]"),
-        "recipe 'tidy': role 'thing' has unknown object type 'Potatoe'",
-    ),
     "one name twice": (f"{GOOD}{GOOD}", "two recipes are named 'tidy'"),
-    "two in one": (
-        GOOD.replace("- put: [thing, place]", "- {put: [thing, place], wash: [thing]}"),
-        "recipe 'tidy': a step is ['put', 'wash']; it must be one of: put, wash, ",
-    ),
-    "role": (
-        GOOD.replace("[thing, place]", "[thing, spot]"),
-        "recipe 'tidy': a step names 'spot'; its roles are: thing, place",
-    ),
-    "roles of a step": (GOOD.replace("[thing, place]", "thing"), "recipe 1 has a wrong field"),
+}
+"""Faulty files, and how the message begins."""
+ONE_STEP, TWO_IN_ONE = "- put: [thing, place]", "- {put: [thing, place], wash: [thing]}"
+KNOWN_STEPS = "it must be one of: put, wash, "
+MISTAKES = {
+    "misspelled": ("roles", "rolls", " 1 lacks field 'roles'"),
+    "name": ("tidy", "tidy up", " 1 has a wrong field 'name'"),
+    "step": ("put", "throw", f" 'tidy': a step is ['throw']; {KNOWN_STEPS}"),
+    "no step": (ONE_STEP, "[]", " 'tidy': it has no steps"),
+    "too few roles": (", place]", "]", " 'tidy': the step 'put' is about 1 roles; it takes 2"),
+    "type": ("loose", "[Potatoe]", " 'tidy': role 'thing' has unknown object type 'Potatoe'"),
+    "two in one": (ONE_STEP, TWO_IN_ONE, f" 'tidy': a step is ['put', 'wash']; {KNOWN_STEPS}"),
+    "role": (", place]", ", spot]", " 'tidy': a step names 'spot'; its roles are: thing, place"),
+    "roles of a step": ("[thing, place]", "thing", " 1 has a wrong field"),
+}
+"""What is written in a good file instead of what, and the message behind ``recipe``."""
+FAULTS |= {
+    fault: (GOOD.replace(right, wrong), f"recipe{message}")
+    for fault, (right, wrong, message) in MISTAKES.items()
 }
 
 

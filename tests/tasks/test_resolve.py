@@ -1,4 +1,4 @@
-"""Tasks are fitted to their scenes; what cannot be is set aside, by name and with its reason."""
+"""Tasks are matched with their scenes; tasks that do not fit are set aside by id with a reason."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from math import dist
 
 import pytest
-from support import make_task
+from support import make_task, with_ids
 
 from er_gym.tasks import AgentPose, Task, TaskFileError, load_suite
 from er_gym.tasks.arrangement import Arrangement, ObjectPose
@@ -193,19 +193,7 @@ def shifted(task: Task, metres: float, rng: random.Random) -> Task:
         return re.sub(r"[+-]?\d+\.\d+\|[+-]?\d+\.\d+\|[+-]?\d+\.\d+", move, object_id)
 
     moved: dict[str, str] = {}
-    return replace(
-        task,
-        key_actions=tuple(
-            replace(
-                key,
-                object_id=at(key.object_id),
-                related_objects=tuple(map(at, key.related_objects)),
-            )
-            for key in task.key_actions
-        ),
-        target_objects=tuple(map(at, task.target_objects)),
-        related_objects=tuple(map(at, task.related_objects)),
-    )
+    return with_ids(task, at)
 
 
 def place(object_id: str) -> tuple[float, ...]:

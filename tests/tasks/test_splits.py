@@ -1,4 +1,4 @@
-"""What is kept from training."""
+"""The objects and rooms that are kept out of training."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from floor_plan_1 import EGG, FRIDGE, MUG
 from support import make_task
 
 from er_gym.tasks import GROUPS, TASK_TYPES, load_suite, suites, verbs
@@ -15,10 +16,7 @@ from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.suite_card import card, receptacle_types, subject_type, summarise
 from er_gym.tasks.task import KeyAction, type_of_id
 
-FRIDGE = "Fridge|-02.10|+00.00|+01.07"
 COUNTER = "CounterTop|-00.08|+01.15|00.00"
-EGG = "Egg|-02.04|+00.81|+01.24"
-MUG = "Mug|-01.76|+00.90|-00.62"
 LAMP = "FloorLamp|-01.00|+00.00|-01.00"
 MOVED = {"Egg_1": ObjectPose(0.0, 1.0, 0.0)}
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from floor_plan_1 import PLATE
 
 from er_gym.tasks import (
     AgentPose,
@@ -27,7 +28,6 @@ from er_gym.tasks.jsonl_format import FORMAT, digest, read_tasks, write_tasks
 from er_gym.tasks.paper_format import write_tasks as write_paper_tasks
 from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
 
-PLATE = "Plate|+00.96|+01.65|-02.61"
 TASK = Task(
     id="FloorPlan1-a",
     type=task_type("pickup_and_put"),

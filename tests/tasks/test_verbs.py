@@ -1,4 +1,4 @@
-"""The table of verbs, and what may be added to it."""
+"""The table of verbs, and rows of other packages."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_added_verbs_follow_in_the_order_of_their_names(monkeypatch: pytest.Monk
     ("names", "message"),
     [
         ("household_verbs:CLAEN", r"verb 'household_verbs:CLAEN'.* \(did you mean CLEAN\?\)"),
-        ("household_verbs", "is no package.module:Name"),
+        ("household_verbs", "is not a package.module:Name"),
         ("household_verbs:Words", r"ER_GYM_VERBS is .*give an er_gym\.tasks\.verbs\.Verb"),
         ("no_such:X", "Cannot import 'no_such'"),
     ],
@@ -88,9 +88,9 @@ def test_wrong_names_in_the_variable(
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"name": "open"}, "'open' is a way to say 'open' already"),
-        ({"aliases": ("turn on",)}, "'turn on' is a way to say 'toggle' already"),
-        ({"name": "init"}, "'init' is a way to say 'init' already"),
+        ({"name": "open"}, "'open' already means 'open'"),
+        ({"aliases": ("turn on",)}, "'turn on' already means 'toggle'"),
+        ({"name": "init"}, "'init' already means 'init'"),
         ({"name": "Clean"}, "'Clean' is not a phrase; write lower-case"),
         ({"name": ""}, "'' is not a phrase"),
         ({"name": "clean_up"}, "'clean_up' is not a phrase"),
@@ -111,7 +111,7 @@ def test_wrong_names_in_the_variable(
         ({"object_types": ("Mag",)}, "no object type 'Mag'; did you mean Mug"),
         ({"hand": ("Sponge",)}, "no object type 'Sponge'; did you mean .*DishSponge"),
         ({"hand": "sponge"}, "hand is 'sponge'; give 'any', 'empty', 'full' or a tuple"),
-        ({"alone": True}, "it takes no object .alone., so object_property has no meaning"),
+        ({"alone": True}, "alone means no object, so object_property has no effect"),
         ({"plan": "clean {what}"}, r"plan is .*write words and \{it\}"),
     ],
 )
@@ -125,13 +125,13 @@ def test_what_a_row_cannot_be(changes: dict[str, object], message: str) -> None:
 def test_two_verbs_may_not_be_said_alike() -> None:
     known = {verb.name: verb for verb in verbs.OWN}
     other = Verb(name="wash", aliases=("clean",), thor_action="CleanObject")
-    with pytest.raises(PluginError, match="verb 'wash': 'clean' is a way to say 'clean' already"):
+    with pytest.raises(PluginError, match="verb 'wash': 'clean' already means 'clean'"):
         verbs._merged(known, [CLEAN, other])
 
 
 def test_a_verb_cannot_be_registered_late() -> None:
     assert verbs.table()
-    with pytest.raises(PluginError, match=r"'clean' comes too late.*\$ER_GYM_VERBS"):
+    with pytest.raises(PluginError, match=r"'clean' is registered too late.*\$ER_GYM_VERBS"):
         verbs.register(CLEAN)
 
 

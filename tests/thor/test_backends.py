@@ -1,4 +1,4 @@
-"""One function for either engine, and what it says when an engine cannot be had."""
+"""``make_controller`` for either engine, and its errors when an engine is unavailable."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What things can do and where they may be put, against the scenes and AI2-THOR's own table."""
+"""Properties and receptacles of object types, compared with the scenes and AI2-THOR's own table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The columns that the engine hands over say what its metadata says."""
+"""The engine's columns agree with its metadata."""
 
 from __future__ import annotations
 

@@ -192,7 +192,7 @@ class SearcherAgent:
         while not self._ready(thing, verb):
             if not observed and thing not in self._view.navigable:
                 observed = True
-                yield from self._step(verbs.OBSERVE, thought=f"Where may the {thing} be?")
+                yield from self._step(verbs.OBSERVE, thought=f"Where can the {thing} be?")
                 continue
             if source and tried[source] == 0 and source in self._view.navigable:
                 tried[source] += 1
@@ -242,7 +242,9 @@ class SearcherAgent:
         if not search_priors.opens(source):
             yield from self._visit(source, thing, verb)
             return self._ready(thing, verb)
-        yield from self._step(verbs.NAVIGATE, source, f"The {thing} is said to be there.")
+        yield from self._step(
+            verbs.NAVIGATE, source, f"The instruction says that the {thing} is there."
+        )
         before = thing in self._view.sees
         if self._is_legal(verbs.OPEN, source):
             yield from self._step(verbs.OPEN, source, f"Is the {thing} in the {source}?")
@@ -309,7 +311,7 @@ class SearcherAgent:
         """Close the containers within reach that it opened."""
         for name in list(self._memory.opened):
             if self._is_legal(verbs.CLOSE, name):
-                yield from self._step(verbs.CLOSE, name, f"The {name} is to be closed again.")
+                yield from self._step(verbs.CLOSE, name, f"I close the {name} again.")
         return True
 
     def _empty_hand(self) -> Steps:
@@ -337,7 +339,7 @@ class SearcherAgent:
                 break
             yield from self._go_and_open(place)
             if self._is_legal(verbs.PUT, place):
-                yield from self._step(verbs.PUT, place, f"Here the {thing} belongs.")
+                yield from self._step(verbs.PUT, place, f"The {thing} belongs here.")
         return not self._view.holds
 
     def _go_and_open(self, place: str) -> Steps:
@@ -359,7 +361,7 @@ class SearcherAgent:
         """Close and open a container again: in a task of two transfers, opening counts only in
         order."""
         if self._is_legal(verbs.CLOSE, place):
-            yield from self._step(verbs.CLOSE, place, f"The {place} was open before its turn.")
+            yield from self._step(verbs.CLOSE, place, f"The {place} was opened too early.")
             yield from self._step(verbs.OPEN, place)
         return True
 
@@ -382,7 +384,7 @@ class SearcherAgent:
         if goal.kind in (instruction.HEAT, instruction.CHILL) and self._is_legal(
             verbs.CLOSE, place
         ):
-            yield from self._step(verbs.CLOSE, place, "It works when it is closed.")
+            yield from self._step(verbs.CLOSE, place, "It runs only when it is closed.")
         if switch and not (switch == "Faucet" and self._water_runs):
             for _ in range(times):
                 yield from self._reach(switch, verbs.TOGGLE)

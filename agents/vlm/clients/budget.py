@@ -102,14 +102,10 @@ class Entry(BaseModel):
             time=datetime.now(timezone.utc).isoformat(timespec="milliseconds"),
             model=model,
             seed=seed,
-            prompt=usage.prompt,
-            completion=usage.completion,
-            cached=usage.cached,
-            reasoning=usage.reasoning,
-            estimated=usage.estimated,
             cost=cost,
             seconds=round(seconds, 3),
             rejected=rejected,
+            **vars(usage),
         )
 
 

@@ -73,9 +73,9 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
         template = template if isinstance(template, str) else None
     has_vision = getattr(config, "vision_config", None) is not None
     if sees and not has_vision:
-        raise ValueError(f"{path} has no eyes; let the agent's setting sees be text")
+        raise ValueError(f"{path} has no vision; set the agent's setting sees to text")
     if not (template or tokenizer.chat_template):
-        raise ValueError(f"{path} has no chat template, so that it cannot be talked to")
+        raise ValueError(f"{path} has no chat template, so it cannot hold a conversation")
     with _errors_in_one_line(f"{path} cannot be loaded"):
         # With Pillow: a whole AutoProcessor needs torchvision, for videos only.
         image_processor = (
@@ -85,8 +85,8 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
         )
     if sees and not (hasattr(image_processor, "merge_size") and hasattr(config, "image_token_id")):
         raise ValueError(
-            f"{path} does not see as Qwen's models do ({type(image_processor).__name__}); "
-            "let a server run it"
+            f"{path} does not process pictures as Qwen's models do "
+            f"({type(image_processor).__name__}); run it on a server"
         )
     with _errors_in_one_line(f"{path} cannot be loaded"):
         model = _model(path, has_vision, local, where)
@@ -125,7 +125,7 @@ def _model(path: str, has_vision: bool, local: Local, where: dict[str, bool]) ->
     )
     model, found = loaded  # a pair, for output_loading_info
     if missing := sorted(found["missing_keys"]):  # transformers would fill them with random values
-        raise ValueError(f"{len(missing)} of its weights are not there, such as {missing[0]}")
+        raise ValueError(f"{len(missing)} of its weights are missing, such as {missing[0]}")
     return model
 
 
@@ -142,7 +142,7 @@ def _adapted(model: Any, adapter: str) -> Any:
         raise ValueError("local.adapter needs peft: pip install 'er-gym[local]'") from None
     if not (Path(adapter) / "adapter_config.json").is_file():
         raise ValueError(
-            f"local.adapter {adapter} is no adapter; give a directory with adapter_config.json"
+            f"local.adapter {adapter} is not an adapter; give a directory with adapter_config.json"
         )
     with (
         _errors_in_one_line(f"local.adapter {adapter} does not fit the model"),

@@ -18,8 +18,8 @@ from agents.vlm.clients.chat_completions import error_text
 _MAY_PASS = frozenset({408, 409, 425, 429})  # and all from 500 on
 _REFUSED: Mapping[int, str] = {
     401: "the server does not accept the key of {key_from}",
-    402: "the server wants to be paid",
-    403: "the server does not let the key of {key_from} do this",
+    402: "the server demands payment",
+    403: "the server does not allow the key of {key_from} to do this",
     404: "the server has no such model, or nothing at all at this address",
 }
 """Statuses that every request would get."""
@@ -81,15 +81,15 @@ def _of_status(error: openai.APIStatusError, key_from: str, answered: bool) -> F
     words = f"{status}, {said}"
     if 300 <= status < 400:
         place = headers.get("location") or "nowhere"
-        ends = f"requests are not sent on to {place}; if the server is there, give its base_url"
+        ends = f"the server redirects to {place}; if the server is there, give its base_url"
         return Failure(words, fatal=ends)
     if _NO_MONEY in (error.code, error.type):
-        return Failure(words, fatal="there is no money left for this key")
+        return Failure(words, fatal="the account of this key has no money left")
     if status in _REFUSED:
         return Failure(words, fatal=_REFUSED[status].format(key_from=key_from))
     about_this = _ABOUT_ONE_CONVERSATION.search(f"{error.code} {said}")
     if status in _MALFORMED and not answered and not about_this:
-        return Failure(words, fatal="no request like this will do better")
+        return Failure(words, fatal="every request like this will fail")
     passes = status in _MAY_PASS or status >= 500
     asked_to = headers.get("x-should-retry") != "false"
     return Failure(words, retryable=passes and asked_to, retry_after=requested_pause(headers))

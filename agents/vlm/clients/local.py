@@ -150,7 +150,7 @@ class LocalClient:
         if len(ids) + most > self._context_length:
             raise ModelError(
                 f"the conversation has {len(ids)} tokens, which with sampling.max_tokens {most} is "
-                f"more than the {self._context_length} of {self._name}; let pictures.keep be fewer"
+                f"more than the {self._context_length} of {self._name}; lower pictures.keep"
             )
         thinking = text.rstrip().endswith(_THINK)
         return _EncodedPrompt(ids, pixels, grids, self._seed(seed, len(messages)), thinking)
@@ -169,7 +169,7 @@ class LocalClient:
             )
         except (jinja2.TemplateError, TypeError) as error:
             raise CannotGoOn(
-                f"{self._name}: its chat template does not take this conversation: "
+                f"{self._name}: its chat template does not accept this conversation: "
                 f"{one_line(error)}"
             ) from None
         return text
@@ -187,8 +187,8 @@ class LocalClient:
     def _patches(self, pictures: Sequence[Picture]) -> tuple[torch.Tensor, torch.Tensor]:
         if self._image_processor is None:
             raise CannotGoOn(
-                f"{self._name} was loaded without eyes, since the agent's setting sees is text, "
-                "and is shown a picture"
+                f"{self._name} was loaded without vision, since the agent's setting sees is text, "
+                "but the conversation has a picture"
             )
         bounds = self._settings.pictures
         try:
@@ -198,7 +198,7 @@ class LocalClient:
                 return_tensors="pt",
             )
         except (OSError, ValueError) as error:
-            raise ModelError(f"a picture cannot be seen: {one_line(error)}") from None
+            raise ModelError(f"a picture cannot be processed: {one_line(error)}") from None
         return seen["pixel_values"], seen["image_grid_thw"]
 
     def _with_image_tokens(self, ids: Sequence[int], grids: torch.Tensor | None) -> list[int]:
@@ -350,9 +350,11 @@ def _explained(error: RuntimeError, rows: Sequence[_EncodedPrompt]) -> Exception
     if isinstance(error, torch.cuda.OutOfMemoryError) or "DefaultCPUAllocator" in str(error):
         tokens = max(len(row.ids) for row in rows)
         return MemoryError(
-            f"{len(rows)} conversations of up to {tokens} tokens do not fit; let local.batch or "
-            "pictures.keep be fewer"
+            f"{len(rows)} conversations of up to {tokens} tokens do not fit into memory; lower "
+            "local.batch or pictures.keep"
         )
     if isinstance(error, getattr(torch, "AcceleratorError", ())):
-        return CannotGoOn(f"the device fails, and this process with it: {one_line(error)}")
+        return CannotGoOn(
+            f"the device failed, and this process cannot use it again: {one_line(error)}"
+        )
     return error

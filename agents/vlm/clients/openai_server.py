@@ -42,11 +42,12 @@ _FIRST_PAUSE, _LONGEST_PAUSE = 0.5, 8.0  # seconds before another try, where the
 _LONGEST_ASKED = 120.0
 """Seconds that a server may ask to wait; for more, the run has to have minutes left."""
 _SEE_TO_IT = (
-    "nothing has answered yet: see whether the server is up and server.base_url right, or give it "
-    "more time with server.timeout"
+    "nothing has answered yet: check that the server is up and server.base_url is right, or raise "
+    "server.timeout"
 )
 _LATE_TRIES = 2
-"""A server may charge for an answer that came too late, so the same is not asked more often."""
+"""The most tries of a request that times out: a server may charge for an answer that came too late.
+"""
 
 
 class OpenAIClient:
@@ -259,7 +260,7 @@ class OpenAIClient:
         if pause > _LONGEST_ASKED and math.isinf(left):
             raise self._supervisor.stop(
                 f"{what}; the server asks to wait {duration(pause)}: {AGAIN} after that, or give "
-                "--max-minutes of more, and it is waited for"
+                "a higher --max-minutes, and er-gym waits"
             )
         of = min(request.of, request.attempt + 1) if failure.timed_out else request.of
         request.retry(what, pause, of)
@@ -299,7 +300,7 @@ def _address(server: Server) -> httpx2.URL:
     if url.scheme not in ("http", "https") or not url.host or not is_port:
         without_user = given.rpartition("@")[2].partition("?")[0]
         raise ValueError(
-            f"server.base_url {without_user!r} is no address; give one such as "
+            f"server.base_url {without_user!r} is not an address; give one such as "
             "http://127.0.0.1:8000/v1"
         )
     return url
@@ -309,7 +310,7 @@ def _key(server: Server, url: httpx2.URL) -> str:
     """The API key; "" if there is none and the server may not need one."""
     key = os.environ.get(server.key_from, "").strip()
     if not (key.isascii() and key.isprintable()):
-        raise CannotGoOn(f"{server.key_from} holds characters that are in no key; set it anew")
+        raise CannotGoOn(f"{server.key_from} holds characters that no key contains; set it again")
     openais_own = url.host == httpx2.URL(OPENAI_URL).host
     if not key and (openais_own or server.api_version):
         raise CannotGoOn(

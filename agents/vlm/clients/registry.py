@@ -98,7 +98,7 @@ CLIENTS: Registry[ModelClientSpec] = Registry(
             install="er-gym[local]",
         ),
         "recorded": ModelClientSpec(
-            opens="RUN", help="what a model said in an earlier run", make=_recorded
+            opens="RUN", help="the recorded replies of an earlier run", make=_recorded
         ),
     },
     expected=f"an {__name__}.ModelClientSpec",
@@ -130,7 +130,7 @@ def resolve_client(name: str) -> tuple[ModelClientSpec, str]:
     """
     client, opened = _split(name)
     if not client:
-        raise PluginError(f"{name!r} is no agent of a model; give {agent_name_forms()}")
+        raise PluginError(f"{name!r} is not a model agent; give {agent_name_forms()}")
     return CLIENTS.get(client), opened
 
 

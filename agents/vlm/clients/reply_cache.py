@@ -60,7 +60,7 @@ class ReplyCache:
                 self._cache = _anew(directory, error)
         except (OSError, sqlite3.Error, diskcache.Timeout) as error:
             raise ValueError(
-                f"replies cannot be kept in {directory} ({error}); choose another --out"
+                f"replies cannot be cached in {directory} ({error}); choose another --out"
             ) from error
 
     @property
@@ -93,7 +93,7 @@ class ReplyCache:
         try:
             return do(cache)
         except (sqlite3.OperationalError, diskcache.Timeout, OSError) as error:
-            warnings.warn(f"{self._directory}: replies are not kept: {error}", stacklevel=3)
+            warnings.warn(f"{self._directory}: replies are not cached: {error}", stacklevel=3)
         except sqlite3.DatabaseError as error:
             self._begin_anew(cache, error)
         return None
@@ -105,7 +105,7 @@ class ReplyCache:
             try:
                 self._cache = _anew(self._directory, damage)
             except (OSError, sqlite3.Error) as error:
-                warnings.warn(f"{self._directory}: replies are not kept: {error}", stacklevel=4)
+                warnings.warn(f"{self._directory}: replies are not cached: {error}", stacklevel=4)
 
 
 def key_of(identity: str, messages: Sequence[Message], seed: int) -> str:
@@ -144,7 +144,7 @@ def _anew(directory: Path, error: Exception) -> Any:
     while (aside := directory.with_name(f"{directory.name}.damaged-{number}")).exists():
         number += 1
     os.rename(directory, aside)
-    warnings.warn(f"{directory} is damaged ({error}); it is now {aside}", stacklevel=2)
+    warnings.warn(f"{directory} is damaged ({error}); it was moved to {aside}", stacklevel=2)
     return _open(directory)
 
 

@@ -38,7 +38,7 @@ class ScriptedClient:
         return said if isinstance(said, Reply) else Reply(said, model="scripted")
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: nothing is open."""
 
 
 class RecordedClient:
@@ -59,8 +59,8 @@ class RecordedClient:
         files = [run] if run.is_file() else sorted((run / "conversations").glob("*.json"))
         if not files:
             raise ValueError(
-                f"{run} holds no conversations; give a run directory of er-gym bench with an agent "
-                "that speaks, or the file of one conversation"
+                f"{run} holds no conversations; give a run directory of er-gym bench with a "
+                "vision-language agent, or the file of one conversation"
             )
         self._run = run
         self._replies: dict[str, Reply] = {}
@@ -73,7 +73,7 @@ class RecordedClient:
         if len(wrong) == len(files):
             raise ValueError(wrong[0])
         for each in wrong:
-            _log.warning("%s; it is left out", each)
+            _log.warning("%s; it is skipped", each)
         everything = "".join(sorted(self._replies))
         self.identity = f'{{"recorded":"{hashlib.sha256(everything.encode()).hexdigest()}"}}'
 
@@ -93,7 +93,7 @@ class RecordedClient:
         return reply
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: nothing is open."""
 
 
 class _Turn(NamedTuple):

@@ -108,8 +108,9 @@ def _problem(words: ParsedAction, said: str) -> str:
         said = " ".join(said[: 4 * _LONGEST_QUOTE].split())
         quote = said if len(said) <= _LONGEST_QUOTE else said[: _LONGEST_QUOTE - 1] + "…"
         return (
-            f"'{quote}' is no action. With an object, there are: {', '.join(verbs.OBJECT_VERBS)}; "
-            f"without: {', '.join(verbs.BARE_VERBS)}. Write one, such as "
+            f"'{quote}' is not an action. Actions with an object: "
+            f"{', '.join(verbs.OBJECT_VERBS)}; without one: {', '.join(verbs.BARE_VERBS)}. Write "
+            "one, such as "
             f"{_EXAMPLE}."
         )
     if words.verb in verbs.OBJECT_VERBS and not words.name:

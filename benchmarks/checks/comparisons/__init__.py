@@ -1,1 +1,1 @@
-"""The embedded engine beside what AI2-THOR recorded: one comparison a file, no verdicts."""
+"""Compares the embedded engine with AI2-THOR's recordings: one comparison a file, no verdicts."""

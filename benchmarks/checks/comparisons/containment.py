@@ -1,4 +1,4 @@
-"""In which receptacles things lie, from geometry alone and as recorded."""
+"""Compares the receptacles of objects, from geometry alone, with the recorded ones."""
 
 from __future__ import annotations
 

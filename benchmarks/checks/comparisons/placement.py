@@ -1,4 +1,4 @@
-"""Random placements: whether what is put down runs into what is there, and where it is put."""
+"""Random placements: whether an object that is put down overlaps others, and where it is put."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _TOUCH = 0.005
 
 @dataclass
 class Placements:
-    """What came of putting random things into random receptacles that take them.
+    """The results of putting random objects into random receptacles that accept them.
 
     Attributes:
         tried, placed: how many; a receptacle may be full.

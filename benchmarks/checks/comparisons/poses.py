@@ -1,4 +1,4 @@
-"""Whether what AI2-THOR opened from a recorded pose can be handled from there."""
+"""Whether objects that AI2-THOR opened from a recorded pose are interactable from there."""
 
 from __future__ import annotations
 

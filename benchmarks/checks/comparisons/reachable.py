@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from operator import add
 from pathlib import Path
 
 import numpy as np
@@ -133,12 +134,7 @@ class ReachableAgreement:
     theirs: float = 0.0
 
     def __add__(self, other: ReachableAgreement) -> ReachableAgreement:
-        return ReachableAgreement(
-            self.given + other.given,
-            self.found + other.found,
-            self.ours + other.ours,
-            self.theirs + other.theirs,
-        )
+        return ReachableAgreement(*map(add, astuple(self), astuple(other)))
 
     @property
     def recall(self) -> float:

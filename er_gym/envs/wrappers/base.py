@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 class TaskWrapper(gymnasium.Wrapper[Any, Any, Any, Any]):
     """A wrapper around an er-gym environment; it has ``action_masks`` as the environment has.
 
-    Gymnasium's wrappers do not hand on what they do not know. Learners that ask by way of
-    ``get_wrapper_attr`` find the method all the same, a plain call finds it only here.
+    Gymnasium's wrappers do not pass on methods that they do not know. Learners that use
+    ``get_wrapper_attr`` still find the method. A plain call finds it only on this class.
     """
 
     def action_masks(self) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now.
 
         Raises:
-            AttributeError: the environment has no ``action_masks``, so it is none of er-gym's.
+            AttributeError: the environment has no ``action_masks``, so it is not one of er-gym's.
         """
         masks: NDArray[np.int8] = self.env.get_wrapper_attr("action_masks")()
         return masks

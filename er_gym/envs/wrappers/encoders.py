@@ -19,7 +19,7 @@ from er_gym.envs.arguments import short_repr
 
 HASHED = "hashed"
 MODEL = "sentence-transformers:"
-"""What the name of an encoder begins with that is a model of sentence-transformers."""
+"""The prefix of the names of encoders that are models of sentence-transformers."""
 BUCKETS = 64
 """The dimension of ``hashed``."""
 _ALLOWED = f"{HASHED!r} or '{MODEL}NAME_OR_DIRECTORY'"
@@ -30,14 +30,14 @@ _INSIDE_A_NAME = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
 class Encoder(Protocol):
-    """Turns a text into a vector, always the same one for the same text."""
+    """Turns a text into a vector. The same text always gives the same vector."""
 
     @property
     def dimension(self) -> int:
         """The length E of the vectors."""
 
     def __call__(self, text: str, /) -> NDArray[np.float32]:
-        """(E,) float32 in [-1, 1], of length 1; zeros for a text that has no words.
+        """(E,) float32 in [-1, 1], of length 1; zeros for a text without words.
 
         The array is the caller's own.
         """
@@ -45,34 +45,36 @@ class Encoder(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class _Named:
-    """An encoder that goes to another process by its name: a model is loaded anew there."""
+    """An encoder that is pickled as its name; the other process loads the model anew."""
 
     name: str
     dimension: int
     embed: Callable[[str], NDArray[np.float32]]
 
     def __call__(self, text: str, /) -> NDArray[np.float32]:
-        return self.embed(text).copy()  # what is remembered stays as it is
+        return self.embed(text).copy()  # the caller may change its array
 
     def __reduce__(self) -> tuple[Callable[[str], Encoder], tuple[str]]:
         return make_encoder, (self.name,)
 
 
 def make_encoder(name: str = HASHED) -> Encoder:
-    """The encoder of a name; made once in a process, and it remembers recent texts.
+    """The encoder of a name. A process makes each encoder once; it caches recent texts.
 
     Args:
         name: ``"hashed"``: words and pairs of neighbouring words, hashed into 64 signed buckets.
-            It needs nothing installed and gives the same bytes on every machine. It knows words,
-            not what they mean. ``CreditCard`` and ``credit card`` are the same words.
-            ``"sentence-transformers:NAME_OR_DIRECTORY"``: a model of that library, on the CPU; a
-            name may be downloaded, a directory is on this machine. Needs the extra ``match``.
+            This encoder needs no further package and gives the same bytes on every machine. It
+            knows words, but not their meaning. ``CreditCard`` and ``credit card`` are the same
+            words.
+            ``"sentence-transformers:NAME_OR_DIRECTORY"``: a model of that library, on the CPU. A
+            named model may be downloaded; a directory is on this machine. It needs the extra
+            ``match``.
 
     Raises:
-        ValueError: the name is neither, or the model cannot be loaded.
+        ValueError: the name is unknown, or the model cannot be loaded.
         ImportError: the name asks for sentence-transformers, which is not installed.
     """
-    # A configuration may hold anything.
+    # The name may come from a configuration file, which may hold any type.
     is_model = isinstance(name, str) and name.startswith(MODEL) and name != MODEL
     if name != HASHED and not is_model:
         raise ValueError(f"unknown encoder {short_repr(name)}; give {_ALLOWED}")
@@ -87,19 +89,19 @@ def _made(name: str) -> Encoder:
     def remembered(text: str) -> NDArray[np.float32]:
         return _unit(embed(text))
 
-    # Not by asking the model: the method has had two names, and may answer None.
+    # The dimension is that of a vector. The model's method has had two names, and may return None.
     return _Named(name, remembered("find").size, remembered)
 
 
 def _unit(vector: NDArray[Any]) -> NDArray[np.float32]:
-    """A vector made 1 long. In float64, lest rounding lead out of [-1, 1]."""
+    """A vector scaled to length 1; computed in float64, so that rounding keeps it in [-1, 1]."""
     exact = vector.astype(np.float64)
     length = np.linalg.norm(exact)
     return (exact / length if length else exact).astype(np.float32)
 
 
 def _hashed(text: str) -> NDArray[np.float64]:
-    """(BUCKETS,) counts with signs, so that what meets in a bucket cancels out on average."""
+    """(BUCKETS,) counts with signs, so that collisions in a bucket cancel out on average."""
     words = _WORD.findall(_INSIDE_A_NAME.sub(" ", text).casefold())
     vector = np.zeros(BUCKETS)
     for feature in (*words, *map(" ".join, pairwise(words))):
@@ -110,7 +112,7 @@ def _hashed(text: str) -> NDArray[np.float64]:
 
 def _model(name: str) -> Callable[[str], NDArray[Any]]:
     try:
-        # By name, for the type checker: it is not there where the extra is not installed.
+        # Imported by name, since the type checker may run without the extra.
         library = import_module("sentence_transformers")
     except ImportError as error:
         raise ImportError(
@@ -119,7 +121,7 @@ def _model(name: str) -> Callable[[str], NDArray[Any]]:
         ) from error
     try:
         model = library.SentenceTransformer(expanduser(name.removeprefix(MODEL)), device="cpu")
-    except Exception as error:  # files, network, formats: each fails with errors of its own
+    except Exception as error:  # files, network and formats each raise errors of their own
         reason = (str(error).strip().splitlines() or [""])[0]
         raise ValueError(
             f"encoder {name!r}: the model cannot be loaded ({type(error).__name__}: {reason}); "
@@ -128,7 +130,8 @@ def _model(name: str) -> Callable[[str], NDArray[Any]]:
         ) from error
 
     def embed(text: str) -> NDArray[Any]:
-        # By position: the argument's name has changed. No bar, which a log level could turn on.
+        # Passed by position, since the argument's name has changed between versions. A log level
+        # could turn on the progress bar.
         return np.asarray(model.encode(text, show_progress_bar=False))
 
     return embed

@@ -16,11 +16,11 @@ KEY = "instruction"
 
 
 class InstructionEmbedding(TaskWrapper, RecordConstructorArgs):
-    """Adds ``"instruction"`` to the observation: what the episode's task says, as a vector.
+    """Adds ``"instruction"`` to the observation: the instruction of the task, as a vector.
 
     ``(E,)`` float32 in [-1, 1], of length 1 (zeros for an instruction without words), the same
     from ``reset`` to the end of the episode. E is the encoder's ``dimension``: 64 for ``"hashed"``.
-    An agent that has only the words gets the same vector from
+    An agent that has only the text gets the same vector from
     :func:`~er_gym.envs.wrappers.make_encoder`.
     """
 
@@ -34,7 +34,7 @@ class InstructionEmbedding(TaskWrapper, RecordConstructorArgs):
 
         Raises:
             ValueError: the encoder's name is unknown or its model cannot be loaded; or the
-                observations are no ``Dict``, or have an ``"instruction"`` already.
+                observation space is not a ``Dict``, or has an ``"instruction"`` already.
             ImportError: what the encoder needs is not installed.
         """
         RecordConstructorArgs.__init__(self, encoder=encoder)
@@ -45,7 +45,7 @@ class InstructionEmbedding(TaskWrapper, RecordConstructorArgs):
                 f"cannot add {KEY!r} to observations that are a {_kind(space)}; wrap an "
                 "environment, once, whose observation space is a Dict, as those of er-gym are"
             )
-        # The name, not the encoder: it is short to pickle, and a process loads a model only once.
+        # The name instead of the encoder: it pickles short, and a process loads a model only once.
         self._encoder = encoder
         shape = (make_encoder(encoder).dimension,)
         self._embedding = np.zeros(shape, dtype=np.float32)
@@ -56,7 +56,7 @@ class InstructionEmbedding(TaskWrapper, RecordConstructorArgs):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin an episode, and encode what its task says."""
+        """Begin an episode, and encode its instruction."""
         obs, info = self.env.reset(seed=seed, options=options)
         self._embedding = make_encoder(self._encoder)(info_entry(info, "task").instruction)
         return self._with_instruction(obs), info

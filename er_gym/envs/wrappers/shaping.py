@@ -1,4 +1,4 @@
-"""A reward that tells at once how far a task has come, and asks for the same behaviour."""
+"""Reward shaping: each key action is rewarded at once, and the best policies stay the same."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def potential(info: Mapping[str, Any]) -> float:
     """Minus the share of the task's key actions that is left, in [-1, 0].
 
     Raises:
-        ValueError: ``info`` is none of an er-gym environment.
+        ValueError: ``info`` does not come from an er-gym environment.
     """
     left, done = (len(info_entry(info, f"key_actions_{state}")) for state in ("left", "done"))
     return -left / max(left + done, 1)
@@ -25,18 +25,18 @@ def potential(info: Mapping[str, Any]) -> float:
 class KeyActionShaping(TaskWrapper, RecordConstructorArgs):
     """Adds potential-based shaping (Ng, Harada and Russell, ICML 1999) to the reward.
 
-    With the potential Φ(s) = -scale × (key actions left / key actions of the task), a step from s
-    to s' gets γ Φ(s') − Φ(s) more. Φ is 0 where an episode has terminated, whatever is left, but
-    not where it is truncated: a learner goes on from there by its own estimate. So all that an
-    episode of T steps gets more, discounted, is γ^T Φ(s_T) − Φ(s_0), which no choice of actions
-    changes once it terminates, and the best policies stay the best. This holds for the discount
-    that the learner uses, and for truncated episodes if it does bootstrap there.
+    The potential is Φ(s) = -scale × (key actions left / key actions of the task). A step from s to
+    s' gets γ Φ(s') − Φ(s) more. Φ is 0 where an episode has terminated, whatever is left. Φ keeps
+    its value where an episode is truncated, since the learner bootstraps there. The discounted sum
+    of what an episode of T steps gets more is γ^T Φ(s_T) − Φ(s_0). For an episode that terminates,
+    this sum does not depend on the actions, so the best policies stay the best. This holds if
+    gamma is the learner's own discount, and for truncated episodes if the learner bootstraps there.
 
-    **For training only, never for evaluation.** The reward then tells about the task what the agent
-    is not told: how many key actions are left. Its sums cannot be compared with those of others,
-    and a step that ends an episode early is paid what was still owed. ``info["unshaped_reward"]``
-    keeps the environment's own reward of each step. Evaluate in an environment without this
-    wrapper, or with ``scale=0``.
+    **For training only, never for evaluation.** The shaped reward reveals how many key actions are
+    left, which the agent is not told. Returns with and without shaping cannot be compared: a step
+    that ends an episode early gets back the whole remaining potential.
+    ``info["unshaped_reward"]`` keeps the environment's own reward of each step. Evaluate in an
+    environment without this wrapper, or with ``scale=0``.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], gamma: float, scale: float = 1.0) -> None:
@@ -45,8 +45,8 @@ class KeyActionShaping(TaskWrapper, RecordConstructorArgs):
         Args:
             env: one of er-gym's, wrapped or not.
             gamma: the learner's own discount γ, from 0 to 1.
-            scale: what all key actions of a task are worth together, 0 or more; 0 leaves the reward
-                as it is.
+            scale: the total that all key actions of a task are worth, 0 or more; 0 leaves the
+                reward unchanged.
 
         Raises:
             ValueError: gamma or scale is out of its range.
@@ -67,7 +67,7 @@ class KeyActionShaping(TaskWrapper, RecordConstructorArgs):
         return obs, info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Do an action; ``info["unshaped_reward"]`` is what the environment gave for it."""
+        """Do an action; ``info["unshaped_reward"]`` is the environment's own reward for it."""
         obs, reward, terminated, truncated, info = self.env.step(action)
         before = self._potential
         self._potential = 0.0 if terminated else self._scale * potential(info)

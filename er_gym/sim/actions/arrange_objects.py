@@ -12,7 +12,8 @@ from pydantic import BaseModel
 from er_gym.sim import consequences
 from er_gym.sim.actions.checks import FARTHEST, within
 from er_gym.sim.actions.pick_place import fall, put_down
-from er_gym.sim.actions.registry import Vector, action, quoted
+from er_gym.sim.actions.registry import action, quoted
+from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.placement_restrictions import accepts
 from er_gym.sim.space.placement import free_spots
@@ -104,7 +105,7 @@ def set_object_poses(
             moved.append(i)
     left_behind = {child for i in moved for child in world.contents[i]}
     size = np.prod(world.high - world.low, axis=1)
-    # Large objects first: what a plate is in, the things on the plate are in as well.
+    # Large objects first: things on a plate are also in every receptacle that the plate is in.
     for i in sorted({*moved, *left_behind}, key=lambda i: -float(size[i])):
         world.relocate_alone(i, receptacles_of(world, i))
     if not placeStationary:

@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
-
 from er_gym.sim.actions.checks import FARTHEST, field_of_view, within
-from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.actions.registry import action
+from er_gym.sim.actions.vectors import PartialVector, Vector
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.settings import ThirdPartyCamera
 from er_gym.sim.world import World
-
-
-class PartialVector(BaseModel):
-    """A point or a direction with some coordinates left out."""
-
-    model_config = ConfigDict(allow_inf_nan=False)
-
-    x: float | None = None
-    y: float | None = None
-    z: float | None = None
 
 
 @action("ChangeFOV")

@@ -8,8 +8,9 @@ from math import remainder
 
 import numpy as np
 
-from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.actions.registry import action
 from er_gym.sim.actions.rotate_look import LOOK_LIMITS, LOOK_TOLERANCE
+from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.agent import Agent
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.room_bounds import room_bounds

@@ -8,7 +8,8 @@ import numpy as np
 
 from er_gym.sim.actions.checks import FARTHEST, within
 from er_gym.sim.actions.move import step_end
-from er_gym.sim.actions.registry import Vector, action, quoted
+from er_gym.sim.actions.registry import action, quoted
+from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.interactable_poses import HORIZONS, interactable_poses
 from er_gym.sim.space.reachable_positions import reachable_positions

@@ -7,7 +7,8 @@ import numpy as np
 from er_gym.sim import consequences
 from er_gym.sim.actions.checks import FARTHEST, within
 from er_gym.sim.actions.pick_place import fall, shift
-from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.actions.registry import action
+from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.clearance import Clearance
 from er_gym.sim.space.placement import spawn_points

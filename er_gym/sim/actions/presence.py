@@ -56,7 +56,7 @@ def enable_object(world: World, *, objectId: str) -> None:
         return
     lay_in_it = world.enable(i)
     back = [k for k in lay_in_it if world.exists[k] and k not in world.in_hand]
-    # Large objects first: what a plate is in, the things on the plate are in as well.
+    # Large objects first: things on a plate are also in every receptacle that the plate is in.
     size = np.prod(world.high - world.low, axis=1)
     for k in sorted({i, *back}, key=lambda k: -float(size[k])):
         world.relocate_alone(k, receptacles_of(world, k))

@@ -10,7 +10,8 @@ from er_gym.sim import consequences
 from er_gym.sim.actions.checks import target, within
 from er_gym.sim.actions.object_action import object_action, pointed_at
 from er_gym.sim.actions.pick_place import fall, shift
-from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.actions.registry import action
+from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.clearance import Clearance
 from er_gym.sim.space.receptacles import receptacles_of

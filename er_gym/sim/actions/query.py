@@ -8,7 +8,8 @@ import numpy as np
 
 from er_gym.sim.actions.checks import FARTHEST, target
 from er_gym.sim.actions.object_action import pointed_at, shown_at
-from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.actions.registry import action
+from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.object_metadata import vector
 from er_gym.sim.scene import SCENE_NAMES

@@ -8,9 +8,9 @@ action's parameters. It returns the event's ``actionReturn`` or raises
   ValueError, if an argument is unknown, missing or cannot be converted. The action may have several
   signatures, such as ``objectId`` and ``x, y``. The signature that knows most of the arguments is
   used, and of several such the one with the fewest required parameters.
-- An action that takes a *server action* gets a record of everything that any action may be told. It
-  ignores keys that it does not read. The case of keys does not matter, and null means that nothing
-  was given.
+- An action that takes a *server action* gets a record of the arguments of all actions. It ignores
+  keys that it does not read. The case of keys does not matter, and null means that nothing was
+  given.
 
 Other packages add actions (``docs/extending.md``): functions under :func:`action`, which are named
 in the environment variable ``ER_GYM_ACTIONS`` or by entry points in the group ``er_gym.actions``.
@@ -24,8 +24,6 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
 from typing import Any, get_type_hints
-
-from pydantic import BaseModel, ConfigDict
 
 from er_gym.plugins import PluginError, added
 from er_gym.sim.actions.conversion import Kind, Unconvertible, kind_of
@@ -63,16 +61,6 @@ _MOST_NAMES = 8
 """Argument names that an error message repeats."""
 
 Run = Callable[..., Any]
-
-
-class Vector(BaseModel):
-    """A point or a direction as AI2-THOR writes it; other keys are ignored."""
-
-    model_config = ConfigDict(allow_inf_nan=False)
-
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -228,7 +216,7 @@ def load_added() -> None:
     """Import the actions of other packages, which registers them.
 
     Raises:
-        PluginError: one cannot be loaded, or is no registered function.
+        PluginError: an action cannot be loaded, or is not a registered function.
     """
     expected = f"a function under @{__name__}.action"
     for found, origin in added("AI2-THOR action", GROUP, VARIABLE, expected, registers=True):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
-from er_gym.sim.actions.registry import Vector, action
+from er_gym.sim.actions.registry import action
+from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.world import World
 
@@ -16,10 +18,6 @@ LOOK_LIMITS = (-30.0, 60.0)
 """The camera tilts from 30 degrees up to 60 degrees down."""
 LOOK_TOLERANCE = 1e-3
 """Tolerance of these limits, degrees: AI2-THOR itself reports 60.00002."""
-
-
-def _turn(world: World, degrees: float) -> None:
-    world.place_agent(replace(world.agent, rotation=(world.agent.rotation + degrees) % 360.0))
 
 
 def _tilt(world: World, action: str, degrees: float, downwards: float) -> None:
@@ -42,41 +40,31 @@ def _tilt(world: World, action: str, degrees: float, downwards: float) -> None:
     world.place_agent(replace(world.agent, horizon=horizon))
 
 
-@action("RotateRight")
-def rotate_right(
-    world: World,
-    *,
-    degrees: float | None = None,
-    manualInteract: bool = False,
-    forceAction: bool = False,
-    speed: float = 1.0,
-    waitForFixedUpdate: bool = False,
-    returnToStart: bool = True,
-    disableRendering: bool = True,
-    fixedDeltaTime: float = 0.02,
-) -> None:
-    """Turn clockwise by some degrees (default: rotateStepDegrees).
+def _turner(sign: float) -> Callable[..., None]:
+    def rotate(
+        world: World,
+        *,
+        degrees: float | None = None,
+        manualInteract: bool = False,
+        forceAction: bool = False,
+        speed: float = 1.0,
+        waitForFixedUpdate: bool = False,
+        returnToStart: bool = True,
+        disableRendering: bool = True,
+        fixedDeltaTime: float = 0.02,
+    ) -> None:
+        """Turn by some degrees (default: rotateStepDegrees).
 
-    All other arguments have no effect: the held object collides with nothing here.
-    """
-    _turn(world, world.settings.rotate_step if degrees is None else degrees)
+        All other arguments have no effect: the held object collides with nothing here.
+        """
+        by = sign * (world.settings.rotate_step if degrees is None else degrees)
+        world.place_agent(replace(world.agent, rotation=(world.agent.rotation + by) % 360.0))
+
+    return rotate
 
 
-@action("RotateLeft")
-def rotate_left(
-    world: World,
-    *,
-    degrees: float | None = None,
-    manualInteract: bool = False,
-    forceAction: bool = False,
-    speed: float = 1.0,
-    waitForFixedUpdate: bool = False,
-    returnToStart: bool = True,
-    disableRendering: bool = True,
-    fixedDeltaTime: float = 0.02,
-) -> None:
-    """Turn anticlockwise, as ``RotateRight`` does clockwise."""
-    _turn(world, -(world.settings.rotate_step if degrees is None else degrees))
+action("RotateRight")(_turner(1.0))  # clockwise
+action("RotateLeft")(_turner(-1.0))
 
 
 @action("LookUp", server_action=True)

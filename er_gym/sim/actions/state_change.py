@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
 import numpy as np
 
 from er_gym.sim import consequences
@@ -66,52 +70,96 @@ def _cut_up(world: World, i: int, state: str) -> None:
     consequences.apply(world)
 
 
-@object_action("BreakObject", server_action=True)
-def break_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
-    """Break an object; an egg cracks open."""
-    i = target(world, objectId, forceAction)
-    require(world, i, "breakable", "something that can be broken")
-    if world.state(i, "isBroken"):
-        raise ActionFailed(f"{objectId} is broken already.")
-    if world.types[i] == "Egg":
-        if i == world.held:
-            raise ActionFailed(
-                f"{objectId} is in the agent's hand; put it down before breaking it."
-            )
+def _break(world: World, i: int) -> None:
+    """Break object i; an egg cracks open."""
+    if world.types[i] != "Egg":
+        world.set_state(i, "isBroken", True)
+    elif i == world.held:
+        raise ActionFailed(
+            f"{world.object_ids[i]} is in the agent's hand; put it down before breaking it."
+        )
+    else:
         _cut_up(world, i, "isBroken")
-        return
-    world.set_state(i, "isBroken", True)
 
 
-@object_action("CookObject", server_action=True)
-def cook_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
-    """Cook an object at once, without a source of heat."""
-    i = target(world, objectId, forceAction)
-    require(world, i, "cookable", "something that can be cooked")
-    if world.state(i, "isCooked"):
-        raise ActionFailed(f"{objectId} is cooked already.")
-    consequences.cook(world, i)
-
-
-@object_action("DirtyObject", server_action=True)
-def dirty_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
-    """Make an object dirty."""
-    i = target(world, objectId, forceAction)
-    require(world, i, "dirtyable", "something that can be dirty")
-    if world.state(i, "isDirty"):
-        raise ActionFailed(f"{objectId} is dirty already.")
+def _dirty(world: World, i: int) -> None:
     world.set_state(i, "isDirty", True)
     consequences.apply(world)
 
 
-@object_action("CleanObject", server_action=True)
-def clean_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
-    """Clean an object."""
-    i = target(world, objectId, forceAction)
-    require(world, i, "dirtyable", "something that can be dirty")
-    if not world.state(i, "isDirty"):
-        raise ActionFailed(f"{objectId} is clean already.")
-    world.set_state(i, "isDirty", False)
+def _empty(world: World, i: int) -> None:
+    world.fill_liquid[i] = None
+    world.set_state(i, "isFilledWithLiquid", False)
+    consequences.apply(world)
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of one state of an object.
+
+    Attributes:
+        prop: the property that the object must have.
+        what: an object with this property, in words.
+        state: the state that changes.
+        becomes: its value afterwards.
+        already: an object with this value, in words.
+    """
+
+    prop: str
+    what: str
+    state: str
+    becomes: bool
+    already: str
+
+    def target(self, world: World, object_id: str, force: bool) -> int:
+        """The row of the object that an action names.
+
+        Raises:
+            ActionFailed: it cannot change so, or is so already; see :func:`.checks.target` too.
+        """
+        i = target(world, object_id, force)
+        require(world, i, self.prop, self.what)
+        if world.state(i, self.state) == self.becomes:
+            raise ActionFailed(f"{object_id} is {self.already} already.")
+        return i
+
+
+_DIRTY = partial(Change, "dirtyable", "something that can be dirty", "isDirty")
+_FILLED = partial(Change, "canFillWithLiquid", "something that can be filled", "isFilledWithLiquid")
+_FILLS = _FILLED(True, "filled")
+_CHANGES: dict[str, tuple[Change, Callable[[World, int], None]]] = {
+    "BreakObject": (
+        Change("breakable", "something that can be broken", "isBroken", True, "broken"),
+        _break,
+    ),
+    # Cooked at once, without a source of heat.
+    "CookObject": (
+        Change("cookable", "something that can be cooked", "isCooked", True, "cooked"),
+        consequences.cook,
+    ),
+    "DirtyObject": (_DIRTY(True, "dirty"), _dirty),
+    "CleanObject": (
+        _DIRTY(False, "clean"),
+        lambda world, i: world.set_state(i, "isDirty", False),
+    ),
+    "EmptyLiquidFromObject": (_FILLED(False, "empty"), _empty),
+    # Such as a roll of paper.
+    "UseUpObject": (
+        Change("canBeUsedUp", "something that can be used up", "isUsedUp", True, "used up"),
+        lambda world, i: world.set_state(i, "isUsedUp", True),
+    ),
+}
+
+
+def _changer(change: Change, do: Callable[[World, int], None]) -> Callable[..., None]:
+    def change_state(world: World, *, objectId: str, forceAction: bool = False) -> None:
+        do(world, change.target(world, objectId, forceAction))
+
+    return change_state
+
+
+for _name, _row in _CHANGES.items():
+    object_action(_name, server_action=True)(_changer(*_row))
 
 
 @object_action("FillObjectWithLiquid", server_action=True)
@@ -124,30 +172,5 @@ def fill_object(
             f"{quoted(fillLiquid)} is not a valid Liquid Type; fillLiquid is one of "
             f"{', '.join(LIQUIDS)}."
         )
-    i = target(world, objectId, forceAction)
-    require(world, i, "canFillWithLiquid", "something that can be filled")
-    if world.state(i, "isFilledWithLiquid"):
-        raise ActionFailed(f"{objectId} is filled already.")
+    i = _FILLS.target(world, objectId, forceAction)
     consequences.fill(world, i, fillLiquid.lower())
-
-
-@object_action("EmptyLiquidFromObject", server_action=True)
-def empty_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
-    """Empty an object."""
-    i = target(world, objectId, forceAction)
-    require(world, i, "canFillWithLiquid", "something that can be filled")
-    if not world.state(i, "isFilledWithLiquid"):
-        raise ActionFailed(f"{objectId} is empty already.")
-    world.fill_liquid[i] = None
-    world.set_state(i, "isFilledWithLiquid", False)
-    consequences.apply(world)
-
-
-@object_action("UseUpObject", server_action=True)
-def use_up_object(world: World, *, objectId: str, forceAction: bool = False) -> None:
-    """Use an object up, such as a roll of paper."""
-    i = target(world, objectId, forceAction)
-    require(world, i, "canBeUsedUp", "something that can be used up")
-    if world.state(i, "isUsedUp"):
-        raise ActionFailed(f"{objectId} is used up already.")
-    world.set_state(i, "isUsedUp", True)

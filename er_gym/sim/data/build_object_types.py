@@ -15,7 +15,7 @@ OUTPUT = Path(__file__).parent / "object_types.json"
 
 
 def object_types() -> dict[str, list[str]]:
-    """For each object type the properties that any of its instances has, both in a fixed order."""
+    """The properties that any instance of each object type has; both are in a fixed order."""
     found: dict[str, set[str]] = {}
     for name in SCENE_NAMES:
         scene = load_scene(name)

@@ -1,4 +1,4 @@
-"""Carcasses of counters, between and behind their cabinets: drawn, but no objects."""
+"""Carcasses of counters, between and behind their cabinets: drawn, but not objects."""
 
 from __future__ import annotations
 

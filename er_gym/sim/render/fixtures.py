@@ -1,4 +1,4 @@
-"""The stoves of kitchens, which are no objects: only their burners and knobs are.
+"""The stoves of kitchens. A stove is not an object: only its burners and knobs are.
 
 AI2-THOR records burners and knobs, but not the stove. Here the burners get a cooktop and, unless
 something else is built in below, an oven. The knobs get a panel behind them: a slope at the front,

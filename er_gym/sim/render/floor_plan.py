@@ -57,7 +57,7 @@ _HANGERS = frozenset(
 )  # fmt: skip
 """Types that hang flat on walls."""
 _NOT_BEFORE_WALLS = frozenset({"Floor", "Faucet"})
-"""Types that say nothing about walls: the boxes of faucets end inside the wall."""
+"""Types that do not show where walls are: the boxes of faucets end inside the wall."""
 _INTO_WALLS = {"CounterTop": 0.3, "Fridge": 0.2, "Toilet": 0.08, "Cabinet": 0.06, "Sink": 0.06}
 """How far the boxes of these types may extend into a wall, metres."""
 _SHOWERS = frozenset({"ShowerDoor", "ShowerGlass"})

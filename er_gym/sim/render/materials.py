@@ -38,4 +38,4 @@ MATERIALS: dict[str, Material] = {
     },
     **{f"picture{k}": Material(f"picture{k}") for k in range(8)},
 }  # fmt: skip
-"""By name; ``picture0`` to ``picture7`` are paintings and posters."""
+"""The materials by name; ``picture0`` to ``picture7`` are paintings and posters."""

@@ -32,7 +32,7 @@ from er_gym.sim.render.box_faces import (
 from er_gym.sim.render.patch import PLAIN, Axis, Patch, Triple, merged, rotation
 
 _AXES: Mapping[str, tuple[int, int, int]] = {"x": (1, 2, 0), "y": (0, 1, 2), "z": (0, 2, 1)}
-"""For each axis, which axes of a solid made about y its x, y and z come from."""
+"""The axes of a solid made about y that become x, y and z of a solid about each axis."""
 
 
 class Mesh:

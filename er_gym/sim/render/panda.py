@@ -30,7 +30,7 @@ from er_gym.sim.render.textures import texture
 NEAR, FAR = 0.1, 40.0
 """The near and the far plane, metres from the camera."""
 SMALLEST_FOV = 1e-3
-"""Degrees. AI2-THOR takes any field of view above 0, but the lens of a smaller one is no number."""
+"""Degrees. AI2-THOR takes any field of view above 0, but a smaller one makes Panda's lens NaN."""
 MOST_INSTANCES = 254
 DEVICES = {
     "cpu": ("p3tinydisplay", "TinyOffscreenGraphicsPipe"),

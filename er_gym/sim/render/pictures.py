@@ -158,7 +158,7 @@ def clock(random: np.random.Generator) -> Picture:
     return picture
 
 
-# -- what shines ---------------------------------------------------------------------------------
+# -- screens, windows and other lights -----------------------------------------------------------
 
 
 @_picture

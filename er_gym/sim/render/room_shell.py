@@ -1,4 +1,4 @@
-"""The shell of a room: floor, walls, ceiling, skirting boards and a door, which are no objects.
+"""The shell of a room: floor, walls, ceiling, skirting boards and a door. These are not objects.
 
 Its colours include the light, which is darker towards edges. Walls have one side, towards the room,
 so a camera outside or above looks through them. Windows stand in holes of the walls.

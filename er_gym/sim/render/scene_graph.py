@@ -1,7 +1,7 @@
 """The scene graph of a room: what is drawn, and where.
 
-What looks the same as before is not made again. Triangles are cached by appearance, nodes by
-appearance, heading and number. Only objects that have changed are updated.
+An object that looks the same as before is not made again. Triangles are cached by appearance, and
+nodes by appearance, heading and number. Only objects that have changed are updated.
 
 Even so, a picture depends on the world alone and not on what was drawn before. Of surfaces at the
 same depth the one drawn first is seen. So the order of drawing is fixed: first the room, then the
@@ -39,7 +39,7 @@ _SCENES = 64
 _SHOWN: CacheKey[object] = CacheKey("state that a scene graph shows")
 _NODES = 2048
 _BEFORE = 8
-"""Everything that is no object is drawn first: its numbers in the order begin this far below 0."""
+"""The parts of the room come first in the order of drawing: they start this far below 0."""
 _HEADING = 1.0
 """Headings are rounded to a multiple of this for lighting, degrees."""
 

@@ -103,7 +103,7 @@ def carpet(random: np.random.Generator) -> Picture:
     return between(0.80, 1.0, stretched(0.7 * random.random((SIDE, SIDE)) + noise(random, 16, 2)))
 
 
-# -- what things are made of ---------------------------------------------------------------------
+# -- materials of objects ------------------------------------------------------------------------
 
 
 def _grain(random: np.random.Generator) -> Picture:
@@ -221,7 +221,7 @@ def basketball(random: np.random.Generator) -> Picture:
     return picture
 
 
-# -- what is printed, on things of any colour ----------------------------------------------------
+# -- prints, for objects of any colour -----------------------------------------------------------
 
 
 @_surface

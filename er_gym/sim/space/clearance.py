@@ -32,7 +32,7 @@ class Clearance:
         self._room = room_bounds(world.scene.name)
         self._ids = world.object_ids
         self._low, self._high = world.low[i].copy(), world.high[i].copy()
-        # Boxes that it overlaps at the start, by the record, are no obstacles.
+        # Boxes that it already overlaps where it is are not obstacles: recorded boxes are rough.
         self._beside = ~self._overlaps(np.zeros(3))
 
     def _overlaps(self, offset: NDArray[np.float64]) -> NDArray[np.bool_]:

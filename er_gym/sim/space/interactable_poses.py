@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,10 +47,10 @@ def interactable_poses(
         max_distance: the largest distance to the object, metres; None for the visibility distance.
     """
     distance = world.settings.visibility_distance if max_distance is None else max_distance
-    filters = (tuple(rotations), tuple(horizons), tuple(standings), max_poses, distance)
+    wanted = _Wanted(tuple(rotations), tuple(horizons), tuple(standings), max_poses, distance)
 
     def search() -> Poses:
-        found = _search(world, i, positions, *filters)
+        found = _search(world, i, positions, wanted)
         found.setflags(write=False)
         return found
 
@@ -64,27 +65,28 @@ def interactable_poses(
         return search()
     settings = world.settings
     lens = (settings.field_of_view, settings.width / settings.height)
-    question = (i, positions.tobytes(), filters, lens, world.agent.position[1])
+    question = (i, positions.tobytes(), wanted, lens, world.agent.position[1])
     return lines_of_sight(world).cached(question, search)
 
 
-def _search(
-    world: World,
-    i: int,
-    positions: NDArray[np.float64],
-    rotations: Sequence[float],
-    horizons: Sequence[float],
-    standings: Sequence[bool],
-    max_poses: int | None,
-    distance: float,
-) -> Poses:
+class _Wanted(NamedTuple):
+    """The poses that are looked for at each position."""
+
+    rotations: tuple[float, ...]
+    horizons: tuple[float, ...]
+    standings: tuple[bool, ...]
+    most: int | None
+    distance: float
+
+
+def _search(world: World, i: int, positions: NDArray[np.float64], wanted: _Wanted) -> Poses:
     found = [np.empty((0, 6))]
     if world.hidden[i]:
         return found[0]
     settings = world.settings
-    near = _within_reach(world, i, positions, distance)
-    yaws, tilts = np.array(rotations) % 360.0, np.array(horizons)
-    upright = np.array(standings, dtype=bool)
+    near = _within_reach(world, i, positions, wanted.distance)
+    yaws, tilts = np.array(wanted.rotations) % 360.0, np.array(wanted.horizons)
+    upright = np.array(wanted.standings, dtype=bool)
     lifts = np.where(upright, CAMERA_STANDING, CAMERA_CROUCHING)
     eyes, count = np.empty((len(near) * len(lifts), 3)), 0
     eyes[:, [0, 2]] = np.repeat(near, len(lifts), axis=0)
@@ -110,9 +112,9 @@ def _search(
         poses[:, 3], poses[:, 4], poses[:, 5] = yaws[yaw], tilts[tilt], upright[body]
         found.append(poses)
         count += len(poses)
-        if max_poses is not None and count >= max_poses:
+        if wanted.most is not None and count >= wanted.most:
             break
-    return np.concatenate(found)[:max_poses]
+    return np.concatenate(found)[: wanted.most]
 
 
 def _one_pose(

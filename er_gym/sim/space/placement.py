@@ -18,6 +18,8 @@ from er_gym.sim.space.solids.families import family
 from er_gym.sim.space.visibility import in_frustum
 from er_gym.sim.world import World, upright_rotation
 
+Floats = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class _Manner:
@@ -51,7 +53,7 @@ _GIVE = 0.02
 _RISES = 0.03
 """A fixed object is an obstacle on a surface if it rises above it by more than this, metres."""
 _OVERHANG = 1.0
-"""Objects farther from a receptacle than this are no obstacles, metres."""
+"""Objects farther from a receptacle than this are not obstacles, metres."""
 _PICKUPABLE = PROPERTIES.index("pickupable")
 _HOLES = frozenset({"Sink", "SinkBasin", "StoveBurner"})
 """Types that are built into a counter and leave no place for other objects."""
@@ -86,7 +88,7 @@ def _manner(world: World, receptacle: int) -> _Manner:
     return _MANNERS.get(world.types[receptacle], _SIDE_BY_SIDE)
 
 
-def _places(world: World, receptacle: int) -> NDArray[np.float64]:
+def _places(world: World, receptacle: int) -> Floats:
     """(R, 2, 2) corners x, z of the rectangles in or on a receptacle where objects can stand."""
     if world.types[receptacle] == "CounterTop":
         return solid_of(world, receptacle).boxes[:, :, [0, 2]]
@@ -99,10 +101,10 @@ def free_spots(
     world: World,
     i: int,
     receptacle: int,
-    near: NDArray[np.float64],
+    near: Floats,
     seen_by: Agent | None = None,
     squeeze: bool = True,
-) -> Iterator[tuple[float, NDArray[np.float64]]]:
+) -> Iterator[tuple[float, Floats]]:
     """Spots for object i in or on a receptacle, nearest to a (2,) x, z point first.
 
     Args:
@@ -116,10 +118,12 @@ def free_spots(
     if is_vessel(world, receptacle):
         yield from _in_vessel(world, i, receptacle)
         return
-    height, tall = surface_height(world, receptacle), _height(world, i)
+    height = surface_height(world, receptacle)
     obstacles, loose = _obstacles(world, receptacle, i, height)
-    free: list[NDArray[np.float64]] = [np.empty((0, 3))]  # heading, x, z
-    heaps: list[tuple[float, float, NDArray[np.float64]]] = []
+    beside = _at_height(obstacles, height, _height(world, i))
+    loose = loose[beside[: len(loose)]]
+    free: list[Floats] = [np.empty((0, 3))]  # heading, x, z
+    heaps: list[tuple[float, float, Floats]] = []
     heaping, places = _manner(world, receptacle).heaps, _places(world, receptacle)
     for yaw, half in _headings(world, i):
         spots = _spots(places, half)
@@ -128,11 +132,11 @@ def free_spots(
             tops = _tops(spots, half, height, world.high[receptacle, 1], obstacles)
             k = int(tops.argmin())
             heaps.append((float(tops[k]), yaw, spots[k]))
-        clear = spots[_free(spots, half, height, tall, obstacles)]
+        clear = spots[_free(spots, half, obstacles[beside])]
         free.append(np.column_stack([np.full(len(clear), yaw), clear]))
     found = np.concatenate(free)
     if squeeze and not len(found):
-        found = _tight_spots(world, _headings(world, i), places, height, tall, obstacles, loose)
+        found = _tight_spots(world, _headings(world, i), places, obstacles[beside], loose)
     order: list[NDArray[Any]] = [_distance(found[:, 1:], near)]
     if seen_by is not None:
         order.append(~_in_picture(world, seen_by, found[:, 1:], height))
@@ -143,7 +147,7 @@ def free_spots(
             yield yaw, np.array([x, top + _SKIN, z])
 
 
-def spawn_points(world: World, receptacle: int, seen_by: Agent | None) -> NDArray[np.float64]:
+def spawn_points(world: World, receptacle: int, seen_by: Agent | None) -> Floats:
     """(S, 3) points on the surface of a receptacle, free or not, metres.
 
     Args:
@@ -156,14 +160,12 @@ def spawn_points(world: World, receptacle: int, seen_by: Agent | None) -> NDArra
     return np.column_stack([spots[:, 0], np.full(len(spots), height), spots[:, 1]])
 
 
-def _distance(spots: NDArray[np.float64], near: NDArray[np.float64]) -> NDArray[np.float64]:
+def _distance(spots: Floats, near: Floats) -> Floats:
     """(S,) distances from (S, 2) spots to a (2,) point."""
     return np.asarray(np.hypot(spots[:, 0] - near[0], spots[:, 1] - near[1]))
 
 
-def _in_picture(
-    world: World, agent: Agent, spots: NDArray[np.float64], height: float
-) -> NDArray[np.bool_]:
+def _in_picture(world: World, agent: Agent, spots: Floats, height: float) -> NDArray[np.bool_]:
     """(S,) whether each spot, (S, 2) x and z at one height, is in the agent's picture."""
     settings = world.settings
     points = np.column_stack([spots[:, 0], np.full(len(spots), height), spots[:, 1]])
@@ -173,28 +175,27 @@ def _in_picture(
     )
 
 
-def _in_vessel(
-    world: World, i: int, receptacle: int
-) -> Iterator[tuple[float, NDArray[np.float64]]]:
+def _in_vessel(world: World, i: int, receptacle: int) -> Iterator[tuple[float, Floats]]:
     """Spots in a vessel, or on top of its contents, from the middle outwards."""
     inside = world.contents[receptacle]
     if inside and not _manner(world, receptacle).heaps:
         return
     base = max([surface_height(world, receptacle), *(float(world.high[c, 1]) for c in inside)])
-    (obstacles, _), tall = _obstacles(world, receptacle, i, base), _height(world, i)
+    obstacles, _ = _obstacles(world, receptacle, i, base)
+    obstacles = obstacles[_at_height(obstacles, base, _height(world, i))]
     places = np.array([[world.low[receptacle], world.high[receptacle]]])[:, :, [0, 2]]
     offcentre = _spots(places, np.zeros(2), _FINE_STEP)
     offcentre = offcentre[np.argsort(np.linalg.norm(offcentre - places.mean(axis=1), axis=1))]
     for spot in offcentre:
         for yaw, half in _headings(world, i):
-            if _free(spot[None], half, base, tall, obstacles)[0]:
+            if _free(spot[None], half, obstacles)[0]:
                 yield yaw, np.array([spot[0], base, spot[1]])
 
 
-# -- the thing -------------------------------------------------------------------------------------
+# -- the object ------------------------------------------------------------------------------------
 
 
-def _headings(world: World, i: int) -> list[tuple[float, NDArray[np.float64]]]:
+def _headings(world: World, i: int) -> list[tuple[float, Floats]]:
     """Headings in degrees that align object i's box with the axes, each with the box's (2,)
     half-size."""
     tilt = upright_rotation(world.rotation[i], 0.0)
@@ -221,9 +222,7 @@ def _height(world: World, i: int) -> float:
 # -- the spots -------------------------------------------------------------------------------------
 
 
-def _spots(
-    places: NDArray[np.float64], half: NDArray[np.float64], step: float = _STEP
-) -> NDArray[np.float64]:
+def _spots(places: Floats, half: Floats, step: float = _STEP) -> Floats:
     """(S, 2) x, z spots in rectangles (R, 2, 2) where a box of half-size (2,) fits."""
     found = [np.empty((0, 2))]
     for low, high in places:
@@ -238,7 +237,7 @@ def _spots(
 
 def _obstacles(
     world: World, receptacle: int, i: int, height: float
-) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+) -> tuple[Floats, NDArray[np.intp]]:
     """The obstacles for object i in or on a receptacle.
 
     Loose objects count wherever they are, since they could be anywhere. Fixed objects count only on
@@ -255,7 +254,7 @@ def _obstacles(
     close = world.exists & (world.high > low).all(axis=1) & (world.low < high).all(axis=1)
     middle = (world.low[receptacle] + world.high[receptacle]) / 2
     loose = world.properties[:, _PICKUPABLE]
-    # A drawer is part of a dresser, so the dresser is no obstacle in it.
+    # A drawer is part of a dresser, so the dresser is not an obstacle in it.
     around = (world.low <= middle).all(axis=1) & (middle <= world.high).all(axis=1)
     close &= loose | ~around
     close[list(aside)] = False
@@ -273,33 +272,24 @@ def _obstacles(
     return np.concatenate(boxes), things
 
 
-def _free(
-    spots: NDArray[np.float64],
-    half: NDArray[np.float64],
-    height: float,
-    tall: float,
-    obstacles: NDArray[np.float64],
-) -> NDArray[np.bool_]:
-    """(S,) whether each spot is free of obstacles."""
-    same_height = _at_height(obstacles, height, tall)
-    low, high = obstacles[same_height][:, :, [0, 2]].swapaxes(0, 1)
+def _free(spots: Floats, half: Floats, obstacles: Floats) -> NDArray[np.bool_]:
+    """(S,) whether each spot is free of obstacles at the object's height."""
+    low, high = obstacles[:, :, [0, 2]].swapaxes(0, 1)
     return np.asarray(~_overlap(spots, half + _SKIN, low, high).any(axis=1))
 
 
-def _at_height(obstacles: NDArray[np.float64], height: float, tall: float) -> NDArray[np.bool_]:
+def _at_height(obstacles: Floats, height: float, tall: float) -> NDArray[np.bool_]:
     """(Q,) whether each box is at the height of an object that stands at ``height``."""
     return np.asarray((obstacles[:, 0, 1] < height + tall) & (obstacles[:, 1, 1] > height + _SKIN))
 
 
 def _tight_spots(
     world: World,
-    headings: list[tuple[float, NDArray[np.float64]]],
-    places: NDArray[np.float64],
-    height: float,
-    tall: float,
-    obstacles: NDArray[np.float64],
+    headings: list[tuple[float, Floats]],
+    places: Floats,
+    obstacles: Floats,
     loose: NDArray[np.intp],
-) -> NDArray[np.float64]:
+) -> Floats:
     """(S, 3) heading, x and z of the free spots that a person would find among the clutter.
 
     An object that fits between upright boxes also fits where it touches one of them, or an edge, in
@@ -309,11 +299,10 @@ def _tight_spots(
     Args:
         headings: see :func:`_headings`.
         places: (R, 2, 2), see :func:`_places`.
-        obstacles, loose: see :func:`_obstacles`.
+        obstacles, loose: see :func:`_obstacles`; only those at the object's height.
     """
-    beside = _at_height(obstacles, height, tall)
-    low, high = obstacles[beside][:, :, [0, 2]].swapaxes(0, 1)
-    turned = [_footprint(world, k) for k in loose[beside[: len(loose)]].tolist()]
+    low, high = obstacles[:, :, [0, 2]].swapaxes(0, 1)
+    turned = [_footprint(world, k) for k in loose.tolist()]
     found = [np.empty((0, 3))]
     for yaw, half in headings:
         wide = half + _SKIN
@@ -340,7 +329,7 @@ def _tight_spots(
     return np.concatenate(found)
 
 
-def _footprint(world: World, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _footprint(world: World, k: int) -> tuple[Floats, Floats]:
     """Object k's box seen from above: (2,) x and z of its middle, and its (E, 2) edges."""
     middle = ((world.low[k] + world.high[k]) / 2)[[0, 2]]
     edges = world.obb[k, 1:] @ unity_rotation(world.rotation[k]).T
@@ -350,10 +339,7 @@ def _footprint(world: World, k: int) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 
 def _overlap_turned(
-    spots: NDArray[np.float64],
-    half: NDArray[np.float64],
-    middle: NDArray[np.float64],
-    edges: NDArray[np.float64],
+    spots: Floats, half: Floats, middle: Floats, edges: Floats
 ) -> NDArray[np.bool_]:
     """(S,) whether no edge of a footprint separates it from a box of half-size (2,) at each spot.
 
@@ -369,12 +355,7 @@ def _overlap_turned(
     return met
 
 
-def _overlap(
-    spots: NDArray[np.float64],
-    half: NDArray[np.float64],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-) -> NDArray[np.bool_]:
+def _overlap(spots: Floats, half: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
     """(S, Q) whether a box of half-size (2,) at each spot overlaps rectangles (Q, 2) to (Q, 2)."""
     x, z = spots[:, 0, None], spots[:, 1, None]
     found = (x > low[:, 0] - half[0]) & (x < high[:, 0] + half[0])
@@ -383,13 +364,7 @@ def _overlap(
     return np.asarray(found)
 
 
-def _tops(
-    spots: NDArray[np.float64],
-    half: NDArray[np.float64],
-    height: float,
-    rim: float,
-    obstacles: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _tops(spots: Floats, half: Floats, height: float, rim: float, obstacles: Floats) -> Floats:
     """(S,) height of the heap under a box of half-size (2,) at each spot, below the rim, metres.
 
     Objects that begin above the rim are not part of the heap.

@@ -1,9 +1,9 @@
 """The size of a room: AI2-THOR's ``sceneBounds``, which is not part of the recorded data.
 
-AI2-THOR encloses everything that it draws, and walls and ceilings are drawn without being objects.
-Known are the Floor's box and the objects on the walls. A room ends a wall's thickness beyond its
-outermost objects, and its ceiling is a little above the highest one. The constants here fit 40
-recorded bounds (see docs/fidelity.md, also for the error).
+AI2-THOR's bounds enclose everything that it draws. It draws walls and ceilings, too, which are not
+objects. The record has only the Floor's box and the objects on the walls. A room ends a wall's
+thickness beyond its outermost objects, and its ceiling is a little above the highest one. The
+constants here fit 40 recorded bounds (see docs/fidelity.md, also for the error).
 """
 
 from __future__ import annotations

@@ -127,7 +127,7 @@ class PlanBuilder:
         """Navigate to a target and put the held object into it.
 
         Raises:
-            ImpossiblePlan: the hand is empty, or the target is no other receptacle.
+            ImpossiblePlan: the hand is empty, or the target is not another receptacle.
         """
         if self.held is None:
             raise ImpossiblePlan("the hand is empty")

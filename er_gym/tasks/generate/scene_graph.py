@@ -148,6 +148,13 @@ def read_scene_graph(objects: Sequence[Mapping[str, Any]], accepts: Accepts) -> 
     return SceneGraph({item["objectId"]: _scene_object(item) for item in objects}, accepts)
 
 
+_PROPERTIES = (
+    *("receptacle", "pickupable", "openable", "toggleable"),
+    *("dirtyable", "cookable", "sliceable"),
+)
+"""Properties that go by their names in the metadata."""
+
+
 def _scene_object(item: Mapping[str, Any]) -> SceneObject:
     box = item["axisAlignedBoundingBox"]
     size = box["size"]
@@ -155,20 +162,14 @@ def _scene_object(item: Mapping[str, Any]) -> SceneObject:
         id=item["objectId"],
         type=item["objectType"],
         parents=tuple(item["parentReceptacles"] or ()),
-        receptacle=item["receptacle"],
-        pickupable=item["pickupable"],
-        openable=item["openable"],
         closed=item["openable"] and not item["isOpen"],
-        toggleable=item["toggleable"],
         on=item["isToggled"],
         controlled=tuple(item["controlledObjects"] or ()),
-        dirtyable=item["dirtyable"],
         fillable=item["canFillWithLiquid"],
-        cookable=item["cookable"],
-        sliceable=item["sliceable"],
         volume=size["x"] * size["y"] * size["z"],
         x=box["center"]["x"],
         z=box["center"]["z"],
+        **{name: item[name] for name in _PROPERTIES},
     )
 
 

@@ -6,21 +6,18 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from support import one_torch_thread
 
 pytest.importorskip("sb3_contrib", reason="needs the extra rl")
 
-import torch
 
 from agents.rl.config import TrainConfig
 
 
 @pytest.fixture(scope="session", autouse=True)
 def one_thread() -> Iterator[None]:
-    """Torch's threads would wait for each other where tests share cores."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+    with one_torch_thread():
+        yield
 
 
 def small(**changes: Any) -> TrainConfig:

@@ -1,9 +1,9 @@
-"""Behaviour cloning: what a teacher does is learnt from its episodes."""
+"""Behaviour cloning: a policy learns a teacher's actions from its episodes."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +12,14 @@ import pytest
 import agents.rl.demonstrations
 from agents.rl.cloning import clone_behaviour, collect_demonstrations
 from agents.rl.config import TrainConfig, WarmStart
-from agents.rl.demonstrations import demonstrate
+from agents.rl.demonstrations import Demonstrations, demonstrate
 from agents.rl.envs import make_env
 from agents.rl.train import ALGORITHMS, make_vec_env, train
 from er_gym.envs.actions import INDEX, Action
 from er_gym.rollout.agent import Decision
 
 Make = Callable[..., TrainConfig]
+Recited = Callable[..., Demonstrations]
 
 
 @pytest.mark.parametrize("teacher", ["oracle", "searcher"])
@@ -48,7 +49,7 @@ def test_demonstrations_are_what_the_learner_would_have_seen(
     assert seen.returns.max() > 1.5
 
 
-def test_a_policy_comes_to_do_what_the_teacher_did(make_config: Make) -> None:
+def test_a_policy_learns_the_teachers_actions(make_config: Make) -> None:
     config = make_config()
     how = WarmStart(teacher="oracle", episodes=20, epochs=150, batch_size=32, learning_rate=3e-3)
     seen = collect_demonstrations(config, how, seed=0)
@@ -71,11 +72,11 @@ def test_a_run_begins_warm(make_config: Make, tmp_path: Path) -> None:
     assert 0 < noted["teacher_success"] <= 1
 
 
-class Mumbler:
-    """Says nonsense, then what cannot be done, then the end."""
+class Reciter:
+    """Says the same texts in each episode, whatever it sees."""
 
-    def __init__(self) -> None:
-        self.says = iter(("hm", "open Apple", "pickup Mug", "end"))
+    def __init__(self, *texts: str) -> None:
+        self.says = iter(texts)
 
     def reset(self, *_: object) -> None:
         """Nothing to prepare."""
@@ -84,43 +85,41 @@ class Mumbler:
         return Decision(next(self.says))
 
 
-def test_what_names_no_action_is_left_out_and_counted(
-    make_config: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(agents.rl.demonstrations, "make_agent", lambda _: Mumbler())
-    config = make_config(
-        env={"episodes": "mini", "types": ["single_toggle"], "illegal_penalty": 0.5}
-    )
-    env = make_env(config.env, with_text=True)
-    env.reset(seed=0)
-    seen = demonstrate(env, "mumbler", 2, 0.9, False)
+@pytest.fixture
+def recited(make_config: Make, monkeypatch: pytest.MonkeyPatch) -> Recited:
+    """A function to the demonstrations of an agent that recites texts in each episode."""
+
+    def play(texts: Sequence[str], episodes: int, only_successes: bool = False) -> Demonstrations:
+        monkeypatch.setattr(agents.rl.demonstrations, "make_agent", lambda _: Reciter(*texts))
+        settings = {"episodes": "mini", "types": ["single_toggle"], "illegal_penalty": 0.5}
+        env = make_env(make_config(env=settings).env, with_text=True)
+        env.reset(seed=0)
+        try:
+            return demonstrate(env, "reciter", episodes, 0.9, only_successes)
+        finally:
+            env.close()
+
+    return play
+
+
+def test_what_names_no_action_is_left_out_and_counted(recited: Recited) -> None:
+    texts = ("hm", "open Apple", "pickup Mug", "end")  # nonsense, then what cannot be done
+    seen = recited(texts, 2)
     assert (seen.episodes, seen.unread, seen.refused) == (2, 4, 2)
     assert seen.actions.tolist() == [INDEX[Action("end")]] * 2
-    assert len(demonstrate(env, "mumbler", 1, 0.9, True)) == 0  # it never succeeds
-    env.close()
+    assert len(recited(texts, 1, only_successes=True)) == 0  # it never succeeds
 
 
 def test_a_step_left_out_counts_in_the_returns_before_it(
-    make_config: Make, monkeypatch: pytest.MonkeyPatch
+    make_config: Make, recited: Recited
 ) -> None:
-    class Backward(Mumbler):
-        def __init__(self) -> None:
-            self.says = iter(("observe", "pickup Mug", "end"))
-
-    monkeypatch.setattr(agents.rl.demonstrations, "make_agent", lambda _: Backward())
-    config = make_config(
-        env={"episodes": "mini", "types": ["single_toggle"], "illegal_penalty": 0.5}
-    )
-    env = make_env(config.env, with_text=True)
-    env.reset(seed=0)
-    seen = demonstrate(env, "backward", 1, 0.9, False)
-    step = config.env.step_penalty
+    step = make_config().env.step_penalty
+    seen = recited(("observe", "pickup Mug", "end"), 1)
     assert seen.returns[1] == pytest.approx(-step)
     assert seen.returns[0] == pytest.approx(-step - 0.9 * (step + 0.5) - 0.81 * step)
-    env.close()
 
 
-def test_a_teacher_that_shows_nothing_is_one_clear_error(make_config: Make) -> None:
+def test_a_teacher_without_usable_steps_is_one_clear_error(make_config: Make) -> None:
     config = make_config(env={"episodes": "mini", "types": ["single_pickup"], "max_steps": 1})
     with pytest.raises(ValueError, match=r"oracle showed nothing to learn in 2 episodes \(0 succ"):
         collect_demonstrations(config, WarmStart(teacher="oracle", episodes=2), seed=0)

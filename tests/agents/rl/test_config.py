@@ -1,4 +1,4 @@
-"""A run's YAML: what fits, what does not, and how that is said."""
+"""The YAML of a training run: valid values, invalid values and their error messages."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def file(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("name", config_names())
 def test_those_that_come_with_er_gym_are_whole(name: str) -> None:
     config = load_config(config_file(name))
-    assert config.env.instances == "explore"  # what the figures of docs/baselines.md are under
+    assert config.env.instances == "explore"  # the figures of docs/baselines.md use this setting
 
 
 def test_defaults_and_overrides(file: Path) -> None:
@@ -42,7 +42,7 @@ def test_what_is_written_out_is_read_the_same(file: Path, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        (["total_steps"], r"'total_steps' is no override; give NAME=VALUE"),
+        (["total_steps"], r"'total_steps' is not an override; give NAME=VALUE"),
         (["total_steps=0"], r"'total_steps': input should be greater than 0, not 0"),
         (["steps=5"], r"'steps': extra inputs are not permitted"),
         (["env.types=[fly]"], r"unknown type 'fly'; choose of: single_search,"),
@@ -51,7 +51,7 @@ def test_what_is_written_out_is_read_the_same(file: Path, tmp_path: Path) -> Non
         (["total_steps.more=1"], r"'total_steps' is 1000, which has no fields"),
         (
             ["curriculum=[{until: 9, types: [single_search]}, {until: 9, types: [single_search]}]"],
-            r"end at \[9, 9\]; let each end later",
+            r"end at \[9, 9\]; each must end after the one",
         ),
     ],
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""DQN and QR-DQN try, and think best, nothing but what is legal."""
+"""DQN and QR-DQN explore and choose only legal actions."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_only_a_legal_action_is_thought_best(env: VecEnv, name: str) -> None:
 
 
 @NAMES
-def test_the_target_hopes_for_nothing_illegal(env: VecEnv, name: str) -> None:
+def test_illegal_actions_have_very_low_values(env: VecEnv, name: str) -> None:
     obs = env.reset()
     said = worth(learner(env, name), obs)
     assert said[:, obs["mask"] == 0].max() < -1000 < said[:, obs["mask"] == 1].min()
@@ -146,7 +146,7 @@ def test_learning_stays_finite(env: VecEnv, name: str) -> None:
 
 
 @NAMES
-def test_what_is_loaded_acts_alike(env: VecEnv, name: str, tmp_path: Path) -> None:
+def test_a_loaded_model_acts_alike(env: VecEnv, name: str, tmp_path: Path) -> None:
     model = learner(env, name)
     model.learn(60, log_interval=None)
     prepare_run(configured(name), tmp_path)
@@ -180,7 +180,7 @@ def test_a_full_buffer_is_enough_if_it_is_smaller_than_the_warm_up(env: VecEnv) 
     assert model._n_updates > 0
 
 
-def test_the_buffer_keeps_what_was_seen(env: VecEnv) -> None:
+def test_the_buffer_keeps_observations(env: VecEnv) -> None:
     spaces = env.observation_space, env.action_space
     half, plain = (
         kind(10, *spaces, n_envs=ENVS) for kind in (dqn.HalfReplayBuffer, DictReplayBuffer)

@@ -1,4 +1,4 @@
-"""Runs are weights and JSON; a file that could run code is read only when that is allowed."""
+"""Model files are weights and JSON. A file that could run code is read only with ``trust``."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_a_zip_that_runs_code_is_refused_and_does_not_run(hostile: tuple[Path, P
     assert not written.exists()
     with pytest.raises(ValueError, match="cannot be read as a model"):
         load_last_checkpoint(path, trust=True)
-    assert written.exists()  # so this test tests what it says
+    assert written.exists()  # otherwise this test would prove nothing
 
 
 def test_the_commands_refuse_it_in_one_line(hostile: tuple[Path, Path], tmp_path: Path) -> None:
@@ -147,8 +147,11 @@ def pickled(run: Path) -> np.ndarray:
         (lambda run: {"about": pickled(run)}, "Object arrays cannot be loaded"),
         (lambda run: {"policy/value_net.0.bias": pickled(run)}, "Object arrays cannot be loaded"),
         (lambda run: {"policy/value_net.0.bias": np.zeros(3, np.float32)}, r"\(16,\) is needed"),
-        (lambda run: {"policy/value_net.0.bias": np.zeros(10**6)}, "larger than it can be"),
-        (lambda run: {"optimizer/99/exp_avg": np.zeros(3, np.float32)}, "belongs to no weight"),
+        (lambda run: {"policy/value_net.0.bias": np.zeros(10**6)}, "larger than its weight"),
+        (
+            lambda run: {"optimizer/99/exp_avg": np.zeros(3, np.float32)},
+            "does not belong to a weight",
+        ),
         (lambda run: {"about": about(run, actions=7)}, "its actions is 7, and 286 is needed"),
         (lambda run: {"about": about(run, counters={})}, "num_timesteps"),
         (lambda run: {"about": np.zeros(5, np.uint8)}, "Expecting value"),

@@ -1,4 +1,4 @@
-"""The network over types: what it looks at, and what it leaves alone."""
+"""The network over types: which inputs change its outputs, and which do not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Training runs: they learn, they continue, they end with as many steps as were asked for."""
+"""Training runs learn, continue, and end after the requested number of steps."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_the_run_directory(make_config: Make, tmp_path: Path) -> None:
     assert list((run / "tensorboard").iterdir())
 
 
-def test_more_steps_continue_a_run_and_none_left_do_nothing(
+def test_more_steps_continue_a_run_and_a_complete_run_does_nothing(
     make_config: Make, tmp_path: Path
 ) -> None:
     run = tmp_path / "run"

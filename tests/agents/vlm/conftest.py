@@ -1,4 +1,4 @@
-"""A server of the tests' own, and Qwen's package for pictures."""
+"""Fixtures: a server for the tests, and Qwen's package for pictures."""
 
 from __future__ import annotations
 

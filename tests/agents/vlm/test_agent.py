@@ -1,4 +1,4 @@
-"""The agent's loop: what it sends, how it reads replies, and what it keeps of them."""
+"""The agent's loop: its requests, its reading of replies, and its record."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_a_model_is_told_the_limit_that_the_environment_keeps(
     assert (episode.max_steps, episode.end_reason) == (4, "step limit")
 
 
-def test_what_was_sent_is_sent_again_unchanged(env: Callable[..., EmbodiedEnv]) -> None:
+def test_sent_messages_never_change(env: Callable[..., EmbodiedEnv]) -> None:
     script = Script(*decided(*WAY))
     play(env("rgb"), script, settings(sees="pictures"))
     for before, after in zip(script.sent, script.sent[1:], strict=False):
@@ -124,7 +124,7 @@ def test_what_was_sent_is_sent_again_unchanged(env: Callable[..., EmbodiedEnv]) 
     assert len(pictures(script.sent[-1])) == len(script.sent)
 
 
-def test_observing_shows_what_is_on_all_sides(env: Callable[..., EmbodiedEnv]) -> None:
+def test_observing_shows_all_sides(env: Callable[..., EmbodiedEnv]) -> None:
     script = Script(*decided("observe", "end"))
     play(env("rgb"), script, settings(sees="pictures"))
     first, seen = pictures(script.sent[0]), pictures(script.sent[1][-1:])
@@ -173,7 +173,7 @@ def test_three_replies_without_an_action_end_the_episode(env: Callable[..., Embo
     assert [step.verb for step in episode.steps] == ["init", "error", "error", "error"]
 
 
-def test_a_usable_reply_begins_the_count_anew(env: Callable[..., EmbodiedEnv]) -> None:
+def test_a_usable_reply_resets_the_count(env: Callable[..., EmbodiedEnv]) -> None:
     script = Script("No.", "No.", *decided("observe"), "No.", "No.", *decided("end"))
     _, episode = play(env(), script, settings())
     assert episode.end_reason == "end"
@@ -185,7 +185,7 @@ def test_even_a_reply_that_reads_like_an_action_is_not_done_if_it_has_a_problem(
     script = Script(*decided("fly to Fridge", "end"))
     _, episode = play(env(), script, settings())
     assert [step.verb for step in episode.steps] == ["init", "error", "end"]
-    assert "'fly to Fridge' is no action" in texts(script.sent[1][-1])
+    assert "'fly to Fridge' is not an action" in texts(script.sent[1][-1])
 
 
 def test_names_are_matched_to_types(env: Callable[..., EmbodiedEnv]) -> None:
@@ -310,7 +310,7 @@ def test_a_recorded_conversation_is_replayed(
     assert "no conversation in" in stranger.error
 
 
-def test_a_directory_without_conversations_is_told(tmp_path: Path) -> None:
+def test_a_directory_without_conversations_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="holds no conversations"):
         RecordedClient(tmp_path)
     (tmp_path / "x.json").write_text("{}")

@@ -1,4 +1,4 @@
-"""Many threads, one model: who gets what, and that nobody waits for ever."""
+"""Batching: many threads share a model, each gets its own result, and none waits for ever."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from agents.vlm.chat import ModelError
 from agents.vlm.clients.batching import Batcher
 from er_gym.rollout.agent import CannotGoOn
 
-LONG = 60.0  # seconds; nothing here waits so long unless it is broken
+LONG = 60.0  # seconds; only broken code waits so long
 Outcome = str | type[Exception]
 
 

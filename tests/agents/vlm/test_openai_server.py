@@ -21,6 +21,7 @@ from typing import Any
 
 import pytest
 from naughty_server import HUGE, MODEL, NaughtyServer, Raw, completion
+from support import run_python
 
 pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
 
@@ -337,7 +338,7 @@ def test_tokens_that_the_server_does_not_tell_or_cannot_have_counted(
     assert reply.model == ""
 
 
-def test_tokens_that_are_told_are_believed(naughty: NaughtyServer, make: Make) -> None:
+def test_reported_token_counts_are_used(naughty: NaughtyServer, make: Make) -> None:
     usage = {"prompt_tokens": 5, "prompt_tokens_details": None, "completion_tokens_details": {}}
     naughty.then(
         Raw({**completion({"content": "end"}), "usage": {**usage, "completion_tokens": 2}})
@@ -398,7 +399,7 @@ SLOW = ("drip", "drip_head", "stall")
         *((slow, "no whole answer within 0.5 s") for slow in SLOW),
     ],
 )
-def test_what_may_pass_is_tried_again(
+def test_temporary_failures_are_tried_again(
     naughty: NaughtyServer, make: Make, behaviour: str, words: str
 ) -> None:
     client = make(naughty.url, timeout=0.5 if behaviour in SLOW else 20)
@@ -453,7 +454,7 @@ def test_the_server_says_how_long_to_wait(make: Make) -> None:
     with NaughtyServer(script=["429"], retry_after="1.2") as server:
         make(server.url).reply(HELLO, seed=0)
         first, second = server.seen
-        assert second.at - first.at >= 1.2  # of its own accord the SDK waits half a second
+        assert second.at - first.at >= 1.2  # the SDK alone would wait half a second
 
 
 @pytest.mark.parametrize("pause", [0.01, 600])
@@ -485,7 +486,7 @@ def test_who_listens_slowly_or_not_at_all_is_not_waited_for(make: Make, pause: f
     ("behaviour", "words"),
     [
         ("401", "401, incorrect key; the server does not accept the key of OUR_TEST_KEY"),
-        ("403", "403, not for you; the server does not let the key of OUR_TEST_KEY do this"),
+        ("403", "403, not for you; the server does not allow the key of OUR_TEST_KEY to do this"),
         ("404", "404, the model does not exist; the server has no such model"),
         ("quota", "429, you exceeded your current quota"),
     ],
@@ -506,7 +507,7 @@ def test_what_ends_the_run(
 def test_a_request_that_is_wrong_in_itself_ends_the_run(naughty: NaughtyServer, make: Make) -> None:
     client = make(naughty.url)
     naughty.then("400", "ok", "400")
-    with pytest.raises(CannotGoOn, match="400, unknown parameter 'top_p'; no request like this"):
+    with pytest.raises(CannotGoOn, match="400, unknown parameter 'top_p'; every request"):
         client.reply(HELLO, seed=0)
     client.reply(HELLO, seed=0)
     with pytest.raises(ModelError, match=r"400, unknown parameter 'top_p'$"):
@@ -534,9 +535,7 @@ def test_no_server(naughty: NaughtyServer, make: Make) -> None:
     never, once = make(naughty.url, tries=1), make(naughty.url, tries=1)
     once.reply(HELLO, seed=0)
     naughty.close()
-    with pytest.raises(
-        CannotGoOn, match=r"refused; nothing has answered yet: see whether the serv"
-    ):
+    with pytest.raises(CannotGoOn, match=r"refused; nothing has answered yet: check that the serv"):
         never.reply(HELLO, seed=0)
     with pytest.raises(ModelError):
         once.reply(HELLO, seed=0)
@@ -556,9 +555,13 @@ def test_no_server(naughty: NaughtyServer, make: Make) -> None:
             CannotGoOn,
             "set NO_SUCH,",
         ),
-        ({"base_url": "", "key_from": "ODD"}, CannotGoOn, "ODD holds characters that are in no"),
-        ({"base_url": "localhost:8000"}, ValueError, "'localhost:8000' is no address; give one"),
-        ({"base_url": "http://me:sk-2@host:x/v1"}, ValueError, "'host:x/v1' is no address"),
+        ({"base_url": "", "key_from": "ODD"}, CannotGoOn, "ODD holds characters that no"),
+        (
+            {"base_url": "localhost:8000"},
+            ValueError,
+            "'localhost:8000' is not an address; give one",
+        ),
+        ({"base_url": "http://me:sk-2@host:x/v1"}, ValueError, "'host:x/v1' is not an address"),
         ({"base_url": "", "api_version": "1"}, ValueError, "give server.base_url too, such as"),
     ],
 )
@@ -621,7 +624,7 @@ def test_who_waits_for_a_turn_is_let_go() -> None:
     assert str(raised[0]) == "the client has been closed"
 
 
-def test_the_key_is_never_told(
+def test_the_key_never_appears(
     naughty: NaughtyServer, make: Make, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.DEBUG)
@@ -648,9 +651,7 @@ def test_the_key_is_never_told(
     assert not [line for line in told if KEY[:10] in line]
 
 
-def test_the_sdks_own_log_does_not_tell_the_key_either(
-    naughty: NaughtyServer, repository: Path
-) -> None:
+def test_the_sdks_own_log_does_not_tell_the_key_either(naughty: NaughtyServer) -> None:
     program = (
         "from agents.vlm.chat import Message\n"
         "from agents.vlm.clients.openai_server import OpenAIClient\n"
@@ -659,15 +660,7 @@ def test_the_sdks_own_log_does_not_tell_the_key_either(
         "OpenAIClient('m', AgentSettings(server=server)).reply((Message('user', ('x',)),), 0)\n"
     )
     naughty.then("500")
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=repository,
-        env={**os.environ, "OPENAI_LOG": "debug"},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=True,
-    )
+    done = run_python(program, OPENAI_LOG="debug")
     assert "Sending HTTP Request" in done.stderr
     assert KEY not in done.stderr + done.stdout
 
@@ -699,7 +692,7 @@ def test_a_query_is_sent_with_each_request(naughty: NaughtyServer, make: Make) -
 @pytest.mark.parametrize("status", [301, 307, 308])
 def test_requests_are_not_sent_on(naughty: NaughtyServer, make: Make, status: int) -> None:
     naughty.then(Raw({}, status, {"Location": f"http://elsewhere.invalid/?key={KEY}"}))
-    words = r"not sent on to http://elsewhere\.invalid/\?key=\*\*\*; if the server is there"
+    words = r"redirects to http://elsewhere\.invalid/\?key=\*\*\*; if the server is there"
     with pytest.raises(CannotGoOn, match=words):
         make(naughty.url).reply(HELLO, seed=0)
     assert naughty.count == 1
@@ -758,7 +751,7 @@ def test_a_server_that_refuses_again_and_again_stops_the_run(
     for kind in (ModelError, ModelError, CannotGoOn):
         with pytest.raises(kind, match="500, something broke"):
             client.reply(HELLO, seed=0)
-    assert client.reply(HELLO, seed=0).text == "observe"  # what is asked later is asked
+    assert client.reply(HELLO, seed=0).text == "observe"  # later requests are sent again
 
 
 def test_those_who_wait_are_let_go_when_the_run_stops(

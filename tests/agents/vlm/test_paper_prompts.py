@@ -1,4 +1,4 @@
-"""Words read off training files: of several styles, and of people who mean no good."""
+"""Prompts from training files: files of several styles, and malicious files."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ SAMPLES = [conversation(first_turn(task)) for task in TASKS]
 
 
 class Reader:
-    """Writes samples to a file and reads the words off it."""
+    """Writes samples to a file and reads the prompts from it."""
 
     def __init__(self, folder: Path) -> None:
         self.file = folder / "train.json"
@@ -152,7 +152,7 @@ def test_what_the_model_saw_is_what_it_sees(read: Reader, style: str) -> None:
         assert later(prompts, action) == later_turn(action)
     assert (prompts.samples, prompts.odd) == (len(TASKS), 0)
     assert prompts.name == "train.json"
-    assert "the words of 6 conversations of" in prompts.about
+    assert "the texts of 6 conversations of" in prompts.about
 
 
 @pytest.mark.parametrize(
@@ -214,7 +214,7 @@ def test_the_language_of_what_is_not_in_the_file(read: Reader) -> None:
 def test_only_as_much_is_read_as_is_needed(read: Reader) -> None:
     samples = [conversation(first_turn(TASKS[i % 6]), ACTIONS[:2]) for i in range(2 * ENOUGH)]
     text = json.dumps(samples)
-    padding = json.dumps("x" * (1 << 22))  # what follows is not even reached
+    padding = json.dumps("x" * (1 << 22))  # the rest is not read
     prompts = read.text(f"{text[:-1]}, {padding}, nonsense")
     assert (prompts.samples, prompts.odd) == (ENOUGH, 0)
 
@@ -540,7 +540,7 @@ ODD_ITEMS: list[object] = [
 def test_odd_items_are_passed_over(read: Reader) -> None:
     prompts = read([*ODD_ITEMS[:6], *SAMPLES, *ODD_ITEMS[6:]])
     assert (prompts.samples, prompts.odd) == (len(SAMPLES), len(ODD_ITEMS))
-    assert f"{len(ODD_ITEMS)} items passed over" in prompts.about
+    assert f"{len(ODD_ITEMS)} items skipped" in prompts.about
     assert first(prompts, "Go.") == first_turn("Go.")
 
 
@@ -590,5 +590,5 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     ("decide", "sees"), [("tools", "pictures"), ("json", "pictures"), ("tags", "text")]
 )
 def test_what_such_models_have_not_learnt(read: Reader, decide: Any, sees: Any) -> None:
-    with pytest.raises(ValueError, match=r"words of train\.json go with decide: tags and sees:"):
+    with pytest.raises(ValueError, match=r"prompts of train\.json need decide: tags and sees:"):
         read(SAMPLES).system(decide=decide, sees=sees)

@@ -1,4 +1,4 @@
-"""The words that a model is given: what comes with er-gym, and what others write."""
+"""Prompts: those that come with er-gym, and those that users write."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def test_words_instead_of_pictures(prompts: PromptSet) -> None:
 
 
 def test_no_list_of_types_is_given_away(prompts: PromptSet) -> None:
-    """Who has eyes has to see what there is."""
+    """A model with vision must find the objects itself, so its prompts list no object types."""
     text = "\n".join(said(prompts, "tags", "pictures"))
     for name in ("Mug", "Drawer", "Cabinet", "Sofa", "Bed", "Desk"):
         assert name not in text.replace(TASK, "")
@@ -272,12 +272,12 @@ def test_what_is_changed_while_it_is_used_changes_nothing(mine: Path) -> None:
         ),
         ("system.jinja", "{{ self.__init__.__globals__ }}", r"system\.jinja:1: SecurityError"),
         ("system.jinja", "{{ range(10 ** 9)|list }}", r"system\.jinja:1: SecurityError"),
-        ("system.jinja", "\n\n{% if %}", r"system\.jinja:3: no template: Expected an expression"),
+        ("system.jinja", "\n\n{% if %}", r"jinja:3: not a valid template: Expected an expression"),
         ("system.jinja", "{% include '../../x.jinja' %}", r"system\.jinja:1: TemplateNotFound"),
         ("views.jinja", "\n{{ nothing }}", r"views\.jinja:2: UndefinedError"),
-        ("feedback.jinja", "{{ problem }}<image>", r"<image> comes 1 times, .* pictures are 0"),
-        ("first.jinja", "No picture.", r"first\.jinja: <image> comes 0 times, .* pictures are 1"),
-        ("views.jinja", "<image>", r"next\.jinja: <image> comes 1 times, .* pictures are 4"),
+        ("feedback.jinja", "{{ problem }}<image>", r"<image> occurs 1 times, .* is 0"),
+        ("first.jinja", "No picture.", r"first\.jinja: <image> occurs 0 times, .* is 1"),
+        ("views.jinja", "<image>", r"next\.jinja: <image> occurs 1 times, .* is 4"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_a_template_is_one_line(
@@ -292,10 +292,13 @@ def test_what_is_wrong_with_a_template_is_one_line(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("observe: look", "say what each of these means, and no other: navigate to, pickup,"),
-        ("- observe", "say what each of these means"),
+        (
+            "observe: look",
+            "give the meanings of these actions, and of no others: navigate to, pickup,",
+        ),
+        ("- observe", "give the meanings of these actions"),
         ("a: [", "not YAML"),
-        ("\n".join(f"{verb}: do" for verb in (*ALL_VERBS, "fly")), "and no other"),
+        ("\n".join(f"{verb}: do" for verb in (*ALL_VERBS, "fly")), "and of no others"),
     ],
 )
 def test_actions_that_do_not_fit(mine: Path, text: str, message: str) -> None:
@@ -325,5 +328,5 @@ def test_without_jinja(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_language_that_is_not_there(mine: Path) -> None:
     shutil.rmtree(mine / "zh")
-    with pytest.raises(ValueError, match="are not there in 'zh'; choose one of: en"):
+    with pytest.raises(ValueError, match="do not exist in 'zh'; choose one of: en"):
         load_prompts(Prompts(profile=str(mine), language="zh"))

@@ -1,4 +1,4 @@
-"""What is struck out of what a server says, and what is left alone."""
+"""Secrets are removed from a server's output, and other text stays."""
 
 from __future__ import annotations
 

@@ -1,12 +1,9 @@
-"""Replies kept on disk: what is a hit and what is not, several processes, and damage."""
+"""The reply cache on disk: hits and misses, several processes, and damage."""
 
 from __future__ import annotations
 
 import os
 import re
-import signal
-import subprocess
-import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -14,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from support import lines_until_killed
 
 pytest.importorskip("diskcache", reason="needs pip install 'er-gym[vlm]'")
 
@@ -73,7 +71,7 @@ def make(tmp_path: Path) -> Iterator[Make]:
         each.close()
 
 
-def test_what_was_asked_once_is_not_asked_again(make: Make) -> None:
+def test_a_repeated_request_is_answered_from_the_cache(make: Make) -> None:
     client = Counting()
     first = make(client).reply(HELLO, seed=1)
     assert (first.from_cache, first.cost) == (False, 0.5)
@@ -164,18 +162,10 @@ for seed in itertools.count():
 """
 
 
-def test_a_killed_process_leaves_what_it_kept(make: Make, tmp_path: Path, repository: Path) -> None:
+def test_a_killed_process_leaves_what_it_kept(make: Make, tmp_path: Path) -> None:
     directory = tmp_path / "run" / "replies"
     mine = make(Counting())  # open at the same time
-    with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(directory)],
-        cwd=repository,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdout is not None
-        seen = [int(process.stdout.readline()) for _ in range(40)]
-        process.send_signal(signal.SIGKILL)
+    seen = list(map(int, lines_until_killed(PROGRAM, directory, 40)))
     question = (Message("user", ("hello",)),)
     for client in (mine, make(Counting())):
         replies = [client.reply(question, seed) for seed in seen]
@@ -219,12 +209,12 @@ def test_a_damaged_file_is_set_aside(
         for seed in range(300):
             assert kept.reply(HELLO, seed).text.startswith("reply ")
     assert [re.sub(r"\(.*?\)", "()", str(each.message)) for each in warned] == [
-        f"{directory} is damaged (); it is now {directory}.damaged-1"
+        f"{directory} is damaged (); it was moved to {directory}.damaged-1"
     ]
     assert (tmp_path / "run" / "replies.damaged-1").is_dir()
     asked = client.asked
     kept.reply(HELLO, seed=299)
-    assert client.asked == asked  # kept anew
+    assert client.asked == asked  # cached again
 
 
 @pytest.mark.parametrize("damage", [_cut, Path.unlink])
@@ -265,5 +255,5 @@ def test_nothing_is_unpickled(make: Make, tmp_path: Path) -> None:
 
 def test_a_directory_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "replies").write_text("")
-    with pytest.raises(ValueError, match=r"replies cannot be kept in .*choose another --out"):
+    with pytest.raises(ValueError, match=r"replies cannot be cached in .*choose another --out"):
         ReplyCache(Counting(), tmp_path / "replies")

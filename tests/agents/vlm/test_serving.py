@@ -1,4 +1,4 @@
-"""Commands for servers as a table; real processes that stand in for servers."""
+"""The command lines of servers as a table, and real processes in place of servers."""
 
 from __future__ import annotations
 
@@ -383,10 +383,10 @@ def test_dry_run_only_says_what_it_would_do(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["nothing.gguf"], "nothing.gguf is no file"),
-        (["./nothing"], "./nothing is not there"),
+        (["nothing.gguf"], "nothing.gguf is not a file"),
+        (["./nothing"], "./nothing does not exist"),
         (["x/y", "--python", "/nothing"], "/nothing does not run as a Python"),
-        (["x/y", "--engine", "vllm", "--dry-run"], "x/y is for vllm to serve"),
+        (["x/y", "--engine", "vllm", "--dry-run"], "vllm should serve x/y"),
     ],
 )
 def test_bad_input_is_one_line(arguments, says, tmp_path, monkeypatch):
@@ -435,7 +435,7 @@ def serving(stand_in):
     command = stand_in(STAND_IN, 0.5, "helper")
     code = (
         "import signal, sys\n"
-        # What runs in the background has Ctrl-C ignored.
+        # Background processes ignore Ctrl-C.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from agents.vlm.serving import Command\n"
         "from benchmarks.cli.serve import run_server\n"

@@ -1,4 +1,4 @@
-"""What stops a run whose server refuses, and what is said while it waits."""
+"""The supervisor stops a run whose server refuses requests, and reports waits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def supervisor() -> RequestSupervisor:
 def test_three_requests_given_up_in_a_row_stop_the_run(supervisor: RequestSupervisor) -> None:
     kinds = [type(supervisor.request(0).gave_up("503")) for _ in range(3)]
     assert kinds == [ModelError, ModelError, CannotGoOn]
-    assert type(supervisor.request(0).gave_up("503")) is ModelError  # counted anew
+    assert type(supervisor.request(0).gave_up("503")) is ModelError  # the count starts again
 
 
 def test_a_reply_between_them_does_not(supervisor: RequestSupervisor) -> None:
@@ -39,7 +39,7 @@ def test_one_request_is_enough_where_others_fail_too_and_nobody_has_a_reply(
         request.retry("503", 0.0, of=6)
     error = first.gave_up("503")
     assert str(error).startswith("the server has refused 3 requests in a row, the last with: 503;")
-    # The others end with it, and are no failures of their own.
+    # The others end with it, and do not count as failures.
     assert isinstance(second.gave_up("late"), CannotGoOn)
     with pytest.raises(CannotGoOn, match="refused 3 requests"):
         third.wait(60)

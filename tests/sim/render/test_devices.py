@@ -1,4 +1,4 @@
-"""The same scene graph through OpenGL, where a driver with EGL is there (Mesa's will do)."""
+"""The same scene graph drawn by OpenGL, if a driver with EGL is installed (Mesa's works)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stoves are under their burners, behind their knobs, and in nobody's way."""
+"""Stoves are under their burners and behind their knobs, and hide no other object."""
 
 from __future__ import annotations
 

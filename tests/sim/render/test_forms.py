@@ -1,4 +1,4 @@
-"""Things that one can carry fill their boxes, however they lie."""
+"""Pickupable objects fill their boxes in every orientation."""
 
 from __future__ import annotations
 

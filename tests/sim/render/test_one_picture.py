@@ -1,4 +1,4 @@
-"""A picture depends on the state of the world, and not on how the world came there."""
+"""A picture depends on the state of the world, not on its history."""
 
 from __future__ import annotations
 

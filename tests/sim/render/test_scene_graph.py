@@ -1,4 +1,4 @@
-"""What the renderer draws: the right things, where they are, in the state that they are in."""
+"""The renderer draws the right objects, at their positions and in their states."""
 
 from __future__ import annotations
 

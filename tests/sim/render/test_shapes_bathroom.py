@@ -1,4 +1,4 @@
-"""Shapes that hide one another by nature: a sink and its basin, blinds and their window."""
+"""Shapes that overlap each other: a sink and its basin, blinds and their window."""
 
 from __future__ import annotations
 

@@ -261,7 +261,7 @@ _HABITS = (_bush, _fronds, _tree, _blades)
 """Shapes by the number of the asset id."""
 
 
-# -- what one waters them with, and other ornaments ------------------------------------------------
+# -- watering cans and other ornaments -------------------------------------------------------------
 
 
 @shape("WateringCan")

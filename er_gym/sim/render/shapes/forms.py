@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
 from math import atan2, degrees, hypot, pi
 
 import numpy as np
 
+from er_gym.sim.render.appearance import Appearance
 from er_gym.sim.render.mesh import Mesh
 from er_gym.sim.render.patch import Colour, Triple
 
@@ -25,6 +27,16 @@ def laid(size: Triple, build: Callable[[Triple], Mesh]) -> Mesh:
     upright.add(build((width, thick, h)), at=(0, h / 2, -thick / 2), turn=("x", 90))
     mesh.add(upright, turn=("y", 0 if d <= w else 90))
     return mesh
+
+
+def lying(build: Callable[[Triple], Mesh]) -> Callable[[Appearance], Mesh]:
+    """The shape of a thin object that only its size decides; see :func:`laid`."""
+
+    @wraps(build)
+    def shape(appearance: Appearance) -> Mesh:
+        return laid(appearance.size, build)
+
+    return shape
 
 
 def leant(size: Triple, thick: float, build: Callable[[float], Mesh]) -> Mesh:

@@ -126,7 +126,7 @@ def panels(
     """
     floor, top = ends
     for k, part in enumerate(footprint):
-        # An edge that touches another part is none.
+        # An edge that touches another part gets no panel.
         others = [
             ((a[0], floor, a[1]), (a[2], top, a[3])) for j, a in enumerate(footprint) if j != k
         ]

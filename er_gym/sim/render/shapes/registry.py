@@ -47,7 +47,7 @@ def load_added() -> None:
     """Import the shapes of other packages, which registers them.
 
     Raises:
-        PluginError: one cannot be loaded, or is no registered function.
+        PluginError: a shape cannot be loaded, or is not a registered function.
     """
     expected = f"a function under @{__name__}.shape"
     for found, origin in added("shape", GROUP, VARIABLE, expected, registers=True):

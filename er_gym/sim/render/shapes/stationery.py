@@ -11,7 +11,7 @@ from er_gym.sim.render.appearance import Appearance
 from er_gym.sim.render.mesh import Mesh
 from er_gym.sim.render.palette import shaded
 from er_gym.sim.render.patch import Colour, Triple
-from er_gym.sim.render.shapes.forms import laid, leant, roundel
+from er_gym.sim.render.shapes.forms import laid, leant, lying, roundel
 from er_gym.sim.render.shapes.registry import shape
 
 _COVERS: tuple[Colour, ...] = (
@@ -20,11 +20,8 @@ _COVERS: tuple[Colour, ...] = (
 )  # fmt: skip
 _PAGES, _PRINT = (0.95, 0.92, 0.82), (0.55, 0.53, 0.50)
 _WHITE, _INK, _STEEL, _BRASS = (
-    (0.97, 0.97, 0.95),
-    (0.10, 0.15, 0.50),
-    (0.78, 0.79, 0.82),
-    (0.85, 0.68, 0.30),
-)
+    (0.97, 0.97, 0.95), (0.10, 0.15, 0.50), (0.78, 0.79, 0.82), (0.85, 0.68, 0.30),
+)  # fmt: skip
 _YELLOW, _RAW_WOOD, _ERASER, _LEAD = (
     (0.95, 0.72, 0.10), (0.87, 0.68, 0.44), (0.93, 0.52, 0.55), (0.15, 0.15, 0.16),
 )  # fmt: skip
@@ -111,18 +108,20 @@ def _half_book(size: Triple, cover: Colour) -> Mesh:
 
 
 @shape("Newspaper")
-def newspaper(appearance: Appearance) -> Mesh:
+@lying
+def newspaper(size: Triple) -> Mesh:
     """Grey-white and folded, its sheets fanned out, with a headline and columns of print."""
-    return laid(appearance.size, _newspaper)
+    w, h, d = size
+    if w >= d:
+        return _wide_newspaper(size)
+    mesh = Mesh()
+    mesh.add(_wide_newspaper((d, h, w)), turn=("y", 90))
+    return mesh
 
 
-def _newspaper(size: Triple) -> Mesh:
+def _wide_newspaper(size: Triple) -> Mesh:
     """A folded newspaper: thick at the fold on its far side, thinner towards the open side."""
     w, h, d = size
-    if w < d:
-        mesh = Mesh()
-        mesh.add(_newspaper((d, h, w)), turn=("y", 90))
-        return mesh
     mesh, back, thin = Mesh(), 0.5 * h - d / 2, 0.35 * h
     for k, (low, high, slip) in enumerate(((0.0, 0.45, 0.0), (0.5, 1.0, 0.03))):
         y0, y1, wide = low * h, high * h, (1 - 2 * slip) * w
@@ -259,12 +258,9 @@ def _key(length: float, bow: float, thick: float, colour: Colour) -> Mesh:
 
 
 @shape("CD")
-def cd(appearance: Appearance) -> Mesh:
+@lying
+def cd(size: Triple) -> Mesh:
     """A silver disc with a hole, which shimmers in all colours."""
-    return laid(appearance.size, _disc)
-
-
-def _disc(size: Triple) -> Mesh:
     w, h, d = size
     mesh = Mesh()
     mesh.lathe([(w / 2, 0), (w / 2, h)], _STEEL, segments=20, squash=(1, d / w))

@@ -114,7 +114,7 @@ def _tray(mesh: Mesh, size: Triple, back: float, colour: Colour) -> None:
 def counter_top(appearance: Appearance) -> Mesh:
     """A slab of stone with holes for sinks. One that extends to the floor has sides as well.
 
-    :mod:`er_gym.sim.render.carcasses` draws the carcasses of other counters, which are no objects.
+    :mod:`er_gym.sim.render.carcasses` draws the carcasses of other counters, which are not objects.
     """
     h = appearance.size[1]
     stone, mesh = appearance.palette.counter, Mesh()

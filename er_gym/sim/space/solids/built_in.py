@@ -51,7 +51,7 @@ def built_in(scene_name: str, i: int) -> tuple[tuple[str, Box], ...]:
 
 @lru_cache(maxsize=128)
 def hosts(scene_name: str) -> Mapping[int, int]:
-    """For each built-in object the row of the object that it is built into; of several the last."""
+    """The row of the object that each built-in object is built into; the last one of several."""
     scene = load_scene(scene_name)
     found = [i for i, kind in enumerate(scene.types) if kind in _HOSTS | _CASES]
     return {k: i for i in found for k in fitted_rows(scene_name, i)}

@@ -1,7 +1,8 @@
-"""Counters: the slab, which is the CounterTop object, and the carcass under it, which is no object.
+"""Counters: the slab, which is the CounterTop object, and the carcass under it, not an object.
 
 The recorded box of nearly every counter is a slab 2 cm thick. Cabinets and drawers under it are
-objects, the carcass between and behind them is not. Only a few counters reach down to the floor.
+objects. The carcass between and behind them is not an object. Only a few counters reach down to the
+floor.
 """
 
 from __future__ import annotations

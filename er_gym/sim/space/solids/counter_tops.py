@@ -30,8 +30,8 @@ def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
     """(R, 2, 2) corners x, z of the rectangles that make up the box of recorded counter i.
 
     Three areas are cut from the box: the area that the agent's body covers as it walks, that of
-    other large furniture, and that right in front of cabinets and drawers. Of the rest the largest
-    rectangle is taken, then the largest of what remains, and so on. If nothing remains, the whole
+    other large furniture, and that right in front of cabinets and drawers. The largest rectangle of
+    the rest is taken, then the largest of what remains, and so on. If nothing remains, the whole
     box is returned: the agent walks under it.
     """
     scene = load_scene(scene_name)

@@ -1,8 +1,8 @@
 """The heading of a fixed object's front.
 
-For most types the front is AI2-THOR's own +z: seen from every recorded fridge, microwave, sofa,
-dresser and desk, the room lies there. Drawers and cabinets are not authored so. Their front is the
-side that faces the room, and a drawer's front is that of the furniture it is part of.
+For most types the front is AI2-THOR's own +z: that side of every recorded fridge, microwave, sofa,
+dresser and desk faces the room. Drawers and cabinets do not follow this rule. Their front is the
+side that faces the room, and a drawer has the front of the furniture that it is part of.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _AT_THE_BACK = 0.2
 _DOUBT = 0.3
 """Two sides may each be the front if their distances to the floor differ by less, metres."""
 _ASIDE = 3.0
-"""How many metres ahead a metre to the side counts for."""
+"""A metre to the side counts as this many metres ahead."""
 SIDES = ((1, 1), (0, 1), (1, -1), (0, -1))
 """World axis (0 x, 1 z) and sign of each side, by quarter turns of its heading from +z."""
 

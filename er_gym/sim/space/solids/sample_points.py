@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.rotation import unity_rotation
-from er_gym.sim.scene import Scene
 from er_gym.sim.scene_objects import SceneObjects
 from er_gym.sim.space.solids.built_in import hosts
 from er_gym.sim.space.solids.carcass import carcass
+from er_gym.sim.space.solids.kept_until_moved import kept_until_moved
 from er_gym.sim.space.solids.solid import upright_box
 from er_gym.sim.space.solids.surface_points import (
     INSET,
@@ -20,7 +18,6 @@ from er_gym.sim.space.solids.surface_points import (
     points_on_top,
     surface_fractions,
 )
-from er_gym.sim.world_cache import ObjectCacheKey
 
 SEEN_FROM_OUTSIDE = ("Drawer", "Cabinet", "CounterTop", "StoveBurner")
 """Types that are seen only from outside: their own boxes hide the points on their far sides."""
@@ -58,34 +55,13 @@ _CLOSE = 0.2
 Floats = NDArray[np.float64]
 
 
-_SAMPLE_POINTS: ObjectCacheKey[Floats] = ObjectCacheKey("sample points", until_moved=True)
-
-
-@lru_cache(maxsize=128)
-def _recorded_points(scene: Scene) -> dict[int, Floats]:
-    """The points of a scene's objects where they are recorded, filled by :func:`sample_points`."""
-    return {}
-
-
+@kept_until_moved("sample points")
 def sample_points(world: SceneObjects, i: int) -> Floats:
-    """(P, 3) points of object i, world frame, metres; kept until the object moves.
-
-    The object is visible if the agent sees any of them. Their number does not depend on where the
-    object is or in which state.
-    """
-    recorded = world.is_where_recorded(i)
-    kept = _recorded_points(world.scene) if recorded else world.cache.of_objects(_SAMPLE_POINTS)
-    points = kept.get(i)
-    if points is None:
-        points = kept[i] = _make_points(world, i)
-    return points
-
-
-def _make_points(world: SceneObjects, i: int) -> Floats:
     """(P, 3) points of object i, world frame, metres.
 
-    Most objects have points all over their boxes, which are the oriented ones where recorded. A
-    built-in object has points on its front, a shelf on its board.
+    The object is visible if the agent sees any of them. Their number does not depend on where the
+    object is or in which state. Most objects have points all over their boxes, which are the
+    oriented ones where recorded. A built-in object has points on its front, a shelf on its board.
     """
     kind = world.types[i]
     if kind == "Floor":

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.rotation import unity_rotation
-from er_gym.sim.scene import Scene
 from er_gym.sim.scene_objects import SceneObjects
 from er_gym.sim.space.recorded_surfaces import recorded_surfaces
 from er_gym.sim.space.solids.box_transforms import trimmed, turned
@@ -17,7 +15,7 @@ from er_gym.sim.space.solids.carcass import carcass
 from er_gym.sim.space.solids.counter_tops import rectangles
 from er_gym.sim.space.solids.facing import facings
 from er_gym.sim.space.solids.families import family, parts
-from er_gym.sim.world_cache import ObjectCacheKey
+from er_gym.sim.space.solids.kept_until_moved import kept_until_moved
 
 _HOB, _UNDER = 0.03, 0.004
 """How much wider than its burners a stove is at least, and how far it is below them, metres."""
@@ -43,26 +41,9 @@ class Solid:
     hiding: NDArray[np.float64]
 
 
-_SOLIDS: ObjectCacheKey[Solid] = ObjectCacheKey("solids", until_moved=True)
-
-
-@lru_cache(maxsize=128)
-def _recorded_solids(scene: Scene) -> dict[int, Solid]:
-    """The solids of a scene's objects at their recorded poses, filled by :func:`solid_of`."""
-    return {}
-
-
+@kept_until_moved("solids")
 def solid_of(world: SceneObjects, i: int) -> Solid:
-    """The solid of object i at its present place; kept until the object moves."""
-    recorded = world.is_where_recorded(i)
-    kept = _recorded_solids(world.scene) if recorded else world.cache.of_objects(_SOLIDS)
-    found = kept.get(i)
-    if found is None:
-        found = kept[i] = _make_solid(world, i)
-    return found
-
-
-def _make_solid(world: SceneObjects, i: int) -> Solid:
+    """The solid of object i at its present place."""
     if world.types[i] == "CounterTop" and i < len(world.scene):
         return _counter(world, i)
     if world.types[i] == "StoveBurner" and i == next(world.of_type("StoveBurner")):
@@ -105,7 +86,7 @@ def upright_box(
 
 
 def _with_stove(world: SceneObjects, i: int) -> Solid:
-    """A burner. The first one of a kitchen also stands for the stove, which is no object.
+    """A burner. The first one of a kitchen also stands for the stove, which is not an object.
 
     The stove hides what is behind it, from the floor to just below the burners. It is a little
     wider than they are.
