@@ -12,6 +12,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+from er_gym.envs.action_handler import Moment
 from er_gym.envs.actions import ACTIONS, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.faults import KIND_OF_VERB, KINDS, FaultPlan, other_places, parse_faults
@@ -126,7 +127,7 @@ def test_there_may_be_nowhere_else(envs: Callable[..., EmbodiedEnv]) -> None:
     handler, perception = episode._handler, episode.perception
     handler._known = KnownTypes(["Fridge"])  # type: ignore[attr-defined]
     object_id, outcome = handler.execute(
-        Action(verbs.NAVIGATE, "Fridge"), perception, episode._available, ()
+        Action(verbs.NAVIGATE, "Fridge"), Moment(perception, episode._available, ())
     )
     assert (object_id, outcome.perception, outcome.success) == ("", None, False)
     assert outcome.problem == "you did not get there, and are still where you were"
@@ -160,7 +161,7 @@ def test_rates_hold_and_a_third_try_goes_through() -> None:
         for action in actions:
             faults = []
             for _ in range(tries):
-                handler.execute(action, None, None, ())  # type: ignore[arg-type]
+                handler.execute(action, None)  # type: ignore[arg-type]
                 faults.append(handler.fault)
             assert inner.done[action] == faults.count("")
             if action.verb == verbs.TOGGLE:
