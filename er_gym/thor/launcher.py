@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
+import threading
 from hashlib import sha256
 from pathlib import Path
 
@@ -27,12 +28,18 @@ def thor_executable() -> str:
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "er-gym"
     path = cache / f"player-{sha256(text.encode()).hexdigest()[:12]}"
     try:
-        if not (os.access(path, os.X_OK) and path.read_text() == text):
-            cache.mkdir(parents=True, exist_ok=True)
-            write_atomic(path, text, mode=EXECUTABLE)
+        with _one_writer:
+            if not (os.access(path, os.X_OK) and path.read_text() == text):
+                cache.mkdir(parents=True, exist_ok=True)
+                write_atomic(path, text, mode=EXECUTABLE)
     except OSError:
         return shlex.join(_command())
     return shlex.quote(str(path))
+
+
+_one_writer = threading.Lock()
+"""A thread that starts a process while another writes the launcher would hand it the open file, and
+Linux runs no file that is open for writing ("Text file busy")."""
 
 
 def _command() -> list[str]:
