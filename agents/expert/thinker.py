@@ -175,10 +175,9 @@ class ThinkingAgent:
             correction=header.correction,
             cost=self._cost,
         )
-        record = (trajectory.model_dump_json() + "\n").encode()
         if self._rejects(trajectory):
-            return {f"{PLAYED}/{stem}.json": record}
-        return {**self._files, f"{PLAYED}/{stem}.json": record}
+            return {f"{PLAYED}/{stem}.json": _bytes(course_only(trajectory))}
+        return {**self._files, f"{PLAYED}/{stem}.json": _bytes(trajectory)}
 
     def _take_result(self, info: Mapping[str, Any]) -> None:
         """Note what came of the last action."""
@@ -274,6 +273,20 @@ class ThinkingAgent:
         replies = list(replies)
         if replies:
             self._cost = _sum_costs(self._cost, replies)
+
+
+def course_only(trajectory: Trajectory) -> Trajectory:
+    """A trajectory without what it saw and thought, to save space: its actions and results."""
+    bare: dict[str, Any] = dict.fromkeys(
+        ("pictures", "view", "thoughts", "navigable", "interactable"), []
+    )
+    bare["views"] = {}
+    turns = [turn.model_copy(update=bare) for turn in trajectory.turns]
+    return trajectory.model_copy(update={"turns": turns})
+
+
+def _bytes(trajectory: Trajectory) -> bytes:
+    return (trajectory.model_dump_json() + "\n").encode()
 
 
 def _spoken(thoughts: tuple[ThoughtRecord, ...]) -> str:

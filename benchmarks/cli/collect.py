@@ -301,7 +301,7 @@ def _settings(
 
     EmbodiedEnv((), **env)  # so that bad arguments are found before any worker starts
     kinds = load_thought_kinds(table)
-    pictures = Pictures(min_pixels=1, max_pixels=2**24)
+    pictures = Pictures(quality=80, min_pixels=1, max_pixels=2**24)
     stated = corrections_recipe() if recipe is None else recipe
     manifest = CollectionManifest(
         suite=suite.name,
