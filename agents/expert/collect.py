@@ -38,7 +38,7 @@ ATTEMPTS = "attempts"
 CORRECTIONS = "corrections"
 """The part of the corrected episodes of a run."""
 _MOST_ROUNDS = 40
-_FRUITLESS_ROUNDS = 3
+_FRUITLESS_ROUNDS = 6
 """A task type of a part of which nothing was taken in this many rounds is given up."""
 
 
@@ -176,7 +176,7 @@ class Stratum:
         """The candidates of the next round: as many as are missing, and a few more where many were
         rejected before."""
         yield_so_far = (len(self.taken) + 1) / (self.played + 1)
-        number = min(round(self.missing / yield_so_far), 4 * self.missing + 4)
+        number = min(round(self.missing / yield_so_far), 6 * self.missing + 6)
         if self.sequence.length is not None:
             number = min(number, self.sequence.length - self.played)
         first = self.played

@@ -277,10 +277,8 @@ class ThinkingAgent:
 
 def course_only(trajectory: Trajectory) -> Trajectory:
     """A trajectory without what it saw and thought, to save space: its actions and results."""
-    bare: dict[str, Any] = dict.fromkeys(
-        ("pictures", "view", "thoughts", "navigable", "interactable"), []
-    )
-    bare["views"] = {}
+    lists = ("pictures", "view", "thoughts", "navigable", "interactable")
+    bare: dict[str, Any] = {"views": {}, **{name: [] for name in lists}}
     turns = [turn.model_copy(update=bare) for turn in trajectory.turns]
     return trajectory.model_copy(update={"turns": turns})
 
