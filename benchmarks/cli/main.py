@@ -14,6 +14,7 @@ from typing import NoReturn
 import click
 
 from benchmarks.cli.bench import bench
+from benchmarks.cli.data import data
 from benchmarks.cli.doctor import doctor
 from benchmarks.cli.errors import (
     INTERRUPTED,
@@ -91,6 +92,7 @@ cli.add_command(train_rl)
 cli.add_command(serve)
 cli.add_command(match_server)
 cli.add_command(inspect)
+cli.add_command(data)
 
 
 @cli.command()
