@@ -92,11 +92,12 @@ def _played(
     name = f"{task.id}~a"
     seed = episode_seed(3, name)
     obs, info = env.reset(seed=seed, options={"task": task})
-    solver, turns, at, over = Solver(), [], "", False
+    solver, at, over = Solver(), "", False
+    turns: list[Turn] = []
     while not over:
         action = info["action"] if info.get("fault") else solver.next(info)[0]
         around = info.get("views") or {"ahead": obs["rgb"]}
-        pictures = []
+        pictures: list[PictureRecord] = []
         for direction, frame in around.items():
             number = sum(len(turn.pictures) for turn in turns) + len(pictures)
             place = f"{PARTS}/{part}/pictures/{name}/{number:03}.jpeg"

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from er_gym.data.collection import Collection
+    from er_gym.data.trajectory import Trajectory
     from er_gym.tasks.task import Task
 
 FORMATS = ("table", "md", "json")
@@ -177,7 +178,7 @@ def _opened(path: Path) -> Collection:
     return Collection.open(path)
 
 
-def _trajectory(collection: Collection, wanted: str) -> object:
+def _trajectory(collection: Collection, wanted: str) -> Trajectory:
     """The trajectory of an id; BadInput names ids that are close to it if there is none."""
     from difflib import get_close_matches
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from hashlib import blake2b
 from typing import Any
 
@@ -114,7 +114,7 @@ class Statistics:
         """The statistics as JSON can hold them."""
         return {
             "format": "er-gym/data-statistics/1",
-            **asdict(self),
+            **_plain(vars(self)),
             "transition_shares": self.transition_shares(),
         }
 
@@ -208,6 +208,15 @@ def _texts(trajectories: Iterable[Trajectory]) -> Iterator[str]:
     for trajectory in trajectories:
         for turn in trajectory.turns:
             yield from (thought.text for thought in turn.thoughts)
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON holds it. (``asdict`` cannot copy a Counter.)"""
+    if isinstance(value, PartStatistics):
+        return _plain(vars(value))
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    return value
 
 
 def _digest(text: str) -> int:

@@ -7,7 +7,8 @@ from math import ceil
 
 _CHINESE = re.compile(r"[\u3400-\u9fff\uf900-\ufaff]")
 _WORD = re.compile(r"[^\W\u3400-\u9fff\uf900-\ufaff]+(?:['’-][^\W\u3400-\u9fff\uf900-\ufaff]+)*")
-_END = re.compile(r"(?<=[.!?…])[\"'”’)]*\s+|(?<=[。！？…])[”’」）]*\s*|\n+")
+_END = re.compile(r"([.!?…][\"'”’)]*)\s+|([。！？…][”’」）]*)\s*")
+"""The end of a sentence, with what closes a quotation."""
 
 
 def count_words(text: str) -> int:
@@ -17,4 +18,5 @@ def count_words(text: str) -> int:
 
 def sentences(text: str) -> list[str]:
     """The sentences of a text, in order, without spaces around them."""
-    return [part.strip() for part in _END.split(text) if part.strip()]
+    lines = _END.sub(lambda end: f"{end[1] or end[2]}\n", text).splitlines()
+    return [line.strip() for line in lines if line.strip()]
