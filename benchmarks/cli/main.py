@@ -15,6 +15,7 @@ import click
 
 from benchmarks.cli.bench import bench
 from benchmarks.cli.collect import collect
+from benchmarks.cli.data import data
 from benchmarks.cli.doctor import doctor
 from benchmarks.cli.errors import (
     INTERRUPTED,
@@ -93,6 +94,7 @@ cli.add_command(train_rl)
 cli.add_command(serve)
 cli.add_command(match_server)
 cli.add_command(inspect)
+cli.add_command(data)
 
 
 @cli.command()
