@@ -17,7 +17,10 @@ def _word(words: str) -> str:
     return rf"\b(?:{words.replace('/', '|')})\b"
 
 
-_NO = "no|not|nor|on|in|to|of|for|with|from|and|or|but|at|by|near|about|into|onto|than|as|if|is|are"
+_NO = (
+    "no|not|nor|on|in|to|of|for|with|from|and|or|but|at|by|near|about|into|onto|than|as|if|is|are"
+    "|i|we|it|there|see|has|have|had|which|can|will|was|were|i'm|i've|i'll|then|so|stands|lies|sits|left|right"
+)
 _D = rf"(?:(?!(?:{_NO}) )[a-z0-9'’-]+ ){{0,4}}"
 """Articles and adjectives before a name."""
 _JOINT = r"(?:,? and,? |,? or |, |,? as well as |,? together with |,? along with | & |/)"
@@ -92,7 +95,7 @@ PHRASES = Phrases(
         _word(
             "may/might/could/perhaps/maybe/possibly/probably/likely/likeliest/likelier/presumably"
             "/potentially/possible/plausible/plausibly/conceivably/suppose/guess/assume/suspect"
-            "/expect/expected/imagine/wonder/wondering/chance/chances/hope/hoping/hopefully/bet"
+            "/expect/expected/imagine/wonder/wondering/hoped/had hoped/thought/can picture/i picture/picturing/chance/chances/hope/hoping/hopefully/bet"
             "/should be/must be/must have/should have/ought to/seems/seem/appears to be/as if/as though"
             "/supposedly/apparently/unclear/unsure/not sure/uncertain/cannot tell/can't tell"
             "/would/i think/i believe/i'd/or/either/no idea/unless"
@@ -203,10 +206,10 @@ PHRASES = Phrases(
     },
     nearly=re.compile(r"(?:slightly|a (?:little|bit|touch|fraction)|just|somewhat)(?: off| over)? $"),
     of_other=re.compile(
-        r"\b(?:next to|beside|near|by|of|on|in|above|under|below|underneath|over|behind|at|inside|with|against|between|beyond|past|than|from|to|towards|along)"
+        r"\b(?:next to|besides|beside|near|by|of|on|in|above|under|below|underneath|over|behind|(?<!looking )at|inside|with|against|between|beyond|past|than|from|to|towards|along)"
         rf" {_D}(?:{MARK} and {_D})?$"
     ),
-    is_so=re.compile(r"\b(?:is|are|stands?|sits?|lies|located|rests?)\b"),
+    is_so=re.compile(r",? (?:is|are|stands?|sits?|lies|lie|rests?|hangs?|there (?:is|are)|there's|i (?:can |could )?(?:also )?(?:see|notice|spot|find|make out|have))\b"),
     states=(
         re.compile(rf"{_X}(?:'s)?(?: doors?| lid| cover| screen)?(?: (?:in front of me|here|there|ahead|nearby))?,?(?: {_IS}|'s){_STATE}"),
         re.compile(rf"{_X},? (?:and |but )?it(?: {_IS}|'s){_STATE}"),
@@ -227,7 +230,7 @@ PHRASES = Phrases(
         re.compile(
             rf"(?P<xs>{MARK})(?:,? (?:is|are|{_HOW}|firmly|securely)|'s)+ (?:in|within) (?:my|the) (?:hands?|grip|gripper|arms?|grasp)\b|\bin my hand(?:s)?(?: is|,? i (?:have|hold)) {_D}{_X}"
         ),
-        re.compile(rf"\bi (?:now|finally|already) have {_D}(?P<xs>{MARK})(?= *(?:$|[.,!]|and\b|so\b))"),
+        re.compile(rf"\bi (?:now|finally|already) have {_D}(?P<xs>{MARK})(?= *(?:$|[.!]|,? (?:so|and (?:i|can|my))\b))"),
     ),
     not_held=(
         re.compile(
@@ -255,7 +258,7 @@ PHRASES = Phrases(
         ),
         verbs.PUT: (
             re.compile(
-                rf"{_PAST}(?:put|placed|left|dropped|set|stored|laid|deposited) (?:it|them|{_D}{_X})(?: down| away| safely)? (?:in|into|on|onto|inside|on top of) {_D}{_Y}"
+                rf"(?:{_PAST}(?:placed|dropped|stored|laid|deposited)|\bi(?:'ve| have)(?: already| just| now)* (?:put|set|left)) (?:it|them|{_D}{_X})(?: down| away| safely)? (?:in|into|on|onto|inside|on top of) {_D}{_Y}"
             ),
         ),
         verbs.TOGGLE: (
@@ -275,9 +278,9 @@ PHRASES = Phrases(
     },
     failed=_any(
         r"\b(?:last|previous|preceding) (?:action|attempt|step|move|try)[^.,]{0,40}?(?:failed|fail|unsuccessful|(?:did not|didn't|has not|hasn't) (?:succeed|work|go)|had no effect|was not|wasn't)",
-        r"\b(?:failed|unable|not able|wasn't able) to (?:open|close|pick|take|grab|put|place|reach|get to|switch|turn|toggle|navigate|go|walk|move|shut|look around|step|observe|do (?:it|that|this|so))\b",
+        r"\b(?:failed|unable|not able|wasn't able) to (?:open|close|pick|take|grab|put|place|reach|get to|switch|turn|toggle|navigate|go|walk|head|move|shut|pull|slice|look around|step|observe|do (?:it|that|this|so))\b",
         r"\battempt to [^.,]{0,40}(?:failed|did not|didn't|was unsuccessful|had no)",
-        r"\b(?:could not|couldn't) (?:open|close|shut|pick|take|grab|put|place|reach|get to|switch|turn|toggle|lift|move|navigate|go|walk|step)\b",
+        r"\b(?:could not|couldn't) (?:open|close|shut|pick|take|grab|put|place|reach|get to|switch|turn|toggle|lift|move|navigate|go|walk|step|head|pull)\b",
         r"\b(?:the|my|that|this) (?:action|attempt|move) (?:has )?(?:failed|did not|didn't)\b",
         r"\bwent wrong\b",
     ),
@@ -304,7 +307,7 @@ PHRASES = Phrases(
     acts={
         "forward": re.compile(r"(?:move|step|go|take|walk|come|get|edge|inch)(?: (?:a|one|little|bit|small|step|slightly|just|few|steps|half))* (?:forward|closer|nearer|ahead)\b|take (?:a|one)(?: small| little| single)? step"),
         "look around": re.compile(
-            r"(?:look|glance|take a (?:good |quick |full )?look|have a look|turn)(?: all)? (?:around|about|round)\b(?! §)|(?:scan|observe|survey|view)(?: the| my| this)?(?: whole| entire| rest of the)? (?:room|surroundings|area|kitchen|bathroom|bedroom|living room|scene)"
+            r"(?:stop and )?(?:observe\b(?! (?:the|that|how|what) §)|(?:look|glance|take a (?:good |quick |full )?look|have a look|turn)(?: all)? (?:around|about|round)\b(?! §)|(?:scan|observe|survey|view)(?: the| my| this)?(?: whole| entire| rest of the)? (?:room|surroundings|area|kitchen|bathroom|bedroom|living room|scene))"
         ),
         "go": _act(_GO, rf"(?:(?:back|over|straight|right|directly|on|up|across|down|now|out|first|to|towards?|for|near|off|close) )+{_D}{_X}"),
         "visit": _act("approach/visit/try/return to/make for", _AND_SO),
@@ -320,7 +323,7 @@ PHRASES = Phrases(
         ),
         "toggle": re.compile(rf"(?:turn|switch|power|toggle|flip|press|activate|deactivate|light)(?: on| off)? {_D}{_X}"),
         "slice": _act("slice|cut|chop", _AND_SO),
-        "end": re.compile(r"(?:end|finish|stop|conclude|wrap up|call it)(?: the task| here| now| it| this| there| my| everything| the)?\b"),
+        "end": re.compile(r"(?:end|finish|stop(?! and\b)|conclude|wrap up|call it)(?: the task| here| now| it| this| there| my| everything| the)?\b"),
     },
     later=re.compile(
         r"\b(?:later|afterwards?|after (?:that|this)|eventually|finally|in the end|then|once|subsequently|at the end|lastly|next i|second|secondly|as well|also|still|come back|if need be|if necessary|only|and then|if|unless|when|until|before|otherwise|could|might|would|don't|not|no|never|rather than|instead of)\b|n't\b"
@@ -335,7 +338,7 @@ PHRASES = Phrases(
         r"\bhints?\b|\bkey actions?\b|\bground[- ]truth\b|\bdata ?sets?\b|\blanguage model\b|\ban ai\b|\bai (?:assistant|model)\b|\bas an? (?:large |ai|assistant|model)",
         r"\b(?:as|i was|i am|i've been|have been) (?:instructed|told|asked) to (?:justify|explain|write|give|provide|produce|respond|think of)\b|\bas instructed,|\bjustify (?:the|my|this) (?:decision|action|choice)",
         r"\b(?:provided|given|supplied|predetermined|intended|predefined|prescribed|expected) (?:decision|action|answer|list|plan|sequence|next (?:step|action))\b|\b(?:decision|action|list|answer|sequence)[^.]{0,30}(?:was|were|has been|have been|am|is) given (?:to me|here)\b|\blist[^.]{0,40}\bgiven\b",
-        r"\b(?:the|a|my|this) (?:candidate |given |pending |navigable |search )?list\b(?! of things to do)|\bmetadata\b|\bsimulator\b|\bsystem prompt\b|\bthe prompt\b|\bword limit\b|\btraining data\b|\bannotat(?:ion|ed|or)",
+        r"\b(?:candidate|given|pending|navigable|provided|supplied|location) list\b|\b(?:on|in|from|per|following) the list\b|\bthe list (?:says|of|that|tells|given|shows|contains)|\bmetadata\b|\bsimulator\b|\bsystem prompt\b|\bthe prompt\b|\bword limit\b|\btraining data\b|\bannotat(?:ion|ed|or)",
         r"\bi(?:'m| am) sorry,? (?:but )?i (?:can't|cannot|can not|am unable|won't)|\bi (?:cannot|can't|am unable to) (?:assist|help|comply|fulfill|provide|process|view (?:the )?images)|\bcan(?:'t|not) (?:assist|help) with",
         r"\b(?:http|error|status)(?: code)?:? ?[45]\d\d\b|\b[45]\d\d (?:internal|bad|too many|service|gateway|forbidden|unauthori|not found|error)|\brate limit|\btoo many requests\b|\binternal server error\b|\btime(?:d)? ?out error\b|\btraceback\b|\bapi key\b|\bexception\b:|\bopenai\b|\bgpt-?\d|\brequest failed\b|\bconnection (?:error|refused|reset)|\binsufficient[_ ]quota|\bcontent policy\b",
     ),
