@@ -79,7 +79,7 @@ def outcome(thought: Thought) -> Iterator[Refusal]:
     phrases = thought.phrases
     admits = any(phrases.failing.search(each.text) for each in thought.clauses if not each.guessed)
     for clause in thought.clauses:
-        if clause.guessed:
+        if clause.guessed and "seem" not in clause.text:
             continue
         if phrases.failed.search(clause.text) and not failed_lately:
             yield Refusal(

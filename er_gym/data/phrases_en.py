@@ -75,13 +75,13 @@ def _act(words: str, rest: str = _AND_SO) -> Phrase:
 PHRASES = Phrases(
     sentence=re.compile(r"(?<=[.!?])[\"')]*\s+|\n+|;\s"),
     clause=_any(
-        r",\s+(?:(?:and|but|so|which|while|yet|then|though|although|because|since|where|as)\s+)?",
+        r",\s+(?!which (?:is|are|sits|stands|lies|rests|i have|i've|i already)\b)(?:(?:and|but|so|which|while|yet|then|though|although|because|since|where|as)\s+)?",
         r":\s+",
         r"\s+[—–-]\s+|—",
         r"\s(?:but|while|because|since|although|though|so that|so|whereas|yet|then)\s",
         r"\s(?:and|or)\s(?=(?:i|there|it|they|my|let|this|that|then|next)\b)",
         r"\s(?=that (?:i|we) (?:can|could|may|might|would|should|will|need|want|have to)\b)",
-        r"\swhich\s(?=(?:is|are|may|might|could|would|means|tells|gives|should|must)\b)",
+        r"\swhich\s(?=(?:may|might|could|would|means|tells|gives|should|must)\b)",
     ),
     verb=re.compile(
         r"\b(?:i|we|is|are|was|were|see|there|has|have|had|can|could|will|would|should|may|might"
@@ -93,7 +93,7 @@ PHRASES = Phrases(
     question=re.compile(r"\?[\"')]*\s*$"),
     hedge=_any(
         _word(
-            "may/might/could/perhaps/maybe/possibly/probably/likely/likeliest/likelier/presumably"
+            "may/might/could(?! not)/perhaps/maybe/possibly/probably/likely/likeliest/likelier/presumably"
             "/potentially/possible/plausible/plausibly/conceivably/suppose/guess/assume/suspect"
             "/expect/expected/imagine/wonder/wondering/hoped/had hoped/thought/can picture/i picture/picturing/chance/chances/hope/hoping/hopefully/bet"
             "/should be/must be/must have/should have/ought to/seems/seem/appears to be/as if/as though"
@@ -132,7 +132,7 @@ PHRASES = Phrases(
     intention=_any(
         r"\b(?:will|shall|let me|let's|let us|going to|about to|plan(?:s|ned|ning)?|intend|decided?|next(?! to\b)"
         r"|want to|had better|i'd better|time to|heading|consider|option|options|could|ready to|try|bring|carry"
-        r"|(?:am|'m) (?:taking|bringing|carrying .* to))\b|'ll\b|^(?:to|by) "
+        r"|(?:am|'m) (?:taking|bringing|carrying .* to))\b|'ll\b|^to (?!(?:one|my|the|either)\b)|^by (?!(?:my|the)\b)"
     ),
     seen=(
         re.compile(
@@ -213,6 +213,8 @@ PHRASES = Phrases(
     states=(
         re.compile(rf"{_X}(?:'s)?(?: doors?| lid| cover| screen)?(?: (?:in front of me|here|there|ahead|nearby))?,?(?: {_IS}|'s){_STATE}"),
         re.compile(rf"{_X},? (?:and |but )?it(?: {_IS}|'s){_STATE}"),
+        re.compile(rf"{_X}, which(?: {_IS}){_STATE}"),
+        re.compile(rf"\bi (?:find|found|see|notice) {_D}{_X}{_STATE}"),
         re.compile(
             r"\b(?:the|an?|this|that|its|already|still|now|currently) (?:already |still |now |half-)?(?:(?P<open>open|opened)|(?P<closed>closed|shut)|(?P<on>lit|switched-on)"
             rf"|(?P<off>unlit|switched-off)) (?:[a-z]+ )?{_X}(?P<no>)"
@@ -228,19 +230,19 @@ PHRASES = Phrases(
             rf"\b(?:have|got|having|with) {_D}(?P<xs>{MARK})(?: (?:now|safely|firmly|securely|already|finally|still))* (?:in (?:my|the|one) (?:hands?|grip|gripper|arms?)|in hand|with me)\b"
         ),
         re.compile(
-            rf"(?P<xs>{MARK})(?:,? (?:is|are|{_HOW}|firmly|securely)|'s)+ (?:in|within) (?:my|the) (?:hands?|grip|gripper|arms?|grasp)\b|\bin my hand(?:s)?(?: is|,? i (?:have|hold)) {_D}{_X}"
+            rf"(?P<xs>{MARK})(?:,? (?:is|are|{_HOW}|firmly|securely)|'s)+ (?:in|within) (?:my|the) (?:hands?|grip|gripper|arms?|grasp|possession)\b|\bin my hand(?:s)?(?: is|,? i (?:have|hold)) {_D}{_X}"
         ),
         re.compile(rf"\bi (?:now|finally|already) have {_D}(?P<xs>{MARK})(?= *(?:$|[.!]|,? (?:so|and (?:i|can|my))\b))"),
     ),
     not_held=(
         re.compile(
-            rf"\b(?:not|n't|no longer)(?: yet| currently)? (?:holding|hold|carrying|carry|have) {_D}(?P<xs>{MARK})(?= *(?:$|[.,!]|yet|now|any|in my hand))"
+            rf"(?:\bnot|n't|no longer)(?: yet| currently)? (?:holding|hold|carrying|carry|have) {_D}(?P<xs>{MARK})(?= *(?:$|[.,!]|yet|now|any|in my hand))"
         ),
         re.compile(rf"(?P<xs>{MARK}) (?:is|are)(?: not|n't| no longer)(?: yet| currently)? in my (?:hands?|grip|gripper)"),
     ),
     empty_hand=re.compile(
         r"\b(?:my|both(?: of my)?|the) (?:hands?|gripper|arms?) (?:is|are|'s)(?: now| still| currently| again| both| completely| otherwise)? (?:empty|free)\b"
-        r"|\bempty[- ]handed\b|\bnothing (?:is )?(?:yet )?in (?:my|the|either) hands?\b|\b(?:not|n't)(?: currently| yet)? (?:holding|carrying|hold|carry) anything\b"
+        r"|(?:\bnot|n't)(?: currently| yet)? have anything in (?:my|either) hands?|\bempty[- ]handed\b|\bnothing (?:is )?(?:yet )?in (?:my|the|either) hands?\b|(?:\bnot|n't)(?: currently| yet)? (?:holding|carrying|hold|carry) anything\b"
         r"|\b(?:hold|holding|carry|carrying) nothing\b|\bwith (?:an empty|a free|empty|free) hands?\b"
     ),
     did={
@@ -272,6 +274,9 @@ PHRASES = Phrases(
         ),
         "searched": (
             re.compile(rf"{_PAST}(?:{_SEARCHED}) {_D}{_X}"),
+            re.compile(rf"{_X},? which {_I}(?:{_SEARCHED})"),
+            re.compile(rf"\bmy (?:search|inspection|check|visit) (?:of|to) {_D}{_X}"),
+            re.compile(rf"{_X} turned out to be empty"),
             re.compile(rf"{_X} (?:has|have|was|is)(?: already| now)* (?:been )?(?:already )?(?:searched|checked|examined|inspected|explored|investigated)\b"),
             re.compile(rf"\bafter (?:searching|checking|opening|visiting|examining|exploring|looking (?:in|into|inside)) {_D}{_X}(?= without| in vain| and finding| and seeing| to no)"),
         ),
@@ -285,8 +290,8 @@ PHRASES = Phrases(
         r"\bwent wrong\b",
     ),
     succeeded=_any(
-        r"\b(?:that|it|this|which) (?:has )?worked\b(?! before)",
-        r"\b(?:last|previous|preceding) (?:action|attempt|step|move|try)[^.,]{0,30}?(?:was (?:a )?success|succeeded|worked|went (?:well|exactly|through|as|smoothly)|has succeeded|did its)",
+        r"\b(?:that|it|this|which) (?:has )?(?:worked|succeeded)\b(?! before)",
+        r"\b(?:last|previous|preceding) (?:action|attempt|step|move|try)[^.,]{0,30}?(?:was (?:a )?success|succeeded|worked|went through|went (?:well|exactly|through|as|smoothly)|has succeeded|did its)",
         r"\b(?:i )?(?:managed|was able|have been able) to (?:open|close|pick|take|grab|put|place|reach|get to|switch|turn|toggle|navigate|go|walk|move|shut|look around|step)\b",
         r"\bwent (?:exactly )?as (?:planned|expected|intended)\b|\bi (?:have )?successfully\b|\bworked as (?:planned|expected)\b",
     ),
@@ -296,7 +301,7 @@ PHRASES = Phrases(
     decides=_any(
         r"\b(?:i|we)(?: will|'ll| shall| am going to| am about to| decide to| have decided to| choose to| intend to| plan to| am now going to| should| must| need to| have to| had better| want to| ought to| am ready to| would rather)\b",
         r"\bi'(?:ll|m going to|m about to|ve decided to|d better|d rather)\b",
-        r"\blet me\b|\blet's\b|\blet us\b|\btime to\b|\bready to\b",
+        r"\bmade up my mind to\b|\blet me\b|\blet's\b|\blet us\b|\btime to\b|\bready to\b",
         r"\b(?:next|best|right|obvious|logical|sensible|first|immediate|remaining|only) (?:step|move|thing|action|option|choice|place|idea|course)[^.,§]{0,40}? (?:is|will be)(?: now)?(?: to)?\b",
         r"\bmakes? (?:the most |more |good |perfect )?sense to\b|\bmy (?:plan|decision|choice) is(?: now)? to\b|\bdecision is to\b|\bdecided(?: to|:)",
         r"\b(?:so|now|therefore|thus|hence|next|then|accordingly),? i(?= )",
