@@ -65,7 +65,7 @@ class _Player:
                 wrong = self._wrong_places(action.object_type)
                 if self.random.random() < _LOOKS:
                     self._step(Action(verbs.OBSERVE), "look around", subgoal, [])
-            while purpose == "search" and wrong:
+            while purpose == "search" and wrong and not self._sees(subgoal.thing):
                 place = wrong[0]
                 if place not in self.info["navigable"]:
                     wrong.pop(0)
@@ -110,6 +110,9 @@ class _Player:
         if action.verb == verbs.OPEN:
             return ("open to put" if held else "open to look"), subgoal
         return _PURPOSE_OF.get(action.verb, "use"), subgoal
+
+    def _sees(self, kind: str) -> bool:
+        return any(each.object_type == kind for each in self.info["object_views"])
 
     def _wrong_places(self, right: str) -> list[str]:
         places = [

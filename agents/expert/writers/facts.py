@@ -21,6 +21,7 @@ Facts that the wordings use (``configs/thoughts``):
 from __future__ import annotations
 
 import random
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -38,6 +39,12 @@ _SMALL_FADES = 4.5
 """Metres beyond which small things are not worth a word."""
 
 
+_STANDING = frozenset(
+    {"CoffeeMachine", "DeskLamp", "Desktop", "HousePlant", "Microwave", "Television", "Toaster"}
+)
+"""Types that stand on others, though they cannot be picked up."""
+
+
 def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
     """The facts of a turn; pools are in a random order."""
     decision, subgoal, last = knowledge.decision, knowledge.subgoal, knowledge.last
@@ -46,11 +53,14 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
     sought = place if thing and thing == knowledge.held else thing
     outcome = outcome_of(knowledge, sought)
     visited = _searched_in_vain(knowledge, outcome)
+    purpose = knowledge.purpose
+    if purpose == "search" and decision.object_type == sought:
+        purpose = "approach"  # nothing could be in, on or near itself
     coming = [kind for kind in dict.fromkeys(knowledge.plan) if kind != decision.object_type]
     if decision.verb == verbs.NAVIGATE:
         coming = [decision.object_type, *coming]
     facts: dict[str, Any] = {
-        "purpose": knowledge.purpose,
+        "purpose": purpose,
         "verb": decision.verb,
         "outcome": outcome,
         "goal_verb": subgoal.verb,
@@ -59,7 +69,7 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
         "sought": sought,
         "object": _known(decision.object_type),
         "held": _known(knowledge.held),
-        "at": _known(knowledge.at),
+        "at": _known(knowledge.at) if knowledge.at != sought else "",
         "last_verb": last.action.verb if last else "",
         "last_object": _known(last.action.object_type) if last else "",
         "part": _part(subgoal.text, knowledge.language),
@@ -72,15 +82,16 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
         **_in_view(knowledge, sought, choices),
     }
     facts[f"is_{outcome}"] = True
-    facts[f"is_{knowledge.purpose}"] = True
+    facts[f"is_{purpose}"] = True
     facts["holds_thing"] = bool(thing) and thing == knowledge.held
-    facts["whole_thing"] = f"{facts['thing']}" if thing else ""
+    facts["elsewhere"] = decision.object_type not in ("", thing)
+    facts["placed"] = _placed(knowledge) if outcome == "put" else ""
     return {name: value for name, value in facts.items() if value}
 
 
 def outcome_of(knowledge: Knowledge, sought: str) -> str:
-    """What came of the last action, as a word: ``start``, ``failed``, ``astray`` (it arrived
-    elsewhere), ``repeated``, ``arrived`` (with something held), ``found``, ``shut`` (at a closed
+    """What came of the last action, as a word: ``start``, ``failed``, ``blocked`` (no way
+    forward), ``astray`` (it arrived elsewhere), ``repeated``, ``arrived`` (with something held), ``found``, ``shut`` (at a closed
     container), ``nothing``, ``opened``, ``opened found``, ``opened nothing``, ``closed``,
     ``looked``, ``looked found``, ``closer``, ``taken``, ``put``, ``toggled``, ``checked``, ``used``.
     """
@@ -89,7 +100,7 @@ def outcome_of(knowledge: Knowledge, sought: str) -> str:
         return "start"
     verb, found = last.action.verb, _has(knowledge.in_view, sought)
     if not last.success:
-        return "astray" if verb == verbs.NAVIGATE and last.fault else "failed"
+        return _AFTER_FAILING.get(verb, "failed")
     if last.purpose == "repeat":
         return "repeated"
     match verb:
@@ -115,9 +126,11 @@ _AFTER: Mapping[str, str] = {
 """The outcome of a verb, where it depends on nothing else."""
 
 
+_AFTER_FAILING: Mapping[str, str] = {verbs.NAVIGATE: "astray", verbs.MOVE_FORWARD: "blocked"}
+"""The outcome of a verb that failed, where it has a word of its own."""
+
+
 def _after_going(knowledge: Knowledge, last: LastAction, found: bool) -> str:
-    if last.fault:
-        return "astray"
     if knowledge.held and last.purpose not in ("search", "look around"):
         return "arrived"
     if found:
@@ -132,6 +145,15 @@ def _searched_in_vain(knowledge: Knowledge, outcome: str) -> list[str]:
     places = [visit.place for visit in knowledge.visits if not visit.found]
     waiting = {knowledge.at} if outcome in ("shut", "found", "arrived", "opened found") else set()
     return [place for place in dict.fromkeys(places) if place not in waiting]
+
+
+def _placed(knowledge: Knowledge) -> str:
+    """What was put down: the one type in view, named in the instruction, that lies there."""
+    assert knowledge.last is not None
+    there = knowledge.last.action.object_type
+    found = {each.type for each in knowledge.view if each.on and same_type(each.on, there)}
+    named = [kind for kind in found if re.search(rf"\b{kind}\b", knowledge.instruction)]
+    return named[0] if len(named) == 1 else ""
 
 
 def _known(object_type: str) -> str:
@@ -174,7 +196,7 @@ def _in_view(knowledge: Knowledge, sought: str, choices: random.Random) -> dict[
     told = [thing for kind, thing in things.items() if kind != sought and _is_worth_a_word(thing)]
     choices.shuffle(told)
     memory = {
-        kind: {"o": kind, "seen_at": _known(where), "at_start": not where}
+        kind: {"o": kind, "seen_at": _known(where) if where != kind else "", "at_start": not where}
         for kind, where in knowledge.seen.items()
         if kind not in everywhere and kind != knowledge.held and kind in OBJECT_TYPES
     }
@@ -218,11 +240,16 @@ def _described(seen: SeenObject, count: int, direction: str = "") -> dict[str, A
         "o_side": side,
         "o_distance": distance,
         "o_metres": str(round(seen.distance)) if 1.6 < seen.distance < 6.4 else "",
-        "o_on": seen.on if seen.on in OBJECT_TYPES else "",
+        "o_on": seen.on if seen.on in OBJECT_TYPES and _lies(seen.type) else "",
         "o_state": state,
         "o_direction": direction,
         "count": count,
     }
+
+
+def _lies(object_type: str) -> bool:
+    """Whether people say of such a thing that it lies or stands on another."""
+    return object_type in _STANDING or "pickupable" in OBJECT_TYPES[object_type].properties
 
 
 def _is_worth_a_word(thing: Mapping[str, Any]) -> bool:

@@ -191,11 +191,11 @@ class Rule:
         if len(order) > 1:
             order.sort(key=lambda line: id(line) in writing.used)
         for line in order:
-            mentioned = set(writing.mentioned)
+            mentioned, latest = set(writing.mentioned), writing.nouns.latest
             try:
                 text = line.write(writing, facts)
             except Missing:
-                writing.mentioned = mentioned
+                writing.mentioned, writing.nouns.latest = mentioned, latest
                 continue
             writing.used.add(id(line))
             return text

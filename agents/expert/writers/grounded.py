@@ -13,7 +13,7 @@ from agents.expert.writers.grammar import Writing, grammar
 from agents.expert.writers.nouns import nouns
 from er_gym.data.trajectory import Language, ThoughtKind, ThoughtRecord
 
-FULLNESS = (0.55, 0.55, 0.3, 0.0, 0.0, 0.0)
+FULLNESS = (0.65, 0.65, 0.3, 0.0, 0.0, 0.0)
 """The probability of optional parts at each try to stay below the limit."""
 _SENTENCE = {
     "en": re.compile(r"(?<=[.!?])\"?\s+(?=[\"A-Z])"),
@@ -67,7 +67,7 @@ def _fitting(
     before = set(writing.mentioned)
     for fullness in FULLNESS:
         writing.fullness = fullness
-        writing.mentioned = set(before)
+        writing.mentioned, writing.nouns.latest = set(before), ""
         text = polished(writing.write(kind, facts), language)
         parts = sentences(text, language)
         if words(text, language) <= limit and len({*parts} - {*said}) == len(parts):

@@ -23,17 +23,22 @@ class Nouns(ABC):
 
     Args:
         names: object type to its names.
+
+    Attributes:
+        latest: the type mentioned last, ``""`` at the beginning of a text.
     """
 
     def __init__(self, names: Mapping[str, Sequence[str]]) -> None:
         self._names = names
         self._chosen: dict[str, str] = {}
+        self.latest = ""
 
     def word(self, value: str, form: str, choices: random.Random) -> str:
         """A fact in a form; what is no object type stays as it is.
 
         Forms: ``""`` bare, ``the``, ``a``, ``in`` with the preposition, ``type`` in the spelling of
-        the environment; English also has ``it``, ``is`` and ``s`` (the plural).
+        the environment (English also has ``in_type``), ``that`` a pronoun if the type was the last to be mentioned, else ``the``;
+        English also has ``it``, ``is`` and ``s`` (the plural).
         """
         if value not in self._names or form == "type":
             return value
@@ -41,6 +46,9 @@ class Nouns(ABC):
             first, *others = self._names[value]
             usual = not others or choices.random() < _FIRST_NAME
             self._chosen[value] = first if usual else choices.choice(others)
+        if form == "that":
+            form = "it" if self.latest == value else "the"
+        self.latest = value
         return self._formed(value, self._chosen[value], form)
 
     @abstractmethod
@@ -68,6 +76,8 @@ class EnglishNouns(Nouns):
                 return f"{'in' if object_type in HOLLOW else 'on'} the {name}"
             case "into":
                 return f"{'into' if object_type in HOLLOW else 'onto'} the {name}"
+            case "in_type":
+                return f"{'in' if object_type in HOLLOW else 'on'} the {object_type}"
             case "a":
                 if object_type in UNCOUNTED - _ONES or plural:
                     return f"some {name}"
@@ -105,8 +115,8 @@ class ChineseNouns(Nouns):
                 return f"一{measure or '个'}{noun}"
             case "this":
                 return f"这{measure or '个'}{noun}"
-            case "that":
-                return f"那{measure or '个'}{noun}"
+            case "it":
+                return "它"
             case "in":
                 return f"{noun}{'里' if object_type in HOLLOW else '上'}"
             case _:
@@ -125,6 +135,9 @@ class ChineseNouns(Nouns):
 
 
 def _plural(name: str) -> str:
+    head, of, rest = name.partition(" of ")
+    if of:
+        return f"{_plural(head)} of {rest}"
     if name.endswith("shelf"):
         return f"{name[:-1]}ves"
     if name.endswith("knife"):
