@@ -1,4 +1,4 @@
-"""Lies and honest thoughts about real scenes: the templates of wordings.py, filled."""
+"""Lies and honest thoughts about real scenes: the templates of lie_wordings.py, filled."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from wordings import HONEST_EN, HONEST_ZH, LIES_EN, LIES_ZH
+from lie_wordings import HONEST_EN, HONEST_ZH, LIES_EN, LIES_ZH
 
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.mentions import alike, all_alike, named_in
@@ -117,6 +117,8 @@ class _Scene:
         """Things of which all of the type share a state."""
         found = []
         for each in self.known.view:
+            if each.open is not None and each.toggled is not None:
+                continue  # Chinese has one word for both
             things = [
                 getattr(other, attribute)
                 for view in self.views.values()
@@ -269,7 +271,10 @@ def _other_act(scene: _Scene) -> str:
         if each not in all_alike([known.decision.object_type or "Floor"])
     ]
     lies_on = {
-        each.type for each in known.view if each.on in alike(known.decision.object_type or "Floor")
+        each.type
+        for view in scene.views.values()
+        for each in view
+        if each.on in alike(known.decision.object_type or "Floor")
     }
     act = scene.draw.choice((verbs.NAVIGATE, verbs.OPEN, verbs.PICKUP))
     takes = [
