@@ -152,7 +152,9 @@ class Dialect:
                 texts.item.replace("{form}", form).replace("{meaning}", meaning)
                 for form, meaning in actions.items()
             )
-            turns.append(ChatTurn("system", (_filled(texts.system, {"actions": explained}),)))
+            turns.append(
+                ChatTurn("system", (_filled(texts.system.strip(), {"actions": explained}),))
+            )
         listed = texts.list_separator.join(actions)
         for index, turn in enumerate(trajectory.turns):
             last = trajectory.turns[index - 1] if index else None

@@ -29,7 +29,7 @@ def _schema() -> Any:
             "thought_kinds": List(List(text)),
             "succeeded": List(Value("bool")),
             "rewards": List(Value("float64")),
-            **{name: text for name in _ABOUT},
+            **dict.fromkeys(_ABOUT, text),
             "success": Value("bool"),
         }
     )
@@ -79,7 +79,6 @@ HF = ExportFormat(
     write=_write,
     card="""\
 ---
-license: apache-2.0
 task_categories:
 - image-text-to-text
 - robotics

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from er_gym.data.exports.base import SPLITS, ExportError, ExportFormat, ExportJob, needs
+from er_gym.data.exports.base import ExportError, ExportFormat, ExportJob, needs
 from er_gym.data.trajectory import Trajectory
 from er_gym.envs.actions import ACTIONS, INDEX
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -21,9 +21,12 @@ from er_gym.tasks.suites import Suite, load_suite, suite_from_file
 from er_gym.tasks.task import Task
 
 NAMESPACE = "er-gym"
-_PLAYING = ("backend", "grid_size", "visibility_distance", "instances", "protocol",
-            "step_penalty", "illegal_penalty")  # fmt: skip
-"""The arguments of the environment that decide how an episode goes."""
+_PLAYING = (
+    *("backend", "width", "height", "field_of_view", "grid_size", "visibility_distance"),
+    *("instances", "protocol", "step_penalty", "illegal_penalty"),
+)
+"""The arguments of the environment that decide how an episode goes. The shape of the view is among
+them, since only what is in view can be gone to."""
 
 
 class _Replays:

@@ -43,9 +43,10 @@ def _write(job: ExportJob) -> None:
     numbers: Counter[tuple[str, str]] = Counter()
     for split, trajectory in job.trajectories():
         job.take(trajectory)
-        key = (trajectory.scene, trajectory.task_type)
-        name = f"{'_'.join(key)}_{numbers[key]}_{trajectory.kind}"
-        folder = PurePosixPath(split, f"data_{trajectory.task_type}", name)
+        kind = trajectory.task_type.replace(" ", "_")
+        key = (trajectory.scene, kind)
+        name = f"{trajectory.scene}_{kind}_{numbers[key]}_{trajectory.kind}"
+        folder = PurePosixPath(split, f"data_{kind}", name)
         images: list[str] = []
         for index, turn in enumerate(trajectory.turns):
             for picture in turn.pictures:

@@ -32,7 +32,7 @@ from er_gym.tasks import verbs
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
 
-SIZE = {"width": 112, "height": 56}
+SIZE = {"width": 128, "height": 72}
 PURPOSE: Mapping[str, Purpose] = {
     verbs.NAVIGATE: "search",
     verbs.PICKUP: "take",
@@ -55,7 +55,7 @@ def play_collection(folder: Path, tasks: int = 12) -> Collection:
         suite_digest=suite.digest,
         seed=0,
         er_gym="0",
-        settings={"env": dict(suite.env)},
+        settings={"env": {**suite.env, **SIZE}},
     )
     collection = Collection.create(folder, manifest)
     step = max(1, len(suite.tasks) // tasks)
@@ -139,7 +139,7 @@ def _pictures(
         path = f"parts/played/pictures/{name}/{turn:03}-{direction}.jpeg"
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         Image.fromarray(pixels).save(folder / path)
-        records.append(PictureRecord(path=path, direction=direction, width=112, height=56))
+        records.append(PictureRecord(path=path, direction=direction, **SIZE))
     return records
 
 
