@@ -56,8 +56,11 @@ class _Replays:
         env = self.env(trajectory.max_steps)
         options = {"task": self._tasks[trajectory.task_id]}
         obs, _ = env.reset(seed=trajectory.seed, options=options)
-        states, rewards, ended, cut = [obs["state"]], [], [], []
+        states = [obs["state"]]
+        rewards: list[float] = []
         actions: list[int] = []
+        ended: list[bool] = []
+        cut: list[bool] = []
         for turn in trajectory.turns:
             if turn.action not in INDEX or (ended and (ended[-1] or cut[-1])):
                 return None, "it turned out otherwise when played again"
@@ -147,10 +150,10 @@ def _write(job: ExportJob) -> None:
             stores[split].update_episodes([EpisodeBuffer(seed=trajectory.seed, **columns)])
             stores[split].update_episode_metadata([_about(trajectory)], [place])
             job.add(split, 0)
-        for split, store in stores.items():
+        for name, store in stores.items():
             store.update_metadata(
                 {
-                    "dataset_id": f"{NAMESPACE}/{split}-v0",
+                    "dataset_id": f"{NAMESPACE}/{name}-v0",
                     "algorithm_name": "er-gym collect",
                     "author": {"er-gym"},
                     "description": "Household tasks in AI2-THOR rooms, played by an expert: state "

@@ -25,7 +25,8 @@ from typing import Any
 
 from er_gym.data.dialects import plain
 from er_gym.data.exports.base import ExportFormat, ExportJob
-from er_gym.data.trajectory import TAG_OF_KIND, KeyActionRecord, PictureRecord, Trajectory, Turn
+from er_gym.data.trajectory import TAG_OF_KIND, PictureRecord, Trajectory, Turn
+from er_gym.rollout.records import KeyActionRecord
 from er_gym.tasks import verbs
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.writing import write_atomic

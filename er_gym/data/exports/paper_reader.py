@@ -17,7 +17,6 @@ from pydantic import BaseModel, ConfigDict
 from er_gym.data.exports.paper import ANGLES, DECISION, INIT, OBSERVE, VERIFY
 from er_gym.data.trajectory import (
     TAG_OF_KIND,
-    KeyActionRecord,
     PictureRecord,
     Purpose,
     ThoughtRecord,
@@ -25,6 +24,7 @@ from er_gym.data.trajectory import (
     Turn,
 )
 from er_gym.envs.actions import Action, parse
+from er_gym.rollout.records import KeyActionRecord
 from er_gym.tasks import verbs
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.files import known_scene, known_type, validated
