@@ -61,9 +61,9 @@ LANGUAGES = ("en", "zh")
     "--copy", is_flag=True, help="Copy pictures; else they are hard links where possible."
 )
 @click.option(
-    "--tasks",
-    metavar="SUITE|FILE",
-    help="With minari: the tasks, if the collection's suite is not to be had.",
+    "--tasks-file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="With minari: the task file that was played, if it is no bundled suite.",
 )
 def export(
     directory: Path,
@@ -74,7 +74,7 @@ def export(
     held_out: str | None,
     per_turn: bool,
     copy: bool,
-    tasks: str | None,
+    tasks_file: Path | None,
 ) -> None:
     """Write the trajectories of the collection DIR as training files.
 
@@ -85,7 +85,6 @@ def export(
     from er_gym.data.collection import Collection
     from er_gym.data.exports import EXPORTS, ExportOptions
     from er_gym.data.exports import export as write
-    from er_gym.data.exports.minari import tasks_by_id
 
     with bad_input():
         name = EXPORTS.get(format).name
@@ -97,7 +96,7 @@ def export(
             held_out=_held_out(held_out),
             per_turn=per_turn,
             copy=copy,
-            tasks=None if tasks is None else dict(tasks_by_id(tasks)),
+            tasks_file=tasks_file,
         )
         collection = Collection.open(directory)
         with bar(terminal(stderr=True)) as shown:

@@ -16,7 +16,6 @@ from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import Collection
 from er_gym.data.dialects import Dialect
 from er_gym.data.trajectory import Language, PictureRecord, Trajectory
-from er_gym.tasks.task import Task
 from er_gym.writing import file_stem
 
 Split: TypeAlias = Literal["train", "validation"]
@@ -41,8 +40,8 @@ class ExportOptions:
         per_turn: one sample for each turn that is learnt, also of trajectories in which all are
             (formats ``sharegpt`` only; the ``trl-turns`` format always does so).
         copy: copy pictures instead of linking them.
-        tasks: by id, for formats that play the trajectories again; by default those of the
-            collection's suite.
+        tasks_file: the task file that was played, for formats that play the trajectories again;
+            by default the collection's suite is loaded by its name.
     """
 
     dialect: str = "tags"
@@ -50,7 +49,7 @@ class ExportOptions:
     held_out: tuple[str, ...] | float = ()
     per_turn: bool = False
     copy: bool = False
-    tasks: Mapping[str, Task] | None = None
+    tasks_file: Path | None = None
 
 
 @dataclass(frozen=True)

@@ -7,66 +7,61 @@ in. One that does not turn out as recorded is left out and counted.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 
+from er_gym.data.collection import Collection
 from er_gym.data.exports.base import ExportError, ExportFormat, ExportJob, needs
 from er_gym.data.trajectory import Trajectory
 from er_gym.envs.actions import ACTIONS, INDEX
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import Suite, load_suite, suite_from_file
-from er_gym.tasks.task import Task
 
 NAMESPACE = "er-gym"
-_PLAYING = (
-    *("backend", "width", "height", "field_of_view", "grid_size", "visibility_distance"),
-    *("instances", "protocol", "step_penalty", "illegal_penalty"),
-)
-"""The arguments of the environment that decide how an episode goes. The shape of the view is among
-them, since only what is in view can be gone to."""
+_OTHERWISE = "it turned out otherwise when played again"
 
 
 class _Replays:
-    """Plays trajectories again, in an environment for each step limit.
+    """Plays trajectories again, each in an environment like that of its part of the collection.
 
     Args:
-        tasks: by id.
-        env: keyword arguments of ``EmbodiedEnv``.
+        collection: what is exported.
+        suite: the suite that was played.
     """
 
-    def __init__(self, tasks: Mapping[str, Task], env: Mapping[str, Any]) -> None:
-        self._tasks, self._arguments = tasks, dict(env)
-        self._envs: dict[int, EmbodiedEnv] = {}
-
-    def env(self, max_steps: int) -> EmbodiedEnv:
-        if max_steps not in self._envs:
-            arguments = {**self._arguments, "obs_mode": "state", "max_steps": max_steps}
-            self._envs[max_steps] = EmbodiedEnv((), **arguments)
-        return self._envs[max_steps]
+    def __init__(self, collection: Collection, suite: Suite) -> None:
+        wanted = {trajectory.task_id for trajectory in collection.trajectories()}
+        fitted = resolve_tasks((each for each in suite.tasks if each.id in wanted), arrange=False)
+        self._tasks = {task.id: task for task in fitted.tasks}
+        self._parts = collection.parts()
+        self._part, self._env = "", EmbodiedEnv((), **{**suite.env, "obs_mode": "state"})
+        self._suite_env = suite.env
+        self.observation_space = self._env.observation_space
+        self.action_space = self._env.action_space
 
     def play(self, trajectory: Trajectory) -> tuple[dict[str, Any] | None, str]:
         """The columns of an episode; or None, and why there are none."""
-        if trajectory.task_id not in self._tasks:
-            return None, "the task is not in the suite"
-        if any(turn.fault for turn in trajectory.turns):
-            return None, "an injected fault"
-        env = self.env(trajectory.max_steps)
-        options = {"task": self._tasks[trajectory.task_id]}
-        obs, _ = env.reset(seed=trajectory.seed, options=options)
+        task = self._tasks.get(trajectory.task_id)
+        if task is None:
+            return None, "its task is not among those of the suite that can be played"
+        env = self._of(trajectory.part)
+        obs, _ = env.reset(seed=trajectory.seed, options={"task": task})
         states = [obs["state"]]
-        rewards: list[float] = []
         actions: list[int] = []
+        rewards: list[float] = []
         ended: list[bool] = []
         cut: list[bool] = []
         for turn in trajectory.turns:
-            if turn.action not in INDEX or (ended and (ended[-1] or cut[-1])):
-                return None, "it turned out otherwise when played again"
+            if turn.action not in INDEX:
+                return None, "a reply named no action"
+            if ended and (ended[-1] or cut[-1]):
+                return None, _OTHERWISE
             obs, reward, terminated, truncated, info = env.step(turn.action)
             if info["action_success"] != turn.success or not math.isclose(reward, turn.reward):
-                return None, "it turned out otherwise when played again"
+                return None, _OTHERWISE
             states.append(obs["state"])
             actions.append(INDEX[turn.action])
             rewards.append(float(reward))
@@ -82,9 +77,17 @@ class _Replays:
         }
         return columns, ""
 
+    def _of(self, part: str) -> EmbodiedEnv:
+        """The environment of a part; that of the part before is closed."""
+        if part != self._part:
+            self.close()
+            arguments = self._parts[part].manifest.env if part in self._parts else self._suite_env
+            self._part, self._env = part, EmbodiedEnv((), **{**arguments, "obs_mode": "state"})
+        return self._env
+
     def close(self) -> None:
-        for env in self._envs.values():
-            env.close()
+        """Close the environment."""
+        self._env.close()
 
 
 def _suite(job: ExportJob) -> Suite:
@@ -93,18 +96,18 @@ def _suite(job: ExportJob) -> Suite:
     Raises:
         ExportError: it is not to be had, or has other tasks now.
     """
-    wanted = job.collection.manifest
+    told, file = job.collection.manifest, job.options.tasks_file
     try:
-        suite = load_suite(wanted.suite)
+        suite = load_suite(told.suite) if file is None else suite_from_file(file)
     except ValueError as error:
         raise ExportError(
-            f"this format plays the trajectories again and needs the collection's suite "
-            f"{wanted.suite!r}: {error}; or give its task file (--tasks)"
+            f"this format plays the trajectories again and needs the tasks of {told.suite!r:.100}: "
+            f"{error}; give their file with --tasks-file"
         ) from error
-    if suite.digest != wanted.suite_digest:
+    if suite.digest != told.suite_digest:
         raise ExportError(
-            f"the suite {wanted.suite!r} has other tasks than when the collection was made; "
-            "give the task file of then (--tasks)"
+            f"the tasks of {suite.name!r:.100} are not those that {job.collection.path} was played "
+            "in; give the same file with --tasks-file, or use the er-gym that collected it"
         )
     return suite
 
@@ -118,18 +121,10 @@ def _write(job: ExportJob) -> None:
         raise needs("minari", "minari", error) from error
     from er_gym import __version__
 
-    settings = job.collection.manifest.settings.get("env", {})
-    env = {name: settings[name] for name in _PLAYING if name in settings}
-    if job.options.tasks is None:
-        suite = _suite(job)
-        tasks: Mapping[str, Task] = {task.id: task for task in suite.tasks}
-        env = {**{k: v for k, v in suite.env.items() if k in _PLAYING}, **env}
-    else:
-        tasks = job.options.tasks
+    suite = _suite(job)
     with ExitStack() as stack:
-        replays = _Replays(tasks, env)
+        replays = _Replays(job.collection, suite)
         stack.callback(replays.close)
-        spaces = replays.env(1)
         stores: dict[str, Any] = {}
         for split, trajectory in job.trajectories():
             columns, why = replays.play(trajectory)
@@ -142,8 +137,8 @@ def _write(job: ExportJob) -> None:
                 folder.mkdir(parents=True)
                 stores[split] = MinariStorage.new(
                     folder,
-                    observation_space=spaces.observation_space,
-                    action_space=spaces.action_space,
+                    observation_space=replays.observation_space,
+                    action_space=replays.action_space,
                     data_format="hdf5",
                 )
             place = stores[split].total_episodes
@@ -183,19 +178,6 @@ def _about(trajectory: Trajectory) -> dict[str, Any]:
         "kind": trajectory.kind,
         "success": trajectory.success,
     }
-
-
-def tasks_by_id(suite_or_file: str) -> Iterator[tuple[str, Task]]:
-    """The tasks of a suite or a task file, by id.
-
-    Raises:
-        ValueError: there is no such suite or file.
-    """
-    from pathlib import Path
-
-    path = Path(suite_or_file)
-    suite = suite_from_file(path) if path.is_file() else load_suite(suite_or_file)
-    return ((task.id, task) for task in suite.tasks)
 
 
 MINARI = ExportFormat(

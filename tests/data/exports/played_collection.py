@@ -28,6 +28,7 @@ from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.solver import Solver
 from er_gym.rollout.records import record_episode
+from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks import verbs
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
@@ -50,23 +51,28 @@ IMPOSSIBLE = Action(verbs.CLOSE, "Fridge")
 def play_collection(folder: Path, tasks: int = 12) -> Collection:
     """Play the first tasks of the suite ``mini`` and keep them as a collection."""
     suite = load_suite("mini")
-    manifest = CollectionManifest(
+    env = {**suite.env, **SIZE}
+    manifest = CollectionManifest(suite="mini", suite_digest=suite.digest, seed=0, er_gym="0")
+    collection = Collection.create(folder, manifest)
+    run = Manifest(
         suite="mini",
         suite_digest=suite.digest,
+        suite_size=tasks,
+        agent="oracle",
+        env=env,
         seed=0,
         er_gym="0",
-        settings={"env": {**suite.env, **SIZE}},
     )
-    collection = Collection.create(folder, manifest)
+    RunDirectory.create(collection.part_path("played"), run)
     step = max(1, len(suite.tasks) // tasks)
-    collection.write(_trajectories(folder, suite.tasks[::step][:tasks], dict(suite.env)))
+    collection.write(_trajectories(folder, suite.tasks[::step][:tasks], env))
     return collection
 
 
 def _trajectories(
     folder: Path, tasks: tuple[Task, ...], env_arguments: dict[str, Any]
 ) -> Iterator[Trajectory]:
-    env = EmbodiedEnv((), obs_mode="rgb+objects", **{**env_arguments, **SIZE})
+    env = EmbodiedEnv((), obs_mode="rgb+objects", **env_arguments)
     for number, task in enumerate(tasks):
         first = ([Action(verbs.OBSERVE)] if number % 2 else []) + (
             [IMPOSSIBLE] if number % 3 == 0 else []

@@ -38,7 +38,7 @@ def test_a_collection_becomes_training_files(collection: Collection, tmp_path: P
         (["--to", "trl", "--held-out", "Attic"], "no room 'Attic'"),
         (["--to", "trl", "--held-out", "2"], "give 0 to less than 1"),
         (["--to", "trl", "--per-turn"], "--per-turn does not go with --to trl"),
-        (["--to", "minari", "--tasks", "nowhere"], "nowhere"),
+        (["--to", "minari", "--tasks-file", "nowhere"], "nowhere"),
     ],
 )
 def test_bad_input_is_one_line(

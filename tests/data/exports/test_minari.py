@@ -53,12 +53,13 @@ def test_episodes_are_those_of_the_trajectories(
 def test_what_turns_out_otherwise_is_left_out(collection: Collection, tmp_path: Path) -> None:
     first, second, third, *_ = collection.trajectories()
     other = Collection.create(tmp_path / "other", collection.manifest)
+    (other.path / "parts").symlink_to(collection.path / "parts")
     wrong = first.turns[-1].model_copy(update={"reward": 7.0})
-    faulty = second.turns[0].model_copy(update={"fault": "open"})
+    unread = second.turns[0].model_copy(update={"verb": "error", "object_type": ""})
     other.write(
         [
             first.model_copy(update={"turns": [*first.turns[:-1], wrong]}),
-            second.model_copy(update={"turns": [faulty, *second.turns[1:]]}),
+            second.model_copy(update={"turns": [unread, *second.turns[1:]]}),
             third.model_copy(update={"task_id": "gone"}),
             third,
         ]
@@ -73,5 +74,5 @@ def test_another_suite_is_said(collection: Collection, tmp_path: Path) -> None:
     manifest = collection.manifest.model_copy(update={"suite_digest": "0"})
     other = Collection.create(tmp_path / "other", manifest)
     other.write(collection.trajectories())
-    with pytest.raises(ExportError, match="has other tasks than when the collection was made"):
+    with pytest.raises(ExportError, match=r"are not those that .* was played in"):
         export(other, "minari", tmp_path / "out")
