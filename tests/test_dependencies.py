@@ -24,6 +24,7 @@ PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["
 MAY_USE = {
     "er_gym": (),
     "er_gym/writing.py": ("charts",),
+    "er_gym/data/exports": ("data", "minari"),
     "agents": (),
     "agents/rl": ("rl",),
     "agents/vlm": ("vlm",),
