@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from benchmarks.cli.data_export import export
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import Place, force_option, workers_option
 from benchmarks.cli.terminal import echo, stdout, terminal
@@ -34,8 +33,7 @@ def data() -> None:
     """Trajectories that er-gym collect has written: count, verify, show, export."""
 
 
-if find_spec("benchmarks.cli.data_export") is not None:  # not there yet on every branch
-    data.add_command(import_module("benchmarks.cli.data_export").export)
+data.add_command(export)
 
 
 @data.command()
