@@ -7,13 +7,20 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from agents.expert.writers.base import ThoughtWriter
+from agents.expert.writers.checked import CheckedWriter
 from agents.expert.writers.grounded import GroundedWriter
 from er_gym.plugins import Registry
+
+
+def checked_grounded() -> ThoughtWriter:
+    """The grounded writer, whose thoughts the critic has passed."""
+    return CheckedWriter(GroundedWriter())
+
 
 WRITERS: Registry[Callable[[], ThoughtWriter]] = Registry(
     kind="writer of thoughts",
     group="er_gym.thought_writers",
-    own={"grounded": GroundedWriter},
+    own={"grounded": checked_grounded},
     expected="a writer's class (agents.expert.writers.base.ThoughtWriter), or a function that "
     "makes a writer",
     fits=callable,
