@@ -33,6 +33,8 @@ MAY_USE = {
     "benchmarks": (),
     "benchmarks/scoring/charts.py": ("charts",),
     "benchmarks/scoring/curves.py": ("charts",),
+    "benchmarks/scoring/data_charts.py": ("charts",),
+    "benchmarks/scoring/drawing.py": ("charts",),
     "benchmarks/cli/inspect.py": ("inspect",),
     "benchmarks/inspect_secrets.py": ("inspect",),
     "benchmarks/inspect_task.py": ("inspect",),
