@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
-from er_gym.data.knowledge import Knowledge
 from er_gym.data.mentions import Mention, all_alike, named_in
 from er_gym.data.phrases import MARK, Phrases
-from er_gym.data.reading import PHRASES, Clause, read
+from er_gym.data.reading import Clause
+from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.data.trajectory import SeenObject
 from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
@@ -33,101 +31,6 @@ PARTS: Mapping[str, frozenset[str]] = {
     "Cabinet": frozenset({"CounterTop", "Sink"}),
 }
 """Receptacles that are parts of others: what lies in a Drawer is in the Dresser."""
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """Why a thought is refused.
-
-    Attributes:
-        code: the sort of fault, such as ``unseen``, ``side``, ``state``, ``decision``.
-        detail: a sentence that a writer can act on: what was claimed, and what is so.
-    """
-
-    code: str
-    detail: str
-
-
-@dataclass(frozen=True)
-class Thought:
-    """A thought that is being checked.
-
-    Attributes:
-        text: as it was written; ``limit``: the most words.
-        kind: the kind that was asked for.
-        known: what the agent knew.
-    """
-
-    text: str
-    kind: str
-    limit: int
-    known: Knowledge
-
-    @cached_property
-    def phrases(self) -> Phrases:
-        """The phrases of its language."""
-        return PHRASES[self.known.language]
-
-    @cached_property
-    def clauses(self) -> tuple[Clause, ...]:
-        """What it says."""
-        return read(self.text, self.known.language)
-
-    @cached_property
-    def views(self) -> Mapping[str, Sequence[SeenObject]]:
-        """The objects in view by direction, ``ahead`` being the agent's own."""
-        return {"ahead": self.known.view, **self.known.views}
-
-    @cached_property
-    def in_view(self) -> frozenset[str]:
-        """The types in view, those alike included."""
-        return all_alike(self.known.in_view)
-
-    @cached_property
-    def seen(self) -> frozenset[str]:
-        """The types that are or were in view, or are in the hand, those alike included."""
-        known = self.known
-        taken = (each.action.object_type for each in known.actions if each.success)
-        types = (*known.seen, *known.in_view, known.held, *taken)
-        return all_alike(each for each in types if each in OBJECT_TYPES) | {"Floor"}
-
-    @cached_property
-    def held(self) -> frozenset[str]:
-        """The type in the hand, those alike included; empty for none."""
-        return all_alike([self.known.held]) if self.known.held else frozenset()
-
-    @cached_property
-    def mentionable(self) -> frozenset[str]:
-        """The types that may be spoken of as existing: seen, named, or offered as targets."""
-        known = self.known
-        places = (each.place for each in known.visits)
-        own = (known.decision.object_type, known.subgoal.thing, known.subgoal.place, known.at)
-        types = (
-            *(*known.navigable, *known.interactable, *known.plan, *places, *own),
-            *named_in(known.instruction),
-        )
-        return self.seen | all_alike(each for each in types if each in OBJECT_TYPES)
-
-    def things(self, types: Iterable[str]) -> Iterator[tuple[str, SeenObject]]:
-        """The objects of some types that are in view, each with its direction."""
-        wanted = all_alike(types)
-        for direction, view in self.views.items():
-            for each in view:
-                if each.type in wanted:
-                    yield direction, each
-
-    def done(self, verb: str, types: frozenset[str]) -> bool:
-        """Whether the agent did that to one of some types."""
-        wanted = all_alike(types)
-        return any(
-            each.success and each.action.verb == verb and each.action.object_type in wanted
-            for each in self.known.actions
-        )
-
-
-def name_of(mention: Mention) -> str:
-    """A name as it stands in the thought, in quotes."""
-    return f"“{mention.text}”"
 
 
 # -- what is seen, and where it is -----------------------------------------------------------------
@@ -150,7 +53,7 @@ def unseen(thought: Thought) -> Iterator[Refusal]:
             for match in phrase.finditer(clause.text):
                 if _wanted_before(clause, match, phrases) or clause.intended:
                     continue
-                for mention in clause.named(match, "xs"):
+                for mention in _subjects(clause, match, phrases):
                     if mention in strange:
                         yield _not_seen(mention)
 
@@ -165,7 +68,7 @@ def hidden(thought: Thought) -> Iterator[Refusal]:
         if not clause.intended:
             for phrase in phrases.located:
                 for match in phrase.finditer(clause.text):
-                    for mention in clause.named(match, "xs"):
+                    for mention in _subjects(clause, match, phrases):
                         if not mention.types & thought.seen and not _is_given(thought, mention):
                             yield _nowhere(mention)
         for match in _matches(clause, (*phrases.on, *phrases.out_of)):
@@ -174,7 +77,7 @@ def hidden(thought: Thought) -> Iterator[Refusal]:
             ):
                 continue
             (holder,) = clause.named(match, "y")
-            for mention in clause.named(match, "xs"):
+            for mention in _subjects(clause, match, phrases):
                 if mention.types & thought.seen or _is_given(thought, mention):
                     continue
                 yield Refusal(
@@ -196,7 +99,7 @@ def inside(thought: Thought) -> Iterator[Refusal]:
             (holder,) = clause.named(match, "y")
             if not _is_shut(thought, holder):
                 continue
-            for mention in clause.named(match, "xs"):
+            for mention in _subjects(clause, match, phrases):
                 here = thought.things(mention.types)
                 if mention.types & thought.seen and not any(
                     each.on in holder.types for _, each in here
@@ -218,7 +121,7 @@ def support(thought: Thought) -> Iterator[Refusal]:
             if _is_placing(clause, match, phrases):
                 continue
             (holder,) = clause.named(match, "y")
-            for mention in clause.named(match, "xs"):
+            for mention in _subjects(clause, match, phrases):
                 wrong = _not_on(thought, mention, holder)
                 if wrong:
                     yield Refusal(
@@ -239,10 +142,27 @@ def side(thought: Thought) -> Iterator[Refusal]:
                     each.side if view == "ahead" else view
                     for view, each in thought.things(mention.types)
                 }
-                fits = not places or direction in places or (nearly and "ahead" in places)
+                fits = (
+                    not places
+                    or direction in places
+                    or (nearly and "ahead" in places)
+                    or _bears_there(thought, mention, clause, direction)
+                )
                 wrong.append("" if fits else f"{name_of(mention)} is {_directions(places)}")
             if wrong and all(wrong):
                 yield Refusal("side", f"{wrong[0]}, not {_directions({direction})}.")
+
+
+def _bears_there(thought: Thought, mention: Mention, clause: Clause, direction: str) -> bool:
+    """Whether a thing that the clause names lies on the one that is mentioned, on that side.
+
+    Large furniture is on both sides of the view; its centre is not where a thing on it is.
+    """
+    return any(
+        each.on in all_alike(mention.types) and direction == (each.side if at == "ahead" else at)
+        for other in clause.mentions
+        for at, each in thought.things(other.types)
+    )
 
 
 def denied(thought: Thought) -> Iterator[Refusal]:
@@ -288,7 +208,7 @@ def state(thought: Thought) -> Iterator[Refusal]:
             word = next((word for word in _STATES if said.get(word)), "on")
             wrong = _is_not(thought, mention, word, bool(match["no"]))
             if wrong:
-                yield Refusal("state", f"{name_of(mention)} {wrong}.")
+                yield Refusal("state", f"{name_of(mention)} {wrong}; say so, or leave it out.")
 
 
 def hand(thought: Thought) -> Iterator[Refusal]:
@@ -302,7 +222,7 @@ def hand(thought: Thought) -> Iterator[Refusal]:
             yield Refusal("held", f"The hand is not empty: {truth}.")
         lost = _matches(clause, phrases.not_held)
         for match in lost:
-            for mention in clause.named(match, "xs"):
+            for mention in _subjects(clause, match, phrases):
                 if mention.types <= thought.held:
                     yield Refusal("held", f"Do not deny it: {truth}.")
         for match in _matches(clause, phrases.held):
@@ -332,6 +252,14 @@ def _wanted_before(clause: Clause, match: re.Match[str], phrases: Phrases) -> bo
     )
 
 
+def _subjects(clause: Clause, match: re.Match[str], phrases: Phrases) -> list[Mention]:
+    """The names that a match is about; "at the sink, the mug is ..." is about the mug alone."""
+    found = clause.named(match, "xs")
+    if phrases.of_other.search(clause.text[: match.start("xs")]):
+        return found[-1:]
+    return found
+
+
 def _is_placing(clause: Clause, match: re.Match[str], phrases: Phrases) -> bool:
     """Whether the thing is being put there, or looked for there, rather than lying there."""
     return bool(phrases.placing.search(clause.text[: match.start("xs")]))
@@ -350,15 +278,16 @@ _GIVEN = re.compile(r"\bthat (?:is|are|lies) (?:in|on)\b|\bfrom (?:the|inside)\b
 def _not_seen(mention: Mention) -> Refusal:
     return Refusal(
         "unseen",
-        f"{name_of(mention)} is not and was not in view. Leave it out, or say that it may be there.",
+        f"{name_of(mention)} is not and was not in view. Leave it out, or say that it may be "
+        "there.",
     )
 
 
 def _nowhere(mention: Mention) -> Refusal:
     return Refusal(
         "hidden",
-        f"The agent cannot know where {name_of(mention)} is: it was never in view. Say where it may "
-        "be, or leave it out.",
+        f"The agent cannot know where {name_of(mention)} is: it was never in view. Say where it "
+        "may be, or leave it out.",
     )
 
 
@@ -393,6 +322,8 @@ def _not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
         if mention.types & thought.held:
             return "it is in the hand"
         return ""
+    if thought.done(verbs.PUT, holder.types) and thought.done(verbs.PICKUP, mention.types):
+        return ""  # another one may be in view
     where = set()
     for direction, each in there:
         if "pickupable" not in OBJECT_TYPES[each.type].properties:
@@ -451,7 +382,9 @@ def _sides(clause: Clause, phrases: Phrases) -> Iterator[tuple[str, bool, list[M
         nearly = bool(phrases.nearly.search(clause.text[:start]))
         begin = found[k - 1][1] if k else 0
         stop = found[k + 1][0] if k + 1 < len(found) else len(clause.text)
-        leading = not clause.among(0, found[0][0])
+        leading = not clause.among(0, found[0][0]) or (
+            phrases.is_so.match(clause.text, end) and clause.among(end, stop)
+        )
         if leading:
             for place, mention in _pairs(clause, end, stop):
                 if not phrases.of_other.search(clause.text[end:place]):

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from er_gym.data import claims, deeds, form
-from er_gym.data.claims import Refusal, Thought
 from er_gym.data.knowledge import Knowledge
+from er_gym.data.thought import Refusal, Thought
 from er_gym.data.trajectory import ThoughtKind
 
 __all__ = ["CHECKS", "Refusal", "check"]

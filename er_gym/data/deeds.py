@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from er_gym.data.claims import Refusal, Thought, name_of
 from er_gym.data.mentions import Mention, all_alike
 from er_gym.data.reading import Clause
+from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
 
@@ -79,7 +79,7 @@ def outcome(thought: Thought) -> Iterator[Refusal]:
     phrases = thought.phrases
     admits = any(phrases.failing.search(each.text) for each in thought.clauses if not each.guessed)
     for clause in thought.clauses:
-        if clause.guessed:
+        if clause.guessed and "seem" not in clause.text:
             continue
         if phrases.failed.search(clause.text) and not failed_lately:
             yield Refusal(
@@ -125,9 +125,7 @@ class Decided:
 def decision(thought: Thought) -> Iterator[Refusal]:
     """Decides on another action than the one that is taken."""
     known, phrases = thought.known, thought.phrases
-    decided = [
-        each for each in _decided(thought) if each.act != "look around" or each.clause.last
-    ]
+    decided = [each for each in _decided(thought) if each.act != "look around" or each.clause.last]
     fitting = [each for each in decided if _fits(thought, each)]
     others = [each for each in decided if each not in fitting and not each.later]
     wrong = None

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from er_gym.data.claims import Refusal, Thought
 from er_gym.data.mentions import find_mentions
+from er_gym.data.thought import Refusal, Thought
 from er_gym.thor import OBJECT_TYPES
 
 _FEWEST = 3

@@ -82,7 +82,6 @@ WIDER: Mapping[str, tuple[str, ...]] = {
     "勺子": ("Ladle",),
 }
 _MORE_EN: Mapping[str, tuple[str, ...]] = {
-    "stand": ("TVStand", "SideTable"),
     "seat": ("Chair", "ArmChair", "Sofa", "Stool"),
     "holder": ("TowelHolder", "HandTowelHolder", "ToiletPaperHanger"),
     "kitchen table": ("DiningTable", "SideTable"),
@@ -124,7 +123,7 @@ _NO_NAME = re.compile(
 _NO_NAME_ZH = re.compile(
     r"地(?!板|面|上)|[花](?=时间|费|了|点|些|掉)|画(?=面|出|像)|布(?=局|置|满)|卡(?=住|在|着)|[分点]钟|时钟(?=方向)"
     r"|书(?=房|写)|盘(?=算|点)|厕所|鞋(?=柜)|电话(?=里)|天花|蛋糕|床(?=头)(?!头柜|头桌)|切换|开关(?=门)|球(?=形)"
-    r"|[纸](?=上谈)|布满|刀(?=口)|灯(?=光|火)|池子|杯(?=具)"
+    r"|[纸](?=上谈)|布满|刀(?=口)|灯(?=光|火)|池子|杯(?=具)|操作(?=台灯)"
 )
 _WORDS = re.compile(r"[A-Za-z]+(?:\d+)?")
 _CAMEL = re.compile(r"[A-Z]+(?![a-z])|[A-Z][a-z]+|\d+")
@@ -211,6 +210,7 @@ def _in_english(text: str) -> Iterator[Mention]:
     lower = [word.group().lower() for word in words]
     spans = [word.span() for word in words]
     barred = [match.span() for match in _NO_NAME.finditer(text)]
+    chinese = bool(_HAN.search(text))
     k = 0
     while k < len(words):
         key, last = "", 0
@@ -227,12 +227,14 @@ def _in_english(text: str) -> Iterator[Mention]:
         start, end = spans[k][0], spans[last][1]
         written = text[start:end]
         exact = written in OBJECT_TYPES and (
-            len(_CAMEL.findall(written)) > 1 or not _begins(text, start)
+            chinese or len(_CAMEL.findall(written)) > 1 or not _begins(text, start)
         )
         if exact:
             found = frozenset({written})
         elif any(a <= start < b for a, b in barred) or (
-            last == k and not _WEAK.isdisjoint((lower[k], lower[k].removesuffix("s"))) and not _after_article(lower, spans, text, k)
+            last == k
+            and not _WEAK.isdisjoint((lower[k], lower[k].removesuffix("s")))
+            and not _after_article(lower, spans, text, k)
         ):
             k += 1
             continue
@@ -259,7 +261,7 @@ def _in_chinese(text: str) -> Iterator[Mention]:
     while k < len(text):
         for length in lengths.get(text[k], ()):
             written = text[k : k + length]
-            if written in names and not (length <= 2 and k in barred):
+            if written in names and not (k in barred and (length <= 2 or written == "操作台")):
                 yield Mention(k, k + length, written, names[written])
                 k += length
                 break

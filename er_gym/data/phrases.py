@@ -38,7 +38,7 @@ class Phrases:
         sides: phrases of place by direction: ``left``, ``right``, ``ahead``, ``behind``.
         nearly: before a side: a little.
         of_other: before a name, what makes it the place of another thing.
-        is_so: between the name before a side and the side: the name is what the side is about.
+        is_so: after a side: the name that follows is what it is about.
         states: claims about ``x``, with the groups ``open``, ``closed``, ``on``, ``off`` and
             ``no`` (not so).
         it_states: the same of "it".

@@ -17,7 +17,10 @@ def _word(words: str) -> str:
     return rf"\b(?:{words.replace('/', '|')})\b"
 
 
-_NO = "no|not|nor|on|in|to|of|for|with|from|and|or|but|at|by|near|about|into|onto|than|as|if|is|are"
+_NO = (
+    "no|not|nor|on|in|to|of|for|with|from|and|or|but|at|by|near|about|into|onto|than|as|if|is|are"
+    "|i|we|it|there|see|has|have|had|which|can|will|was|were|i'm|i've|i'll|then|so|stands|lies|sits|left|right"
+)
 _D = rf"(?:(?!(?:{_NO}) )[a-z0-9'’-]+ ){{0,4}}"
 """Articles and adjectives before a name."""
 _JOINT = r"(?:,? and,? |,? or |, |,? as well as |,? together with |,? along with | & |/)"
@@ -72,13 +75,13 @@ def _act(words: str, rest: str = _AND_SO) -> Phrase:
 PHRASES = Phrases(
     sentence=re.compile(r"(?<=[.!?])[\"')]*\s+|\n+|;\s"),
     clause=_any(
-        r",\s+(?:(?:and|but|so|which|while|yet|then|though|although|because|since|where|as)\s+)?",
+        r",\s+(?!which (?:is|are|sits|stands|lies|rests|i have|i've|i already)\b)(?:(?:and|but|so|which|while|yet|then|though|although|because|since|where|as)\s+)?",
         r":\s+",
         r"\s+[—–-]\s+|—",
         r"\s(?:but|while|because|since|although|though|so that|so|whereas|yet|then)\s",
         r"\s(?:and|or)\s(?=(?:i|there|it|they|my|let|this|that|then|next)\b)",
         r"\s(?=that (?:i|we) (?:can|could|may|might|would|should|will|need|want|have to)\b)",
-        r"\swhich\s(?=(?:is|are|may|might|could|would|means|tells|gives|should|must)\b)",
+        r"\swhich\s(?=(?:may|might|could|would|means|tells|gives|should|must)\b)",
     ),
     verb=re.compile(
         r"\b(?:i|we|is|are|was|were|see|there|has|have|had|can|could|will|would|should|may|might"
@@ -90,9 +93,9 @@ PHRASES = Phrases(
     question=re.compile(r"\?[\"')]*\s*$"),
     hedge=_any(
         _word(
-            "may/might/could/perhaps/maybe/possibly/probably/likely/likeliest/likelier/presumably"
+            "may/might/could(?! not)/perhaps/maybe/possibly/probably/likely/likeliest/likelier/presumably"
             "/potentially/possible/plausible/plausibly/conceivably/suppose/guess/assume/suspect"
-            "/expect/expected/imagine/wonder/wondering/chance/chances/hope/hoping/hopefully/bet"
+            "/expect/expected/imagine/wonder/wondering/hoped/had hoped/thought/can picture/i picture/picturing/chance/chances/hope/hoping/hopefully/bet"
             "/should be/must be/must have/should have/ought to/seems/seem/appears to be/as if/as though"
             "/supposedly/apparently/unclear/unsure/not sure/uncertain/cannot tell/can't tell"
             "/would/i think/i believe/i'd/or/either/no idea/unless"
@@ -129,7 +132,7 @@ PHRASES = Phrases(
     intention=_any(
         r"\b(?:will|shall|let me|let's|let us|going to|about to|plan(?:s|ned|ning)?|intend|decided?|next(?! to\b)"
         r"|want to|had better|i'd better|time to|heading|consider|option|options|could|ready to|try|bring|carry"
-        r"|(?:am|'m) (?:taking|bringing|carrying .* to))\b|'ll\b|^(?:to|by) "
+        r"|(?:am|'m) (?:taking|bringing|carrying .* to))\b|'ll\b|^to (?!(?:one|my|the|either)\b)|^by (?!(?:my|the)\b)"
     ),
     seen=(
         re.compile(
@@ -203,13 +206,15 @@ PHRASES = Phrases(
     },
     nearly=re.compile(r"(?:slightly|a (?:little|bit|touch|fraction)|just|somewhat)(?: off| over)? $"),
     of_other=re.compile(
-        r"\b(?:next to|beside|near|by|of|on|in|above|under|below|underneath|over|behind|at|inside|with|against|between|beyond|past|than|from|to|towards|along)"
+        r"\b(?:next to|besides|beside|near|by|of|on|in|above|under|below|underneath|over|behind|(?<!looking )at|inside|with|against|between|beyond|past|than|from|to|towards|along)"
         rf" {_D}(?:{MARK} and {_D})?$"
     ),
-    is_so=re.compile(r"\b(?:is|are|stands?|sits?|lies|located|rests?)\b"),
+    is_so=re.compile(r",? (?:is|are|stands?|sits?|lies|lie|rests?|hangs?|there (?:is|are)|there's|i (?:can |could )?(?:also )?(?:see|notice|spot|find|make out|have))\b"),
     states=(
         re.compile(rf"{_X}(?:'s)?(?: doors?| lid| cover| screen)?(?: (?:in front of me|here|there|ahead|nearby))?,?(?: {_IS}|'s){_STATE}"),
         re.compile(rf"{_X},? (?:and |but )?it(?: {_IS}|'s){_STATE}"),
+        re.compile(rf"{_X}, which(?: {_IS}){_STATE}"),
+        re.compile(rf"\bi (?:find|found|see|notice) {_D}{_X}{_STATE}"),
         re.compile(
             r"\b(?:the|an?|this|that|its|already|still|now|currently) (?:already |still |now |half-)?(?:(?P<open>open|opened)|(?P<closed>closed|shut)|(?P<on>lit|switched-on)"
             rf"|(?P<off>unlit|switched-off)) (?:[a-z]+ )?{_X}(?P<no>)"
@@ -225,19 +230,19 @@ PHRASES = Phrases(
             rf"\b(?:have|got|having|with) {_D}(?P<xs>{MARK})(?: (?:now|safely|firmly|securely|already|finally|still))* (?:in (?:my|the|one) (?:hands?|grip|gripper|arms?)|in hand|with me)\b"
         ),
         re.compile(
-            rf"(?P<xs>{MARK})(?:,? (?:is|are|{_HOW}|firmly|securely)|'s)+ (?:in|within) (?:my|the) (?:hands?|grip|gripper|arms?|grasp)\b|\bin my hand(?:s)?(?: is|,? i (?:have|hold)) {_D}{_X}"
+            rf"(?P<xs>{MARK})(?:,? (?:is|are|{_HOW}|firmly|securely)|'s)+ (?:in|within) (?:my|the) (?:hands?|grip|gripper|arms?|grasp|possession)\b|\bin my hand(?:s)?(?: is|,? i (?:have|hold)) {_D}{_X}"
         ),
-        re.compile(rf"\bi (?:now|finally|already) have {_D}(?P<xs>{MARK})(?= *(?:$|[.,!]|and\b|so\b))"),
+        re.compile(rf"\bi (?:now|finally|already) have {_D}(?P<xs>{MARK})(?= *(?:$|[.!]|,? (?:so|and (?:i|can|my))\b))"),
     ),
     not_held=(
         re.compile(
-            rf"\b(?:not|n't|no longer)(?: yet| currently)? (?:holding|hold|carrying|carry|have) {_D}(?P<xs>{MARK})(?= *(?:$|[.,!]|yet|now|any|in my hand))"
+            rf"(?:\bnot|n't|no longer)(?: yet| currently)? (?:holding|hold|carrying|carry|have) {_D}(?P<xs>{MARK})(?= *(?:$|[.,!]|yet|now|any|in my hand))"
         ),
         re.compile(rf"(?P<xs>{MARK}) (?:is|are)(?: not|n't| no longer)(?: yet| currently)? in my (?:hands?|grip|gripper)"),
     ),
     empty_hand=re.compile(
         r"\b(?:my|both(?: of my)?|the) (?:hands?|gripper|arms?) (?:is|are|'s)(?: now| still| currently| again| both| completely| otherwise)? (?:empty|free)\b"
-        r"|\bempty[- ]handed\b|\bnothing (?:is )?(?:yet )?in (?:my|the|either) hands?\b|\b(?:not|n't)(?: currently| yet)? (?:holding|carrying|hold|carry) anything\b"
+        r"|(?:\bnot|n't)(?: currently| yet)? have anything in (?:my|either) hands?|\bempty[- ]handed\b|\bnothing (?:is )?(?:yet )?in (?:my|the|either) hands?\b|(?:\bnot|n't)(?: currently| yet)? (?:holding|carrying|hold|carry) anything\b"
         r"|\b(?:hold|holding|carry|carrying) nothing\b|\bwith (?:an empty|a free|empty|free) hands?\b"
     ),
     did={
@@ -255,7 +260,7 @@ PHRASES = Phrases(
         ),
         verbs.PUT: (
             re.compile(
-                rf"{_PAST}(?:put|placed|left|dropped|set|stored|laid|deposited) (?:it|them|{_D}{_X})(?: down| away| safely)? (?:in|into|on|onto|inside|on top of) {_D}{_Y}"
+                rf"(?:{_PAST}(?:placed|dropped|stored|laid|deposited)|\bi(?:'ve| have)(?: already| just| now)* (?:put|set|left)) (?:it|them|{_D}{_X})(?: down| away| safely)? (?:in|into|on|onto|inside|on top of) {_D}{_Y}"
             ),
         ),
         verbs.TOGGLE: (
@@ -269,21 +274,24 @@ PHRASES = Phrases(
         ),
         "searched": (
             re.compile(rf"{_PAST}(?:{_SEARCHED}) {_D}{_X}"),
+            re.compile(rf"{_X},? which {_I}(?:{_SEARCHED})"),
+            re.compile(rf"\bmy (?:search|inspection|check|visit) (?:of|to) {_D}{_X}"),
+            re.compile(rf"{_X} turned out to be empty"),
             re.compile(rf"{_X} (?:has|have|was|is)(?: already| now)* (?:been )?(?:already )?(?:searched|checked|examined|inspected|explored|investigated)\b"),
             re.compile(rf"\bafter (?:searching|checking|opening|visiting|examining|exploring|looking (?:in|into|inside)) {_D}{_X}(?= without| in vain| and finding| and seeing| to no)"),
         ),
     },
     failed=_any(
         r"\b(?:last|previous|preceding) (?:action|attempt|step|move|try)[^.,]{0,40}?(?:failed|fail|unsuccessful|(?:did not|didn't|has not|hasn't) (?:succeed|work|go)|had no effect|was not|wasn't)",
-        r"\b(?:failed|unable|not able|wasn't able) to (?:open|close|pick|take|grab|put|place|reach|get to|switch|turn|toggle|navigate|go|walk|move|shut|look around|step|observe|do (?:it|that|this|so))\b",
+        r"\b(?:failed|unable|not able|wasn't able) to (?:open|close|pick|take|grab|put|place|reach|get to|switch|turn|toggle|navigate|go|walk|head|move|shut|pull|slice|look around|step|observe|do (?:it|that|this|so))\b",
         r"\battempt to [^.,]{0,40}(?:failed|did not|didn't|was unsuccessful|had no)",
-        r"\b(?:could not|couldn't) (?:open|close|shut|pick|take|grab|put|place|reach|get to|switch|turn|toggle|lift|move|navigate|go|walk|step)\b",
+        r"\b(?:could not|couldn't) (?:open|close|shut|pick|take|grab|put|place|reach|get to|switch|turn|toggle|lift|move|navigate|go|walk|step|head|pull)\b",
         r"\b(?:the|my|that|this) (?:action|attempt|move) (?:has )?(?:failed|did not|didn't)\b",
         r"\bwent wrong\b",
     ),
     succeeded=_any(
-        r"\b(?:that|it|this|which) (?:has )?worked\b(?! before)",
-        r"\b(?:last|previous|preceding) (?:action|attempt|step|move|try)[^.,]{0,30}?(?:was (?:a )?success|succeeded|worked|went (?:well|exactly|through|as|smoothly)|has succeeded|did its)",
+        r"\b(?:that|it|this|which) (?:has )?(?:worked|succeeded)\b(?! before)",
+        r"\b(?:last|previous|preceding) (?:action|attempt|step|move|try)[^.,]{0,30}?(?:was (?:a )?success|succeeded|worked|went through|went (?:well|exactly|through|as|smoothly)|has succeeded|did its)",
         r"\b(?:i )?(?:managed|was able|have been able) to (?:open|close|pick|take|grab|put|place|reach|get to|switch|turn|toggle|navigate|go|walk|move|shut|look around|step)\b",
         r"\bwent (?:exactly )?as (?:planned|expected|intended)\b|\bi (?:have )?successfully\b|\bworked as (?:planned|expected)\b",
     ),
@@ -293,7 +301,7 @@ PHRASES = Phrases(
     decides=_any(
         r"\b(?:i|we)(?: will|'ll| shall| am going to| am about to| decide to| have decided to| choose to| intend to| plan to| am now going to| should| must| need to| have to| had better| want to| ought to| am ready to| would rather)\b",
         r"\bi'(?:ll|m going to|m about to|ve decided to|d better|d rather)\b",
-        r"\blet me\b|\blet's\b|\blet us\b|\btime to\b|\bready to\b",
+        r"\bmade up my mind to\b|\blet me\b|\blet's\b|\blet us\b|\btime to\b|\bready to\b",
         r"\b(?:next|best|right|obvious|logical|sensible|first|immediate|remaining|only) (?:step|move|thing|action|option|choice|place|idea|course)[^.,§]{0,40}? (?:is|will be)(?: now)?(?: to)?\b",
         r"\bmakes? (?:the most |more |good |perfect )?sense to\b|\bmy (?:plan|decision|choice) is(?: now)? to\b|\bdecision is to\b|\bdecided(?: to|:)",
         r"\b(?:so|now|therefore|thus|hence|next|then|accordingly),? i(?= )",
@@ -304,7 +312,7 @@ PHRASES = Phrases(
     acts={
         "forward": re.compile(r"(?:move|step|go|take|walk|come|get|edge|inch)(?: (?:a|one|little|bit|small|step|slightly|just|few|steps|half))* (?:forward|closer|nearer|ahead)\b|take (?:a|one)(?: small| little| single)? step"),
         "look around": re.compile(
-            r"(?:look|glance|take a (?:good |quick |full )?look|have a look|turn)(?: all)? (?:around|about|round)\b(?! §)|(?:scan|observe|survey|view)(?: the| my| this)?(?: whole| entire| rest of the)? (?:room|surroundings|area|kitchen|bathroom|bedroom|living room|scene)"
+            r"(?:stop and )?(?:observe\b(?! (?:the|that|how|what) §)|(?:look|glance|take a (?:good |quick |full )?look|have a look|turn)(?: all)? (?:around|about|round)\b(?! §)|(?:scan|observe|survey|view)(?: the| my| this)?(?: whole| entire| rest of the)? (?:room|surroundings|area|kitchen|bathroom|bedroom|living room|scene))"
         ),
         "go": _act(_GO, rf"(?:(?:back|over|straight|right|directly|on|up|across|down|now|out|first|to|towards?|for|near|off|close) )+{_D}{_X}"),
         "visit": _act("approach/visit/try/return to/make for", _AND_SO),
@@ -320,7 +328,7 @@ PHRASES = Phrases(
         ),
         "toggle": re.compile(rf"(?:turn|switch|power|toggle|flip|press|activate|deactivate|light)(?: on| off)? {_D}{_X}"),
         "slice": _act("slice|cut|chop", _AND_SO),
-        "end": re.compile(r"(?:end|finish|stop|conclude|wrap up|call it)(?: the task| here| now| it| this| there| my| everything| the)?\b"),
+        "end": re.compile(r"(?:end|finish|stop(?! and\b)|conclude|wrap up|call it)(?: the task| here| now| it| this| there| my| everything| the)?\b"),
     },
     later=re.compile(
         r"\b(?:later|afterwards?|after (?:that|this)|eventually|finally|in the end|then|once|subsequently|at the end|lastly|next i|second|secondly|as well|also|still|come back|if need be|if necessary|only|and then|if|unless|when|until|before|otherwise|could|might|would|don't|not|no|never|rather than|instead of)\b|n't\b"
@@ -335,7 +343,7 @@ PHRASES = Phrases(
         r"\bhints?\b|\bkey actions?\b|\bground[- ]truth\b|\bdata ?sets?\b|\blanguage model\b|\ban ai\b|\bai (?:assistant|model)\b|\bas an? (?:large |ai|assistant|model)",
         r"\b(?:as|i was|i am|i've been|have been) (?:instructed|told|asked) to (?:justify|explain|write|give|provide|produce|respond|think of)\b|\bas instructed,|\bjustify (?:the|my|this) (?:decision|action|choice)",
         r"\b(?:provided|given|supplied|predetermined|intended|predefined|prescribed|expected) (?:decision|action|answer|list|plan|sequence|next (?:step|action))\b|\b(?:decision|action|list|answer|sequence)[^.]{0,30}(?:was|were|has been|have been|am|is) given (?:to me|here)\b|\blist[^.]{0,40}\bgiven\b",
-        r"\b(?:the|a|my|this) (?:candidate |given |pending |navigable |search )?list\b(?! of things to do)|\bmetadata\b|\bsimulator\b|\bsystem prompt\b|\bthe prompt\b|\bword limit\b|\btraining data\b|\bannotat(?:ion|ed|or)",
+        r"\b(?:candidate|given|pending|navigable|provided|supplied|location) list\b|\b(?:on|in|from|per|following) the list\b|\bthe list (?:says|of|that|tells|given|shows|contains)|\bmetadata\b|\bsimulator\b|\bsystem prompt\b|\bthe prompt\b|\bword limit\b|\btraining data\b|\bannotat(?:ion|ed|or)",
         r"\bi(?:'m| am) sorry,? (?:but )?i (?:can't|cannot|can not|am unable|won't)|\bi (?:cannot|can't|am unable to) (?:assist|help|comply|fulfill|provide|process|view (?:the )?images)|\bcan(?:'t|not) (?:assist|help) with",
         r"\b(?:http|error|status)(?: code)?:? ?[45]\d\d\b|\b[45]\d\d (?:internal|bad|too many|service|gateway|forbidden|unauthori|not found|error)|\brate limit|\btoo many requests\b|\binternal server error\b|\btime(?:d)? ?out error\b|\btraceback\b|\bapi key\b|\bexception\b:|\bopenai\b|\bgpt-?\d|\brequest failed\b|\bconnection (?:error|refused|reset)|\binsufficient[_ ]quota|\bcontent policy\b",
     ),

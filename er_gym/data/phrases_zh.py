@@ -35,7 +35,7 @@ _STATE = (
 def _act(words: str, after: str = "") -> Phrase:
     """A verb before its object, or after it with 把."""
     after = after or words
-    return re.compile(rf"去?(?:(?:{words})(?:一下)?{_D}{_X}|把{_D}{_X2}(?:{after}))")
+    return re.compile(rf"去?(?:(?:{words})(?:一下)?{_D}{_X}|把{_D}{_X2}(?:{after})(?!.{{0,2}}了))")
 
 
 PHRASES = Phrases(
@@ -46,7 +46,7 @@ PHRASES = Phrases(
     question=re.compile(r"[？?]|吗[。？?]?$|呢[。？?]?$|会不会|是不是|能不能|哪里|哪儿"),
     hedge=re.compile(
         r"可能|也许|或许|大概|估计|说不定|似乎|好像|猜|推测|多半|兴许|想必|会不会|恐怕|应该|不知道|是否|没准|希望|不确定"
-        r"|或者|要么|无论|像是|假设|怀疑|我想|我觉得|我认为|看样子|八成|有望|或|值得|不妨|说不准"
+        r"|或者|要么|无论|像是|假设|怀疑|我想|我觉得|我认为|看样子|以为|原想|本想|八成|有望|或|值得|不妨|说不准"
     ),
     negation=re.compile(r"没|不|未|无|别|并非|缺|除了"),
     condition=re.compile(r"如果|假如|要是|一旦|除非|只要|等到|等我|的话|直到|万一|若|即使|无论|以便"),
@@ -85,7 +85,7 @@ PHRASES = Phrases(
     },
     nearly=re.compile(r"(?:稍微?|偏|略|有点|略微)(?:偏|靠)?(?:向|在)?$"),
     of_other=re.compile(r"(?:靠近|紧挨着|挨着|紧邻|在)$"),
-    is_so=re.compile(r"在|位于"),
+    is_so=re.compile(r"，?(?:还|也|则|就|正)*(?:有|是|放着|摆着|立着|能看到|可以看到|我看到)"),
     states=(
         re.compile(rf"(?<![把将]){_X}{_STATE}"),
         re.compile(
@@ -115,11 +115,11 @@ PHRASES = Phrases(
             re.compile(rf"(?:拿起|拿到|捡起|取出|拾起|抓起)了{_D}{_X}"),
             re.compile(rf"{_EARLIER}把{_D}{_X}(?:拿|取|捡|抓)"),
         ),
-        verbs.PUT: (re.compile(rf"{_EARLIER}把{_D}(?:§|它|东西)(?:放进|放到|放在|放入|搁在|放回)了?{_D}{_Y}"),),
+        verbs.PUT: (re.compile(rf"把{_D}(?:§|它|东西)(?:放进|放到|放在|放入|放回){_D}{_Y}(?:的)?[上里中内面边]{{0,2}}了"), re.compile(rf"{_EARLIER}把{_D}(?:§|它|东西)(?:放进|放到|放在|放入|搁在|放回)了?{_D}{_Y}"),),
         verbs.NAVIGATE: (
             re.compile(rf"去过了?{_D}{_X}"),
             re.compile(rf"{_X}{_BEFORE}去过"),
-            re.compile(rf"(?:走到|来到|到达|到)了{_D}{_X}"),
+            re.compile(rf"(?:走到|来到|到达|(?<![拿看找见碰遇得想])到)了{_D}{_X}"),
         ),
         "searched": (
             re.compile(rf"{_SEEK}(?:过|完)了?{_D}{_X}"),
@@ -142,16 +142,16 @@ PHRASES = Phrases(
     weak=re.compile(r"(?:应该|需要|我想|我得)$"),
     acts={
         "forward": re.compile(r"(?:向前|往前|前进|再?靠近一[点些]|走近一[步点])"),
-        "look around": re.compile(r"(?:环顾|环视|观察(?:一下)?(?:四周|周围|房间|整个)|看看(?:四周|周围)|四处看|看一圈|扫视)"),
+        "look around": re.compile(r"(?:停下来?|站在原地)*(?:观察|环顾|环视|观察(?:一下)?(?:四周|周围|房间|整个)|看看(?:四周|周围)|四处看|看一圈|扫视)"),
         "open": _act("打开|拉开"),
         "close": _act("关上|关闭|合上|关掉|关"),
-        "put": re.compile(rf"去?把{_D}(?:{MARK}|它|东西)(?:放|搁|送|带|拿)(?:进|到|在|入|回|去)?{_D}{_X}|放(?:进|到|在|入){_D}{_X2}"),
+        "put": re.compile(rf"去?把{_D}(?:{MARK}|它|东西)(?:放|搁|送|带|拿)(?:进|到|在|入|回|去)?{_D}{_X}(?![^，。]{{0,3}}了)|放(?:进|到|在|入){_D}{_X2}(?![^，。]*了)"),
         "take": _act("拿起|捡起|抓起|拾起|取出|拿|取", "拿|取|捡|抓"),
         "toggle": _act("开启|启动|按下|切换|拨动"),
         "check": re.compile(rf"去?(?:检查|查看|看看|搜索|找找|搜|翻找|看一看|翻翻|瞧瞧)(?:一下)?{_D}{_X}"),
         "go": re.compile(rf"(?:导航到|走到|走向|走去|前往|去往|去到|回到|移动到|靠近|来到|走近|去|到|回){_D}{_X}"),
         "slice": _act("切开|切"),
-        "end": re.compile(r"结束|完成任务|停下|停止|收工"),
+        "end": re.compile(r"结束|完成任务|停下(?!来)|停止|收工"),
     },
     later=re.compile(r"然后|之后|随后|最后|稍后|以后|如果|可以|等|再|接着|才|不|没|别"),
     first=re.compile(r"首先|第一步|马上|立刻"),

@@ -17,6 +17,7 @@ from er_gym.data.phrases_zh import PHRASES as CHINESE
 from er_gym.data.trajectory import Language
 
 PHRASES: dict[Language, Phrases] = {"en": ENGLISH, "zh": CHINESE}
+_AND = ("and ", "but ", "while ", "，")
 _SPACES = re.compile(r"[ \t\r\f\v]+")
 
 
@@ -134,9 +135,16 @@ def _parts(text: str, at: Phrase) -> Iterator[str]:
 def _clauses(sentence: str, phrases: Phrases) -> list[str]:
     """The clauses of a sentence. What has no verb belongs to the clause before it."""
     clauses: list[str] = []
-    for part in _parts(sentence, phrases.clause):
-        if clauses and not (phrases.verb.search(part) and phrases.verb.search(clauses[-1])):
+    waiting = ""  # words without a verb or a name, such as "on my left,"
+    for each in _parts(sentence, phrases.clause):
+        part, waiting = waiting + each, ""
+        begins = not clauses or clauses[-1].endswith(_AND)
+        if begins and MARK not in part and not phrases.verb.search(part):
+            waiting = part
+        elif clauses and not (phrases.verb.search(part) and phrases.verb.search(clauses[-1])):
             clauses[-1] += part
         else:
             clauses.append(part)
+    if waiting:
+        clauses[-1:] = [*clauses[-1:], waiting] if not clauses else [clauses[-1] + waiting]
     return clauses

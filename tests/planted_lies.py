@@ -1,4 +1,4 @@
-"""Lies and honest thoughts about real scenes: the templates of wordings.py, filled."""
+"""Lies and honest thoughts about real scenes: the templates of lie_wordings.py, filled."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from wordings import HONEST_EN, HONEST_ZH, LIES_EN, LIES_ZH
+from lie_wordings import HONEST_EN, HONEST_ZH, LIES_EN, LIES_ZH
 
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.mentions import alike, all_alike, named_in
@@ -117,6 +117,8 @@ class _Scene:
         """Things of which all of the type share a state."""
         found = []
         for each in self.known.view:
+            if each.open is not None and each.toggled is not None:
+                continue  # Chinese has one word for both
             things = [
                 getattr(other, attribute)
                 for view in self.views.values()
@@ -180,7 +182,11 @@ class _Scene:
                 for other in view
                 if other.type in alike(each.type)
             ]
-            if len(same) != 1 or not each.on or "pickupable" not in OBJECT_TYPES[each.type].properties:
+            if (
+                len(same) != 1
+                or not each.on
+                or "pickupable" not in OBJECT_TYPES[each.type].properties
+            ):
                 continue
             holders = [
                 one
@@ -196,7 +202,13 @@ class _Scene:
         return found
 
 
-_GENERAL = {"Floor", "Window", "RoomDecor", "TableTopDecor", *(t for t in OBJECT_TYPES if "Sliced" in t)}
+_GENERAL = {
+    "Floor",
+    "Window",
+    "RoomDecor",
+    "TableTopDecor",
+    *(t for t in OBJECT_TYPES if "Sliced" in t),
+}
 """Types of which a lie would not be plain."""
 _DOORS = {"ShowerCurtain", "ShowerDoor", "Blinds", "Book", "Toilet", "Laptop", "Curtains", "Box"}
 """They open, but nobody would look for things in them."""
@@ -253,13 +265,23 @@ def _is_vague(scene: _Scene, sort: str) -> bool:
 def _other_act(scene: _Scene) -> str:
     """An action that is not the decision, and no step towards it."""
     known = scene.known
-    types = [each for each in scene.types if each not in all_alike([known.decision.object_type or "Floor"])]
-    lies_on = {each.type for each in known.view if each.on in alike(known.decision.object_type or "Floor")}
+    types = [
+        each
+        for each in scene.types
+        if each not in all_alike([known.decision.object_type or "Floor"])
+    ]
+    lies_on = {
+        each.type
+        for view in scene.views.values()
+        for each in view
+        if each.on in alike(known.decision.object_type or "Floor")
+    }
     act = scene.draw.choice((verbs.NAVIGATE, verbs.OPEN, verbs.PICKUP))
     takes = [
         each
         for each in types
-        if each not in lies_on and (act == verbs.NAVIGATE or verbs.verb_named(act).takes(each))
+        if each not in lies_on
+        and (act == verbs.NAVIGATE or verbs.verb_named(act).takes(each))
         and known.seen.get(each) not in alike(known.decision.object_type or "Floor")
     ]
     return scene.act(Action(act, scene.pick(takes))) if takes else ""

@@ -63,7 +63,12 @@ def _actions(info: Any) -> Any:
         if opens and Action(verbs.OPEN, opens[0]) in to_open:
             info = yield Action(verbs.OPEN, opens[0])
             info = yield Action(verbs.CLOSE, opens[0])
-    info = yield Action(verbs.PICKUP, _thing(info))  # fails: it is not in reach
+    out_of_reach = [
+        each
+        for each in info["visible"]
+        if verbs.verb_named(verbs.PICKUP).takes(each) and each not in info["interactable"]
+    ]
+    info = yield Action(verbs.PICKUP, next(iter(out_of_reach), _thing(info)))  # fails
     info = yield Action(verbs.OBSERVE)
     solver = Solver()
     while True:
