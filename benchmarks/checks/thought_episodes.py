@@ -26,6 +26,7 @@ from er_gym.data.trajectory import (
 from er_gym.envs.actions import Action
 from er_gym.envs.solver import Solver
 from er_gym.tasks import verbs
+from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import KeyAction, Task
 from er_gym.thor import OBJECT_TYPES
 
@@ -223,8 +224,6 @@ def written(
 
 def played(count: int, seed: int, suite: Any = "train") -> Iterator[tuple[Task, list[Turn]]]:
     """Episodes of tasks drawn from a suite."""
-    from er_gym.tasks.suites import load_suite
-
     tasks = random.Random(seed).sample(list(load_suite(suite).tasks), count)
     env = EmbodiedEnv(suite, obs_mode="objects")
     try:

@@ -4,18 +4,19 @@ Facts that the wordings use (``configs/thoughts``):
 
 - ``purpose``, ``verb``, ``outcome`` (:func:`outcome_of`), ``goal_verb``;
 - object types: ``thing`` (what the subgoal is about), ``place`` (the named destination), ``sought``
-  (what is looked for: the thing, or the place once the thing is held), ``object`` (of the decision),
-  ``held``, ``at``, ``last_object``, ``next1`` … ``next4`` (the plan), ``latest`` (the place searched
-  last in vain);
+  (what is looked for: the thing, or the place once the thing is held), ``object`` (of the
+  decision), ``held``, ``at``, ``last_object``, ``next1`` … ``next4`` (the plan), ``latest`` (the
+  place searched last in vain), ``placed`` (what was put down);
 - things, each with the facts of :func:`_described`: ``object_view``, ``sought_view``,
   ``place_view``, ``last_view`` (in view now), ``object_memory``, ``sought_memory`` (seen before);
 - pools: ``view`` and its parts ``left``, ``ahead``, ``right``, ``near``; ``surfaces`` (things in
   view that others lie on or in); ``shut`` (closed things in view); ``before`` (seen, not in view);
   ``visited`` (searched in vain); ``plan``; after looking around ``to_right``, ``behind``,
   ``to_left``;
-- flags: ``again`` (the place was searched before), ``many`` (more than one place was searched in
-  vain), ``unseen`` (what is sought is not in view), ``first``, ``final`` (of this turn's thoughts),
-  and the value of each text, such as ``is_search``.
+- flags: ``again`` (the place was searched before), ``elsewhere`` (the decision is not about the
+  thing itself), ``holds_thing``, ``many`` (more than one place was searched in vain),
+  ``unseen`` (what is sought is not in view), ``first``, ``final`` (of this turn's thoughts), and
+  the purpose and the outcome, as ``is_search``.
 """
 
 from __future__ import annotations
@@ -43,6 +44,10 @@ _STANDING = frozenset(
     {"CoffeeMachine", "DeskLamp", "Desktop", "HousePlant", "Microwave", "Television", "Toaster"}
 )
 """Types that stand on others, though they cannot be picked up."""
+
+
+_UNNOTICED = frozenset({"Book", "Box", "Laptop", "Blinds"})
+"""Types of which nobody says that they are open or closed."""
 
 
 def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
@@ -91,9 +96,10 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
 
 def outcome_of(knowledge: Knowledge, sought: str) -> str:
     """What came of the last action, as a word: ``start``, ``failed``, ``blocked`` (no way
-    forward), ``astray`` (it arrived elsewhere), ``repeated``, ``arrived`` (with something held), ``found``, ``shut`` (at a closed
-    container), ``nothing``, ``opened``, ``opened found``, ``opened nothing``, ``closed``,
-    ``looked``, ``looked found``, ``closer``, ``taken``, ``put``, ``toggled``, ``checked``, ``used``.
+    forward), ``astray`` (it arrived elsewhere), ``repeated``, ``arrived`` (with something held),
+    ``found``, ``shut`` (at a closed container), ``nothing``, ``opened``, ``opened found``,
+    ``opened nothing``, ``closed``, ``looked``, ``looked found``, ``closer``, ``taken``, ``put``,
+    ``toggled``, ``checked``, ``used``.
     """
     last = knowledge.last
     if last is None:
@@ -190,7 +196,9 @@ def _in_view(knowledge: Knowledge, sought: str, choices: random.Random) -> dict[
         for direction, view in knowledge.views.items()
     }
     everywhere = {kind: thing for view in around.values() for kind, thing in view.items()} | things
-    decided = knowledge.decision.object_type
+    decision, decided = knowledge.decision, knowledge.decision.object_type
+    toggled = knowledge.last is not None and knowledge.last.action.verb == verbs.TOGGLE
+    switches = {kind: {**thing, "o_state": thing["o_power"]} for kind, thing in everywhere.items()}
     place = knowledge.subgoal.place
     last = knowledge.last.action.object_type if knowledge.last else ""
     told = [thing for kind, thing in things.items() if kind != sought and _is_worth_a_word(thing)]
@@ -203,9 +211,9 @@ def _in_view(knowledge: Knowledge, sought: str, choices: random.Random) -> dict[
     holders = Counter(thing["o_on"] for thing in told if thing["o_on"])
     return {
         "sought_view": _named(everywhere, sought),
-        "object_view": _named(everywhere, decided),
+        "object_view": _named(switches if decision.verb == verbs.TOGGLE else everywhere, decided),
         "place_view": _named(everywhere, place),
-        "last_view": _named(things, last),
+        "last_view": _named(switches if toggled else things, last),
         "sought_memory": _named(memory, sought),
         "object_memory": _named(memory, decided),
         "unseen": bool(sought) and not _named(everywhere, sought),
@@ -227,12 +235,11 @@ def _in_view(knowledge: Knowledge, sought: str, choices: random.Random) -> dict[
 def _described(seen: SeenObject, count: int, direction: str = "") -> dict[str, Any]:
     """A thing in view: ``o`` (its type), ``o_side``, ``o_distance`` (near, middle or far),
     ``o_metres`` (a whole number of 2 to 6, or ``""``), ``o_on``, ``o_state`` (open, closed, on or
-    off), ``count``, and after looking around ``o_direction``."""
-    state = ""
-    if seen.open is not None and seen.type not in ("Book", "Box", "Laptop", "Blinds"):
+    off), ``o_power`` (on or off), ``count``, and after looking around ``o_direction``."""
+    power = "" if seen.toggled is None else "on" if seen.toggled else "off"
+    state = power
+    if seen.open is not None and seen.type not in _UNNOTICED:
         state = "open" if seen.open else "closed"
-    elif seen.toggled is not None:
-        state = "on" if seen.toggled else "off"
     side = seen.side if seen.distance > HERE and not direction else ""
     distance = "near" if seen.distance < NEAR else "far" if seen.distance > FAR else "middle"
     return {
@@ -242,6 +249,7 @@ def _described(seen: SeenObject, count: int, direction: str = "") -> dict[str, A
         "o_metres": str(round(seen.distance)) if 1.6 < seen.distance < 6.4 else "",
         "o_on": seen.on if seen.on in OBJECT_TYPES and _lies(seen.type) else "",
         "o_state": state,
+        "o_power": power,
         "o_direction": direction,
         "count": count,
     }
@@ -259,9 +267,9 @@ def _is_worth_a_word(thing: Mapping[str, Any]) -> bool:
 
 def _named(things: Mapping[str, Mapping[str, Any]], wanted: str) -> Mapping[str, Any] | None:
     """The thing of a type, or else of one that the environment takes for the same."""
-    if wanted in things:
-        return things[wanted]
-    return None
+    if wanted in things or not wanted:
+        return things.get(wanted)
+    return next((thing for kind, thing in things.items() if same_type(kind, wanted)), None)
 
 
 def _pool(things: Iterable[Mapping[str, Any]]) -> tuple[Mapping[str, Any], ...]:

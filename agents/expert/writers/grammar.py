@@ -4,15 +4,18 @@ A rule is a block of lines in a YAML file; each line is an alternative. In a lin
 
 - ``[a|b|]`` is one of several texts, perhaps an empty one;
 - ``{name}`` is a rule, or a fact in words; ``{name?}`` is a rule that may be left out;
-- ``{form:fact}`` is a fact in a form of :class:`~agents.expert.writers.nouns.Nouns`: ``{the:thing}``;
+- ``{form:fact}`` is a fact in a form of :class:`~agents.expert.writers.nouns.Nouns`, such as
+  ``{the:thing}``;
 - ``{some:pool}`` lists two or three things of a pool that were not mentioned yet;
 - ``{rule@pool}`` takes a thing of a pool that was not mentioned yet, and fills the rule with its
   facts;
 - ``{?fact}`` and ``{!fact}`` say that the line needs a fact, or must not have it.
 
 A line that needs what is not there is passed over, and so is, where there are others, a line that
-the same writing has used already. A rule can be a mapping instead, ``by`` with the name of a fact
-and a block for each of its values; the value ``else`` stands for all others.
+the same writing has used already. A line that begins with ``~`` is used only if no other can be. A
+rule can be a mapping instead, ``by`` with the name of a fact
+and a block for each of its values; the value ``else`` stands for all others, and
+for those whose lines cannot be filled.
 """
 
 from __future__ import annotations
@@ -174,6 +177,7 @@ class _Perhaps:
 @dataclass(frozen=True)
 class _Line:
     parts: tuple[_Part, ...]
+    is_last_resort: bool = False
 
     def write(self, writing: Writing, facts: Facts) -> str:
         return "".join([part.write(writing, facts) for part in self.parts])
@@ -189,7 +193,7 @@ class Rule:
         """The text of the first line, in a random order, that can be filled."""
         order = writing.random.sample(self.lines, len(self.lines))
         if len(order) > 1:
-            order.sort(key=lambda line: id(line) in writing.used)
+            order.sort(key=lambda line: (line.is_last_resort, id(line) in writing.used))
         for line in order:
             mentioned, latest = set(writing.mentioned), writing.nouns.latest
             try:
@@ -199,7 +203,7 @@ class Rule:
                 continue
             writing.used.add(id(line))
             return text
-        raise Missing
+        raise Missing("no line can be filled")
 
 
 @dataclass(frozen=True)
@@ -211,10 +215,17 @@ class Table:
 
     def write(self, writing: Writing, facts: Facts) -> str:
         """The text of the rule for the fact's value."""
-        rule = self.rows.get(facts.get(self.by, ""), self.rows.get("else"))
-        if rule is None:
+        rule = self.rows.get(facts.get(self.by, ""))
+        others = self.rows.get("else")
+        if rule is not None:
+            try:
+                return rule.write(writing, facts)
+            except Missing:
+                if others is None:
+                    raise
+        if others is None:
             raise Missing(self.by)
-        return rule.write(writing, facts)
+        return others.write(writing, facts)
 
 
 _Part: TypeAlias = _Text | _Guard | _Name | _Form | _List | _Scope | _Perhaps | Rule
@@ -267,13 +278,14 @@ def parse(line: str, where: str = "a line") -> _Line:
     Raises:
         ValueError: a bracket is not closed.
     """
-    tokens = _TOKEN.findall(line)
-    if "".join(tokens) != line:
+    text = line.removeprefix("~").lstrip()
+    tokens = _TOKEN.findall(text)
+    if "".join(tokens) != text:
         raise ValueError(f"{where}: a brace is not closed in {line!r}")
     parsed, rest = _parsed(tokens, 0, where, line)
     if rest != len(tokens):
         raise ValueError(f"{where}: a bracket is closed that was not opened in {line!r}")
-    return parsed
+    return _Line(parsed.parts, text != line)
 
 
 def _parsed(tokens: Sequence[str], at: int, where: str, line: str) -> tuple[_Line, int]:

@@ -37,8 +37,8 @@ class Nouns(ABC):
         """A fact in a form; what is no object type stays as it is.
 
         Forms: ``""`` bare, ``the``, ``a``, ``in`` with the preposition, ``type`` in the spelling of
-        the environment (English also has ``in_type``), ``that`` a pronoun if the type was the last to be mentioned, else ``the``;
-        English also has ``it``, ``is`` and ``s`` (the plural).
+        the environment, ``that`` a pronoun if the type was the last to be mentioned, else ``the``.
+        English also has ``into``, ``in_type``, ``it``, ``they``, ``is`` and ``s`` (the plural).
         """
         if value not in self._names or form == "type":
             return value
