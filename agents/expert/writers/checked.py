@@ -9,7 +9,7 @@ from agents.expert.writers.base import ThoughtRequest, ThoughtWriter, WrittenTho
 from er_gym.data.critic import check
 
 _TRIES = 8
-"""The thoughts of a turn are written at most this often; then those with the fewest faults stand."""
+"""The thoughts of a turn are written at most this often; then the best try stands."""
 _STRIDE = 0x9E3779B97F4A7C15
 """Sets the seeds of the tries far apart."""
 
