@@ -2,41 +2,81 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
 from agents.expert.recipe import ANOMALY, CORRECTED, SEARCH
+from er_gym.data.course_checks import SHORTEST, are_key_actions
 from er_gym.data.trajectory import Trajectory
-from er_gym.rollout.records import KeyActionRecord
-from er_gym.tasks import verbs
-from er_gym.tasks.equivalence import same_type
-from er_gym.tasks.task import type_of_id
+from er_gym.envs.actions import Action
+from er_gym.rollout.records import EpisodeRecord, KeyActionRecord
 
 
-def rejection(trajectory: Trajectory, most_actions: int) -> str:
-    """Why a trajectory is not taken, ``""`` if it is."""
-    if not trajectory.success:
+@dataclass(frozen=True)
+class PlayedCourse:
+    """What was done in an episode, as far as it decides whether it is taken.
+
+    Attributes:
+        kind, mode: of the trajectory.
+        success: whether the task was done.
+        key_actions: the task's.
+        actions: what was done, ``end`` included.
+        done: for each action, whether it was done.
+    """
+
+    kind: str
+    mode: str
+    success: bool
+    key_actions: Sequence[KeyActionRecord]
+    actions: Sequence[Action]
+    done: Sequence[bool]
+
+    @classmethod
+    def of_trajectory(cls, trajectory: Trajectory) -> PlayedCourse:
+        """The course of a trajectory."""
+        return cls(
+            trajectory.kind,
+            trajectory.mode,
+            trajectory.success,
+            trajectory.key_actions,
+            [turn.action for turn in trajectory.turns],
+            [turn.success for turn in trajectory.turns],
+        )
+
+    @classmethod
+    def of_episode(cls, episode: EpisodeRecord, kind: str, mode: str) -> PlayedCourse:
+        """The course of an episode that an expert or an explorer played."""
+        steps = [step for step in episode.steps[1:] if not step.appended]
+        return cls(
+            kind,
+            mode,
+            episode.success,
+            episode.key_actions,
+            [Action(step.verb, step.object_type) for step in steps],
+            [step.success for step in steps],
+        )
+
+
+def rejection(course: PlayedCourse, most_actions: int) -> str:
+    """Why a trajectory with this course is not taken, ``""`` if it is.
+
+    Args:
+        course: what was done.
+        most_actions: longer trajectories are not taken.
+    """
+    if not course.success:
         return "no success"
-    if trajectory.actions > most_actions:
+    if len(course.actions) > most_actions:
         return "too long"
-    if trajectory.kind == "b" and not is_key_actions(trajectory):
+    only_key_actions = are_key_actions(course.actions, course.key_actions)
+    if course.kind == SHORTEST and not only_key_actions:
         return "more than the key actions"
-    searches = trajectory.kind in ("a", "c") or trajectory.mode == SEARCH
-    if searches and is_key_actions(trajectory):
+    if (course.kind in ("a", "c") or course.mode == SEARCH) and only_key_actions:
         return "nothing was searched"
-    odd = [turn for turn in trajectory.turns if turn.fault or turn.purpose == "repeat"]
-    if trajectory.kind == ANOMALY and not odd:
+    repeated = any(one == other for one, other in pairwise(course.actions))
+    if course.kind == ANOMALY and all(course.done) and not repeated:
         return "nothing went wrong"
-    refused = any(not turn.success for turn in trajectory.turns)
-    if refused and trajectory.kind not in (ANOMALY, CORRECTED):
+    if course.kind not in (ANOMALY, CORRECTED) and not all(course.done):
         return "an action was refused"
     return ""
-
-
-def is_key_actions(trajectory: Trajectory) -> bool:
-    """Whether the actions are the task's key actions and nothing else."""
-    keys = trajectory.key_actions
-    if keys and keys[-1].verb != verbs.END:
-        keys = [*keys, KeyActionRecord(verb=verbs.END)]
-    return len(keys) == len(trajectory.turns) and all(
-        turn.verb == key.verb
-        and same_type(turn.object_type, type_of_id(key.object_id) or key.object_type)
-        for turn, key in zip(trajectory.turns, keys, strict=True)
-    )

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from er_gym.data.trajectory import Trajectory
+from er_gym.envs.actions import Action
 from er_gym.rollout.records import KeyActionRecord
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import same_type
@@ -38,11 +39,16 @@ def course_problems(trajectory: Trajectory) -> Iterator[str]:
 
 def is_key_actions(trajectory: Trajectory) -> bool:
     """Whether the actions are the task's key actions, in order, and nothing else."""
-    keys = trajectory.key_actions
+    return are_key_actions([turn.action for turn in trajectory.turns], trajectory.key_actions)
+
+
+def are_key_actions(actions: Sequence[Action], key_actions: Sequence[KeyActionRecord]) -> bool:
+    """Whether actions are the key actions, in order, and nothing else, ``end`` included."""
+    keys = [*key_actions]
     if keys and keys[-1].verb != verbs.END:
-        keys = [*keys, KeyActionRecord(verb=verbs.END)]
-    return len(keys) == len(trajectory.turns) and all(
-        turn.verb == key.verb
-        and same_type(turn.object_type, type_of_id(key.object_id) or key.object_type)
-        for turn, key in zip(trajectory.turns, keys, strict=True)
+        keys.append(KeyActionRecord(verb=verbs.END))
+    return len(keys) == len(actions) and all(
+        action.verb == key.verb
+        and same_type(action.object_type, type_of_id(key.object_id) or key.object_type)
+        for action, key in zip(actions, keys, strict=True)
     )
