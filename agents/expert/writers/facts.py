@@ -201,7 +201,8 @@ def _in_view(knowledge: Knowledge, sought: str, choices: random.Random) -> dict[
     switches = {kind: {**thing, "o_state": thing["o_power"]} for kind, thing in everywhere.items()}
     place = knowledge.subgoal.place
     last = knowledge.last.action.object_type if knowledge.last else ""
-    told = [thing for kind, thing in things.items() if kind != sought and _is_worth_a_word(thing)]
+    known = {sought, knowledge.at, last}  # no news
+    told = [each for kind, each in things.items() if kind not in known and _is_worth_a_word(each)]
     choices.shuffle(told)
     memory = {
         kind: {"o": kind, "seen_at": _known(where) if where != kind else "", "at_start": not where}

@@ -38,7 +38,7 @@ class Nouns(ABC):
 
         Forms: ``""`` bare, ``the``, ``a``, ``in`` with the preposition, ``type`` in the spelling of
         the environment, ``that`` a pronoun if the type was the last to be mentioned, else ``the``.
-        English also has ``into``, ``in_type``, ``it``, ``they``, ``is`` and ``s`` (the plural).
+        English also has ``into``, ``in_type``, ``it``, ``they``, ``is``, ``was`` and ``s`` (the plural).
         """
         if value not in self._names or form == "type":
             return value
@@ -88,6 +88,8 @@ class EnglishNouns(Nouns):
                 return "they" if plural else "it"
             case "is":
                 return "are" if plural else "is"
+            case "was":
+                return "were" if plural else "was"
             case "s":
                 return _plural(name)
             case _:
