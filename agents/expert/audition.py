@@ -1,7 +1,7 @@
 """Auditions: candidates are played without pictures and thoughts, to see which will be taken.
 
-Two thirds of the candidates are not taken: their object was in view from the beginning, nothing went
-wrong, the explorer did not find it. An audition costs a tenth of an episode with pictures, and an
+Two thirds of the candidates are not taken: their object was in view from the beginning, nothing
+went wrong, the explorer did not find it. An audition costs a tenth of an episode with pictures. An
 episode comes out the same as its audition, since both have the same seed.
 """
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from agents.expert.acceptance import rejection
+from agents.expert.acceptance import PlayedCourse, rejection
+from agents.expert.audition import audition
 from agents.expert.candidates import (
     Candidate,
     Candidates,
@@ -18,7 +19,6 @@ from agents.expert.candidates import (
 from agents.expert.corrections import beginning_of
 from agents.expert.explorer import Strength
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
-from agents.expert.silent import SilentAgent
 from agents.expert.thinker import OBS_MODE, ThinkingAgent, TrajectoryHeader
 from agents.expert.thought_kinds import ThoughtKinds
 from agents.expert.writers.base import ThoughtWriter
@@ -33,13 +33,14 @@ from er_gym.rollout.runner import run
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME
 
-ATTEMPTS = "attempts"
-"""The suffix of the run directory with the explorers' attempts that a part corrects."""
 CORRECTIONS = "corrections"
 """The part of the corrected episodes of a run."""
-_MOST_ROUNDS = 40
+_MOST_ROUNDS = 5
+"""Chosen candidates are played at most so many times over; they fail only by a crash."""
 _FRUITLESS_ROUNDS = 6
-"""A task type of a part of which nothing was taken in this many rounds is given up."""
+"""A task type of a part of which nothing was chosen in this many rounds is given up."""
+_PRIOR = 20
+"""The expected share of a part weighs as much as this many candidates looked at."""
 
 
 @dataclass(frozen=True)
@@ -124,25 +125,13 @@ class MakeThinker:
             self.make_writer(),
             settings.pictures,
             seed,
-            rejects=partial(rejection, most_actions=self.most_actions),
+            rejects=partial(_rejects, most_actions=self.most_actions),
         )
 
     def __getstate__(self) -> dict[str, Any]:
         # The workers need neither the suite's tasks nor the recipe.
         light = replace(self.settings, tasks=(), recipe=Recipe(parts={}))
         return {**self.__dict__, "settings": light}
-
-
-@dataclass(frozen=True)
-class MakeSilent:
-    """Makes the agents of attempts, which are recorded without thoughts and pictures."""
-
-    candidates: Mapping[str, Candidate]
-    kinds: ThoughtKinds
-
-    def __call__(self, task: Task, seed: int) -> Agent:
-        """The agent of a candidate's attempt."""
-        return SilentAgent(self.candidates[task.id].course(seed, self.kinds))
 
 
 @dataclass(eq=False)
@@ -152,36 +141,49 @@ class Stratum:
     Attributes:
         sequence: the candidates.
         quota: how many to take.
-        played: how many candidates have been looked at.
+        expected: the share of candidates that is expected to be taken; it only decides how many
+            are looked at in one round.
+        looked_at: how many candidates have been looked at.
+        chosen: those that are to be played, in order.
         taken: those taken, in order.
-        fruitless: rounds in a row in which none was taken.
+        fruitless: rounds in a row in which none was chosen.
     """
 
     sequence: Candidates
     quota: int
-    played: int = 0
+    expected: float = 1.0
+    looked_at: int = 0
+    chosen: list[Candidate] = field(default_factory=list)
     taken: list[Candidate] = field(default_factory=list)
     fruitless: int = 0
 
     @property
     def missing(self) -> int:
-        return self.quota - len(self.taken)
+        """How many are neither taken nor to be played."""
+        return self.quota - len(self.taken) - len(self.chosen)
 
     @property
     def open(self) -> bool:
-        exhausted = self.sequence.length is not None and self.played >= self.sequence.length
+        """Whether there are more candidates to look at."""
+        exhausted = self.sequence.length is not None and self.looked_at >= self.sequence.length
         return self.missing > 0 and self.fruitless < _FRUITLESS_ROUNDS and not exhausted
 
     def next(self) -> list[Candidate]:
-        """The candidates of the next round: as many as are missing, and a few more where many were
-        rejected before."""
-        yield_so_far = (len(self.taken) + 1) / (self.played + 1)
-        number = min(round(self.missing / yield_so_far), 6 * self.missing + 6)
+        """The candidates of the next round: as many as will probably be needed."""
+        found = len(self.taken) + len(self.chosen)
+        share = (found + self.expected * _PRIOR) / (self.looked_at + _PRIOR)
+        number = min(round(self.missing / share) + 1, 8 * self.missing + 8)
         if self.sequence.length is not None:
-            number = min(number, self.sequence.length - self.played)
-        first = self.played
-        self.played += number
+            number = min(number, self.sequence.length - self.looked_at)
+        first = self.looked_at
+        self.looked_at += number
         return [self.sequence[index] for index in range(first, first + number)]
+
+    def choose(self, fit: Sequence[Candidate]) -> None:
+        """Choose candidates of a round, in order, until there are enough."""
+        more = fit[: self.missing]
+        self.chosen += more
+        self.fruitless = 0 if more else self.fruitless + 1
 
 
 def recipe_strata(settings: CollectSettings, limit: int | None) -> dict[tuple[str, str], Stratum]:
@@ -206,7 +208,9 @@ def recipe_strata(settings: CollectSettings, limit: int | None) -> dict[tuple[st
         )
     return {
         (part, kind): Stratum(
-            CandidateSequence(part, recipe.parts[part], by_type[kind], settings.seed), number
+            CandidateSequence(part, recipe.parts[part], by_type[kind], settings.seed),
+            number,
+            recipe.parts[part].expected,
         )
         for (part, kind), number in wanted.items()
         if number
@@ -325,30 +329,51 @@ class Collector:
 
     def _collect_part(self, part: str, strata: Sequence[Stratum]) -> None:
         row = self._settings.recipe.parts[part]
-        env: dict[str, Any] = {**self._settings.env, "obs_mode": OBS_MODE}
+        env: dict[str, Any] = dict(self._settings.env)
         if row.faults:
             env["faults"] = row.faults
-        with self._part_directory(part, env) as directory:
+        with self._part_directory(part, {**env, "obs_mode": OBS_MODE}) as directory:
             for _ in range(_MOST_ROUNDS):
-                rounds = [(stratum, stratum.next()) for stratum in strata if stratum.open]
-                if not rounds:
+                while any(stratum.open for stratum in strata):
+                    self._choose(strata, env, row.most_actions)
+                if not any(stratum.chosen for stratum in strata):
                     break
-                candidates = [each for _, chosen in rounds for each in chosen]
-                ready = self._ready(part, candidates)
-                self._play(directory, ready, row.most_actions)
-                for stratum, chosen in rounds:
-                    self._judge(stratum, [ready[one.id] for one in chosen if one.id in ready])
-                self._tell(part, sum(len(one.taken) for one in self._strata.values()))
+                try:
+                    self._play(directory, strata, row.most_actions)
+                finally:  # what was played before an interruption is taken, too
+                    for stratum in strata:
+                        self._take(stratum, row.most_actions)
+                    self.summary.taken = sum(len(one.taken) for one in self._strata.values())
+                    self._tell(part, self.summary.taken)
+
+    def _choose(self, strata: Sequence[Stratum], env: Mapping[str, Any], most: int) -> None:
+        """Look at more candidates, and choose those that an audition shows to be fit."""
+        rounds = [(stratum, stratum.next()) for stratum in strata if stratum.open]
+        fit: dict[str, Candidate] = {}
+        for verdict in audition(
+            [each for _, candidates in rounds for each in candidates],
+            env=env,
+            seed=self._settings.seed,
+            kinds=self._settings.kinds,
+            most_actions=most,
+            workers=self._parallelism.workers,
+        ):
+            if verdict.reason:
+                self._reject(verdict.reason)
+            else:
+                fit[verdict.candidate.id] = verdict.candidate
+        for stratum, candidates in rounds:
+            stratum.choose([fit[one.id] for one in candidates if one.id in fit])
 
     @contextmanager
     def _part_directory(self, part: str, env: Mapping[str, Any]) -> Iterator[RunDirectory]:
         settings = self._settings
-        row = settings.recipe.parts.get(part.removesuffix(f"-{ATTEMPTS}"))
+        row = settings.recipe.parts[part]
         manifest = Manifest(
             suite=settings.manifest["suite"],
             suite_digest=settings.manifest["suite_digest"],
             suite_size=len(settings.tasks),
-            agent=row.actor if row else "explorer",
+            agent=row.actor,
             agent_settings=settings.manifest["settings"],
             env=dict(env),
             seed=settings.seed,
@@ -358,50 +383,14 @@ class Collector:
         with locked_run_directory(path, manifest) as directory:
             yield directory
 
-    def _ready(self, part: str, candidates: Sequence[Candidate]) -> dict[str, Candidate]:
-        """The candidates that can be played, by id; corrections get their failed attempts."""
-        if not candidates or candidates[0].actor != "corrector" or candidates[0].beginning:
-            return {each.id: each for each in candidates}
-        attempts = f"{part}-{ATTEMPTS}"
-        env = {**self._settings.env, "obs_mode": "objects"}
-        with self._part_directory(attempts, env) as directory:
-            tasks = _by_scene(each.played_task for each in candidates)
-            make = MakeSilent({each.id: each for each in candidates}, self._settings.kinds)
-            self._run(directory, tasks, make, "processes")
-            wanted = {each.id: each for each in candidates}
-            ready = {}
-            for episode in directory.episodes():
-                candidate = wanted.get(episode.task_id)
-                if candidate is None:
-                    continue
-                beginning = beginning_of(episode)
-                if beginning.problem:
-                    self._reject(f"attempt: {beginning.problem}")
-                    continue
-                ready[candidate.id] = replace(
-                    candidate,
-                    beginning=beginning,
-                    run=attempts,
-                    episode=episode.task_id,
-                    strength=None,
-                )
-        return ready
-
-    def _play(
-        self, directory: RunDirectory, candidates: Mapping[str, Candidate], most: int
-    ) -> None:
-        tasks = _by_scene(each.played_task for each in candidates.values())
-        make = MakeThinker(candidates, self._make_writer, self._settings, most)
-        self._run(directory, tasks, make, self._executor)
-
-    def _run(
-        self, directory: RunDirectory, tasks: Sequence[Task], make: Any, executor: str
-    ) -> None:
+    def _play(self, directory: RunDirectory, strata: Sequence[Stratum], most: int) -> None:
+        """Play the chosen candidates with pictures and thoughts."""
+        chosen = {each.id: each for stratum in strata for each in stratum.chosen}
         summary = run(
             directory,
-            tasks,
-            make,
-            executor=executor,
+            _by_scene(each.played_task for each in chosen.values()),
+            MakeThinker(chosen, self._make_writer, self._settings, most),
+            executor=self._executor,
             parallelism=self._parallelism,
             listeners=self._listeners,
             cost=self._cost,
@@ -409,26 +398,26 @@ class Collector:
         self.summary.played += summary.played
         self.summary.crashed += [f"{each.task_id}: {each.error}" for each in summary.crashed]
 
-    def _judge(self, stratum: Stratum, candidates: Sequence[Candidate]) -> None:
-        """Take candidates of a round, in order, until the quota is full."""
-        before = len(stratum.taken)
-        for candidate in candidates:
-            if stratum.missing <= 0:
-                break
+    def _take(self, stratum: Stratum, most: int) -> None:
+        """Take the chosen candidates that were played and came out well, in order."""
+        for candidate in stratum.chosen:
             try:
                 trajectory = self._collection.played(candidate.part, candidate.id)
-            except CollectionError:  # it crashed, and that is in the summary
+            except CollectionError:  # it crashed, as the summary says, or was not played
                 continue
-            most = self._settings.recipe.parts[candidate.part].most_actions
-            reason = rejection(trajectory, most)
+            reason = rejection(PlayedCourse.of_trajectory(trajectory), most)
             if reason:
                 self._reject(reason)
             else:
                 stratum.taken.append(candidate)
-        stratum.fruitless = 0 if len(stratum.taken) > before else stratum.fruitless + 1
+        stratum.chosen.clear()
 
     def _reject(self, reason: str) -> None:
         self.summary.rejected[reason] = self.summary.rejected.get(reason, 0) + 1
+
+
+def _rejects(trajectory: Trajectory, most_actions: int) -> str:
+    return rejection(PlayedCourse.of_trajectory(trajectory), most_actions)
 
 
 def _by_scene(tasks: Iterable[Task]) -> list[Task]:

@@ -35,6 +35,8 @@ class Part(BaseModel):
             searched for.
         repeats: the share of actions that the expert repeats without need.
         most_actions: longer trajectories are not taken.
+        expected: the share of candidates that is expected to be taken. It decides how many are
+            looked at in one round, and so the time, but not which are taken.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -47,6 +49,7 @@ class Part(BaseModel):
     faults: dict[str, float] = {}
     repeats: float = Field(default=0.0, ge=0, le=1)
     most_actions: int = Field(default=36, gt=0)
+    expected: float = Field(default=0.5, gt=0, le=1)
 
     @field_validator("types")
     @classmethod
