@@ -38,7 +38,8 @@ class Nouns(ABC):
 
         Forms: ``""`` bare, ``the``, ``a``, ``in`` with the preposition, ``type`` in the spelling of
         the environment, ``that`` a pronoun if the type was the last to be mentioned, else ``the``.
-        English also has ``into``, ``in_type``, ``it``, ``they``, ``is``, ``was`` and ``s`` (the plural).
+        English also has ``into``, ``in_type``, ``it``, ``they``, ``is``, ``was`` and ``s`` (the
+        plural).
         """
         if value not in self._names or form == "type":
             return value
