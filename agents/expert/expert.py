@@ -10,7 +10,7 @@ from agents.expert.places import candidates, draw_places, plan_of
 from agents.expert.task_course import GiveUp, Intents, TaskCourse
 from agents.expert.thought_kinds import Check
 from agents.scripted.searcher import search_priors
-from er_gym.data.trajectory import Purpose, Subgoal
+from er_gym.data.trajectory import Purpose
 from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
@@ -156,9 +156,12 @@ class CorrectedCourse(ExpertCourse):
             self._legs[-1],
         )
         self._subgoal = leg.subgoal
+        purpose = replayed_purpose(action, self.view.held)
+        if purpose == "search" and self._in_view(leg.thing):
+            purpose = "approach"
         return Intent(
             action,
-            replayed_purpose(action, self.view.held),
+            purpose,
             self._subgoal,
             plan=(action.object_type,) if action.verb == verbs.NAVIGATE else (),
             train=False,
@@ -170,12 +173,11 @@ class CorrectedCourse(ExpertCourse):
         held = self.view.held
         if not held or held in wanted:
             return True
-        for place in sorted(self.view.reach):
-            action = Action(verbs.PUT, place)
-            if action in self.view.legal and search_priors.has(place, "receptacle"):
-                down = Subgoal(verb=verbs.PUT, thing=held, place=place)
-                if (yield from self._do(Intent(action, "put", down))):
-                    return True
+        receptacles = (name for name in self.view.reach if search_priors.has(name, "receptacle"))
+        for place in sorted(receptacles):
+            down = Intent(Action(verbs.PUT, place), "put down", self._subgoal)
+            if down.action in self.view.legal and (yield from self._do(down)):
+                return True
         raise GiveUp
 
 

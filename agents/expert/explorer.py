@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import cos, radians
 from random import Random
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -73,7 +75,7 @@ class ExplorerCourse(TaskCourse):
     def _find(self, leg: Leg) -> Intents:
         tried: list[str] = []
         looks = 0
-        if leg.hidden and self._must_search and self._way_to(leg):
+        if leg.hidden and self._must_search and self._in_view(leg.thing):
             raise GiveUp
         self._must_search = self._must_search and not leg.hidden
         if self._random.random() < self._strength.blunders:
@@ -128,15 +130,20 @@ class ExplorerCourse(TaskCourse):
         """Where to go for an object whose place is known: named, or in view."""
         if not leg.hidden:
             return self._known(leg.place)
-        for view in self._views():
+        views = self._views()
+        for view in views:
             if same_type(view.object_type, leg.thing):
-                names = (view.on, view.object_type)
+                names = [view.on, view.object_type, *_nearest_to(view, self._ahead())]
                 return next((name for name in names if name in self.view.navigable), "")
         return ""
 
+    def _ahead(self) -> Sequence[ObjectView]:
+        views: Sequence[ObjectView] = self.view.info["object_views"]
+        return views
+
     def _views(self) -> list[ObjectView]:
         around = self.view.info.get("object_views_around", {})
-        return [*self.view.info["object_views"], *(v for each in around.values() for v in each)]
+        return [*self._ahead(), *(view for each in around.values() for view in each)]
 
     def _next_places(self, leg: Leg, tried: list[str]) -> list[str]:
         weighted = candidates(leg.thing, self.view.navigable, without=tried)
@@ -164,3 +171,14 @@ class ExplorerCourse(TaskCourse):
         if key.verb in (verbs.PUT, verbs.TOGGLE, verbs.CLOSE):
             raise GiveUp  # it takes the task for done
         return False
+
+
+def _nearest_to(goal: ObjectView, views: Sequence[ObjectView]) -> list[str]:
+    """The types of the objects in view, those nearest to an object in view first."""
+
+    def apart(view: ObjectView) -> float:
+        angle = radians(view.bearing - goal.bearing)
+        square = view.distance**2 + goal.distance**2
+        return square - 2 * view.distance * goal.distance * cos(angle)
+
+    return [view.object_type for view in sorted(views, key=apart)]

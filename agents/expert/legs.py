@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from er_gym.data.trajectory import Purpose, Subgoal
+from er_gym.data.trajectory import Language, Purpose, Subgoal
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import same_type
 from er_gym.tasks.generate.words import in_or_on_the
@@ -18,7 +18,7 @@ class Leg:
 
     Attributes:
         navigate: the key action that goes to the place; None if the task begins with another verb.
-        thing: the type of the object that the agent is after at the place.
+        thing: the type of the object that the agent looks for at the place.
         hidden: whether the agent must search for the place. The instruction does not name it.
         actions: the key actions that are done there.
         subgoal: what the agent is after.
@@ -36,8 +36,13 @@ class Leg:
         return "" if self.navigate is None else self.navigate.actual_type
 
 
-def legs_of(task: Task) -> tuple[Leg, ...]:
-    """The legs of a task, without ``end``."""
+def legs_of(task: Task, language: Language = "en") -> tuple[Leg, ...]:
+    """The legs of a task, without ``end``.
+
+    Args:
+        task: the task.
+        language: in which the parts of a task are put into words.
+    """
     groups: list[tuple[KeyAction | None, list[KeyAction]]] = []
     for key in task.key_actions:
         if key.verb == verbs.NAVIGATE:
@@ -46,45 +51,55 @@ def legs_of(task: Task) -> tuple[Leg, ...]:
             if not groups:
                 groups.append((None, []))
             groups[-1][1].append(key)
-    parts = sum(key.verb == verbs.PUT for key in task.key_actions)
-    return tuple(
-        _leg(navigate, actions, [*after], parts > 1)
-        for navigate, actions, after in (
-            (*group, (key for _, later in groups[number + 1 :] for key in later))
-            for number, group in enumerate(groups)
-        )
-    )
+    several = sum(key.verb == verbs.PUT for key in task.key_actions) > 1
+    legs: list[Leg] = []
+    carried = ""
+    for number, (navigate, actions) in enumerate(groups):
+        later = [key for _, after in groups[number + 1 :] for key in after]
+        legs.append(_leg(navigate, actions, later, carried, several, language))
+        for key in actions:
+            if key.verb == verbs.PICKUP:
+                carried = key.actual_type
+    return tuple(legs)
 
 
 def _leg(
     navigate: KeyAction | None,
     actions: Sequence[KeyAction],
     later: Sequence[KeyAction],
+    carried: str,
     several: bool,
+    language: Language,
 ) -> Leg:
     related = () if navigate is None else navigate.related_objects
     place = "" if navigate is None else navigate.actual_type
     sought = type_of_id(related[-1]) if related else ""
     hidden = len(related) > 1 and not same_type(sought, place)
     main = next((key for key in actions if key.verb not in (verbs.OPEN, verbs.CLOSE)), None)
-    thing = sought if hidden else (main.actual_type if main else sought or place)
-    if not hidden and main is not None and main.verb == verbs.PUT:
-        thing = place
-    put = next((key for key in (*actions, *later) if key.verb == verbs.PUT), None)
     verb = main.verb if main else "find"
+    thing = sought if hidden else (main.actual_type if main else sought or place)
+    put = next((key for key in (*actions, *later) if key.verb == verbs.PUT), None)
     destination = ""
-    if (verb == verbs.PICKUP and put is not None) or (verb == verbs.PUT and put is not None):
+    if put is not None and verb in (verbs.PICKUP, verbs.PUT):
         destination = put.actual_type
+    moved = carried if verb == verbs.PUT and carried else thing
     text = ""
-    if several and verb == verbs.PICKUP and destination:
-        text = f"put the {thing} {in_or_on_the(destination)}"
+    if several and destination and moved:
+        text = _PARTS[language].format(thing=moved, place=_where(destination, language))
     return Leg(
         navigate,
         thing,
         hidden,
         tuple(actions),
-        Subgoal(verb=verb, thing=thing, place=destination, text=text),
+        Subgoal(verb=verb, thing=moved, place=destination, text=text),
     )
+
+
+_PARTS = {"en": "put the {thing} {place}", "zh": "把 {thing} 放到 {place}"}
+
+
+def _where(destination: str, language: Language) -> str:
+    return in_or_on_the(destination) if language == "en" else destination
 
 
 PURPOSES: dict[str, Purpose] = {

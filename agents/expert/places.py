@@ -13,6 +13,8 @@ _BELOW_ANY = 0.01
 """The likelihood of a place that AI2-THOR does not allow for the object."""
 _NOT_SEARCHED = frozenset({"Floor", "StoveBurner", "Toaster", "CoffeeMachine", "Chair", "Stool"})
 """Receptacles in which nobody looks for a thing first."""
+_ONLY_FOR_SMALL = frozenset({"GarbageCan", "LaundryHamper", "Box", "Toilet", "TowelHolder"})
+"""Receptacles in or on which no fixed object stands."""
 
 
 def candidates(
@@ -26,9 +28,12 @@ def candidates(
         without: types that are left out, with their equivalents (Sink for SinkBasin).
     """
     left_out = (thing, *without)
+    fixed = not search_priors.has(thing, "pickupable")
     found: list[tuple[str, float]] = []
     for place in navigable:
         if not search_priors.has(place, "receptacle") or place in search_priors.MOBILE:
+            continue
+        if fixed and (search_priors.opens(place) or place in _ONLY_FOR_SMALL):
             continue
         if place in _NOT_SEARCHED or any(same_type(place, each) for each in left_out):
             continue

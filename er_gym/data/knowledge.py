@@ -66,7 +66,7 @@ class Knowledge:
         at: the type last navigated to, ``""`` at first.
         seen: every object type that is or was in view, with the place (the type last navigated to,
             ``""`` for the start) where it was in view last.
-        visits: the places searched for the present subgoal's object, in order.
+        visits: the places searched for the present subgoal, in order.
         navigable, interactable: the object types that are legal targets now.
         last: the last action; None at the first turn.
         actions: every action before this turn, oldest first.
@@ -152,10 +152,10 @@ def knowledge_at(
 
 
 def _visits(before: Sequence[Turn], subgoal: Subgoal) -> list[Visit]:
-    """The places searched for the subgoal's object, in order."""
+    """The places searched for a subgoal, in order."""
     visits: list[Visit] = []
     for index, turn in enumerate(before):
-        if turn.subgoal.thing != subgoal.thing or not turn.success:
+        if turn.subgoal != subgoal or not turn.success:
             continue
         if turn.verb == verbs.NAVIGATE and turn.purpose in ("search", "approach", "retry"):
             visits.append(Visit(turn.object_type, index, found=turn.earned))

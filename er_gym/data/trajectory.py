@@ -47,6 +47,7 @@ Purpose: TypeAlias = Literal[
     "carry",  # go with the held object to its destination
     "open to put",
     "put",
+    "put down",  # put away what was taken by mistake
     "switch",  # toggle
     "use",  # any other interaction that the task asks for: slice, close a microwave, ...
     "check",  # move a little, to look at the result once more
@@ -131,8 +132,9 @@ class Subgoal(_Record):
 
     Attributes:
         verb: what is to be done to ``thing``: ``find`` or a verb of the environment.
-        thing: the type of the object that it is about.
-        place: the type of the destination that the instruction names, ``""`` for none.
+        thing: the type of the object that it is about; with ``put in``, the object to be put.
+        place: the type of the destination that the instruction names, ``""`` for none. Once the
+            thing is in the hand, this is what is searched for or gone to.
         text: the part of the instruction that it belongs to, in a task of several parts.
     """
 
