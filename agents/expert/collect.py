@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
-from agents.expert.acceptance import rejection
 from agents.expert.candidates import (
     Candidate,
     Candidates,
@@ -17,15 +15,10 @@ from agents.expert.candidates import (
 )
 from agents.expert.corrections import beginning_of
 from agents.expert.explorer import Strength
+from agents.expert.players import MakeSilent, Players, PlaySettings
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
-from agents.expert.silent import SilentAgent
-from agents.expert.thinker import OBS_MODE, ThinkingAgent, TrajectoryHeader
-from agents.expert.thought_kinds import ThoughtKinds
-from agents.expert.writers.base import ThoughtWriter
-from agents.vlm.settings import Pictures
-from er_gym.data.collection import PARTS, Collection, CollectionError
-from er_gym.data.trajectory import Correction, Language, Trajectory
-from er_gym.rollout.agent import Agent
+from er_gym.data.collection import Collection, CollectionError
+from er_gym.data.trajectory import Trajectory
 from er_gym.rollout.events import Cost, EventListener
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.run_directory import Manifest, RunDirectory, locked_run_directory
@@ -50,9 +43,7 @@ class CollectSettings:
         recipe: how many of what.
         tasks: the suite's tasks.
         env: keyword arguments of the environment, without ``obs_mode`` and ``faults``.
-        kinds: which kinds of thoughts are drawn.
-        pictures: how pictures are encoded.
-        language: of the thoughts.
+        play: what all players share.
         seed: of everything that is drawn.
         manifest: what the parts' manifests have in common with the collection's.
     """
@@ -60,9 +51,7 @@ class CollectSettings:
     recipe: Recipe
     tasks: Sequence[Task]
     env: Mapping[str, Any]
-    kinds: ThoughtKinds
-    pictures: Pictures
-    language: Language
+    play: PlaySettings
     seed: int
     manifest: Mapping[str, Any]
 
@@ -86,63 +75,6 @@ class CollectSummary:
     rejected: dict[str, int] = field(default_factory=dict)
     crashed: list[str] = field(default_factory=list)
     missing: dict[tuple[str, str], int] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class MakeThinker:
-    """Makes the agents of a part's episodes: a :class:`~er_gym.rollout.agent.MakeAgent`."""
-
-    candidates: Mapping[str, Candidate]
-    make_writer: Callable[[], ThoughtWriter]
-    settings: CollectSettings
-    most_actions: int
-
-    def __call__(self, task: Task, seed: int) -> Agent:
-        """The agent of a candidate's episode."""
-        candidate, settings = self.candidates[task.id], self.settings
-        correction = None
-        if candidate.beginning is not None:
-            correction = Correction(
-                run=candidate.run,
-                episode=candidate.episode,
-                first_wrong=candidate.beginning.first_wrong,
-            )
-        header = TrajectoryHeader(
-            task_id=candidate.task.id,
-            part=candidate.part,
-            kind=candidate.kind,
-            mode=candidate.mode,
-            language=settings.language,
-            actor=candidate.said_actor,
-            folder=f"{PARTS}/{candidate.part}",
-            correction=correction,
-        )
-        return ThinkingAgent(
-            candidate.course(seed, settings.kinds),
-            header,
-            settings.kinds,
-            self.make_writer(),
-            settings.pictures,
-            seed,
-            rejects=partial(rejection, most_actions=self.most_actions),
-        )
-
-    def __getstate__(self) -> dict[str, Any]:
-        # The workers need neither the suite's tasks nor the recipe.
-        light = replace(self.settings, tasks=(), recipe=Recipe(parts={}))
-        return {**self.__dict__, "settings": light}
-
-
-@dataclass(frozen=True)
-class MakeSilent:
-    """Makes the agents of attempts, which are recorded without thoughts and pictures."""
-
-    candidates: Mapping[str, Candidate]
-    kinds: ThoughtKinds
-
-    def __call__(self, task: Task, seed: int) -> Agent:
-        """The agent of a candidate's attempt."""
-        return SilentAgent(self.candidates[task.id].course(seed, self.kinds))
 
 
 @dataclass(eq=False)
@@ -269,7 +201,7 @@ class Collector:
     Args:
         collection: where to.
         settings: what decides the trajectories.
-        make_writer: makes the writer of thoughts; picklable for ``executor="processes"``.
+        players: who plays; what they make is picklable for ``executor="processes"``.
         strata: the candidates by part and task type, and how many of each are wanted.
         executor, parallelism: as :func:`er_gym.rollout.runner.run` takes them.
         listeners: hear of every event of the runs.
@@ -281,7 +213,7 @@ class Collector:
         self,
         collection: Collection,
         settings: CollectSettings,
-        make_writer: Callable[[], ThoughtWriter],
+        players: Players,
         strata: Mapping[tuple[str, str], Stratum],
         *,
         executor: str = "processes",
@@ -291,7 +223,7 @@ class Collector:
         tell: Callable[[str, int], None] = lambda part, taken: None,
     ) -> None:
         self._tell = tell
-        self._collection, self._settings, self._make_writer = collection, settings, make_writer
+        self._collection, self._settings, self._players = collection, settings, players
         self._executor, self._parallelism = executor, parallelism
         self._listeners, self._cost = tuple(listeners), cost
         self._strata = strata
@@ -325,7 +257,7 @@ class Collector:
 
     def _collect_part(self, part: str, strata: Sequence[Stratum]) -> None:
         row = self._settings.recipe.parts[part]
-        env: dict[str, Any] = {**self._settings.env, "obs_mode": OBS_MODE}
+        env: dict[str, Any] = {**self._settings.env, "obs_mode": self._players.obs_mode}
         if row.faults:
             env["faults"] = row.faults
         with self._part_directory(part, env) as directory:
@@ -335,10 +267,13 @@ class Collector:
                     break
                 candidates = [each for _, chosen in rounds for each in chosen]
                 ready = self._ready(part, candidates)
-                self._play(directory, ready, row.most_actions)
-                for stratum, chosen in rounds:
-                    self._judge(stratum, [ready[one.id] for one in chosen if one.id in ready])
-                self._tell(part, sum(len(one.taken) for one in self._strata.values()))
+                try:
+                    self._play(directory, ready, row.most_actions)
+                finally:  # what a round that was stopped has played is taken too
+                    for stratum, chosen in rounds:
+                        self._judge(stratum, [ready[one.id] for one in chosen if one.id in ready])
+                    self.summary.taken = sum(len(one.taken) for one in self._strata.values())
+                    self._tell(part, self.summary.taken)
 
     @contextmanager
     def _part_directory(self, part: str, env: Mapping[str, Any]) -> Iterator[RunDirectory]:
@@ -348,7 +283,7 @@ class Collector:
             suite=settings.manifest["suite"],
             suite_digest=settings.manifest["suite_digest"],
             suite_size=len(settings.tasks),
-            agent=row.actor if row else "explorer",
+            agent=self._players.name or (row.actor if row else "explorer"),
             agent_settings=settings.manifest["settings"],
             env=dict(env),
             seed=settings.seed,
@@ -366,7 +301,7 @@ class Collector:
         env = {**self._settings.env, "obs_mode": "objects"}
         with self._part_directory(attempts, env) as directory:
             tasks = _by_scene(each.played_task for each in candidates)
-            make = MakeSilent({each.id: each for each in candidates}, self._settings.kinds)
+            make = MakeSilent({each.id: each for each in candidates}, self._settings.play.kinds)
             self._run(directory, tasks, make, "processes")
             wanted = {each.id: each for each in candidates}
             ready = {}
@@ -391,7 +326,7 @@ class Collector:
         self, directory: RunDirectory, candidates: Mapping[str, Candidate], most: int
     ) -> None:
         tasks = _by_scene(each.played_task for each in candidates.values())
-        make = MakeThinker(candidates, self._make_writer, self._settings, most)
+        make = self._players.make(candidates, self._settings.play, most)
         self._run(directory, tasks, make, self._executor)
 
     def _run(
@@ -417,10 +352,10 @@ class Collector:
                 break
             try:
                 trajectory = self._collection.played(candidate.part, candidate.id)
-            except CollectionError:  # it crashed, and that is in the summary
+            except CollectionError:  # it crashed, as the summary says, or was not played
                 continue
             most = self._settings.recipe.parts[candidate.part].most_actions
-            reason = rejection(trajectory, most)
+            reason = self._players.rejection(trajectory, most)
             if reason:
                 self._reject(reason)
             else:

@@ -73,3 +73,11 @@ def encode(rgb: NDArray[np.uint8], settings: Pictures) -> Picture:
     file = BytesIO()
     image.save(file, settings.format, **options)
     return Picture(file.getvalue(), f"image/{settings.format}", *size)
+
+
+def within_bounds(picture: Picture, settings: Pictures) -> Picture:
+    """A picture, encoded anew if it has too many or too few pixels for the settings."""
+    if fitted(picture.width, picture.height, settings) == (picture.width, picture.height):
+        return picture
+    with Image.open(BytesIO(picture.data)) as image:
+        return encode(np.asarray(image.convert("RGB")), settings)
