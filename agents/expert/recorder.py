@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.expert.course import Intent
+from agents.expert.legs import in_language
 from agents.vlm.chat import Picture
 from agents.vlm.pictures import encode
 from agents.vlm.settings import Pictures
@@ -134,7 +135,7 @@ class TrajectoryRecorder:
             interactable=list(info["interactable"]),
             at=self._at,
             purpose=intent.purpose,
-            subgoal=intent.subgoal,
+            subgoal=in_language(intent.subgoal, self._header.language),
             plan=list(intent.plan),
             verb=intent.action.verb,
             object_type=intent.action.object_type,

@@ -142,25 +142,23 @@ class WriterPrompts:
     def _named(self, object_type: str) -> str:
         """An object type in words; what is no object type stays as it is."""
         known = names(self.language).get(object_type)
-        return (
-            known[0].rpartition(" ")[2]
-            if known and self.language == "zh"
-            else (known[0] if known else object_type)
-        )
+        if known is None:
+            return object_type
+        # Chinese names stand behind their measure word.
+        return known[0].rpartition(" ")[2] if self.language == "zh" else known[0]
 
     def _told(self, known: Knowledge) -> dict[str, Any]:
         """The facts that hints are made of, object types in words."""
         facts = facts_of(known, random.Random(0))
-        told = ("thing", "place", "sought", "at", "last_object", "placed", "latest")
+        told = ("sought", "at", "last_object")
         visited = [each["o"] for each in facts.get("visited", ())]
         plan = [each["o"] for each in facts.get("plan", ())]
         return {
             **{name: self._named(facts.get(name, "")) for name in told},
             "outcome": facts["outcome"],
-            "goal": known.subgoal.text,
+            "goal": facts.get("part", ""),
             "visited": tuple(map(self._named, visited)),
             "plan": tuple(map(self._named, plan)),
-            "failed": known.last is not None and not known.last.success,
         }
 
     def _views(self, known: Knowledge) -> Iterable[_View]:
