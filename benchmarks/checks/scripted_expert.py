@@ -19,37 +19,12 @@ Messages = Sequence[Mapping[str, Any]]
 _TAG = re.compile(r"^<(Observation|Thinking|Planning|Reflection|Verification)>", re.MULTILINE)
 _DECISION = re.compile(r"The robot's decision: ([^,(]+?) ?(?:\(the ([^)]+)\))?, ")
 _PLAN = re.compile(r"in this order: (.+?)\. You may look elsewhere")
-<<<<<<< HEAD
-_ORDINALS = [
-    "first",
-    "second",
-    "third",
-    "fourth",
-    "fifth",
-    "sixth",
-    "seventh",
-    "eighth",
-    "ninth",
-    "tenth",
-    "eleventh",
-    "twelfth",
-    "thirteenth",
-    "fourteenth",
-    "fifteenth",
-    "sixteenth",
-    "seventeenth",
-    "eighteenth",
-    "nineteenth",
-    "twentieth",
-]
-=======
 _ORDINALS = (
     "first", "second", "third", "fourth", "fifth",
     "sixth", "seventh", "eighth", "ninth", "tenth",
     "eleventh", "twelfth", "thirteenth", "fourteenth", "fifteenth",
     "sixteenth", "seventeenth", "eighteenth", "nineteenth", "twentieth",
 )  # fmt: skip
->>>>>>> model
 _LEADS: Mapping[str, str] = {
     "Observation": "Let me take in what is before me as I come to my {nth} move.",
     "Thinking": "I think about where I am with my task before my {nth} move.",
