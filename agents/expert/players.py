@@ -38,15 +38,15 @@ class PlaySettings:
 
 
 class Players(Protocol):
-    """Makes the agents of a collection.
+    """Makes the agents of a collection."""
 
-    Attributes:
-        name: who decides, as the parts' manifests name it; ``""`` for the actor of the part.
-        obs_mode: the observations that the agents need.
-    """
+    @property
+    def name(self) -> str:
+        """Who decides, as the parts' manifests name it; ``""`` for the actor of the part."""
 
-    name: str
-    obs_mode: str
+    @property
+    def obs_mode(self) -> str:
+        """The observations that the agents need."""
 
     def make(
         self, candidates: Mapping[str, Candidate], settings: PlaySettings, most_actions: int
