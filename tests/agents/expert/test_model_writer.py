@@ -1,4 +1,4 @@
-"""A model as the writer of thoughts: what it is told, what is taken of its replies, and what not."""
+"""A model as the writer of thoughts: what it is told, and what is taken of its replies."""
 
 from __future__ import annotations
 
