@@ -75,6 +75,7 @@ class TrajectoryRecorder:
         pictures: how pictures are encoded.
         rejects: why a trajectory will not be taken, ``""`` if it will. Only a trajectory that will
             be taken leaves its pictures.
+        learn_failures: whether turns whose action was not done are to be learnt from.
 
     Attributes:
         turns: those so far.
@@ -87,7 +88,10 @@ class TrajectoryRecorder:
         header: TrajectoryHeader,
         pictures: Pictures,
         rejects: Callable[[Trajectory], str],
+        *,
+        learn_failures: bool = True,
     ) -> None:
+        self._learn_failures = learn_failures
         self._task, self._header, self._pictures, self._rejects = task, header, pictures, rejects
         self.turns: list[Turn] = []
         self.pictures_now: tuple[Picture, ...] = ()
@@ -179,6 +183,11 @@ class TrajectoryRecorder:
 
     def _trajectory(self, episode: EpisodeRecord) -> Trajectory:
         task, header = self._task, self._header
+        turns = with_results(self.turns, self._faults, episode)
+        if not self._learn_failures:
+            turns = [
+                turn.model_copy(update={"train": turn.train and turn.success}) for turn in turns
+            ]
         return Trajectory(
             id=task.id,
             task_id=header.task_id,
@@ -195,7 +204,7 @@ class TrajectoryRecorder:
             language=header.language,
             actor=header.actor,
             max_steps=episode.max_steps,
-            turns=with_results(self.turns, self._faults, episode),
+            turns=turns,
             success=episode.success,
             end_reason=episode.end_reason,
             correction=header.correction,

@@ -88,6 +88,10 @@ def collect_with_faults(out: Path, limit: int, *more: str, seed: int = 0) -> Out
         CliRunner().invoke(cli, [*command, "--max-usd", "1000"], standalone_mode=False)
         if server.count != again:
             problems.append(f"a collection that is done sent {server.count - again} requests")
+        if server.repeated:
+            problems.append(f"{server.repeated} requests were sent again after an answer")
+        if server.accepted != len(_ledger(out)):
+            problems.append(f"{server.accepted} answers, {len(_ledger(out))} in the ledger")
         requests = server.count
     ledger = _ledger(out)
     if ledger[: len(paid_before)] != paid_before:

@@ -46,10 +46,7 @@ class ModelWriter:
         prompts: WriterPrompts,
         fallback: ThoughtWriter | None = None,
     ) -> None:
-        if settings.decide != "tags":
-            raise ValueError(
-                f"decide is {settings.decide!r}, but thoughts are written in tags: leave decide out"
-            )
+        check_settings(settings)
         self.name = name
         self._client, self._settings, self._prompts = client, settings, prompts
         self._fallback = fallback or GroundedWriter()
@@ -97,6 +94,18 @@ class ModelWriter:
                 refused=drafts.refused[index],
             )
             for index, kind in enumerate(request.kinds)
+        )
+
+
+def check_settings(settings: AgentSettings) -> None:
+    """Check that a client with these settings can write thoughts.
+
+    Raises:
+        ValueError: it would be asked for another form of replies than tags.
+    """
+    if settings.decide != "tags":
+        raise ValueError(
+            f"decide is {settings.decide!r}, but thoughts are written in tags: leave decide out"
         )
 
 
