@@ -46,14 +46,11 @@ class Players(Protocol):
     @property
     def obs_mode(self) -> str:
         """The observations that the agents need."""
-<<<<<<< HEAD
 
     @property
     def scripted(self) -> bool:
         """Whether the agents do what the candidates' courses decide, so that an audition shows how
         their episodes come out."""
-=======
->>>>>>> model
 
     def make(
         self, candidates: Mapping[str, Candidate], settings: PlaySettings, most_actions: int

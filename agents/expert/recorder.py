@@ -183,7 +183,7 @@ class TrajectoryRecorder:
 
     def _trajectory(self, episode: EpisodeRecord) -> Trajectory:
         task, header = self._task, self._header
-        turns = with_results(self.turns, self._faults, episode)
+        turns = learnt_after_fault(with_results(self.turns, self._faults, episode))
         if not self._learn_failures:
             turns = [
                 turn.model_copy(update={"train": turn.train and turn.success}) for turn in turns
@@ -237,6 +237,21 @@ class TrajectoryRecorder:
         return PictureRecord(
             path=path, direction=direction, width=picture.width, height=picture.height
         )
+
+
+def learnt_after_fault(turns: list[Turn]) -> list[Turn]:
+    """Turns of which nothing is learnt up to the first fault or mistake, that turn included.
+
+    As in the paper's third stage (arXiv 2503.21696), the reflection on a fault and what follows it
+    are learnt. Turns without a fault stay as they are.
+    """
+    odd = [k for k, turn in enumerate(turns) if turn.fault or turn.purpose == "repeat"]
+    if not odd:
+        return turns
+    return [
+        turn.model_copy(update={"train": False}) if k <= odd[0] else turn
+        for k, turn in enumerate(turns)
+    ]
 
 
 def bill_of(replies: Sequence[ModelReply]) -> ModelReply | None:
