@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from collections.abc import Callable, Sequence
 from functools import cache
-from pathlib import Path
 from random import Random
 
+import played_turns
 import pytest
 
 from agents.expert.model_places import ModelPlaces, named_places
@@ -24,15 +22,6 @@ from er_gym.data.critic import check
 from er_gym.data.knowledge import Knowledge, knowledge_at
 from er_gym.data.trajectory import Language, ThoughtKind
 from er_gym.tasks import verbs
-
-_spec = importlib.util.spec_from_file_location(
-    "played_turns", Path(__file__).parents[2] / "data" / "played_turns.py"
-)
-assert _spec is not None
-assert _spec.loader is not None
-played_turns = importlib.util.module_from_spec(_spec)
-sys.modules.setdefault("played_turns", played_turns)
-_spec.loader.exec_module(played_turns)
 
 Say = Callable[[Sequence[dict[str, str]]], str]
 PICTURE = Picture(b"\xff\xd8 jpeg", "image/jpeg", 160, 96)
