@@ -195,11 +195,12 @@ class Rule:
         if len(order) > 1:
             order.sort(key=lambda line: (line.is_last_resort, id(line) in writing.used))
         for line in order:
-            mentioned, latest = set(writing.mentioned), writing.nouns.latest
+            mentioned, nouns = set(writing.mentioned), writing.nouns
+            latest, earlier = nouns.latest, nouns.earlier
             try:
                 text = line.write(writing, facts)
             except Missing:
-                writing.mentioned, writing.nouns.latest = mentioned, latest
+                writing.mentioned, nouns.latest, nouns.earlier = mentioned, latest, earlier
                 continue
             writing.used.add(id(line))
             return text

@@ -67,7 +67,8 @@ def _fitting(
     before = set(writing.mentioned)
     for fullness in FULLNESS:
         writing.fullness = fullness
-        writing.mentioned, writing.nouns.latest = set(before), ""
+        writing.mentioned = set(before)
+        writing.nouns.forget()
         text = polished(writing.write(kind, facts), language)
         parts = sentences(text, language)
         if words(text, language) <= limit and len({*parts} - {*said}) == len(parts):
