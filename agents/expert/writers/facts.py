@@ -22,7 +22,8 @@ Facts that the wordings use (``configs/thoughts``):
   ``holds_thing``, ``many`` (more than one place was searched in vain), ``typical`` (people often
   keep such a thing at the decision's object), ``far_fetched`` (they hardly do), ``unseen`` (what is
   sought is not in view), ``several`` (the task has several parts), ``second`` (one of them is
-  done), ``next_part`` (one of them has just been done, and another begins), ``first``, ``final``
+  done), ``earned`` (the last action did a key action), ``told`` (it has been said where what is
+  sought is), ``next_part`` (one of them has just been done, and another begins), ``first``, ``final``
   (of this turn's thoughts), and the purpose and the outcome, as ``is_search``.
 """
 
@@ -47,6 +48,10 @@ HERE, NEAR, FAR = 0.35, 1.3, 3.0
 far."""
 _TYPICAL, _UNUSUAL = 1.0, 0.2
 """Likelihoods from which a place is typical for a thing, and below which it is far-fetched."""
+
+
+_TELLING = frozenset({"found", "looked found", "opened found", "detour"})
+"""Outcomes whose wordings tell where what is sought is."""
 
 
 _STANDING = frozenset(
@@ -102,6 +107,8 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
     if thing and decision.object_type in OBJECT_TYPES and thing in search_priors.placement_table():
         likelihood = search_priors.likelihood(thing, decision.object_type)
         facts["typical"], facts["far_fetched"] = likelihood >= _TYPICAL, likelihood < _UNUSUAL
+    facts["earned"] = last is not None and last.earned
+    facts["told"] = outcome in _TELLING
     facts[f"is_{outcome}"] = True
     facts[f"is_{purpose}"] = True
     facts["holds_thing"] = bool(thing) and thing == knowledge.held

@@ -266,6 +266,8 @@ def _parsed_rule(value: object, where: str) -> Rule | Table:
         )
     rows: dict[str, Rule] = {}
     for key, lines in value.items():
+        if isinstance(key, bool):
+            raise ValueError(f"{where}: YAML reads a key as {key}; put on and off in quotes")
         if key != "by":
             row = _parsed_rule(lines, f"{where}: {key}")
             assert isinstance(row, Rule)
