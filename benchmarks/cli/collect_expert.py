@@ -198,12 +198,13 @@ class ExpertRun:
 
         writer = ModelWriter(session.name, session.client, self.run.settings, prompts)
         if self.options.places == "model":
+            # An audition does not know which places the model will name.
             return Thinkers(
                 lambda: writer,
                 lambda seed: ModelPlaces(session.client, prompts, seed),
                 think_later=True,
             )
-        return Thinkers(lambda: writer, think_later=True)
+        return Thinkers(lambda: writer)
 
 
 def _refuse_without_model(options: ExpertOptions) -> None:

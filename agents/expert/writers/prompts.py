@@ -5,12 +5,13 @@ from __future__ import annotations
 import random
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 from agents.expert.writers.base import ThoughtRequest
 from agents.expert.writers.facts import facts_of
 from agents.expert.writers.nouns import names
+from agents.expert.writers.replies import OwnWords
 from agents.vlm.chat import Message, Picture
 from agents.vlm.prompt_set import interleave_pictures, without_marks
 from agents.vlm.template_files import TemplateFiles
@@ -80,6 +81,11 @@ class WriterPrompts:
     def digest(self) -> str:
         """sha256 of the templates, in hex."""
         return self.files.digest
+
+    @cached_property
+    def own_words(self) -> OwnWords:
+        """Checks that what is written does not repeat these prompts."""
+        return OwnWords.than(self.files.sources.values())
 
     def role(self) -> Message:
         """The system message for thoughts."""

@@ -17,7 +17,7 @@ from agents.expert.writers.prompts import load_writer_prompts
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients.scripted import ScriptedClient
 from agents.vlm.settings import AgentSettings
-from benchmarks.checks.scripted_expert import SAYS, good
+from benchmarks.checks.scripted_expert import SAYS, good, in_tags
 from er_gym.data.critic import check
 from er_gym.data.knowledge import Knowledge, knowledge_at
 from er_gym.data.trajectory import Language, ThoughtKind
@@ -140,6 +140,28 @@ def test_two_thoughts_of_a_turn_may_not_be_the_same() -> None:
     written, _ = write(same, asked=request())
     assert [each.writer for each in written.thoughts] == ["openai:m", "grounded"]
     assert set(written.thoughts[1].refused) == {"repeat"}
+
+
+ECHOES = {
+    "echo": "I know where the robot stands in its task, and what follows from that; at most.",
+    "voice": "The robot wonders where it should look first.",
+}
+
+
+@pytest.mark.parametrize("code", ECHOES)
+def test_a_model_that_repeats_its_prompt_is_refused(code: str) -> None:
+    written, _ = write(in_tags(ECHOES[code]), asked=request())
+    assert {each.writer for each in written.thoughts} == {"grounded"}
+    assert all(code in each.refused for each in written.thoughts)
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_what_the_grounded_writer_says_is_no_echo_of_the_prompts(language: Language) -> None:
+    own_words = load_writer_prompts(language).own_words
+    for index in range(len(episode()[1])):
+        asked = ThoughtRequest(known(index, language), ("reflection", "planning"), (150, 150))
+        for thought in GroundedWriter().write(asked).thoughts:
+            assert own_words.refusals(thought.text) == ()
 
 
 def test_a_reply_of_two_megabytes_is_read_at_once_and_not_quoted() -> None:
