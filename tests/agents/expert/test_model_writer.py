@@ -14,6 +14,7 @@ from agents.expert.writers.base import ThoughtRequest, WrittenThoughts
 from agents.expert.writers.grounded import GroundedWriter
 from agents.expert.writers.model import ModelWriter
 from agents.expert.writers.prompts import load_writer_prompts
+from agents.expert.writers.registry import checked_grounded
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients.scripted import ScriptedClient
 from agents.vlm.settings import AgentSettings
@@ -113,7 +114,7 @@ def test_what_is_refused_is_asked_for_again_with_the_reasons_and_nothing_else() 
 def test_what_is_no_thought_never_becomes_one(name: str) -> None:
     written, client = write(SAYS[name], asked=request())
     assert len(client.conversations) == 3
-    grounded = GroundedWriter().write(request()).thoughts
+    grounded = checked_grounded().write(request()).thoughts
     for thought, expected in zip(written.thoughts, grounded, strict=True):
         if thought.writer == "openai:m":  # a lie may spare the other thought of the turn
             assert check(thought.text, thought.kind, known(0), limit=100) == ()
