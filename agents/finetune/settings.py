@@ -1,4 +1,4 @@
-"""The settings of a fine-tuning run: one validated YAML file. Imports neither torch nor transformers.
+"""The settings of a fine-tuning run: one validated YAML file. Imports no model library.
 
 er-gym's own files are ``configs/finetune/NAME.yaml``. Every field has a default. ``er-gym finetune
 --config stage1 --set training.epochs=2`` overrides a field.
