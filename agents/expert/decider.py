@@ -41,6 +41,9 @@ _KIND_OF_TAG = {tag: kind for kind, tag in TAG_OF_KIND.items()}
 class DecidingAgent:
     """Lets a vision-language agent decide and think, and records the trajectory.
 
+    The thoughts are the model's own, so what the critic has against them is recorded only. A turn
+    whose action was refused is not to be learnt from.
+
     Args:
         agent: decides.
         name: of the model.
@@ -68,8 +71,9 @@ class DecidingAgent:
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Begin an episode."""
-        pictures = self._settings.pictures
-        self._recorder = TrajectoryRecorder(task, self._header, pictures, self._rejects)
+        self._recorder = TrajectoryRecorder(
+            task, self._header, self._settings.pictures, self._rejects, learn_failures=False
+        )
         self._legs = legs_of(task)
         self._agent.reset(replace(task, instruction=self._instruct(task)), obs, info)
 

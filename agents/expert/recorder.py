@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.expert.course import Intent
+from agents.expert.legs import in_language
 from agents.vlm.chat import Picture
 from agents.vlm.pictures import encode
 from agents.vlm.settings import Pictures
@@ -74,6 +75,7 @@ class TrajectoryRecorder:
         pictures: how pictures are encoded.
         rejects: why a trajectory will not be taken, ``""`` if it will. Only a trajectory that will
             be taken leaves its pictures.
+        learn_failures: whether turns whose action was not done are to be learnt from.
 
     Attributes:
         turns: those so far.
@@ -86,7 +88,10 @@ class TrajectoryRecorder:
         header: TrajectoryHeader,
         pictures: Pictures,
         rejects: Callable[[Trajectory], str],
+        *,
+        learn_failures: bool = True,
     ) -> None:
+        self._learn_failures = learn_failures
         self._task, self._header, self._pictures, self._rejects = task, header, pictures, rejects
         self.turns: list[Turn] = []
         self.pictures_now: tuple[Picture, ...] = ()
@@ -134,7 +139,7 @@ class TrajectoryRecorder:
             interactable=list(info["interactable"]),
             at=self._at,
             purpose=intent.purpose,
-            subgoal=intent.subgoal,
+            subgoal=in_language(intent.subgoal, self._header.language),
             plan=list(intent.plan),
             verb=intent.action.verb,
             object_type=intent.action.object_type,
@@ -178,6 +183,11 @@ class TrajectoryRecorder:
 
     def _trajectory(self, episode: EpisodeRecord) -> Trajectory:
         task, header = self._task, self._header
+        turns = learnt_after_fault(with_results(self.turns, self._faults, episode))
+        if not self._learn_failures:
+            turns = [
+                turn.model_copy(update={"train": turn.train and turn.success}) for turn in turns
+            ]
         return Trajectory(
             id=task.id,
             task_id=header.task_id,
@@ -194,7 +204,7 @@ class TrajectoryRecorder:
             language=header.language,
             actor=header.actor,
             max_steps=episode.max_steps,
-            turns=with_results(self.turns, self._faults, episode),
+            turns=turns,
             success=episode.success,
             end_reason=episode.end_reason,
             correction=header.correction,
@@ -227,6 +237,21 @@ class TrajectoryRecorder:
         return PictureRecord(
             path=path, direction=direction, width=picture.width, height=picture.height
         )
+
+
+def learnt_after_fault(turns: list[Turn]) -> list[Turn]:
+    """Turns of which nothing is learnt up to the first fault or mistake, that turn included.
+
+    As in the paper's third stage (arXiv 2503.21696), the reflection on a fault and what follows it
+    are learnt. Turns without a fault stay as they are.
+    """
+    odd = [k for k, turn in enumerate(turns) if turn.fault or turn.purpose == "repeat"]
+    if not odd:
+        return turns
+    return [
+        turn.model_copy(update={"train": False}) if k <= odd[0] else turn
+        for k, turn in enumerate(turns)
+    ]
 
 
 def bill_of(replies: Sequence[ModelReply]) -> ModelReply | None:

@@ -6,41 +6,26 @@ It reads the prompts of ``configs/prompts/expert/en`` and, for a model that deci
 
 from __future__ import annotations
 
+import hashlib
 import json
 import random
 import re
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from benchmarks.checks.faulty_server import Exchange, FaultyServer, body, completion, error
 
 Messages = Sequence[Mapping[str, Any]]
-_TAG = re.compile(r"<(Observation|Thinking|Planning|Reflection|Verification)>")
+_TAG = re.compile(r"^<(Observation|Thinking|Planning|Reflection|Verification)>", re.MULTILINE)
 _DECISION = re.compile(r"The robot's decision: ([^,(]+?) ?(?:\(the ([^)]+)\))?, ")
 _PLAN = re.compile(r"in this order: (.+?)\. You may look elsewhere")
-_ORDINALS = [
-    "first",
-    "second",
-    "third",
-    "fourth",
-    "fifth",
-    "sixth",
-    "seventh",
-    "eighth",
-    "ninth",
-    "tenth",
-    "eleventh",
-    "twelfth",
-    "thirteenth",
-    "fourteenth",
-    "fifteenth",
-    "sixteenth",
-    "seventeenth",
-    "eighteenth",
-    "nineteenth",
-    "twentieth",
-]
+_ORDINALS = (
+    "first", "second", "third", "fourth", "fifth",
+    "sixth", "seventh", "eighth", "ninth", "tenth",
+    "eleventh", "twelfth", "thirteenth", "fourteenth", "fifteenth",
+    "sixteenth", "seventeenth", "eighteenth", "nineteenth", "twentieth",
+)  # fmt: skip
 _LEADS: Mapping[str, str] = {
     "Observation": "Let me take in what is before me as I come to my {nth} move.",
     "Thinking": "I think about where I am with my task before my {nth} move.",
@@ -145,11 +130,36 @@ SAYS: Mapping[str, Callable[[Messages], str]] = {
 """Answers that are no thoughts of the robot, by name."""
 
 
+@dataclass
+class ScriptedExpert(FaultyServer):
+    """The server; its faults are drawn for each request.
+
+    Attributes:
+        repeated: how many requests came again that had a whole answer before.
+    """
+
+    repeated: int = 0
+    _answered: set[bytes] = field(default_factory=set)
+
+    def __enter__(self) -> ScriptedExpert:
+        super().__enter__()
+        return self
+
+    def note_answer(self, request: bytes) -> None:
+        """Note that a request gets a whole answer."""
+        digest = hashlib.sha256(request).digest()
+        with self.lock:
+            self.repeated += digest in self._answered
+            self._answered.add(digest)
+
+
 def answers(say: Callable[[Messages], str], **changed: Any) -> Callable[[Exchange], None]:
     """A good answer in form, with these words; tokens are counted as four bytes each."""
 
     def fault(exchange: Exchange) -> None:
         words = say(json.loads(exchange.body)["messages"])
+        assert isinstance(exchange.faulty, ScriptedExpert)
+        exchange.faulty.note_answer(exchange.body)
         heard, said = len(exchange.body) // 40 + 1, len(words) // 4 + 1
         counts = {"prompt_tokens": heard, "completion_tokens": said, "total_tokens": heard + said}
         exchange.send(
@@ -177,7 +187,7 @@ FAILS: Mapping[str, Callable[[Exchange], None]] = {
 """Faults of the server, by name."""
 
 
-def scripted_expert(bad: float = 0.0, failing: float = 0.0, seed: int = 0) -> FaultyServer:
+def scripted_expert(bad: float = 0.0, failing: float = 0.0, seed: int = 0) -> ScriptedExpert:
     """A server; use it as a context manager.
 
     Args:
@@ -197,9 +207,4 @@ def scripted_expert(bad: float = 0.0, failing: float = 0.0, seed: int = 0) -> Fa
             chosen = [*FAILS.values()][int(which * len(FAILS))]
         chosen(exchange)
 
-    return FaultyServer(fault)
-
-
-def count_codes(codes: Sequence[str]) -> str:
-    """Codes of refusals with their numbers, the most frequent first."""
-    return ", ".join(f"{code} {number}" for code, number in Counter(codes).most_common())
+    return ScriptedExpert(fault)

@@ -328,7 +328,7 @@ def _players(
 @contextmanager
 def _locked(out: Path, manifest: CollectionManifest) -> Iterator[Collection]:
     """The collection, for this process alone; a directory that cannot be used is bad input."""
-    from er_gym.data.collection import Collection
+    from er_gym.data.collection import MANIFEST, PARTS, Collection
     from er_gym.locking import exclusive_use
 
     with bad_input():
@@ -338,6 +338,10 @@ def _locked(out: Path, manifest: CollectionManifest) -> Iterator[Collection]:
         with bad_input():
             collection = Collection.create(out, manifest)
         yield collection
+    except BadInput:
+        if not (out / PARTS).exists():  # nothing has begun: the directory is free for another
+            (out / MANIFEST).unlink(missing_ok=True)
+        raise
     finally:
         lock.__exit__(None, None, None)
 

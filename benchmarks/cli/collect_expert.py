@@ -114,6 +114,7 @@ class ExpertRun:
         if options.expert is None:
             _refuse_without_model(options)
             return None
+        from agents.expert.writers.model import check_settings
         from agents.vlm.clients.budget import Ledger
         from agents.vlm.clients.registry import resolve_client
         from benchmarks.cli.vlm_run import VLMRun
@@ -126,6 +127,8 @@ class ExpertRun:
         run = VLMRun.of(options.expert, vlm)
         prompts = run.settings.prompts.model_copy(update={"language": language})
         run = replace(run, settings=run.settings.model_copy(update={"prompts": prompts}))
+        if not options.decides:
+            check_settings(run.settings)
         if kind.priced:
             Ledger(run.budget, run.settings.prices)  # says whether prices are missing
         return ExpertRun(options, run, language)
@@ -193,15 +196,15 @@ class ExpertRun:
         from agents.expert.players import Thinkers
         from agents.expert.writers.model import ModelWriter
 
-        with bad_input():
-            writer = ModelWriter(session.name, session.client, self.run.settings, prompts)
+        writer = ModelWriter(session.name, session.client, self.run.settings, prompts)
         if self.options.places == "model":
+            # An audition does not know which places the model will name.
             return Thinkers(
                 lambda: writer,
                 lambda seed: ModelPlaces(session.client, prompts, seed),
                 think_later=True,
             )
-        return Thinkers(lambda: writer, think_later=True)
+        return Thinkers(lambda: writer)
 
 
 def _refuse_without_model(options: ExpertOptions) -> None:

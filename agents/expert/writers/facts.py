@@ -2,32 +2,42 @@
 
 Facts that the wordings use (``configs/thoughts``):
 
-- ``purpose``, ``verb``, ``outcome`` (:func:`outcome_of`), ``goal_verb``;
+- ``purpose``, ``verb``, ``outcome`` (:func:`agents.expert.writers.outcomes.outcome_of`),
+  ``goal_verb``; ``problem`` (why an action was refused), ``closing`` (why a container is closed:
+  taken, placed or empty), ``ended`` (what the end shows: put, pickup, toggle or find), ``power``
+  (whether the thing is on or off);
 - object types: ``thing`` (what the subgoal is about), ``place`` (the named destination), ``sought``
   (what is looked for: the thing, or the place once the thing is held), ``object`` (of the
-  decision), ``held``, ``at``, ``last_object``, ``next1`` … ``next4`` (the plan), ``latest`` (the
-  place searched last in vain), ``placed`` (what was put down);
+  decision), ``held``, ``at``, ``last_object``, ``arrived_at`` (where a walk that went wrong ended),
+  ``next1`` … ``next4`` (the plan), ``latest`` (the place searched last in vain), ``placed`` (what
+  was put down last) and ``placed_in``; in a task of several parts ``later_thing`` and
+  ``later_place`` (of the part to come), ``done_thing`` and ``done_place`` (of the part done);
 - things, each with the facts of :func:`_described`: ``object_view``, ``sought_view``,
   ``place_view``, ``last_view`` (in view now), ``object_memory``, ``sought_memory`` (seen before);
-- pools: ``view`` and its parts ``left``, ``ahead``, ``right``, ``near``; ``surfaces`` (things in
-  view that others lie on or in); ``shut`` (closed things in view); ``before`` (seen, not in view);
-  ``visited`` (searched in vain); ``plan``; after looking around ``to_right``, ``behind``,
-  ``to_left``;
-- flags: ``again`` (the place was searched before), ``elsewhere`` (the decision is not about the
-  thing itself), ``holds_thing``, ``many`` (more than one place was searched in vain),
-  ``unseen`` (what is sought is not in view), ``first``, ``final`` (of this turn's thoughts), and
-  the purpose and the outcome, as ``is_search``.
+- pools: ``view`` and its parts ``left``, ``ahead``, ``right``, ``near``; ``here`` (things that lie
+  where the agent searched); ``shut`` (closed things in view); ``visited`` (searched in vain);
+  ``plan``; after looking around ``to_right``, ``behind``, ``to_left``;
+- flags: ``again`` (the place was searched before), ``lies_there`` (what is sought is seen to lie at
+  the decision's object), ``elsewhere`` (the decision is not about the thing itself),
+  ``holds_thing``, ``many`` (more than one place was searched in vain), ``typical`` (people often
+  keep such a thing at the decision's object), ``far_fetched`` (they hardly do), ``unseen`` (what is
+  sought is not in view), ``several`` (the task has several parts), ``second`` (one of them is
+  done), ``earned`` (the last action did a key action), ``told`` (it has been said where what is
+  sought is), ``next_part`` (one of them has just been done, and another begins), ``first``, ``final``
+  (of this turn's thoughts), and the purpose and the outcome, as ``is_search``.
 """
 
 from __future__ import annotations
 
 import random
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from er_gym.data.knowledge import Knowledge, LastAction
+from agents.expert.writers.outcomes import arrived_at, outcome_of, problem_of
+from agents.scripted.searcher import search_priors
+from er_gym.data.knowledge import Knowledge
+from er_gym.data.mentions import named_in
 from er_gym.data.trajectory import SeenObject
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import same_type
@@ -36,8 +46,12 @@ from er_gym.thor import OBJECT_TYPES
 HERE, NEAR, FAR = 0.35, 1.3, 3.0
 """Metres: below the first a side means little; up to the second a thing is near, beyond the third
 far."""
-_SMALL_FADES = 4.5
-"""Metres beyond which small things are not worth a word."""
+_TYPICAL, _UNUSUAL = 1.0, 0.2
+"""Likelihoods from which a place is typical for a thing, and below which it is far-fetched."""
+
+
+_TELLING = frozenset({"found", "looked found", "opened found", "detour"})
+"""Outcomes whose wordings tell where what is sought is."""
 
 
 _STANDING = frozenset(
@@ -53,17 +67,18 @@ _UNNOTICED = frozenset({"Book", "Box", "Laptop", "Blinds"})
 def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
     """The facts of a turn; pools are in a random order."""
     decision, subgoal, last = knowledge.decision, knowledge.subgoal, knowledge.last
-    thing = _known(subgoal.thing)
-    place = _known(subgoal.place)
+    thing, place = _known(subgoal.thing), _known(subgoal.place)
     sought = place if thing and thing == knowledge.held else thing
     outcome = outcome_of(knowledge, sought)
     visited = _searched_in_vain(knowledge, outcome)
-    purpose = knowledge.purpose
-    if purpose == "search" and decision.object_type == sought:
-        purpose = "approach"  # nothing could be in, on or near itself
     coming = [kind for kind in dict.fromkeys(knowledge.plan) if kind != decision.object_type]
     if decision.verb == verbs.NAVIGATE:
         coming = [decision.object_type, *coming]
+    view = _in_view(knowledge, sought, choices)
+    lies_on = (view["sought_view"] or {}).get("o_on", "")
+    purpose: str = knowledge.purpose
+    if purpose == "search" and (decision.object_type == sought or lies_on):
+        purpose = "approach"  # nobody searches for what is in view
     facts: dict[str, Any] = {
         "purpose": purpose,
         "verb": decision.verb,
@@ -77,72 +92,89 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
         "at": _known(knowledge.at) if knowledge.at != sought else "",
         "last_verb": last.action.verb if last else "",
         "last_object": _known(last.action.object_type) if last else "",
-        "part": _part(subgoal.text, knowledge.language),
+        "problem": problem_of(last) if last else "",
+        "arrived_at": arrived_at(last) if last else "",
         "latest": visited[-1] if visited else "",
         "visited": _pool({"o": kind} for kind in visited),
         "many": len(visited) > 1,
         "again": decision.object_type in [visit.place for visit in knowledge.visits],
+        "lies_there": bool(lies_on) and same_type(lies_on, decision.object_type),
         "plan": _pool({"o": kind} for kind in coming),
         **{f"next{number}": kind for number, kind in enumerate(coming[:4], 1)},
-        **_in_view(knowledge, sought, choices),
+        **view,
+        **_story(knowledge, thing),
     }
+    if thing and decision.object_type in OBJECT_TYPES and thing in search_priors.placement_table():
+        likelihood = search_priors.likelihood(thing, decision.object_type)
+        facts["typical"], facts["far_fetched"] = likelihood >= _TYPICAL, likelihood < _UNUSUAL
+    facts["earned"] = last is not None and last.earned
+    facts["told"] = outcome in _TELLING
     facts[f"is_{outcome}"] = True
     facts[f"is_{purpose}"] = True
     facts["holds_thing"] = bool(thing) and thing == knowledge.held
     facts["elsewhere"] = decision.object_type not in ("", thing)
-    facts["placed"] = _placed(knowledge) if outcome == "put" else ""
     return {name: value for name, value in facts.items() if value}
 
 
-def outcome_of(knowledge: Knowledge, sought: str) -> str:
-    """What came of the last action, as a word: ``start``, ``failed``, ``blocked`` (no way
-    forward), ``astray`` (it arrived elsewhere), ``repeated``, ``arrived`` (with something held),
-    ``found``, ``shut`` (at a closed container), ``nothing``, ``opened``, ``opened found``,
-    ``opened nothing``, ``closed``, ``looked``, ``looked found``, ``closer``, ``taken``, ``put``,
-    ``toggled``, ``checked``, ``used``.
-    """
-    last = knowledge.last
-    if last is None:
-        return "start"
-    verb, found = last.action.verb, _has(knowledge.in_view, sought)
-    if not last.success:
-        return _AFTER_FAILING.get(verb, "failed")
-    if last.purpose == "repeat":
-        return "repeated"
-    match verb:
-        case verbs.NAVIGATE:
-            return _after_going(knowledge, last, found)
-        case verbs.OPEN:
-            if knowledge.held:
-                return "opened"
-            return "opened found" if found else "opened nothing"
-        case verbs.OBSERVE:
-            return "looked found" if found else "looked"
-        case verbs.MOVE_FORWARD:
-            return "checked" if last.purpose == "check" else "closer"
-    return _AFTER.get(verb, "used")
+def _story(knowledge: Knowledge, thing: str) -> dict[str, Any]:
+    """What was done so far, and what is still to come in a task of several parts."""
+    held, last, subgoal = "", knowledge.last, knowledge.subgoal
+    puts: list[tuple[str, str]] = []
+    toggled = False
+    latest = ""
+    closing = "empty"
+    for each in knowledge.actions:
+        if not each.success:
+            continue
+        verb = each.action.verb
+        if verb == verbs.PICKUP:
+            held, closing = each.action.object_type, "taken"
+        elif verb == verbs.PUT and held:
+            latest, closing = held, "placed"
+            if each.earned:
+                puts.append((_known(held), _known(each.action.object_type)))
+        elif verb == verbs.TOGGLE:
+            toggled = toggled or same_type(each.action.object_type, thing)
+        elif verb == verbs.OPEN:
+            closing = "empty" if not knowledge.held else "taken"
+    several = bool(subgoal.text)
+    begins = bool(puts) and subgoal.thing != puts[-1][0]
+    put_now = last is not None and last.success and last.action.verb == verbs.PUT
+    story: dict[str, Any] = {
+        "placed": _known(latest) if put_now else "",
+        "several": several,
+        "second": several and begins,
+        "next_part": several and begins and put_now,
+        "closing": closing,
+        "ended": _ended(knowledge, thing, puts, toggled),
+    }
+    others = [pair for pair in puts if pair[0] != subgoal.thing]
+    if several and others:
+        story["done_thing"], story["done_place"] = others[-1]
+    if several and not puts:
+        pairs = {subgoal.thing, subgoal.place}
+        named = [kind for kind in named_in(knowledge.instruction) if kind not in pairs]
+        carried = [kind for kind in named if _is_carried(kind)]
+        story["later_thing"] = carried[0] if len(carried) == 1 else ""
+    return story
 
 
-_AFTER: Mapping[str, str] = {
-    verbs.CLOSE: "closed",
-    verbs.PICKUP: "taken",
-    verbs.PUT: "put",
-    verbs.TOGGLE: "toggled",
-}
-"""The outcome of a verb, where it depends on nothing else."""
+def _ended(
+    knowledge: Knowledge, thing: str, puts: Sequence[tuple[str, str]], toggled: bool
+) -> str:
+    """What the agent can point at when it ends."""
+    verb, place = knowledge.subgoal.verb, knowledge.subgoal.place
+    if verb == verbs.PUT and puts and puts[-1][0] == thing and same_type(puts[-1][1], place):
+        return "put"
+    if verb == verbs.PICKUP and thing and thing == knowledge.held:
+        return "pickup"
+    if verb == verbs.TOGGLE and toggled:
+        return "toggle"
+    return "find" if verb == "find" and thing in knowledge.in_view else ""
 
 
-_AFTER_FAILING: Mapping[str, str] = {verbs.NAVIGATE: "astray", verbs.MOVE_FORWARD: "blocked"}
-"""The outcome of a verb that failed, where it has a word of its own."""
-
-
-def _after_going(knowledge: Knowledge, last: LastAction, found: bool) -> str:
-    if knowledge.held and last.purpose not in ("search", "look around"):
-        return "arrived"
-    if found:
-        return "found"
-    here = next((each for each in knowledge.view if each.type == knowledge.at), None)
-    return "shut" if here is not None and here.open is False else "nothing"
+def _is_carried(kind: str) -> bool:
+    return "pickupable" in OBJECT_TYPES[kind].properties
 
 
 def _searched_in_vain(knowledge: Knowledge, outcome: str) -> list[str]:
@@ -153,27 +185,8 @@ def _searched_in_vain(knowledge: Knowledge, outcome: str) -> list[str]:
     return [place for place in dict.fromkeys(places) if place not in waiting]
 
 
-def _placed(knowledge: Knowledge) -> str:
-    """What was put down: the one type in view, named in the instruction, that lies there."""
-    assert knowledge.last is not None
-    there = knowledge.last.action.object_type
-    found = {each.type for each in knowledge.view if each.on and same_type(each.on, there)}
-    named = [kind for kind in found if re.search(rf"\b{kind}\b", knowledge.instruction)]
-    return named[0] if len(named) == 1 else ""
-
-
 def _known(object_type: str) -> str:
     return object_type if object_type in OBJECT_TYPES else ""
-
-
-def _part(text: str, language: str) -> str:
-    """A part of the instruction, to be quoted within a sentence; ``""`` in another language."""
-    is_chinese = any("一" <= character <= "鿿" for character in text)
-    return text.strip().rstrip(".。!！") if is_chinese is (language == "zh") else ""
-
-
-def _has(types: Iterable[str], wanted: str) -> bool:
-    return bool(wanted) and any(kind == wanted or same_type(kind, wanted) for kind in types)
 
 
 # -- things in view --------------------------------------------------------------------------------
@@ -209,7 +222,10 @@ def _in_view(knowledge: Knowledge, sought: str, choices: random.Random) -> dict[
         for kind, where in knowledge.seen.items()
         if kind not in everywhere and kind != knowledge.held and kind in OBJECT_TYPES
     }
-    holders = Counter(thing["o_on"] for thing in told if thing["o_on"])
+    searched = last if knowledge.last and knowledge.last.action.verb == verbs.OPEN else knowledge.at
+    lying = [each for each in things.values() if each["o_on"] and searched]
+    here = [each for each in lying if same_type(each["o_on"], searched) and each["o"] != sought]
+    thing = _named(switches, _known(knowledge.subgoal.thing))
     return {
         "sought_view": _named(everywhere, sought),
         "object_view": _named(switches if decision.verb == verbs.TOGGLE else everywhere, decided),
@@ -219,13 +235,13 @@ def _in_view(knowledge: Knowledge, sought: str, choices: random.Random) -> dict[
         "object_memory": _named(memory, decided),
         "unseen": bool(sought) and not _named(everywhere, sought),
         "view": tuple(told),
-        "surfaces": tuple(thing for thing in told if thing["o"] in holders),
+        "here": tuple(here),
+        "power": thing["o_state"] if thing and not knowledge.held else "",
         "left": tuple(thing for thing in told if thing["o_side"] == "left"),
         "ahead": tuple(thing for thing in told if thing["o_side"] == "ahead"),
         "right": tuple(thing for thing in told if thing["o_side"] == "right"),
         "near": tuple(thing for thing in told if thing["o_distance"] == "near"),
         "shut": tuple(thing for thing in told if thing["o_state"] == "closed"),
-        "before": _shuffled([each for kind, each in memory.items() if kind != sought], choices),
         **{
             name: _shuffled([t for t in around.get(way, {}).values() if t["o"] != sought], choices)
             for name, way in (("to_right", "right"), ("behind", "behind"), ("to_left", "left"))

@@ -195,11 +195,12 @@ class Rule:
         if len(order) > 1:
             order.sort(key=lambda line: (line.is_last_resort, id(line) in writing.used))
         for line in order:
-            mentioned, latest = set(writing.mentioned), writing.nouns.latest
+            mentioned, nouns = set(writing.mentioned), writing.nouns
+            latest, earlier = nouns.latest, nouns.earlier
             try:
                 text = line.write(writing, facts)
             except Missing:
-                writing.mentioned, writing.nouns.latest = mentioned, latest
+                writing.mentioned, nouns.latest, nouns.earlier = mentioned, latest, earlier
                 continue
             writing.used.add(id(line))
             return text
@@ -265,6 +266,8 @@ def _parsed_rule(value: object, where: str) -> Rule | Table:
         )
     rows: dict[str, Rule] = {}
     for key, lines in value.items():
+        if isinstance(key, bool):
+            raise ValueError(f"{where}: YAML reads a key as {key}; put on and off in quotes")
         if key != "by":
             row = _parsed_rule(lines, f"{where}: {key}")
             assert isinstance(row, Rule)

@@ -48,6 +48,7 @@ class GroundedWriter:
         thoughts = []
         for index, (kind, limit) in enumerate(zip(request.kinds, request.limits, strict=True)):
             place = {"first": index == 0, "final": index == len(request.kinds) - 1}
+            place["told"] = index > 0 or facts.get("told", False)
             text = _fitting(writing, kind, {**facts, **place}, limit, language, said)
             said.update(sentences(text, language))
             thoughts.append(ThoughtRecord(kind=kind, text=text, writer=self.name))
@@ -67,7 +68,8 @@ def _fitting(
     before = set(writing.mentioned)
     for fullness in FULLNESS:
         writing.fullness = fullness
-        writing.mentioned, writing.nouns.latest = set(before), ""
+        writing.mentioned = set(before)
+        writing.nouns.forget()
         text = polished(writing.write(kind, facts), language)
         parts = sentences(text, language)
         if words(text, language) <= limit and len({*parts} - {*said}) == len(parts):

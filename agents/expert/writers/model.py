@@ -8,7 +8,13 @@ from dataclasses import dataclass, field, replace
 from agents.expert.writers.base import ThoughtRequest, ThoughtWriter, WrittenThoughts
 from agents.expert.writers.grounded import GroundedWriter
 from agents.expert.writers.prompts import WriterPrompts
-from agents.expert.writers.replies import NO_REPLY, codes_of, quoted, read_thought
+from agents.expert.writers.replies import (
+    NO_REPLY,
+    OwnWords,
+    codes_of,
+    quoted,
+    read_thought,
+)
 from agents.vlm.chat import Client, Message, ModelError, Reply, model_reply
 from agents.vlm.pictures import within_bounds
 from agents.vlm.settings import AgentSettings
@@ -46,10 +52,7 @@ class ModelWriter:
         prompts: WriterPrompts,
         fallback: ThoughtWriter | None = None,
     ) -> None:
-        if settings.decide != "tags":
-            raise ValueError(
-                f"decide is {settings.decide!r}, but thoughts are written in tags: leave decide out"
-            )
+        check_settings(settings)
         self.name = name
         self._client, self._settings, self._prompts = client, settings, prompts
         self._fallback = fallback or GroundedWriter()
@@ -63,7 +66,7 @@ class ModelWriter:
         shown = request.pictures if self._settings.sees == "pictures" else ()
         pictures = [within_bounds(each, self._settings.pictures) for each in shown]
         conversation = [self._prompts.role(), self._prompts.turn(request, pictures)]
-        drafts = _Drafts(request)
+        drafts = _Drafts(request, self._prompts.own_words)
         replies: list[ModelReply] = []
         for attempt in range(TRIES):
             try:
@@ -100,17 +103,31 @@ class ModelWriter:
         )
 
 
+def check_settings(settings: AgentSettings) -> None:
+    """Check that a client with these settings can write thoughts.
+
+    Raises:
+        ValueError: it would be asked for another form of replies than tags.
+    """
+    if settings.decide != "tags":
+        raise ValueError(
+            f"decide is {settings.decide!r}, but thoughts are written in tags: leave decide out"
+        )
+
+
 @dataclass
 class _Drafts:
     """The thoughts of a turn as far as they stand.
 
     Attributes:
         request: the turn.
+        own_words: checks that the model does not repeat its prompt.
         texts: the thoughts that stand, by index.
         refused: the codes of the refusals of each thought, by index.
     """
 
     request: ThoughtRequest
+    own_words: OwnWords
     texts: dict[int, str] = field(default_factory=dict)
     refused: dict[int, list[str]] = field(init=False)
 
@@ -150,7 +167,10 @@ class _Drafts:
             for each, text in self.texts.items()
         ]
         known = replace(known, earlier=[*known.earlier, now])
-        refusals = check(found.text, kind, known, limit=limit)
+        refusals = (
+            *self.own_words.refusals(found.text),
+            *check(found.text, kind, known, limit=limit),
+        )
         if not refusals:
             self.texts[index] = found.text
         return refusals

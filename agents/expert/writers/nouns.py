@@ -26,31 +26,46 @@ class Nouns(ABC):
 
     Attributes:
         latest: the type mentioned last, ``""`` at the beginning of a text.
+        earlier: the one mentioned before it.
     """
 
     def __init__(self, names: Mapping[str, Sequence[str]]) -> None:
         self._names = names
         self._chosen: dict[str, str] = {}
         self.latest = ""
+        self.earlier = ""
 
     def word(self, value: str, form: str, choices: random.Random) -> str:
         """A fact in a form; what is no object type stays as it is.
 
-        Forms: ``""`` bare, ``the``, ``a``, ``in`` with the preposition, ``type`` in the spelling of
-        the environment, ``that`` a pronoun if the type was the last to be mentioned, else ``the``.
-        English also has ``into``, ``in_type``, ``it``, ``they``, ``is``, ``was`` and ``s`` (the
-        plural).
+        Forms: ``""`` bare, ``the``, ``name`` (never a pronoun), ``a``, ``in`` with the preposition,
+        ``that`` a pronoun if the type was the last to be mentioned, else ``the``, and ``to``, the
+        way there. English also has ``into``, ``it``, ``they``, ``is``, ``was`` and ``s`` (the
+        plural), and ``the``, ``in`` and ``into`` are pronouns if the type was the last to be
+        mentioned.
         """
-        if value not in self._names or form == "type":
+        if value not in self._names:
             return value
         if value not in self._chosen:
             first, *others = self._names[value]
             usual = not others or choices.random() < _FIRST_NAME
             self._chosen[value] = first if usual else choices.choice(others)
-        if form == "that":
-            form = "it" if self.latest == value else "the"
-        self.latest = value
+        form = self._short(value, form) or form
+        if self.latest != value:
+            self.earlier, self.latest = self.latest, value
         return self._formed(value, self._chosen[value], form)
+
+    def forget(self) -> None:
+        """Begin a new text."""
+        self.latest = self.earlier = ""
+
+    def _short(self, value: str, form: str) -> str:
+        """The form of a pronoun where it is clear what is meant, else ``""``."""
+        if form == "that":
+            return "it" if self.latest == value else "the"
+        if form == "to" and value in (self.latest, self.earlier):
+            return "there"
+        return ""
 
     @abstractmethod
     def _formed(self, object_type: str, name: str, form: str) -> str:
@@ -65,20 +80,34 @@ class Nouns(ABC):
         """A list of words: "a, b and c"."""
 
 
+_PRONOUNS = {"the": "it", "in": "in it", "into": "into it"}
+
+
 class EnglishNouns(Nouns):
     """See :class:`Nouns`."""
+
+    def _short(self, value: str, form: str) -> str:
+        if form in _PRONOUNS and self.latest == value and value not in PLURAL:
+            return _PRONOUNS[form]
+        return super()._short(value, form)
 
     def _formed(self, object_type: str, name: str, form: str) -> str:
         plural = object_type in PLURAL
         match form:
-            case "the":
+            case "the" | "name":
                 return f"the {name}"
+            case "to":
+                return f"to the {name}"
+            case "there":
+                return "there"
+            case "in it":
+                return "in it" if object_type in HOLLOW else "on it"
+            case "into it":
+                return "into it" if object_type in HOLLOW else "onto it"
             case "in":
                 return f"{'in' if object_type in HOLLOW else 'on'} the {name}"
             case "into":
                 return f"{'into' if object_type in HOLLOW else 'onto'} the {name}"
-            case "in_type":
-                return f"{'in' if object_type in HOLLOW else 'on'} the {object_type}"
             case "a":
                 if object_type in UNCOUNTED - _ONES or plural:
                     return f"some {name}"
@@ -122,6 +151,10 @@ class ChineseNouns(Nouns):
                 return "它"
             case "in":
                 return f"{noun}{'里' if object_type in HOLLOW else '上'}"
+            case "to":
+                return f"{noun}那里"
+            case "there":
+                return "那里"
             case _:
                 return noun
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import random
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 from agents.expert.writers.base import ThoughtRequest
 from agents.expert.writers.facts import facts_of
 from agents.expert.writers.nouns import names
+from agents.expert.writers.replies import OwnWords
 from agents.vlm.chat import Message, Picture
 from agents.vlm.prompt_set import interleave_pictures, without_marks
 from agents.vlm.template_files import TemplateFiles
@@ -81,6 +82,11 @@ class WriterPrompts:
         """sha256 of the templates, in hex."""
         return self.files.digest
 
+    @cached_property
+    def own_words(self) -> OwnWords:
+        """Checks that what is written does not repeat these prompts."""
+        return OwnWords.than(self.files.sources.values())
+
     def role(self) -> Message:
         """The system message for thoughts."""
         return Message("system", (self.files.render("role.jinja"),))
@@ -142,25 +148,23 @@ class WriterPrompts:
     def _named(self, object_type: str) -> str:
         """An object type in words; what is no object type stays as it is."""
         known = names(self.language).get(object_type)
-        return (
-            known[0].rpartition(" ")[2]
-            if known and self.language == "zh"
-            else (known[0] if known else object_type)
-        )
+        if known is None:
+            return object_type
+        # Chinese names stand behind their measure word.
+        return known[0].rpartition(" ")[2] if self.language == "zh" else known[0]
 
     def _told(self, known: Knowledge) -> dict[str, Any]:
         """The facts that hints are made of, object types in words."""
         facts = facts_of(known, random.Random(0))
-        told = ("thing", "place", "sought", "at", "last_object", "placed", "latest")
+        told = ("sought", "at", "last_object")
         visited = [each["o"] for each in facts.get("visited", ())]
         plan = [each["o"] for each in facts.get("plan", ())]
         return {
             **{name: self._named(facts.get(name, "")) for name in told},
             "outcome": facts["outcome"],
-            "goal": known.subgoal.text,
+            "goal": facts.get("part", ""),
             "visited": tuple(map(self._named, visited)),
             "plan": tuple(map(self._named, plan)),
-            "failed": known.last is not None and not known.last.success,
         }
 
     def _views(self, known: Knowledge) -> Iterable[_View]:

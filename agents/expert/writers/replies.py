@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from agents.vlm.chat import Reply
@@ -13,6 +14,11 @@ NO_REPLY = "no reply"
 """The code of a request without a reply, after all tries."""
 _LONGEST_WORD = 30
 """A text with more characters for each word that it may have is not read any further."""
+_RUN, _CHINESE_RUN = 9, 14
+"""So many words in a row, or Chinese characters, are no coincidence."""
+_HAN = re.compile(r"[一-鿿]")
+_WORD = re.compile(r"[一-鿿]|[a-z']+")
+_OTHER_VOICE = re.compile(r"\bthe robot\b|机器人", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -22,8 +28,9 @@ class ReadThought:
     Attributes:
         text: the thought; ``""`` if there is none that can be used.
         refusals: why not. Beside the critic's codes there are ``empty`` (the reply says nothing),
-            ``missing`` (it lacks the tag, as a model's refusal does), ``cut`` (it breaks off) and
-            ``twice`` (the tag comes several times).
+            ``missing`` (it lacks the tag, as a model's refusal does), ``cut`` (it breaks off),
+            ``twice`` (the tag comes several times), ``echo`` (it repeats the prompt) and ``voice``
+            (it speaks of the robot as of somebody else).
     """
 
     text: str = ""
@@ -54,6 +61,37 @@ def read_thought(reply: Reply, kind: ThoughtKind, limit: int) -> ReadThought:
     if len(text) > _LONGEST_WORD * limit:
         return _refused("length", f"The thought is far too long; write at most {limit} words.")
     return ReadThought(text)
+
+
+@dataclass(frozen=True)
+class OwnWords:
+    """Checks that a thought is in words of its own, and in the robot's voice.
+
+    Attributes:
+        prompts: runs of words of the prompts' own texts.
+    """
+
+    prompts: frozenset[tuple[str, ...]]
+
+    @classmethod
+    def than(cls, texts: Iterable[str]) -> OwnWords:
+        """Other words than those of these texts."""
+        return cls(frozenset(run for text in texts for run in _runs(text)))
+
+    def refusals(self, text: str) -> tuple[Refusal, ...]:
+        """What a model says that copies its instructions, as small models do."""
+        found = []
+        if any(run in self.prompts for run in _runs(text)):
+            found.append(Refusal("echo", "This repeats what you were told; use your own words."))
+        if _OTHER_VOICE.search(text):
+            found.append(Refusal("voice", "Speak as the robot: say “I”, not “the robot”."))
+        return tuple(found)
+
+
+def _runs(text: str) -> Iterator[tuple[str, ...]]:
+    words = _WORD.findall(text.lower())
+    length = _CHINESE_RUN if _HAN.search(text) else _RUN
+    yield from zip(*(words[start:] for start in range(length)), strict=False)
 
 
 def quoted(reply: Reply, most: int = 6_000) -> str:
