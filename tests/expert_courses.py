@@ -76,7 +76,7 @@ class Played:
 
 def environment(**more: object) -> EmbodiedEnv:
     """The suite's environment, without pictures."""
-    return EmbodiedEnv((), **{**SUITE.env, "obs_mode": SilentAgent.obs_mode, **more})  # type: ignore[arg-type]
+    return EmbodiedEnv((), **{**SUITE.env, "obs_mode": SilentAgent.obs_mode, **more})
 
 
 def play(env: EmbodiedEnv, candidate: Candidate) -> Played:

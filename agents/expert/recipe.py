@@ -127,7 +127,8 @@ def quotas(recipe: Recipe, limit: int | None, types: set[str]) -> dict[tuple[str
     """How many trajectories to take, by part and task type.
 
     Types without tasks are left out, and the others of the part take their shares. The numbers sum
-    to ``limit``. With a larger limit, none of them is smaller, so that a collection can grow.
+    to ``limit``; each is its share times a factor that is the same for all, rounded. With a larger
+    limit, none of them is smaller, so that a collection can grow.
 
     Args:
         recipe: the recipe.
@@ -149,7 +150,9 @@ def quotas(recipe: Recipe, limit: int | None, types: set[str]) -> dict[tuple[str
 def _rounded(shares: Mapping[tuple[str, str], Fraction], total: int) -> dict[tuple[str, str], int]:
     """Whole numbers in the proportion of some shares that sum to ``total``.
 
-    The method of Webster and Sainte-Laguë. The largest remainder would be as near, but there a
+    The method of Webster and Sainte-Laguë: ``round(share * factor)`` with the factor that gives
+    the total. A large share may so miss its exact part of the total by more than 1 (at most by 1/2,
+    and its part of 1/2 for each of the shares). The largest remainder stays within 1, but there a
     number may become smaller when the total grows.
     """
     whole = sum(shares.values())
