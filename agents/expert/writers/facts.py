@@ -106,7 +106,8 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
     }
     if thing and decision.object_type in OBJECT_TYPES and thing in search_priors.placement_table():
         likelihood = search_priors.likelihood(thing, decision.object_type)
-        facts["typical"], facts["far_fetched"] = likelihood >= _TYPICAL, likelihood < _UNUSUAL
+        facts["typical"] = likelihood >= _TYPICAL and decision.object_type != "GarbageCan"
+        facts["far_fetched"] = likelihood < _UNUSUAL
     facts["earned"] = last is not None and last.earned
     facts["told"] = outcome in _TELLING
     facts[f"is_{outcome}"] = True
