@@ -49,6 +49,9 @@ _WORDS: Mapping[Language, Mapping[ThoughtKind, str]] = {
 }
 
 
+_STEP: Mapping[Language, str] = {"en": " This is step {number}.", "zh": "这是第 {number} 步。"}
+
+
 def make_collection(
     path: Path,
     *,
@@ -186,4 +189,5 @@ def _thoughts(
         kinds = ("verification",)
     for kind in kinds:
         text = _WORDS[language][kind].format(seen=seen, action=action)
+        text += _STEP[language].format(number=len(turns) + 1)  # no thought is repeated
         yield ThoughtRecord(kind=kind, text=text)

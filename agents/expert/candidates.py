@@ -18,6 +18,7 @@ from agents.expert.course import Course
 from agents.expert.expert import CorrectedCourse, ExpertCourse
 from agents.expert.explorer import ExplorerCourse, Strength
 from agents.expert.kinds import ORDERED_KIND, draw_mode
+from agents.expert.places import DrawnPlaces, PlaceChooser
 from agents.expert.recipe import ANOMALY, CORRECTED, EXPLORED, SEARCH, Part
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.tasks.task import Task
@@ -67,8 +68,13 @@ class Candidate:
         """Who decides, as trajectories name it."""
         return f"{self.actor}:{self.explorer}" if self.explorer else self.actor
 
-    def course(self, seed: int, kinds: ThoughtKinds) -> Course:
-        """The course of an episode of the candidate."""
+    def course(
+        self,
+        seed: int,
+        kinds: ThoughtKinds,
+        places: PlaceChooser = DrawnPlaces(),  # noqa: B008 (has no state)
+    ) -> Course:
+        """The course of an episode of the candidate; ``places`` chooses the expert's wrong ones."""
         random = Random(seed)
         task = self.played_task
         check = kinds.draw_check(task, random)
@@ -87,6 +93,7 @@ class Candidate:
             retries=_RETRIES if anomalous else 0,
             repeats=self.repeats,
             strict=None if not anomalous else False,
+            places=places,
         )
 
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, field
 from typing import Any
 
-from agents.expert.acceptance import PlayedCourse, rejection
 from agents.expert.audition import audition
 from agents.expert.candidates import (
     Candidate,
@@ -18,14 +16,10 @@ from agents.expert.candidates import (
 )
 from agents.expert.corrections import beginning_of
 from agents.expert.explorer import Strength
+from agents.expert.players import Players, PlaySettings
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
-from agents.expert.thinker import OBS_MODE, ThinkingAgent, TrajectoryHeader
-from agents.expert.thought_kinds import ThoughtKinds
-from agents.expert.writers.base import ThoughtWriter
-from agents.vlm.settings import Pictures
-from er_gym.data.collection import PARTS, Collection, CollectionError
-from er_gym.data.trajectory import Correction, Language, Trajectory
-from er_gym.rollout.agent import Agent
+from er_gym.data.collection import Collection, CollectionError
+from er_gym.data.trajectory import Trajectory
 from er_gym.rollout.events import Cost, EventListener
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.run_directory import Manifest, RunDirectory, locked_run_directory
@@ -51,9 +45,7 @@ class CollectSettings:
         recipe: how many of what.
         tasks: the suite's tasks.
         env: keyword arguments of the environment, without ``obs_mode`` and ``faults``.
-        kinds: which kinds of thoughts are drawn.
-        pictures: how pictures are encoded.
-        language: of the thoughts.
+        play: what all players share.
         seed: of everything that is drawn.
         manifest: what the parts' manifests have in common with the collection's.
     """
@@ -61,9 +53,7 @@ class CollectSettings:
     recipe: Recipe
     tasks: Sequence[Task]
     env: Mapping[str, Any]
-    kinds: ThoughtKinds
-    pictures: Pictures
-    language: Language
+    play: PlaySettings
     seed: int
     manifest: Mapping[str, Any]
 
@@ -87,51 +77,6 @@ class CollectSummary:
     rejected: dict[str, int] = field(default_factory=dict)
     crashed: list[str] = field(default_factory=list)
     missing: dict[tuple[str, str], int] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class MakeThinker:
-    """Makes the agents of a part's episodes: a :class:`~er_gym.rollout.agent.MakeAgent`."""
-
-    candidates: Mapping[str, Candidate]
-    make_writer: Callable[[], ThoughtWriter]
-    settings: CollectSettings
-    most_actions: int
-
-    def __call__(self, task: Task, seed: int) -> Agent:
-        """The agent of a candidate's episode."""
-        candidate, settings = self.candidates[task.id], self.settings
-        correction = None
-        if candidate.beginning is not None:
-            correction = Correction(
-                run=candidate.run,
-                episode=candidate.episode,
-                first_wrong=candidate.beginning.first_wrong,
-            )
-        header = TrajectoryHeader(
-            task_id=candidate.task.id,
-            part=candidate.part,
-            kind=candidate.kind,
-            mode=candidate.mode,
-            language=settings.language,
-            actor=candidate.said_actor,
-            folder=f"{PARTS}/{candidate.part}",
-            correction=correction,
-        )
-        return ThinkingAgent(
-            candidate.course(seed, settings.kinds),
-            header,
-            settings.kinds,
-            self.make_writer(),
-            settings.pictures,
-            seed,
-            rejects=partial(_rejects, most_actions=self.most_actions),
-        )
-
-    def __getstate__(self) -> dict[str, Any]:
-        # The workers need neither the suite's tasks nor the recipe.
-        light = replace(self.settings, tasks=(), recipe=Recipe(parts={}))
-        return {**self.__dict__, "settings": light}
 
 
 @dataclass(eq=False)
@@ -273,7 +218,7 @@ class Collector:
     Args:
         collection: where to.
         settings: what decides the trajectories.
-        make_writer: makes the writer of thoughts; picklable for ``executor="processes"``.
+        players: who plays; what they make is picklable for ``executor="processes"``.
         strata: the candidates by part and task type, and how many of each are wanted.
         executor, parallelism: as :func:`er_gym.rollout.runner.run` takes them.
         listeners: hear of every event of the runs.
@@ -285,7 +230,7 @@ class Collector:
         self,
         collection: Collection,
         settings: CollectSettings,
-        make_writer: Callable[[], ThoughtWriter],
+        players: Players,
         strata: Mapping[tuple[str, str], Stratum],
         *,
         executor: str = "processes",
@@ -295,7 +240,7 @@ class Collector:
         tell: Callable[[str, int], None] = lambda part, taken: None,
     ) -> None:
         self._tell = tell
-        self._collection, self._settings, self._make_writer = collection, settings, make_writer
+        self._collection, self._settings, self._players = collection, settings, players
         self._executor, self._parallelism = executor, parallelism
         self._listeners, self._cost = tuple(listeners), cost
         self._strata = strata
@@ -332,7 +277,7 @@ class Collector:
         env: dict[str, Any] = dict(self._settings.env)
         if row.faults:
             env["faults"] = row.faults
-        with self._part_directory(part, {**env, "obs_mode": OBS_MODE}) as directory:
+        with self._part_directory(part, {**env, "obs_mode": self._players.obs_mode}) as directory:
             for _ in range(_MOST_ROUNDS):
                 while any(stratum.open for stratum in strata):
                     self._choose(strata, env, row.most_actions)
@@ -349,12 +294,16 @@ class Collector:
     def _choose(self, strata: Sequence[Stratum], env: Mapping[str, Any], most: int) -> None:
         """Look at more candidates, and choose those that an audition shows to be fit."""
         rounds = [(stratum, stratum.next()) for stratum in strata if stratum.open]
+        if not self._players.scripted:
+            for stratum, candidates in rounds:
+                stratum.choose(candidates)
+            return
         fit: dict[str, Candidate] = {}
         for verdict in audition(
             [each for _, candidates in rounds for each in candidates],
             env=env,
             seed=self._settings.seed,
-            kinds=self._settings.kinds,
+            kinds=self._settings.play.kinds,
             most_actions=most,
             workers=self._parallelism.workers,
         ):
@@ -373,7 +322,7 @@ class Collector:
             suite=settings.manifest["suite"],
             suite_digest=settings.manifest["suite_digest"],
             suite_size=len(settings.tasks),
-            agent=row.actor,
+            agent=self._players.name or row.actor,
             agent_settings=settings.manifest["settings"],
             env=dict(env),
             seed=settings.seed,
@@ -389,7 +338,7 @@ class Collector:
         summary = run(
             directory,
             _by_scene(each.played_task for each in chosen.values()),
-            MakeThinker(chosen, self._make_writer, self._settings, most),
+            self._players.make(chosen, self._settings.play, most),
             executor=self._executor,
             parallelism=self._parallelism,
             listeners=self._listeners,
@@ -405,7 +354,7 @@ class Collector:
                 trajectory = self._collection.played(candidate.part, candidate.id)
             except CollectionError:  # it crashed, as the summary says, or was not played
                 continue
-            reason = rejection(PlayedCourse.of_trajectory(trajectory), most)
+            reason = self._players.rejection(trajectory, most)
             if reason:
                 self._reject(reason)
             else:
@@ -414,10 +363,6 @@ class Collector:
 
     def _reject(self, reason: str) -> None:
         self.summary.rejected[reason] = self.summary.rejected.get(reason, 0) + 1
-
-
-def _rejects(trajectory: Trajectory, most_actions: int) -> str:
-    return rejection(PlayedCourse.of_trajectory(trajectory), most_actions)
 
 
 def _by_scene(tasks: Iterable[Task]) -> list[Task]:

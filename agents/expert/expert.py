@@ -6,7 +6,13 @@ from random import Random
 
 from agents.expert.course import Intent
 from agents.expert.legs import Leg
-from agents.expert.places import candidates, draw_places, plan_of
+from agents.expert.places import (
+    DrawnPlaces,
+    PlaceChooser,
+    candidates,
+    draw_places,
+    plan_of,
+)
 from agents.expert.task_course import GiveUp, Intents, TaskCourse
 from agents.expert.thought_kinds import Check
 from agents.scripted.searcher import search_priors
@@ -35,6 +41,7 @@ class ExpertCourse(TaskCourse):
         check: how the task ends.
         retries, repeats: see :class:`~agents.expert.task_course.TaskCourse`.
         strict: whether kind ``b`` is given up where it needs more than the key actions.
+        places: chooses the wrong places.
     """
 
     def __init__(
@@ -48,6 +55,7 @@ class ExpertCourse(TaskCourse):
         retries: int = 0,
         repeats: float = 0.0,
         strict: bool | None = None,
+        places: PlaceChooser = DrawnPlaces(),  # noqa: B008 (has no state)
     ) -> None:
         super().__init__(
             task,
@@ -57,7 +65,7 @@ class ExpertCourse(TaskCourse):
             repeats=repeats,
             strict=kind == "b" if strict is None else strict,
         )
-        self._kind, self._mode = kind, mode
+        self._kind, self._mode, self._places = kind, mode, places
         self._searches = 0
 
     def _find(self, leg: Leg) -> Intents:
@@ -110,7 +118,7 @@ class ExpertCourse(TaskCourse):
             index = self._random.randint(0, wrong)
             mode = "0" * index + "1" + "0" * (wrong - index)
         plausible = candidates(leg.thing, self.view.navigable, without=[leg.place])
-        wrong_places = draw_places(plausible, mode.count("0"), self._random)
+        wrong_places = self._places.choose(leg.thing, plausible, mode.count("0"), self._random)
         return plan_of(mode, leg.place, wrong_places)
 
     def _show_place(self, leg: Leg, visited: tuple[str, ...]) -> Intents:

@@ -36,13 +36,8 @@ class Leg:
         return "" if self.navigate is None else self.navigate.actual_type
 
 
-def legs_of(task: Task, language: Language = "en") -> tuple[Leg, ...]:
-    """The legs of a task, without ``end``.
-
-    Args:
-        task: the task.
-        language: in which the parts of a task are put into words.
-    """
+def legs_of(task: Task) -> tuple[Leg, ...]:
+    """The legs of a task, without ``end``; parts of a task are in English."""
     groups: list[tuple[KeyAction | None, list[KeyAction]]] = []
     for key in task.key_actions:
         if key.verb == verbs.NAVIGATE:
@@ -56,7 +51,7 @@ def legs_of(task: Task, language: Language = "en") -> tuple[Leg, ...]:
     carried = ""
     for number, (navigate, actions) in enumerate(groups):
         later = [key for _, after in groups[number + 1 :] for key in after]
-        legs.append(_leg(navigate, actions, later, carried, several, language))
+        legs.append(_leg(navigate, actions, later, carried, several))
         for key in actions:
             if key.verb == verbs.PICKUP:
                 carried = key.actual_type
@@ -69,7 +64,6 @@ def _leg(
     later: Sequence[KeyAction],
     carried: str,
     several: bool,
-    language: Language,
 ) -> Leg:
     related = () if navigate is None else navigate.related_objects
     place = "" if navigate is None else navigate.actual_type
@@ -85,7 +79,7 @@ def _leg(
     moved = carried if verb == verbs.PUT and carried else thing
     text = ""
     if several and destination and moved:
-        text = _PARTS[language].format(thing=moved, place=_where(destination, language))
+        text = f"put the {moved} {in_or_on_the(destination)}"
     return Leg(
         navigate,
         thing,
@@ -95,11 +89,11 @@ def _leg(
     )
 
 
-_PARTS = {"en": "put the {thing} {place}", "zh": "把 {thing} 放到 {place}"}
-
-
-def _where(destination: str, language: Language) -> str:
-    return in_or_on_the(destination) if language == "en" else destination
+def in_language(subgoal: Subgoal, language: Language) -> Subgoal:
+    """A subgoal with its part of the task in words of a language."""
+    if not subgoal.text or language == "en":
+        return subgoal
+    return subgoal.model_copy(update={"text": f"把 {subgoal.thing} 放到 {subgoal.place}"})
 
 
 PURPOSES: dict[str, Purpose] = {

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from random import Random
+from typing import Protocol
 
 from agents.scripted.searcher import search_priors
+from er_gym.rollout.agent import ModelReply
 from er_gym.tasks.equivalence import same_type
 
 _BELOW_ANY = 0.01
@@ -63,6 +65,42 @@ def draw_places(
         for place, weight in weighted
     ]
     return [place for _, place in sorted(noisy, reverse=True)[:number]]
+
+
+class PlaceChooser(Protocol):
+    """Chooses the wrong places of a search."""
+
+    def choose(
+        self, thing: str, weighted: Sequence[tuple[str, float]], number: int, random: Random
+    ) -> list[str]:
+        """Different places in the order in which they are to be searched.
+
+        Args:
+            thing: the type of the object that is searched for.
+            weighted: the places there are, with their weights.
+            number: how many at the most.
+            random: draws whatever is to be drawn.
+
+        Raises:
+            CannotGoOn: a model is asked, and no later request can succeed either.
+        """
+
+    def take_replies(self) -> Sequence[ModelReply]:
+        """What a model has replied since the last call; empty where none is asked."""
+
+
+class DrawnPlaces:
+    """Draws places by their likelihood; a :class:`PlaceChooser`."""
+
+    def choose(
+        self, thing: str, weighted: Sequence[tuple[str, float]], number: int, random: Random
+    ) -> list[str]:
+        """See :func:`draw_places`."""
+        return draw_places(weighted, number, random)
+
+    def take_replies(self) -> Sequence[ModelReply]:
+        """None: no model is asked."""
+        return ()
 
 
 def plan_of(mode: str, right: str, wrong: Sequence[str]) -> list[str]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from math import ceil, floor, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from agents.vlm.chat import Picture
 from agents.vlm.settings import Pictures
@@ -66,3 +68,11 @@ def encode(rgb: NDArray[np.uint8], settings: Pictures) -> Picture:
     size = fitted(width, height, settings)
     data = encode_picture(rgb, size, form=settings.format, quality=settings.quality)
     return Picture(data, f"image/{settings.format}", *size)
+
+
+def within_bounds(picture: Picture, settings: Pictures) -> Picture:
+    """A picture, encoded anew if it has too many or too few pixels for the settings."""
+    if fitted(picture.width, picture.height, settings) == (picture.width, picture.height):
+        return picture
+    with Image.open(BytesIO(picture.data)) as image:
+        return encode(np.asarray(image.convert("RGB")), settings)

@@ -323,10 +323,9 @@ def _vlm_run(agent: str, vlm_options: VLMOptions) -> VLMRun | None:
 
     if is_model_agent(agent):
         return VLMRun.of(agent, vlm_options)
-    given = [name for name, value in vars(vlm_options).items() if value not in (None, ())]
-    if given:
-        option = "--set" if given[0] == "overrides" else f"--{given[0].replace('_', '-')}"
+    if vlm_options.given:
         raise BadInput(
-            f"{option} is for vision-language agents, such as openai:MODEL, not for {agent}"
+            f"{vlm_options.given[0]} is for vision-language agents, such as openai:MODEL, not for "
+            f"{agent}"
         )
     return None

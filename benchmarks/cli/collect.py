@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from benchmarks.cli.collect_expert import ExpertOptions, ExpertRun, with_expert_options
 from benchmarks.cli.errors import (
     CRASHED,
     INTERRUPTED,
@@ -23,9 +23,12 @@ from benchmarks.cli.terminal import terminal
 
 if TYPE_CHECKING:
     from agents.expert.collect import CollectSettings, CollectSummary, Stratum
+    from agents.expert.players import Players
     from agents.expert.recipe import Recipe
-    from agents.expert.writers.base import ThoughtWriter
+    from agents.expert.writers.registry import NamedWriter
+    from benchmarks.cli.collect_progress import CollectProgress
     from er_gym.data.collection import Collection, CollectionManifest
+    from er_gym.rollout.events import Cost
     from er_gym.tasks.suites import Suite
 
 LANGUAGES = ("en", "zh")
@@ -56,7 +59,7 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
     type=Words(),
     default="grounded",
     show_default=True,
-    help="Who writes the thoughts: grounded, or package.module:Class.",
+    help="Who writes the thoughts: grounded, or package.module:Class. For a model, give --expert.",
 )
 @click.option(
     "--thoughts",
@@ -80,6 +83,7 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 )
 @workers_option
 @seed_option
+@with_expert_options
 def collect(
     suite: str | None,
     tasks_file: Path | None,
@@ -96,44 +100,88 @@ def collect(
     correct: Path | None,
     workers: int,
     seed: int,
+    expert_options: ExpertOptions,
 ) -> int:
     """Collect trajectories with pictures and thoughts, to train on.
 
     An expert that knows where things are, and explorers that do not, play the tasks of a suite. The
     default recipe has the parts and proportions of the paper's training set. The same command
     continues a collection; a larger --limit extends it. `er-gym data` shows, verifies and exports
-    collections.
+    collections. With --expert, a model writes the thoughts; what it replied and cost stays in the
+    directory.
     """
+    from agents.expert.collect import Collector
+    from benchmarks.cli.collect_choice import chosen_recipe, chosen_tasks, source_of
+    from benchmarks.cli.collect_progress import CollectProgress
     from er_gym.data.collection import TRAJECTORIES
     from er_gym.rollout.agent import CannotGoOn
+    from er_gym.rollout.executor import Parallelism
     from er_gym.rollout.worker_pool import WorkerSetupError
 
     console = terminal(stderr=True)
     with bad_input():
-        source, env = _source(suite, tasks_file, correct)
-        source = _chosen(source, split(types), split(scenes))
-        asked = _recipe(recipe, split(parts), split(kinds)) if correct is None else None
+        model = ExpertRun.of(expert_options, language)  # type: ignore[arg-type]
+        if model is not None:
+            _refuse_misfits(model, writer, kinds, correct)
+        source, env = source_of(suite, tasks_file, correct)
+        source = chosen_tasks(source, split(types), split(scenes))
+        asked = chosen_recipe(recipe, split(parts), split(kinds)) if correct is None else None
         settings, manifest = _settings(
-            source, env, asked, correct, language=language, seed=seed, writer=writer, table=thoughts
+            source,
+            env,
+            asked,
+            correct,
+            model,
+            language=language,
+            seed=seed,
+            writer=writer,
+            table=thoughts,
         )
-        strata, left_out = _strata(settings, correct, limit)
+        strata, left_out = _strata(settings, correct, limit, model)
         make_writer = _make_writer(writer)
     for reason, number in left_out.items():
         console.print(f"{number} episodes left out: {reason}", style="dim", soft_wrap=True)
+    total = sum(stratum.quota for stratum in strata.values())
+    shown = CollectProgress(console, total)
+    collector = None
+    bill: Cost | None = None
     try:
-        with _locked(out, manifest) as collection:
-            total = sum(stratum.quota for stratum in strata.values())
-            shown = CollectProgress(console, total)
-            with shown:
-                summary = _collect(collection, settings, make_writer, strata, workers, shown)
+        with (
+            _locked(out, manifest) as collection,
+            _players(model, make_writer, out, shown) as ready,
+        ):
+            players, cost = ready
+            collector = Collector(
+                collection,
+                settings,
+                players,
+                strata,
+                executor="processes" if model is None else "threads",
+                parallelism=Parallelism(workers, model.run.concurrency if model else 1),
+                listeners=[shown],
+                cost=cost,
+                tell=shown.taken,
+            )
+            try:
+                with shown:
+                    summary = collector.collect()
+            finally:
+                bill = cost()
     except WorkerSetupError as error:
         raise click.ClickException(str(error)) from error
     except OSError as error:  # the disk is full, the share is gone
         raise BadInput(f"{error}; the same command continues {out}") from error
     except (KeyboardInterrupt, CannotGoOn) as error:
         why = str(error) if isinstance(error, CannotGoOn) else "interrupted"
-        print_problem(f"{why}: the same command continues {out}")
+        done = collector.summary.taken if collector else 0
+        print_problem(
+            f"{why}: {done} of {total} trajectories are in {out}; the same command continues"
+        )
+        if bill:
+            console.print(str(bill))
         return STOPPED if isinstance(error, CannotGoOn) else INTERRUPTED
+    if bill:
+        console.print(str(bill))
     console.print(_in_words(summary, out / TRAJECTORIES), soft_wrap=True)
     for (part, task_type), number in summary.missing.items():
         print_problem(
@@ -149,141 +197,12 @@ def collect(
     return 0
 
 
-class CollectProgress:
-    """Shows how many trajectories are taken: a live bar on a terminal, a few lines elsewhere."""
-
-    def __init__(self, console: Any, total: int) -> None:
-        from benchmarks.cli.progress import bar
-
-        self._console, self._total = console, total
-        self._taken = self._played = 0
-        self._told = 0
-        self._bar = bar(console)
-        self._task = self._bar.add_task("trajectories", total=total, status="starting")
-
-    def __enter__(self) -> CollectProgress:
-        self._bar.start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._bar.stop()
-
-    def __call__(self, event: object) -> None:
-        """Hear of an event of a run."""
-        from er_gym.rollout.events import EpisodeEnded
-
-        if isinstance(event, EpisodeEnded):
-            self._played += 1
-            self._show()
-
-    def taken(self, part: str, number: int) -> None:
-        """Hear how many trajectories are taken so far, of all parts."""
-        self._taken = number
-        self._bar.update(self._task, description=part)
-        self._show()
-        tenth = 10 * number // max(self._total, 1)
-        if not self._console.is_terminal and tenth > self._told:
-            self._told = tenth
-            self._console.print(
-                f"{part}: {number}/{self._total} trajectories, {self._played} episodes played",
-                soft_wrap=True,
-            )
-
-    def _show(self) -> None:
-        self._bar.update(
-            self._task, completed=self._taken, status=f"{self._played} episodes played"
-        )
-
-
-def _source(
-    name: str | None, tasks_file: Path | None, correct: Path | None
-) -> tuple[Suite, dict[str, Any]]:
-    """The suite with the tasks, and the environment in which they are played."""
-    from er_gym.rollout.run_directory import RunDirectory
-    from er_gym.tasks.suites import load_suite, suite_from_file, suite_names
-
-    if name is not None and tasks_file is not None:
-        raise BadInput("give --suite or --tasks-file, not both")
-    if correct is None:
-        if name is None and tasks_file is None:
-            raise BadInput(f"give --suite (one of: {', '.join(suite_names())}) or --tasks-file")
-        suite = load_suite(name) if name is not None else suite_from_file(_given(tasks_file))
-        return suite, {"backend": "embedded", **suite.env}
-    manifest = RunDirectory.open(correct).manifest
-    if tasks_file is not None:
-        suite = suite_from_file(tasks_file)
-    else:
-        suite = load_suite(name or manifest.suite)
-    if suite.digest != manifest.suite_digest:
-        raise BadInput(
-            f"{correct} was played with other tasks than those of {suite.name}; give the --suite "
-            f"or --tasks-file of that run, which was {manifest.suite}"
-        )
-    env = {key: value for key, value in manifest.env.items() if key not in ("obs_mode", "faults")}
-    # Pictures are drawn at the suite's size, whatever the run's agent looked at.
-    return suite, {**env, **{key: suite.env[key] for key in _SIZE if key in suite.env}}
-
-
-_SIZE = ("width", "height")
-
-
-def _given(path: Path | None) -> Path:
-    assert path is not None
-    return path
-
-
-def _chosen(suite: Suite, types: Sequence[str], scenes: Sequence[str]) -> Suite:
-    """The suite with only the tasks that were asked for."""
-    from er_gym.tasks.types import task_type
-
-    wanted = {task_type(name).name for name in types}
-    there = {task.scene for task in suite.tasks}
-    unknown = [scene for scene in scenes if scene not in there]
-    if unknown:
-        raise BadInput(f"{suite.name} has no task in {unknown[0]}; it plays in {len(there)} scenes")
-    tasks = tuple(
-        task
-        for task in suite.tasks
-        if (not wanted or task.type.name in wanted) and (not scenes or task.scene in scenes)
-    )
-    if not tasks:
-        raise BadInput(f"{suite.name} has no task of the types {', '.join(sorted(wanted))}")
-    return replace(suite, tasks=tasks)
-
-
-def _recipe(name: str, parts: Sequence[str], kinds: Sequence[str]) -> Recipe:
-    """The recipe with only the parts and kinds that were asked for."""
-    from agents.expert.recipe import load_recipe
-
-    recipe = load_recipe(name)
-    for part in parts:
-        if part not in recipe.parts:
-            raise BadInput(f"unknown part {part!r}; the recipe has: {', '.join(recipe.parts)}")
-    chosen = {part: row for part, row in recipe.parts.items() if not parts or part in parts}
-    if kinds:
-        chosen = _of_kinds(chosen, kinds)
-    return recipe.model_copy(update={"parts": chosen})
-
-
-def _of_kinds(parts: Mapping[str, Any], kinds: Sequence[str]) -> dict[str, Any]:
-    """The parts in which an expert plays these kinds, with no other kinds."""
-    known = dict.fromkeys(kind for row in parts.values() for kind in row.kinds)
-    for kind in kinds:
-        if kind not in known:
-            raise BadInput(f"unknown kind {kind!r}; the recipe has: {', '.join(known)}")
-    left = {}
-    for name, row in parts.items():
-        shares = {kind: share for kind, share in row.kinds.items() if kind in kinds}
-        if shares:
-            left[name] = row.model_copy(update={"kinds": shares})
-    return left
-
-
 def _settings(
     suite: Suite,
     env: Mapping[str, Any],
     recipe: Recipe | None,
     correct: Path | None,
+    model: ExpertRun | None,
     *,
     language: Any,
     seed: int,
@@ -292,6 +211,7 @@ def _settings(
 ) -> tuple[CollectSettings, CollectionManifest]:
     """What decides the trajectories, and the manifest that states it."""
     from agents.expert.collect import CollectSettings, corrections_recipe
+    from agents.expert.players import PlaySettings
     from agents.expert.thought_kinds import load_thought_kinds
     from agents.vlm.settings import Pictures
     from er_gym import __version__
@@ -299,10 +219,16 @@ def _settings(
     from er_gym.envs.embodied_env import EmbodiedEnv
     from er_gym.tasks.resolve import resolve_tasks
 
+    if model is not None:
+        env = {**env, **model.env}
     EmbodiedEnv((), **env)  # so that bad arguments are found before any worker starts
     kinds = load_thought_kinds(table)
     pictures = Pictures(quality=80, min_pixels=1, max_pixels=2**24)
     stated = corrections_recipe() if recipe is None else recipe
+    if model is not None and model.options.decides:
+        from agents.expert.decider import model_recipe
+
+        stated = model_recipe(stated)
     manifest = CollectionManifest(
         suite=suite.name,
         suite_digest=suite.digest,
@@ -316,6 +242,7 @@ def _settings(
             "env": dict(env),
             "pictures": pictures.model_dump(mode="json", include={"format", "quality"}),
             **({} if correct is None else {"corrects": correct.name}),
+            **({} if model is None else {"expert": model.stated}),
         },
         seed=seed,
         er_gym=__version__,
@@ -324,9 +251,7 @@ def _settings(
         recipe=stated,
         tasks=resolve_tasks(suite.tasks, env["backend"]).tasks,
         env=env,
-        kinds=kinds,
-        pictures=pictures,
-        language=language,
+        play=PlaySettings(kinds, pictures, language),
         seed=seed,
         manifest=manifest.model_dump(mode="json"),
     )
@@ -334,14 +259,20 @@ def _settings(
 
 
 def _strata(
-    settings: CollectSettings, correct: Path | None, limit: int | None
+    settings: CollectSettings, correct: Path | None, limit: int | None, model: ExpertRun | None
 ) -> tuple[dict[tuple[str, str], Stratum], dict[str, int]]:
     """The candidates, and how many failed episodes are left out, by the reason."""
     from agents.expert.collect import correction_strata, recipe_strata
     from er_gym.rollout.run_directory import RunDirectory
 
     if correct is None:
-        return recipe_strata(settings, limit), {}
+        wanted = recipe_strata(settings, limit)
+        if model is not None and model.options.decides:
+            from agents.expert.decider import ModelCandidates
+
+            for stratum in wanted.values():
+                stratum.sequence = ModelCandidates(stratum.sequence, model.run.name)
+        return wanted, {}
     strata, left_out = correction_strata(settings.tasks, RunDirectory.open(correct), limit)
     if not strata:
         why = "; ".join(f"{number} x {reason}" for reason, number in left_out.items())
@@ -349,7 +280,7 @@ def _strata(
     return strata, left_out
 
 
-def _make_writer(name: str) -> Callable[[], ThoughtWriter]:
+def _make_writer(name: str) -> NamedWriter:
     """Makes the writer of a name; the name is checked at once."""
     from agents.expert.writers.registry import NamedWriter
 
@@ -358,10 +289,34 @@ def _make_writer(name: str) -> Callable[[], ThoughtWriter]:
     return make
 
 
+def _refuse_misfits(model: ExpertRun, writer: str, kinds: str | None, correct: Path | None) -> None:
+    """Options that do not go with a model."""
+    if writer != "grounded":
+        raise BadInput(f"give --writer {writer} or --expert {model.run.name}, not both")
+    if model.options.decides and correct is not None:
+        raise BadInput("--correct follows a plan: leave out --decisions model")
+    if model.options.decides and kinds is not None:
+        raise BadInput("--kinds is for --decisions plan: a model that decides plays one kind")
+
+
+@contextmanager
+def _players(
+    model: ExpertRun | None, make_writer: NamedWriter, out: Path, shown: CollectProgress
+) -> Iterator[tuple[Players, Callable[[], Cost | None]]]:
+    """Who plays, and a function that says what that has cost."""
+    if model is None:
+        from agents.expert.players import Thinkers
+
+        yield Thinkers(make_writer), lambda: None
+        return
+    with model.players(out, shown.say) as ready:
+        yield ready
+
+
 @contextmanager
 def _locked(out: Path, manifest: CollectionManifest) -> Iterator[Collection]:
     """The collection, for this process alone; a directory that cannot be used is bad input."""
-    from er_gym.data.collection import Collection
+    from er_gym.data.collection import MANIFEST, PARTS, Collection
     from er_gym.locking import exclusive_use
 
     with bad_input():
@@ -371,30 +326,12 @@ def _locked(out: Path, manifest: CollectionManifest) -> Iterator[Collection]:
         with bad_input():
             collection = Collection.create(out, manifest)
         yield collection
+    except BadInput:
+        if not (out / PARTS).exists():  # nothing has begun: the directory is free for another
+            (out / MANIFEST).unlink(missing_ok=True)
+        raise
     finally:
         lock.__exit__(None, None, None)
-
-
-def _collect(
-    collection: Collection,
-    settings: CollectSettings,
-    make_writer: Callable[[], ThoughtWriter],
-    strata: Mapping[tuple[str, str], Stratum],
-    workers: int,
-    shown: CollectProgress,
-) -> CollectSummary:
-    from agents.expert.collect import Collector
-    from er_gym.rollout.executor import Parallelism
-
-    return Collector(
-        collection,
-        settings,
-        make_writer,
-        strata,
-        parallelism=Parallelism(workers),
-        listeners=[shown],
-        tell=shown.taken,
-    ).collect()
 
 
 def _in_words(summary: CollectSummary, file: Path) -> str:

@@ -118,7 +118,8 @@ class ThoughtRecord(_Record):
         writer: who wrote it: ``grounded``, or a model such as ``openai:MODEL``.
         refused: why the critic refused a model's earlier attempts, a code each
             (:mod:`er_gym.data.critic`). If the writer is ``grounded`` and this is not empty, the
-            grounded writer took the model's place.
+            grounded writer took the model's place. In a trajectory of the kind ``model``, where the
+            model decides and thinks in one reply, they are the reasons against this very thought.
     """
 
     kind: ThoughtKind

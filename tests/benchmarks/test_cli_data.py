@@ -142,7 +142,7 @@ BAD = {
     "no kind of picture": (
         ("show", "x", "--trajectory", SOAP, "--out", "a.txt"),
         as_it_is,
-        "'.txt' is no kind of picture",
+        "'.txt' is not a picture format",
     ),
     "no folder": (
         ("show", "x", "--trajectory", SOAP, "--out", "no/a.png"),
@@ -151,7 +151,7 @@ BAD = {
     ),
     "tasks of a file": (("verify", "x"), other_suite, "give it with --tasks-file"),
     "other tasks": (("verify", "x"), other_digest, "are not those that x was played in"),
-    "damaged part": (("verify", "x"), damaged_part, "is no run manifest"),
+    "damaged part": (("verify", "x"), damaged_part, "is not a run manifest"),
     "unwritten": (("stats", "x"), unwritten, "trajectories.jsonl cannot be read"),
     "cut": (("stats", "x"), cut, "trajectories.jsonl:8: "),
     "cut to verify": (("verify", "x"), cut, "trajectories.jsonl:8: "),

@@ -76,7 +76,7 @@ def test_what_was_played_comes_out_again_in_two_processes(played: Collection) ->
     assert any(turn.views for one in every for turn in one.turns)
 
 
-CHANGES: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
+CHANGES: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "view": (
         lambda one: one["turns"][1]["view"][0].update(distance=99.0),
         "turn 1: view is [SeenObject(",
@@ -88,10 +88,17 @@ CHANGES: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
     "reward": (lambda one: one["turns"][0].update(reward=7.0), "turn 0: reward is"),
     "object": (lambda one: one["turns"][0].update(object_id="Egg|1"), "turn 0: object_id is"),
     "fault": (lambda one: one["turns"][0].update(fault="open"), "turn 0: fault is '', recorded"),
-    "success": (lambda one: one["turns"][0].update(success=False), "turn 0: success is True"),
+    "success": (
+        # Without the thought after it, which says that the action was done.
+        lambda one: (one["turns"][0].update(success=False), one["turns"][1].update(thoughts=[])),
+        "turn 0: success is True",
+    ),
     "end reason": (lambda one: one.update(end_reason="step limit"), "end_reason is 'end'"),
     "missing": (lambda one: one["turns"].pop(), "the episode goes on after the last turn"),
-    "more": (lambda one: one["turns"].append(one["turns"][-1]), "the episode is over before it"),
+    "more": (
+        lambda one: one["turns"].append({**one["turns"][-1], "thoughts": []}),
+        "the episode is over before it",
+    ),
     "direction": (
         lambda one: one["turns"][0]["pictures"][0].update(direction="left"),
         "there is no view 'left' at this turn",
@@ -105,7 +112,7 @@ CHANGES: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
 def test_a_changed_record_is_found(
     collection: Collection,
     verdicts: Callable[..., dict[str, verify.Verdict]],
-    change: Callable[[dict[str, Any]], None],
+    change: Callable[[dict[str, Any]], object],
     message: str,
 ) -> None:
     changed_id = changed(collection, 3, change)

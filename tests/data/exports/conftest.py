@@ -10,7 +10,7 @@ import pytest
 sys.path.append(str(Path(__file__).parent))  # for the helpers beside it
 sys.path.append(str(Path(__file__).parents[2] / "agents" / "vlm"))  # for tiny_qwen
 
-from played_collection import play_collection
+from exported_collection import play_collection
 
 from er_gym.data.collection import Collection
 
