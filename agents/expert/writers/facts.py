@@ -10,10 +10,11 @@ Facts that the wordings use (``configs/thoughts``):
   (what is looked for: the thing, or the place once the thing is held), ``object`` (of the
   decision), ``held``, ``at``, ``last_object``, ``arrived_at`` (where a walk that went wrong ended),
   ``next1`` … ``next4`` (the plan), ``latest`` (the place searched last in vain), ``placed`` (what
-  was put down last) and ``placed_in``; in a task of several parts ``later_thing`` and
-  ``later_place`` (of the part to come), ``done_thing`` and ``done_place`` (of the part done);
+  was put down just now); in a task of several parts ``later_thing`` (of the part to come),
+  ``done_thing`` and ``done_place`` (of the part done);
 - things, each with the facts of :func:`_described`: ``object_view``, ``sought_view``,
-  ``place_view``, ``last_view`` (in view now), ``object_memory``, ``sought_memory`` (seen before);
+  ``place_view``, ``last_view`` (in view now), ``object_memory``, ``sought_memory``,
+  ``place_memory`` (seen before);
 - pools: ``view`` and its parts ``left``, ``ahead``, ``right``, ``near``; ``here`` (things that lie
   where the agent searched); ``shut`` (closed things in view); ``visited`` (searched in vain);
   ``plan``; after looking around ``to_right``, ``behind``, ``to_left``;
@@ -234,6 +235,7 @@ def _in_view(knowledge: Knowledge, sought: str, choices: random.Random) -> dict[
         "last_view": _named(switches if toggled else things, last),
         "sought_memory": _named(memory, sought),
         "object_memory": _named(memory, decided),
+        "place_memory": _named(memory, place),
         "unseen": bool(sought) and not _named(everywhere, sought),
         "view": tuple(told),
         "here": tuple(here),
