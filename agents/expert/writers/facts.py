@@ -24,8 +24,8 @@ Facts that the wordings use (``configs/thoughts``):
   keep such a thing at the decision's object), ``far_fetched`` (they hardly do), ``unseen`` (what is
   sought is not in view), ``several`` (the task has several parts), ``second`` (one of them is
   done), ``earned`` (the last action did a key action), ``told`` (it has been said where what is
-  sought is), ``next_part`` (one of them has just been done, and another begins), ``first``, ``final``
-  (of this turn's thoughts), and the purpose and the outcome, as ``is_search``.
+  sought is), ``next_part`` (one of them has just been done, and another begins), ``first``,
+  ``final`` (of this turn's thoughts), and the purpose and the outcome, as ``is_search``.
 """
 
 from __future__ import annotations
@@ -161,9 +161,7 @@ def _story(knowledge: Knowledge, thing: str) -> dict[str, Any]:
     return story
 
 
-def _ended(
-    knowledge: Knowledge, thing: str, puts: Sequence[tuple[str, str]], toggled: bool
-) -> str:
+def _ended(knowledge: Knowledge, thing: str, puts: Sequence[tuple[str, str]], toggled: bool) -> str:
     """What the agent can point at when it ends."""
     verb, place = knowledge.subgoal.verb, knowledge.subgoal.place
     if verb == verbs.PUT and puts and puts[-1][0] == thing and same_type(puts[-1][1], place):
