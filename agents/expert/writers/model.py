@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from agents.expert.writers.base import ThoughtRequest, ThoughtWriter, WrittenThoughts
-from agents.expert.writers.grounded import GroundedWriter
 from agents.expert.writers.prompts import WriterPrompts
+from agents.expert.writers.registry import checked_grounded
 from agents.expert.writers.replies import (
     NO_REPLY,
     OwnWords,
@@ -38,7 +38,8 @@ class ModelWriter:
         client: asks it.
         settings: of the client; ``sees`` says whether it is sent pictures.
         prompts: what it is told.
-        fallback: writes what the model does not.
+        fallback: writes what the model does not; by default the grounded writer, checked by the
+            critic.
 
     Raises:
         ValueError: the settings ask for another form of replies than tags.
@@ -55,7 +56,7 @@ class ModelWriter:
         check_settings(settings)
         self.name = name
         self._client, self._settings, self._prompts = client, settings, prompts
-        self._fallback = fallback or GroundedWriter()
+        self._fallback = fallback or checked_grounded()
 
     def write(self, request: ThoughtRequest) -> WrittenThoughts:
         """Write the thoughts of a turn; see :class:`~agents.expert.writers.base.ThoughtWriter`.
