@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,8 +17,9 @@ from benchmarks.cli.errors import (
     BadInput,
     bad_input,
     print_problem,
+    report_set_aside,
 )
-from benchmarks.cli.options import Place, Words, seed_option, split, workers_option
+from benchmarks.cli.options import Place, Words, named, seed_option, workers_option
 from benchmarks.cli.terminal import terminal
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from er_gym.data.collection import Collection, CollectionManifest
     from er_gym.rollout.events import Cost
     from er_gym.tasks.suites import Suite
+    from er_gym.tasks.task import Task
 
 LANGUAGES = ("en", "zh")
 _directory = Place(file_okay=False, path_type=Path)
@@ -45,10 +47,8 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 )
 @click.option(
     "--recipe",
-    default="paper",
-    show_default=True,
     metavar="NAME",
-    help="What is collected: a YAML file, or the name of one of er-gym's own.",
+    help="What is collected: a YAML file, or the name of one of er-gym's own.  [default: paper]",
 )
 @click.option("--parts", metavar="PART,…", help="Collect only these parts of the recipe.")
 @click.option("--kinds", metavar="a,b,c", help="Only these kinds of the expert's trajectories.")
@@ -89,7 +89,7 @@ def collect(
     tasks_file: Path | None,
     out: Path,
     limit: int | None,
-    recipe: str,
+    recipe: str | None,
     parts: str | None,
     kinds: str | None,
     types: str | None,
@@ -111,12 +111,15 @@ def collect(
     directory.
     """
     from agents.expert.collect import Collector
-    from benchmarks.cli.collect_choice import chosen_recipe, chosen_tasks, source_of
+    from benchmarks.cli.collect_choice import chosen_recipe, chosen_tasks, fitted_tasks, source_of
     from benchmarks.cli.collect_progress import CollectProgress
-    from er_gym.data.collection import TRAJECTORIES
+    from er_gym.data.collection import TRAJECTORIES, CollectionError
+    from er_gym.locking import Locked
     from er_gym.rollout.agent import CannotGoOn
     from er_gym.rollout.executor import Parallelism
+    from er_gym.rollout.run_directory import RunDirectoryError
     from er_gym.rollout.worker_pool import WorkerSetupError
+    from er_gym.writing import ForeignFile
 
     console = terminal(stderr=True)
     with bad_input():
@@ -124,10 +127,16 @@ def collect(
         if model is not None:
             _refuse_misfits(model, writer, kinds, correct)
         source, env = source_of(suite, tasks_file, correct)
-        source = chosen_tasks(source, split(types), split(scenes))
-        asked = chosen_recipe(recipe, split(parts), split(kinds)) if correct is None else None
+        source = chosen_tasks(source, named("--types", types), named("--scenes", scenes))
+        fitted = fitted_tasks(source, env["backend"])
+        asked = None
+        if correct is None:
+            asked = chosen_recipe(recipe, named("--parts", parts), named("--kinds", kinds))
+        else:
+            _refuse_recipe({"--recipe": recipe, "--parts": parts, "--kinds": kinds})
         settings, manifest = _settings(
             source,
+            fitted.tasks,
             env,
             asked,
             correct,
@@ -139,6 +148,7 @@ def collect(
         )
         strata, left_out = _strata(settings, correct, limit, model)
         make_writer = _make_writer(writer)
+    report_set_aside(source.name, fitted.set_aside, fitted.substitutions)
     for reason, number in left_out.items():
         console.print(f"{number} episodes left out: {reason}", style="dim", soft_wrap=True)
     total = sum(stratum.quota for stratum in strata.values())
@@ -169,6 +179,8 @@ def collect(
                 bill = cost()
     except WorkerSetupError as error:
         raise click.ClickException(str(error)) from error
+    except (CollectionError, RunDirectoryError, Locked, ForeignFile) as error:
+        raise BadInput(f"{error}; nothing else in {out} has changed") from error
     except OSError as error:  # the disk is full, the share is gone
         raise BadInput(f"{error}; the same command continues {out}") from error
     except (KeyboardInterrupt, CannotGoOn) as error:
@@ -199,6 +211,7 @@ def collect(
 
 def _settings(
     suite: Suite,
+    tasks: Sequence[Task],
     env: Mapping[str, Any],
     recipe: Recipe | None,
     correct: Path | None,
@@ -217,7 +230,6 @@ def _settings(
     from er_gym import __version__
     from er_gym.data.collection import CollectionManifest
     from er_gym.envs.embodied_env import EmbodiedEnv
-    from er_gym.tasks.resolve import resolve_tasks
 
     if model is not None:
         env = {**env, **model.env}
@@ -241,7 +253,7 @@ def _settings(
             "language": language,
             "env": dict(env),
             "pictures": pictures.model_dump(mode="json", include={"format", "quality"}),
-            **({} if correct is None else {"corrects": correct.name}),
+            **({} if correct is None else {"corrects": _name_of(correct)}),
             **({} if model is None else {"expert": model.stated}),
         },
         seed=seed,
@@ -249,13 +261,20 @@ def _settings(
     )
     settings = CollectSettings(
         recipe=stated,
-        tasks=resolve_tasks(suite.tasks, env["backend"]).tasks,
+        tasks=tasks,
         env=env,
         play=PlaySettings(kinds, pictures, language),
         seed=seed,
         manifest=manifest.model_dump(mode="json"),
     )
     return settings, manifest
+
+
+def _name_of(run: Path) -> str:
+    """The name of a run directory with the digest of what it plays."""
+    from er_gym.rollout.run_directory import RunDirectory
+
+    return f"{run.resolve().name} ({RunDirectory.open(run).manifest.digest})"
 
 
 def _strata(
@@ -287,6 +306,13 @@ def _make_writer(name: str) -> NamedWriter:
     make = NamedWriter(name)
     make()
     return make
+
+
+def _refuse_recipe(options: Mapping[str, str | None]) -> None:
+    """What --correct collects needs no recipe."""
+    for option, given in options.items():
+        if given is not None:
+            raise BadInput(f"{option} is for a recipe; --correct RUN collects without one")
 
 
 def _refuse_misfits(model: ExpertRun, writer: str, kinds: str | None, correct: Path | None) -> None:

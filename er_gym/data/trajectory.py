@@ -116,10 +116,10 @@ class ThoughtRecord(_Record):
         kind: one of :data:`THOUGHT_KINDS`.
         text: without a tag.
         writer: who wrote it: ``grounded``, or a model such as ``openai:MODEL``.
-        refused: why the critic refused a model's earlier attempts, a code each
-            (:mod:`er_gym.data.critic`). If the writer is ``grounded`` and this is not empty, the
-            grounded writer took the model's place. In a trajectory of the kind ``model``, where the
-            model decides and thinks in one reply, they are the reasons against this very thought.
+        refused: why the critic refused earlier attempts, a code each (:mod:`er_gym.data.critic`).
+            If the writer is ``grounded``, these were a model's, whose place it took, or its own. In
+            a trajectory of the kind ``model``, where the model decides and thinks in one reply,
+            they are the reasons against this very thought.
     """
 
     kind: ThoughtKind
