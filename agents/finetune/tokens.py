@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from agents.finetune.settings import DataSettings, Mask
 from er_gym.data.chat import Chat, ChatTurn
-from er_gym.data.trajectory import PictureRecord
 from er_gym.data.train_mask import train_mask
+from er_gym.data.trajectory import PictureRecord
 
 FEEDBACK = "<|feedback|>"
 """Stands before the environment's answer to an action that could not be done; a token."""

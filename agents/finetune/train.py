@@ -1,10 +1,9 @@
 """Fine-tunes a model on conversations, from its settings, or continues where it was.
 
 Read it from top to bottom: :func:`train` is the whole run. The loop is that of transformers'
-``Trainer``, which knows accelerate, DeepSpeed and FSDP. TRL's ``SFTTrainer`` (1.16) builds on the
-same and only stands in the way here: it makes labels itself from text, without flags for turns; on a
-CPU it computes scores for every token, learnt or not; and it reads the output embedding's weights
-past PEFT's layer, so that a row that a LoRA trains would not learn.
+``Trainer``, which knows accelerate, DeepSpeed and FSDP. TRL's ``SFTTrainer`` builds on the same.
+What it adds are labels and batches, which are our own here, for the flags of turns; and its loss,
+which on a CPU (TRL 1.16) computes the scores of every token, learnt or not.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ import math
 import os
 import re
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -153,6 +153,7 @@ def train(
     with ExitStack() as stack:
         if first:
             stack.enter_context(exclusive_use(out))
+        stack.enter_context(_quiet_libraries())
         run.check(manifest)
         if run.finished:
             return _result(run, samples, new=False)
@@ -618,6 +619,23 @@ class _Log(transformers.TrainerCallback):
 
     def on_train_end(self, args: Any, state: Any, control: Any, **more: Any) -> None:
         self._board.close()
+
+
+@contextmanager
+def _quiet_libraries() -> Iterator[None]:
+    """Without the libraries' own progress bars, and warnings about what they ask of each other."""
+    shown = transformers.utils.logging.is_progress_bar_enabled()
+    transformers.utils.logging.disable_progress_bar()
+    try:
+        with warnings.catch_warnings():
+            # PEFT asks transformers by an old name.
+            warnings.filterwarnings(
+                "ignore", message=".*is_gradient_checkpointing", module="transformers"
+            )
+            yield
+    finally:
+        if shown:
+            transformers.utils.logging.enable_progress_bar()
 
 
 @contextmanager

@@ -84,5 +84,5 @@ def _rows_wanted(adapter: Path) -> int:
     """The rows that an adapter's own tokens need; 0 if it trained none."""
     told = json.loads((adapter / ADAPTER).read_text(encoding="utf-8"))
     trained = told.get("trainable_token_indices") or []
-    ids = sum(trained.values(), []) if isinstance(trained, dict) else trained
-    return max(ids, default=-1) + 1
+    lists = trained.values() if isinstance(trained, dict) else [trained]
+    return max((each for ids in lists for each in ids), default=-1) + 1
