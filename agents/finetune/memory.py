@@ -1,7 +1,7 @@
 """How much memory fine-tuning takes: bytes from a model's configuration and the plan, no weights.
 
-The formula counts what transformers, PEFT and PyTorch keep, for decoder models with gated MLPs, such
-as Llama and Qwen, and for the vision towers of Qwen2-VL, Qwen2.5-VL and Qwen3-VL.
+The formula counts what transformers, PEFT and PyTorch keep, for decoder models with gated MLPs,
+such as Llama and Qwen, and for the vision towers of Qwen2-VL, Qwen2.5-VL and Qwen3-VL.
 
 ==============  ==================================================================================
 weights         2 bytes a parameter that stays as it is, in bfloat16; 4 in float32, and for one

@@ -628,10 +628,7 @@ def _quiet_libraries() -> Iterator[None]:
     transformers.utils.logging.disable_progress_bar()
     try:
         with warnings.catch_warnings():
-            # PEFT asks transformers by an old name.
-            warnings.filterwarnings(
-                "ignore", message=".*is_gradient_checkpointing", module="transformers"
-            )
+            warnings.filterwarnings("ignore", message=".*is_gradient_checkpointing")  # peft 0.21
             yield
     finally:
         if shown:

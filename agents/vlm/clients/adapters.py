@@ -76,6 +76,7 @@ def with_adapter(model: Any, adapter: Path, *, merge: bool = False) -> Any:
     with warnings.catch_warnings():
         # peft only warns about an adapter that lacks some of its weights.
         warnings.filterwarnings("error", message="Found missing adapter keys")
+        warnings.filterwarnings("ignore", message=".*is_gradient_checkpointing")  # peft 0.21
         adapted = peft.PeftModel.from_pretrained(model, adapter, key_mapping=names)
     return adapted.merge_and_unload() if merge else adapted
 

@@ -59,8 +59,11 @@ def make_model(
         maker = transformers.AutoModelForImageTextToText
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(0)
-        made = maker.from_config(transformers.AutoConfig.from_pretrained(directory))
-        made.float().save_pretrained(directory)
+        made = maker.from_config(transformers.AutoConfig.from_pretrained(directory)).float()
+    with torch.no_grad():
+        # Wide, so that an adapter, which leaves it as it is, can be sure of a word.
+        made.lm_head.weight *= 6
+    made.save_pretrained(directory)
     return directory
 
 
