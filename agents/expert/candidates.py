@@ -131,12 +131,16 @@ class CandidateSequence:
         part: as the recipe has it.
         tasks: the tasks of the type; not empty.
         seed: the collection's.
+        says_part: whether ids name the part; so they must where another part has the same kinds.
     """
 
     length = None
 
-    def __init__(self, name: str, part: Part, tasks: Sequence[Task], seed: int) -> None:
+    def __init__(
+        self, name: str, part: Part, tasks: Sequence[Task], seed: int, *, says_part: bool = False
+    ) -> None:
         self._name, self._part, self._tasks = name, part, tasks
+        self._says = f"{name}-" if says_part else ""
         self._seed = f"{seed}/{name}/{tasks[0].type.name}"
 
     def __getitem__(self, index: int) -> Candidate:
@@ -157,7 +161,7 @@ class CandidateSequence:
             if kind == EXPLORED and random.random() >= part.direct:
                 mode = SEARCH
         return Candidate(
-            id=f"{task.id}-{kind}{round_number or ''}",
+            id=f"{task.id}-{self._says}{kind}{round_number or ''}",
             part=self._name,
             actor=part.actor,
             task=task,

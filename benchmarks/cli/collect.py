@@ -113,10 +113,13 @@ def collect(
     from agents.expert.collect import Collector
     from benchmarks.cli.collect_choice import chosen_recipe, chosen_tasks, source_of
     from benchmarks.cli.collect_progress import CollectProgress
-    from er_gym.data.collection import TRAJECTORIES
+    from er_gym.data.collection import TRAJECTORIES, CollectionError
+    from er_gym.locking import Locked
     from er_gym.rollout.agent import CannotGoOn
     from er_gym.rollout.executor import Parallelism
+    from er_gym.rollout.run_directory import RunDirectoryError
     from er_gym.rollout.worker_pool import WorkerSetupError
+    from er_gym.writing import ForeignFile
 
     console = terminal(stderr=True)
     with bad_input():
@@ -169,6 +172,8 @@ def collect(
                 bill = cost()
     except WorkerSetupError as error:
         raise click.ClickException(str(error)) from error
+    except (CollectionError, RunDirectoryError, Locked, ForeignFile) as error:
+        raise BadInput(f"{error}; nothing else in {out} has changed") from error
     except OSError as error:  # the disk is full, the share is gone
         raise BadInput(f"{error}; the same command continues {out}") from error
     except (KeyboardInterrupt, CannotGoOn) as error:
@@ -241,7 +246,7 @@ def _settings(
             "language": language,
             "env": dict(env),
             "pictures": pictures.model_dump(mode="json", include={"format", "quality"}),
-            **({} if correct is None else {"corrects": correct.name}),
+            **({} if correct is None else {"corrects": _name_of(correct)}),
             **({} if model is None else {"expert": model.stated}),
         },
         seed=seed,
@@ -256,6 +261,13 @@ def _settings(
         manifest=manifest.model_dump(mode="json"),
     )
     return settings, manifest
+
+
+def _name_of(run: Path) -> str:
+    """The name of a run directory with the digest of what it plays."""
+    from er_gym.rollout.run_directory import RunDirectory
+
+    return f"{run.resolve().name} ({RunDirectory.open(run).manifest.digest})"
 
 
 def _strata(

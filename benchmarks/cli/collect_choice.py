@@ -86,13 +86,16 @@ def chosen_recipe(name: str, parts: Sequence[str], kinds: Sequence[str]) -> Reci
 
 def _of_kinds(parts: Mapping[str, Any], kinds: Sequence[str]) -> dict[str, Any]:
     """The parts in which an expert plays these kinds, with no other kinds."""
-    known = dict.fromkeys(kind for row in parts.values() for kind in row.kinds)
+    experts = [row for row in parts.values() if row.actor == "expert"]
+    if not experts:
+        raise BadInput(f"--kinds is for parts that an expert plays, not for {', '.join(parts)}")
+    known = dict.fromkeys(kind for row in experts for kind in row.all_kinds)
     for kind in kinds:
         if kind not in known:
             raise BadInput(f"unknown kind {kind!r}; the recipe has: {', '.join(known)}")
     left = {}
     for name, row in parts.items():
         shares = {kind: share for kind, share in row.kinds.items() if kind in kinds}
-        if shares:
+        if any(shares.values()):
             left[name] = row.model_copy(update={"kinds": shares})
     return left

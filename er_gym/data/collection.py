@@ -23,7 +23,8 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from er_gym.data.trajectory import Trajectory
-from er_gym.rollout.run_directory import RunDirectory, RunDirectoryError
+from er_gym.locking import LOCK
+from er_gym.rollout.run_directory import EPISODES, RunDirectory, RunDirectoryError
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.reading import read_bytes, read_text
 from er_gym.writing import file_stem, make_folder, write_atomic
@@ -80,7 +81,8 @@ class Collection:
             CollectionError: another collection, or something else, is there; nothing is changed.
             OSError: the directory cannot be made or written to.
         """
-        if (path / MANIFEST).exists():
+        begun = (path / MANIFEST).exists()
+        if begun and not _is_bare(path):
             there = cls.open(path).manifest
             theirs = there.model_dump(mode="json")
             for name, here in manifest.model_dump(mode="json").items():
@@ -89,7 +91,7 @@ class Collection:
                         f"{path} holds another collection: its {name} is {theirs[name]!r:.300}, "
                         f"this one's {here!r:.300}; choose another --out, or repeat that command"
                     )
-        elif path.exists() and any(entry.name != "run.lock" for entry in path.iterdir()):
+        elif not begun and path.exists() and {each.name for each in path.iterdir()} - {LOCK}:
             raise CollectionError(
                 f"{path} is not empty and holds no {MANIFEST}; choose another --out"
             )
@@ -188,6 +190,17 @@ class Collection:
                     yield Trajectory.model_validate_json(line)
                 except ValidationError as error:
                     raise CollectionError(f"{path}:{number}: {_first_problem(error)}") from error
+
+
+def _is_bare(path: Path) -> bool:
+    """Whether a directory holds nothing that was collected, as after a command that was stopped
+    before its first episode. Another command may begin there."""
+    file = path / TRAJECTORIES
+    if {entry.name for entry in path.iterdir()} - {MANIFEST, TRAJECTORIES, PARTS, LOCK}:
+        return False
+    if file.is_symlink() or (file.exists() and not (file.is_file() and not file.stat().st_size)):
+        return False
+    return next((path / PARTS).glob(f"*/{EPISODES}/*"), None) is None
 
 
 def _first_problem(error: Exception) -> str:
