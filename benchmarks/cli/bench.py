@@ -183,9 +183,7 @@ def bench(
             succeeded = sum(episode.success for episode in before)
             title = f"{asked.name}, {agent}"
             progress = Progress(console, title, len(episodes), len(before), succeeded)
-            prepared = _prepared_run(
-                run_directory, chosen, samples, workers, agent, vlm_run, trust
-            )
+            prepared = _prepared_run(run_directory, chosen, samples, workers, agent, vlm_run, trust)
             with prepared as (play, cost):
                 with progress:
                     outcome = play(progress)
