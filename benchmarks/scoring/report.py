@@ -20,7 +20,8 @@ from benchmarks.scoring.metrics import (
     summarise_by,
 )
 from benchmarks.scoring.samples import TaskSamples, by, most_samples, task_samples
-from benchmarks.scoring.scorers import CORRECTED, PAPER, SCORERS, lacks_search_targets
+from benchmarks.scoring.scorers import CORRECTED, PAPER, SCORERS
+from er_gym.rollout.judgement import lacks_search_targets
 from er_gym.rollout.records import EpisodeRecord, episode_key
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks.errors import describe_substitutions
