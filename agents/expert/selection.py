@@ -29,7 +29,7 @@ from er_gym.tasks.types import BY_NAME
 
 SAMPLED = "sampled"
 """The part of a collection that holds selected episodes."""
-RECIPE = "recipe"
+RECIPE: Literal["recipe"] = "recipe"
 MOST_ACTIONS = 36
 """The paper's longest step limit."""
 RAREST = 30.0
@@ -259,10 +259,11 @@ def selection_strata(
         limit: how many in all; None for as many as may be.
     """
     there = {name: len(candidates) for name, candidates in screening.candidates.items()}
-    if rules.balance == RECIPE:
+    factor = rules.balance
+    if factor == RECIPE:
         wanted = _in_proportion(there, recipe, limit)
     else:
-        wanted = _level(_capped(there, rules.balance), limit)
+        wanted = _level(_capped(there, factor), limit)
     return {
         (SAMPLED, name): Stratum(FixedCandidates(candidates), wanted.get(name, 0))
         for name, candidates in screening.candidates.items()

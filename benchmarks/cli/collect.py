@@ -165,7 +165,7 @@ def collect(
         )
         if selection is not None:
             screening, strata = selection.strata(settings.tasks, limit, seed)
-            left_out = {}
+            left_out: dict[str, int] = {}
         else:
             strata, left_out = _strata(settings, correct, limit, model)
         make_writer = _make_writer(writer)

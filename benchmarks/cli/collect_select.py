@@ -127,7 +127,7 @@ def with_select_options(command: Callable[..., Any]) -> Callable[..., Any]:
     with_options.__doc__ = command.__doc__
     with_options.__name__ = command.__name__
     with_options.__click_params__ = getattr(command, "__click_params__", [])  # type: ignore[attr-defined]
-    return reduce(lambda made, option: option(made), reversed(_OPTIONS.values()), with_options)
+    return reduce(lambda made, option: option(made), reversed([*_OPTIONS.values()]), with_options)
 
 
 @dataclass(frozen=True)
