@@ -381,6 +381,7 @@ class Collector:
     def _play(self, directory: RunDirectory, strata: Sequence[Stratum], most: int) -> None:
         """Play the chosen candidates with pictures and thoughts."""
         chosen = {each.id: each for stratum in strata for each in stratum.chosen}
+        self._forget_damaged(directory, chosen.values(), most)
         summary = run(
             directory,
             _by_scene(each.played_task for each in chosen.values()),
@@ -393,6 +394,23 @@ class Collector:
         )
         self.summary.played += summary.played
         self.summary.crashed += [f"{each.task_id}: {each.error}" for each in summary.crashed]
+
+    def _forget_damaged(
+        self, directory: RunDirectory, candidates: Iterable[Candidate], most: int
+    ) -> None:
+        """Let episodes be played again whose trajectory or pictures are damaged or gone."""
+        for each in candidates:
+            if directory.has(each.id) and not self._is_whole(each, most):
+                directory.forget(each.id)
+
+    def _is_whole(self, candidate: Candidate, most: int) -> bool:
+        try:
+            trajectory = self._collection.played(candidate.part, candidate.id)
+        except CollectionError:
+            return False
+        if self._players.rejection(trajectory, most):
+            return True  # pictures of what is not taken are not kept
+        return self._collection.has_pictures(trajectory)
 
     def _take(self, directory: RunDirectory, stratum: Stratum, most: int) -> None:
         """Take the chosen candidates that were played and came out well, in order."""

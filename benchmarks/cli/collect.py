@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -19,8 +19,9 @@ from benchmarks.cli.errors import (
     BadInput,
     bad_input,
     print_problem,
+    report_set_aside,
 )
-from benchmarks.cli.options import Place, Words, seed_option, split, workers_option
+from benchmarks.cli.options import Place, Words, named, seed_option, workers_option
 from benchmarks.cli.terminal import stdout, terminal
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from er_gym.data.collection import Collection, CollectionManifest
     from er_gym.rollout.events import Cost
     from er_gym.tasks.suites import Suite
+    from er_gym.tasks.task import Task
 
 LANGUAGES = ("en", "zh")
 _directory = Place(file_okay=False, path_type=Path)
@@ -47,10 +49,8 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 )
 @click.option(
     "--recipe",
-    default="paper",
-    show_default=True,
     metavar="NAME",
-    help="What is collected: a YAML file, or the name of one of er-gym's own.",
+    help="What is collected: a YAML file, or the name of one of er-gym's own.  [default: paper]",
 )
 @click.option("--parts", metavar="PART,…", help="Collect only these parts of the recipe.")
 @click.option("--kinds", metavar="a,b,c", help="Only these kinds of the expert's trajectories.")
@@ -92,7 +92,7 @@ def collect(
     tasks_file: Path | None,
     out: Path,
     limit: int | None,
-    recipe: str,
+    recipe: str | None,
     parts: str | None,
     kinds: str | None,
     types: str | None,
@@ -116,7 +116,7 @@ def collect(
     failed ones are corrected.
     """
     from agents.expert.collect import Collector
-    from benchmarks.cli.collect_choice import chosen_recipe, chosen_tasks, source_of
+    from benchmarks.cli.collect_choice import chosen_recipe, chosen_tasks, fitted_tasks, source_of
     from benchmarks.cli.collect_progress import CollectProgress
     from er_gym.data.collection import TRAJECTORIES, CollectionError
     from er_gym.locking import Locked
@@ -144,15 +144,21 @@ def collect(
         model = ExpertRun.of(expert_options, language)  # type: ignore[arg-type]
         if model is not None:
             _refuse_misfits(model, writer, kinds, correct)
+        asked: Recipe | None = None
         if selection is not None:
             source, env = selection.source(suite, tasks_file)
-            asked: Recipe | None = selection.collected
+            asked = selection.collected
         else:
             source, env = source_of(suite, tasks_file, correct)
-            asked = chosen_recipe(recipe, split(parts), split(kinds)) if correct is None else None
-        source = chosen_tasks(source, split(types), split(scenes))
+        source = chosen_tasks(source, named("--types", types), named("--scenes", scenes))
+        fitted = fitted_tasks(source, env["backend"])
+        if correct is not None:
+            _refuse_recipe({"--recipe": recipe, "--parts": parts, "--kinds": kinds})
+        elif selection is None:
+            asked = chosen_recipe(recipe, named("--parts", parts), named("--kinds", kinds))
         settings, manifest = _settings(
             source,
+            fitted.tasks,
             env,
             asked,
             correct,
@@ -169,6 +175,7 @@ def collect(
         else:
             strata, left_out = _strata(settings, correct, limit, model)
         make_writer = _make_writer(writer)
+    report_set_aside(source.name, fitted.set_aside, fitted.substitutions)
     for reason, number in left_out.items():
         console.print(f"{number} episodes left out: {reason}", style="dim", soft_wrap=True)
     total = sum(stratum.quota for stratum in strata.values())
@@ -240,6 +247,7 @@ def collect(
 
 def _settings(
     suite: Suite,
+    tasks: Sequence[Task],
     env: Mapping[str, Any],
     recipe: Recipe | None,
     correct: Path | None,
@@ -259,7 +267,6 @@ def _settings(
     from er_gym import __version__
     from er_gym.data.collection import CollectionManifest
     from er_gym.envs.embodied_env import EmbodiedEnv
-    from er_gym.tasks.resolve import resolve_tasks
 
     if model is not None:
         env = {**env, **model.env}
@@ -292,7 +299,7 @@ def _settings(
     )
     settings = CollectSettings(
         recipe=stated,
-        tasks=resolve_tasks(suite.tasks, env["backend"]).tasks,
+        tasks=tasks,
         env=env,
         play=PlaySettings(kinds, pictures, language),
         seed=seed,
@@ -337,6 +344,13 @@ def _make_writer(name: str) -> NamedWriter:
     make = NamedWriter(name)
     make()
     return make
+
+
+def _refuse_recipe(options: Mapping[str, str | None]) -> None:
+    """What --correct collects needs no recipe."""
+    for option, given in options.items():
+        if given is not None:
+            raise BadInput(f"{option} is for a recipe; --correct RUN collects without one")
 
 
 def _refuse_misfits(model: ExpertRun, writer: str, kinds: str | None, correct: Path | None) -> None:

@@ -148,13 +148,13 @@ class Selection:
 
     @staticmethod
     def of(
-        options: SelectOptions, recipe_name: str, strict: bool, refused: Mapping[str, bool]
+        options: SelectOptions, recipe_name: str | None, strict: bool, refused: Mapping[str, bool]
     ) -> Selection | None:
         """From the options; None if nothing is to be selected.
 
         Args:
             options: of the command line.
-            recipe_name: ``--recipe``.
+            recipe_name: ``--recipe``, for its proportions.
             strict: ``--strict-thoughts``.
             refused: by name, whether an option was given that does not go with ``--select``.
 
@@ -169,7 +169,9 @@ class Selection:
         misfit = next((name for name, given in refused.items() if given), "")
         if misfit:
             raise BadInput(f"{misfit} does not go with --select: leave one of them out")
-        from agents.expert.recipe import load_recipe
+        if recipe_name is not None and options.balance != "recipe":
+            raise BadInput("--recipe is for --select with --balance recipe: give that, too")
+        from agents.expert.recipe import DEFAULT, load_recipe
         from er_gym.rollout.run_directory import RunDirectory
 
         paths = [path.resolve() for path in options.select]
@@ -177,7 +179,7 @@ class Selection:
         if twice is not None:
             raise BadInput(f"{twice} is given twice; give each --select once")
         runs = tuple(RunDirectory.open(path) for path in paths)
-        return Selection(runs, options, load_recipe(recipe_name), strict)
+        return Selection(runs, options, load_recipe(recipe_name or DEFAULT), strict)
 
     @cached_property
     def rules(self) -> SelectionRules:

@@ -9,6 +9,8 @@ from typing import Any
 
 import click
 
+from benchmarks.cli.errors import BadInput
+
 SCORER_CHOICES = ("both", "paper", "corrected")
 """As in ``benchmarks.scoring.report``, which is too slow to import for ``--help``; a test
 compares."""
@@ -112,6 +114,13 @@ def overrides_option(example: str) -> Any:
 def split(*lists: str | None) -> list[str]:
     """The words of comma-separated lists."""
     return [word.strip() for text in lists for word in (text or "").split(",") if word.strip()]
+
+
+def named(option: str, text: str | None) -> list[str]:
+    """The words of an option's comma-separated list; empty only if the option was not given."""
+    if text is not None and not split(text):
+        raise BadInput(f"{option} {text!r} names nothing; name one, or leave it out")
+    return split(text)
 
 
 class Place(click.Path):

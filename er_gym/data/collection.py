@@ -83,14 +83,13 @@ class Collection:
         """
         begun = (path / MANIFEST).exists()
         if begun and not _is_bare(path):
-            there = cls.open(path).manifest
-            theirs = there.model_dump(mode="json")
-            for name, here in manifest.model_dump(mode="json").items():
-                if theirs[name] != here:
-                    raise CollectionError(
-                        f"{path} holds another collection: its {name} is {theirs[name]!r:.300}, "
-                        f"this one's {here!r:.300}; choose another --out, or repeat that command"
-                    )
+            theirs = cls.open(path).manifest.model_dump(mode="json")
+            ours = manifest.model_dump(mode="json")
+            if theirs != ours:
+                raise CollectionError(
+                    f"{path} holds another collection: {_difference(theirs, ours)}; choose "
+                    "another --out, or repeat that command"
+                )
         elif not begun and path.exists() and {each.name for each in path.iterdir()} - {LOCK}:
             raise CollectionError(
                 f"{path} is not empty and holds no {MANIFEST}; choose another --out"
@@ -151,6 +150,11 @@ class Collection:
         except (TaskFileError, ValidationError) as error:
             raise CollectionError(f"{file}: {_first_problem(error)}") from error
 
+    def has_pictures(self, trajectory: Trajectory) -> bool:
+        """Whether all pictures of a trajectory are there."""
+        pictures = (picture for turn in trajectory.turns for picture in turn.pictures)
+        return all((self.path / picture.path).is_file() for picture in pictures)
+
     def write(self, trajectories: Iterable[Trajectory]) -> int:
         """Replace ``trajectories.jsonl`` as a whole, and return how many lines it has.
 
@@ -190,6 +194,24 @@ class Collection:
                     yield Trajectory.model_validate_json(line)
                 except ValidationError as error:
                     raise CollectionError(f"{path}:{number}: {_first_problem(error)}") from error
+
+
+def _difference(theirs: Any, ours: Any, name: str = "") -> str:
+    """The first difference between two manifests, in words."""
+    if isinstance(theirs, dict) and isinstance(ours, dict):
+        for key in (*theirs, *ours):
+            if theirs.get(key, _ABSENT) != ours.get(key, _ABSENT):
+                inner = f"{name}.{key}" if name else str(key)
+                return _difference(theirs.get(key, _ABSENT), ours.get(key, _ABSENT), inner)
+    return f"its {name} is {theirs!r:.300}, this one's {ours!r:.300}"
+
+
+class _Absent:
+    def __repr__(self) -> str:
+        return "not given"
+
+
+_ABSENT = _Absent()
 
 
 def _is_bare(path: Path) -> bool:

@@ -212,6 +212,10 @@ class RunDirectory:
         """Whether there is a record of an episode, crashed or not; it is written last."""
         return self._file(key).is_file()
 
+    def forget(self, key: str) -> None:
+        """Remove the record of an episode, so that it is played again."""
+        self._file(key).unlink(missing_ok=True)
+
     def attach(self, key: str, attachments: Mapping[str, bytes], folders: Sequence[str]) -> None:
         """Write the files that an agent leaves; they replace earlier ones of the same episode.
 
