@@ -179,10 +179,9 @@ def bench(
         with _locked(out, manifest) as run_directory:
             for line in run_directory.move_aside(episodes):
                 print_problem(line)
-            before = finished(run_directory, chosen, samples)
-            succeeded = sum(episode.success for episode in before)
+            before = [each.success for each in finished(run_directory, chosen, samples)]
             title = f"{asked.name}, {agent}"
-            progress = Progress(console, title, len(episodes), len(before), succeeded)
+            progress = Progress(console, title, len(episodes), len(before), sum(before))
             prepared = _prepared_run(run_directory, chosen, samples, workers, agent, vlm_run, trust)
             with prepared as (play, cost):
                 with progress:
