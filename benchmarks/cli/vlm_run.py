@@ -82,8 +82,9 @@ class VLMRun:
         workers: int,
         listeners: Iterable[EventListener] = (),
         say: Callable[[object], None] | None = None,
+        samples: int = 1,
     ) -> RunSummary:
-        """Play the tasks that the run directory has no finished episode of.
+        """Play the tasks that the run directory has no finished episode of, each ``samples`` times.
 
         ``say`` is called, from any thread, with messages about the server for the user; without it,
         a logger warns.
@@ -98,4 +99,5 @@ class VLMRun:
             parallelism=Parallelism(workers, self.concurrency),
             listeners=listeners,
             cost=lambda: factory.cost,
+            samples=samples,
         )
