@@ -1,293 +1,285 @@
-"""How much memory a fine-tuning run needs, worked out from a model's configuration alone.
+"""How much memory fine-tuning takes: bytes from a model's configuration and the plan, no weights.
 
-Nothing is loaded. :func:`shape_of` reads what ``config.json`` says of a Qwen-VL model, or of a
-language model of Llama's build; :func:`estimate` adds up what lies on one GPU:
+The formula counts what transformers, PEFT and PyTorch keep, for decoder models with gated MLPs, such
+as Llama and Qwen, and for the vision towers of Qwen2-VL, Qwen2.5-VL and Qwen3-VL.
 
-- weights, gradients and the optimizer's states, by the usual mixed precision: a weight that learns
-  takes 2 bytes, its gradient 2, and AdamW 12 (a float32 copy and two moments); a frozen weight
-  takes 2. Adapters, and all that learns beside them, are kept in float32: 4 + 4 + 8 bytes. ZeRO-3
-  divides all of it among the GPUs (Rajbhandari et al., arXiv 1910.02054);
-- activations: with checkpointing the input of every layer and the inside of one layer, without it
-  the inside of every layer (as in Korthikanti et al., arXiv 2205.05198, for attention that keeps no
-  matrix of scores);
-- the logits, once in bfloat16 and in float32, with a gradient: for long conversations and large
-  vocabularies this is the largest part.
+==============  ==================================================================================
+weights         2 bytes a parameter that stays as it is, in bfloat16; 4 in float32, and for one
+                that learns, which bfloat16 arithmetic also keeps a copy of, 2 bytes more
+gradients       4 bytes a parameter that learns
+optimizer       8 bytes a parameter that learns: AdamW's two moments
+activations     what the backward pass needs of each layer for each token; with checkpointing only
+                each layer's input, and all of one layer at a time
+logits          of the tokens that get loss: the scores, their logarithms and the gradients
+overhead        libraries and fragments: 1 GiB and a tenth on a GPU, half a GiB on a CPU
+==============  ==================================================================================
 
-The sum lacks what the CUDA context and fragmentation take; :data:`OVERHEAD` stands for them.
+With ZeRO-3 over n GPUs weights, gradients and optimizer are 16 bytes a parameter that learns and 2
+of another, spread over the GPUs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
+from typing import Any, Literal
 
-GIB = 1024**3
-OVERHEAD = 2 * GIB
-"""The CUDA context, communication buffers and fragmentation: a guess, not a measurement."""
-_HALF, _FULL = 2, 4
-_ADAM = 8
-"""Bytes a weight of AdamW's two moments in float32."""
-_LOGITS = _HALF + _FULL + _FULL
-"""Bytes for each logit: bfloat16, float32, and the gradient in float32."""
-_VISION_INSIDE = 8
-"""How many values of the hidden size a layer of the vision tower holds for each patch."""
+GIB = 1 << 30
 
 
 @dataclass(frozen=True)
-class VisionShape:
-    """The vision tower and its projector.
+class VisionNumbers:
+    """A vision tower: layers, sizes, and the projectors that turn its features into tokens.
 
     Attributes:
-        layers, hidden, intermediate: of the tower. ``gated``: whether its MLP has three matrices.
-        patch, temporal, merge: pixels a side of a patch, frames a patch, and patches a side that
-            become one token of the language model.
-        out: the language model's hidden size.
-        rms: whether its norms have no bias.
-        mergers: projectors beside the last, each after a layer inside (Qwen3-VL's DeepStack).
-        positions: learnt position embeddings; 0 for none. ``patch_bias``: of the embedding.
+        layers, hidden, intermediate: of the tower.
+        gated: whether its MLPs have three matrices, not two.
+        patch_values: numbers in a patch.
+        positions: learnt embeddings of places.
+        merge: patches a side that become one token.
+        out: the language model's size.
+        projectors: how many.
+        projector_hidden: the size between a projector's two layers.
     """
 
     layers: int
     hidden: int
     intermediate: int
     gated: bool
-    patch: int
-    temporal: int
+    patch_values: int
+    positions: int
     merge: int
     out: int
-    rms: bool
-    mergers: int = 0
-    positions: int = 0
-    patch_bias: bool = False
+    projectors: int = 1
 
     @property
     def tower(self) -> int:
-        """The parameters of the tower."""
-        h, i = self.hidden, self.intermediate
-        mlp = 3 * h * i + 2 * i + h if self.gated else 2 * h * i + i + h
-        norms = 2 * h if self.rms else 4 * h
-        layer = 4 * h * h + 4 * h + mlp + norms
-        embedding = 3 * self.temporal * self.patch**2 * h + (h if self.patch_bias else 0)
-        return self.layers * layer + embedding + self.positions * h
+        """Parameters, without projectors."""
+        mlp = (3 if self.gated else 2) * self.hidden * self.intermediate
+        layer = 4 * self.hidden**2 + mlp
+        return self.layers * layer + (self.patch_values + self.positions) * self.hidden
 
     @property
     def projector(self) -> int:
-        """The parameters of the projectors: a norm and two matrices each."""
-        wide = self.hidden * self.merge**2
-        matrices = wide * wide + wide + wide * self.out + self.out
-        norm = self.hidden if self.rms else 2 * self.hidden
-        return matrices + norm + self.mergers * (matrices + 2 * wide)
+        """Parameters of the projectors."""
+        merged = self.hidden * self.merge**2
+        return self.projectors * (merged**2 + merged * self.out)
 
 
 @dataclass(frozen=True)
-class ModelShape:
-    """The sizes of a model that decide how much memory it takes.
+class ModelNumbers:
+    """What the memory depends on in a model's configuration.
 
     Attributes:
-        layers, hidden, intermediate, heads, kv_heads, head_dim: of the language model.
-        vocabulary: rows of the embedding.
-        tied: whether the output matrix is the embedding.
-        attention_bias: whether queries, keys and values have a bias; ``query_norms``: whether
-            queries and keys are normalised.
-        vision: None for a language model.
+        layers, hidden, intermediate, vocabulary: of the language model.
+        heads, kv_heads, head_size: of its attention.
+        tied: whether input and output embeddings are the same.
+        vision: None for a text-only model.
     """
 
     layers: int
     hidden: int
     intermediate: int
+    vocabulary: int
     heads: int
     kv_heads: int
-    head_dim: int
-    vocabulary: int
+    head_size: int
     tied: bool
-    attention_bias: bool = False
-    query_norms: bool = False
-    vision: VisionShape | None = None
+    vision: VisionNumbers | None = None
 
     @property
-    def language(self) -> int:
-        """The parameters of the language model's layers and its last norm."""
-        h, d = self.hidden, self.head_dim
-        queries, keys = self.heads * d, self.kv_heads * d
-        attention = 2 * h * queries + 2 * h * keys
-        attention += queries + 2 * keys if self.attention_bias else 0
-        attention += 2 * d if self.query_norms else 0
-        return self.layers * (attention + 3 * h * self.intermediate + 2 * h) + h
+    def attended(self) -> int:
+        """The size of all queries of a token; ``keys`` of all keys."""
+        return self.heads * self.head_size
+
+    @property
+    def keys(self) -> int:
+        """The size of all keys of a token."""
+        return self.kv_heads * self.head_size
+
+    @property
+    def linear(self) -> int:
+        """Parameters of the language model's layers."""
+        attention = self.hidden * (2 * self.attended + 2 * self.keys)
+        return self.layers * (attention + 3 * self.hidden * self.intermediate)
 
     @property
     def embeddings(self) -> int:
-        """The parameters of the embedding, and of the output matrix if it is another."""
-        return self.vocabulary * self.hidden * (1 if self.tied else 2)
+        """Parameters of the embeddings, input and output."""
+        return (1 if self.tied else 2) * self.vocabulary * self.hidden
 
     @property
     def parameters(self) -> int:
-        """All parameters."""
+        """All; without biases and norms, which are less than a thousandth."""
         vision = self.vision.tower + self.vision.projector if self.vision else 0
-        return self.language + self.embeddings + vision
+        return self.linear + self.embeddings + vision
 
     def lora(self, rank: int) -> int:
-        """The parameters of an adapter on all linear layers of the language model."""
-        h, queries, keys = self.hidden, self.heads * self.head_dim, self.kv_heads * self.head_dim
-        sides = 2 * (h + queries) + 2 * (h + keys) + 3 * (h + self.intermediate)
-        return self.layers * rank * sides
+        """Parameters of an adapter on all linear layers of the language model."""
+        pairs = (
+            2 * (self.hidden + self.attended)  # q, o
+            + 2 * (self.hidden + self.keys)  # k, v
+            + 3 * (self.hidden + self.intermediate)
+        )
+        return self.layers * rank * pairs
 
 
 @dataclass(frozen=True)
-class Load:
-    """What is trained, and on what.
+class Plan:
+    """How a model is tuned, as far as memory depends on it.
 
     Attributes:
-        tokens: of a batch on one GPU, pictures expanded.
-        patches: of the pictures of a batch; about four for each of their tokens.
+        precision: of the arithmetic.
         lora_rank: None for full fine-tuning.
-        freeze: ``vision``, ``projector``: what does not learn; with an adapter nothing of them
-            does.
-        new_tokens: whether, with an adapter, the embedding and the output matrix learn as a whole,
-            because a token is new.
-        gpus: how many share the work; ``sharded``: whether ZeRO-3 or FSDP divides the model.
+        freeze: parts that do not learn, as in the settings.
         checkpointing: whether activations are computed again.
-        half: False where everything is float32, as on a CPU.
+        batch: conversations at a time.
+        tokens, learnt, patches: the most of a conversation: its tokens, those that get loss, and
+            the patches of its pictures.
+        gpus: over how many ZeRO-3 spreads what it can; 1 for none.
+        on_gpu: whether it is trained on a GPU.
     """
 
+    precision: Literal["bfloat16", "float32"]
+    lora_rank: int | None
+    freeze: tuple[str, ...]
+    checkpointing: bool
+    batch: int
     tokens: int
-    patches: int = 0
-    lora_rank: int | None = None
-    freeze: tuple[str, ...] = ("vision", "projector")
-    new_tokens: bool = False
+    learnt: int
+    patches: int
     gpus: int = 1
-    sharded: bool = False
-    checkpointing: bool = True
-    half: bool = True
+    on_gpu: bool = True
 
 
 @dataclass(frozen=True)
 class Memory:
-    """Bytes on one GPU.
-
-    Attributes:
-        weights, gradients, optimizer, activations, logits: see the module.
-        learning: how many parameters learn, on all GPUs together.
-    """
+    """Bytes, by what they are for; on one GPU, or of the process. See the module."""
 
     weights: int
     gradients: int
     optimizer: int
     activations: int
     logits: int
-    learning: int
+    overhead: int
 
     @property
     def total(self) -> int:
-        """The sum, with :data:`OVERHEAD`."""
-        parts = (self.weights, self.gradients, self.optimizer, self.activations, self.logits)
-        return sum(parts) + OVERHEAD
+        """The sum."""
+        return sum(getattr(self, each.name) for each in fields(self))
+
+    def __str__(self) -> str:
+        parts = ", ".join(
+            f"{each.name} {size(getattr(self, each.name))}" for each in fields(self)
+        )
+        return f"{size(self.total)} ({parts})"
 
 
-def estimate(shape: ModelShape, load: Load) -> Memory:
-    """The memory of a run on one of its GPUs."""
-    learning = _learning(shape, load)
-    value = _HALF if load.half else _FULL
-    shares = load.gpus if load.sharded else 1
-    if load.lora_rank is None:
-        weights = shape.parameters * value
-        gradients = learning * value
-        optimizer = learning * (_ADAM + (_FULL if load.half else 0))
+def memory(model: ModelNumbers, plan: Plan) -> Memory:
+    """An estimate of the most memory that training takes."""
+    small = 2 if plan.precision == "bfloat16" else 4
+    trained = trained_parameters(model, plan)
+    frozen = model.parameters - trained + (model.lora(plan.lora_rank) if plan.lora_rank else 0)
+    copy = small if plan.precision == "bfloat16" else 0
+    if plan.gpus > 1:
+        weights = (2 + 4) * trained + 2 * frozen
+        weights, gradients, optimizer = (
+            each // plan.gpus for each in (weights, 2 * trained, 8 * trained)
+        )
     else:
-        weights = shape.parameters * value + learning * _FULL
-        gradients, optimizer = learning * _FULL, learning * _ADAM
-    return Memory(
-        weights=weights // shares,
-        gradients=gradients // shares,
-        optimizer=optimizer // shares,
-        activations=_activations(shape, load, value),
-        logits=load.tokens * shape.vocabulary * (_LOGITS if load.half else 2 * _FULL),
-        learning=learning,
-    )
+        weights = (4 + copy) * trained + small * frozen
+        gradients, optimizer = 4 * trained, 8 * trained
+    rows = plan.batch * plan.tokens
+    activations = _activations(model, plan, rows, small)
+    logits = plan.batch * plan.learnt * model.vocabulary * (small + 8)
+    overhead = GIB // 2
+    if plan.on_gpu:
+        overhead = GIB + (weights + gradients + optimizer + activations + logits) // 10
+    return Memory(weights, gradients, optimizer, activations, logits, overhead)
 
 
-def _learning(shape: ModelShape, load: Load) -> int:
+def trained_parameters(model: ModelNumbers, plan: Plan) -> int:
     """How many parameters learn."""
-    if load.lora_rank is not None:
-        return shape.lora(load.lora_rank) + (shape.embeddings if load.new_tokens else 0)
-    vision = shape.vision
-    frozen = 0
-    if vision is not None:
-        frozen += vision.tower if "vision" in load.freeze else 0
-        frozen += vision.projector if "projector" in load.freeze else 0
-    return shape.parameters - frozen
+    if plan.lora_rank is not None:
+        return model.lora(plan.lora_rank)
+    learnt = model.linear + model.embeddings
+    if model.vision is not None:
+        learnt += 0 if "vision" in plan.freeze else model.vision.tower
+        learnt += 0 if "projector" in plan.freeze else model.vision.projector
+    return learnt
 
 
-def _activations(shape: ModelShape, load: Load, value: int) -> int:
-    """Activations of the language model, and the inside of one layer of the vision tower."""
-    h = shape.hidden
-    attention = (2 * shape.heads + 2 * shape.kv_heads) * shape.head_dim
-    inside = load.tokens * (4 * h + attention + 3 * shape.intermediate) * value
-    inputs = load.tokens * h * value
-    text = shape.layers * inputs + inside if load.checkpointing else shape.layers * inside
-    vision = shape.vision
-    if vision is None or not load.patches:
-        return text
-    mlp = (3 if vision.gated else 2) * vision.intermediate
-    look = load.patches * (_VISION_INSIDE * vision.hidden + mlp) * value
-    learns = load.lora_rank is None and "vision" not in load.freeze
-    if learns and not load.checkpointing:
-        look *= vision.layers
-    elif learns:
-        look += vision.layers * load.patches * vision.hidden * value
-    return text + look
+def _activations(model: ModelNumbers, plan: Plan, rows: int, small: int) -> int:
+    """Bytes that wait for the backward pass, and those of the vision tower, which may not."""
+    # Full fine-tuning has embeddings in float32, and so what runs from layer to layer.
+    stream = small if plan.lora_rank is not None else 4
+    norms = 2 * model.hidden * (2 * 4 + small)  # each keeps its input and its output in float32
+    attention = small * (model.hidden + 6 * model.attended + 3 * model.keys)
+    mlp = small * (model.hidden + 4 * model.intermediate)
+    layer = norms + attention + mlp + stream * 2 * model.hidden
+    if plan.checkpointing:
+        found = rows * (model.layers * stream * model.hidden + 2 * layer)
+    else:
+        found = rows * model.layers * layer
+    if model.vision is not None:
+        patches = plan.batch * plan.patches
+        wide = small * (8 * model.vision.hidden + 3 * model.vision.intermediate)
+        frozen = "vision" in plan.freeze or plan.lora_rank is not None
+        once = frozen or plan.checkpointing
+        found += patches * wide * (2 if once else model.vision.layers)
+        found += patches * 4 * model.vision.patch_values
+    return found
 
 
-def shape_of(config: Mapping[str, Any]) -> ModelShape:
-    """The shape of a model by what its ``config.json`` holds, whichever of the two layouts it has:
-    newer files keep the language model's numbers in ``text_config``.
+def numbers_of(config: Mapping[str, Any]) -> ModelNumbers:
+    """The numbers of a model by its ``config.json``, of today's transformers or an older one.
 
     Raises:
-        ValueError: a number that is needed is not there.
+        ValueError: an entry is missing; the message names it.
     """
-    text = {**config, **(config.get("text_config") or {})}
-    kind = str(config.get("model_type", ""))
+    text = {**config, **config.get("text_config", {})}
     try:
-        hidden, heads = int(text["hidden_size"]), int(text["num_attention_heads"])
-        return ModelShape(
-            layers=int(text["num_hidden_layers"]),
-            hidden=hidden,
-            intermediate=int(text["intermediate_size"]),
+        heads = text["num_attention_heads"]
+        return ModelNumbers(
+            layers=text["num_hidden_layers"],
+            hidden=text["hidden_size"],
+            intermediate=text["intermediate_size"],
+            vocabulary=text["vocab_size"],
             heads=heads,
-            kv_heads=int(text.get("num_key_value_heads") or heads),
-            head_dim=int(text.get("head_dim") or hidden // heads),
-            vocabulary=int(text["vocab_size"]),
-            # Whole models of transformers say it at the top; their text part has a default.
+            kv_heads=text.get("num_key_value_heads") or heads,
+            head_size=text.get("head_dim") or text["hidden_size"] // heads,
             tied=bool(config.get("tie_word_embeddings", text.get("tie_word_embeddings", False))),
-            attention_bias=kind.startswith("qwen2") or bool(text.get("attention_bias")),
-            query_norms=kind.startswith("qwen3"),
-            vision=_vision(kind, config["vision_config"], hidden)
+            vision=_vision(config["vision_config"], text["hidden_size"])
             if config.get("vision_config")
             else None,
         )
     except KeyError as error:
         raise ValueError(
-            f"the model's configuration ({kind or 'no model_type'}) lacks {error.args[0]!r}, so its "
-            "memory cannot be estimated; give a Qwen-VL model, or a language model of Llama's build"
-        ) from error
+            f"the model's configuration has no {error.args[0]}, so its memory cannot be foreseen; "
+            "skip the check of memory"
+        ) from None
 
 
-def _vision(kind: str, vision: Mapping[str, Any], out: int) -> VisionShape:
-    older = kind == "qwen2_vl"
-    hidden = int(vision["embed_dim"] if older else vision["hidden_size"])
-    deepstack = vision.get("deepstack_visual_indexes") or ()
-    newer = kind.startswith("qwen3")
-    return VisionShape(
-        layers=int(vision["depth"]),
+def _vision(config: Mapping[str, Any], out: int) -> VisionNumbers:
+    # Qwen2-VL calls the tower's size embed_dim, and the language model's hidden_size.
+    first = "embed_dim" in config
+    hidden = config["embed_dim"] if first else config["hidden_size"]
+    wide = int(hidden * config.get("mlp_ratio", 4)) if first else config["intermediate_size"]
+    side = config.get("patch_size", 14)
+    channels = config.get("in_channels", config.get("in_chans", 3))
+    return VisionNumbers(
+        layers=config["depth"],
         hidden=hidden,
-        intermediate=int(hidden * vision["mlp_ratio"] if older else vision["intermediate_size"]),
-        gated=kind == "qwen2_5_vl",
-        patch=int(vision.get("patch_size", 14)),
-        temporal=int(vision.get("temporal_patch_size", 2)),
-        merge=int(vision.get("spatial_merge_size", 2)),
-        out=out,
-        rms=kind == "qwen2_5_vl",
-        mergers=len(deepstack) if newer else 0,
-        positions=int(vision.get("num_position_embeddings", 0)) if newer else 0,
-        patch_bias=newer,
+        intermediate=wide,
+        gated=not first and "fullatt_block_indexes" in config,
+        patch_values=channels * config.get("temporal_patch_size", 2) * side**2,
+        positions=config.get("num_position_embeddings", 0),
+        merge=config.get("spatial_merge_size", 2),
+        out=config.get("out_hidden_size", out) if not first else out,
+        projectors=1 + len(config.get("deepstack_visual_indexes", ())),
     )
+
+
+def size(count: int) -> str:
+    """A number of bytes in words."""
+    return f"{count / GIB:.1f} GiB" if count >= GIB / 10 else f"{count / (1 << 20):.0f} MiB"

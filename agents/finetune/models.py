@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from agents import configs
-from agents.finetune.memory import ModelShape, shape_of
+from agents.finetune.memory import ModelNumbers, numbers_of
 from er_gym.tasks.reading import parse_json, read_text
 
 KIND = "models"
@@ -39,9 +39,15 @@ class ModelFacts(BaseModel):
     config: dict[str, Any]
 
     @property
-    def shape(self) -> ModelShape:
+    def numbers(self) -> ModelNumbers:
         """The sizes that decide how much memory it takes."""
-        return shape_of(self.config)
+        return numbers_of(self.config)
+
+    @property
+    def token_side(self) -> int:
+        """The pixels a side of what becomes one token of a picture."""
+        vision = self.config["vision_config"]
+        return int(vision["patch_size"] * vision["spatial_merge_size"])
 
     @property
     def model_type(self) -> str:
@@ -112,37 +118,33 @@ def _of_directory(directory: Path, known: dict[str, ModelFacts]) -> ChosenModel:
     config = parse_json(read_text(file), file)
     if not isinstance(config, dict):
         raise ValueError(f"{file} is no model's configuration; it holds no table")
-    shape = shape_of(config)
+    numbers = numbers_of(config)
+    sizes = numbers.layers, numbers.hidden
     for name, facts in known.items():
         same = facts.model_type == config.get("model_type")
-        if same and (shape.layers, shape.hidden) == (facts.shape.layers, facts.shape.hidden):
+        if same and sizes == (facts.numbers.layers, facts.numbers.hidden):
             return ChosenModel(name, facts, str(directory.resolve()))
     builds = sorted({facts.model_type for facts in known.values()})
     raise ValueError(
-        f"{directory} holds a {config.get('model_type')} of {shape.layers} layers, which is of the "
+        f"{directory} holds a {config.get('model_type')} of {numbers.layers} layers, which is of the "
         f"size of none of {', '.join(known)} ({', '.join(builds)}); add it to configs/models"
     )
 
 
-def picture_tokens(
-    shape: ModelShape, width: int, height: int, min_pixels: int, max_pixels: int
-) -> int:
+def picture_tokens(side: int, width: int, height: int, min_pixels: int, max_pixels: int) -> int:
     """How many tokens the language model sees for a picture.
 
     The rule of Qwen's image processor (``smart_resize`` of transformers): both sides become
-    multiples of a token's side, and the area comes between the bounds.
+    multiples of a token's ``side``, and the area comes between the bounds.
 
     Raises:
-        ValueError: the model sees no pictures, or the picture is too thin.
+        ValueError: the picture is too thin.
     """
-    if shape.vision is None:
-        raise ValueError("the model sees no pictures; choose a vision-language model")
     if max(width, height) / min(width, height) > _MOST_TIMES_LONGER:
         raise ValueError(
             f"a picture of {width} × {height} pixels is too thin; Qwen's models take sides up to "
             f"{_MOST_TIMES_LONGER} : 1"
         )
-    side = shape.vision.patch * shape.vision.merge
     rows, columns = round(height / side) * side, round(width / side) * side
     if rows * columns > max_pixels:
         scale = math.sqrt(height * width / max_pixels)
