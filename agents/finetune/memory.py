@@ -169,9 +169,7 @@ class Memory:
         return sum(getattr(self, each.name) for each in fields(self))
 
     def __str__(self) -> str:
-        parts = ", ".join(
-            f"{each.name} {size(getattr(self, each.name))}" for each in fields(self)
-        )
+        parts = ", ".join(f"{each.name} {size(getattr(self, each.name))}" for each in fields(self))
         return f"{size(self.total)} ({parts})"
 
 

@@ -126,8 +126,8 @@ def _of_directory(directory: Path, known: dict[str, ModelFacts]) -> ChosenModel:
             return ChosenModel(name, facts, str(directory.resolve()))
     builds = sorted({facts.model_type for facts in known.values()})
     raise ValueError(
-        f"{directory} holds a {config.get('model_type')} of {numbers.layers} layers, which is of the "
-        f"size of none of {', '.join(known)} ({', '.join(builds)}); add it to configs/models"
+        f"{directory} holds a {config.get('model_type')} of {numbers.layers} layers, which is of "
+        f"the size of none of {', '.join(known)} ({', '.join(builds)}); add it to configs/models"
     )
 
 

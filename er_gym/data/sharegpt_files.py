@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -310,9 +310,9 @@ def _guessed(items: JsonItems) -> Columns:
     first = items[0]
     for columns in (Columns(), OLDER):
         messages = first.get(columns.messages) if isinstance(first, dict) else None
-        if isinstance(messages, Sequence) and messages and isinstance(messages[0], Mapping):
-            if columns.role in messages[0] and columns.content in messages[0]:
-                return columns
+        head = messages[0] if isinstance(messages, list) and messages else None
+        if isinstance(head, Mapping) and columns.role in head and columns.content in head:
+            return columns
     has = ", ".join(first)[:100] if isinstance(first, dict) else type(first).__name__
     raise ShareGptError(
         f"{items.path} has neither messages with role and content nor conversations with from and "
