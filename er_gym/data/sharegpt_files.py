@@ -22,7 +22,7 @@ from PIL import Image, UnidentifiedImageError
 from er_gym.data.chat import IMAGE, Chat, ChatTurn, Part, Role
 from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
 from er_gym.data.json_items import JsonItems, json_items
-from er_gym.data.sharegpt_report import Problems, Report, Sample, report_of
+from er_gym.data.sharegpt_report import HARMLESS, Problems, Report, Sample, report_of
 from er_gym.data.trajectory import PictureRecord
 from er_gym.tasks.reading import parse_json, read_text
 
@@ -162,6 +162,7 @@ def open_sharegpt(
     pictures: Path | None = None,
     feedback: bool | None = None,
     last_turn_only: bool | None = None,
+    decisions: bool = False,
     leave_out: bool = False,
 ) -> ShareGptFile:
     """Open a ShareGPT file, and check all of it. Memory grows by some bytes a sample.
@@ -176,6 +177,7 @@ def open_sharegpt(
         last_turn_only: whether each sample teaches its last turn alone; by default if the file's
             name ends in ``_turns``, as er-gym's export has it. Otherwise a message's ``loss`` says
             whether it is learnt, and if there is none, all the assistant's are.
+        decisions: whether a reply that does not end in a known action is a problem, too.
         leave_out: leave out the samples that have problems, instead of raising.
 
     Raises:
@@ -187,7 +189,8 @@ def open_sharegpt(
     items = json_items(file)
     columns = columns or _guessed(items)
     folder = pictures or _folder(file, items, columns)
-    problems, chosen = Problems(), array("Q")
+    problems = Problems(harmless=frozenset() if decisions else HARMLESS)
+    chosen = array("Q")
     for index in range(len(items)):
         sample = sample_of(items[index], columns)
         sound = problems.look(index, sample, folder)

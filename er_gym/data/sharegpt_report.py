@@ -29,7 +29,7 @@ TOLD: Mapping[ProblemKind, str] = {
 }
 """How each kind is told, after a number of samples."""
 HARMLESS: frozenset[ProblemKind] = frozenset({"no decision"})
-"""A conversation can be learnt from without these, but not played or imported."""
+"""A conversation can be learnt from all the same, but no action can be read from it."""
 _MOST_NAMED = 3
 _DECIDED = re.compile(rf"<{DECISION}>([^<>]*)</{DECISION}>[\s.]*\Z")
 
@@ -71,6 +71,7 @@ class Report:
         counts: kind of problem to the number of samples that have it.
         first: kind of problem to the places and reasons of the first.
         unsound: how many samples have a problem that is not harmless.
+        harmless: the kinds of problems that are.
     """
 
     path: Path
@@ -81,6 +82,7 @@ class Report:
     counts: Mapping[ProblemKind, int]
     first: Mapping[ProblemKind, tuple[str, ...]]
     unsound: int
+    harmless: frozenset[ProblemKind] = HARMLESS
 
     def lines(self) -> list[str]:
         """The report for people: what there is, then a line for each kind of problem."""
@@ -97,15 +99,20 @@ class Report:
         told = "; ".join(
             f"{count:,} {TOLD[kind]} (first: {self.first[kind][0]})"
             for kind, count in self.counts.items()
-            if kind not in HARMLESS
+            if kind not in self.harmless
         )
         return f"{self.path}: of {self.samples:,} samples, {told or 'none has a problem'}"
 
 
 @dataclass
 class Problems:
-    """Looks at one sample after the other."""
+    """Looks at one sample after the other.
 
+    Attributes:
+        harmless: kinds of problems with which a sample is used all the same.
+    """
+
+    harmless: frozenset[ProblemKind] = HARMLESS
     samples: int = 0
     replies: int = 0
     pictures: int = 0
@@ -126,7 +133,7 @@ class Problems:
             named = self.first.setdefault(kind, [])
             if len(named) < _MOST_NAMED:
                 named.append((index, why))
-        sound = HARMLESS.issuperset(found)
+        sound = self.harmless.issuperset(found)
         self.unsound += not sound
         return sound
 
@@ -145,6 +152,7 @@ def report_of(items: JsonItems, problems: Problems) -> Report:
             for kind, named in problems.first.items()
         },
         unsound=problems.unsound,
+        harmless=problems.harmless,
     )
 
 
