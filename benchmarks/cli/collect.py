@@ -57,6 +57,11 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 @click.option("--types", metavar="TYPE,…", help="Only tasks of these types.")
 @click.option("--scenes", metavar="SCENE,…", help="Only tasks in these scenes.")
 @click.option(
+    "--instances",
+    type=click.Choice(("target", "explore")),
+    help="Which object a type name means.  [default: the suite's]",
+)
+@click.option(
     "--writer",
     type=Words(),
     default="grounded",
@@ -97,6 +102,7 @@ def collect(
     kinds: str | None,
     types: str | None,
     scenes: str | None,
+    instances: str | None,
     writer: str,
     thoughts: str,
     language: str,
@@ -150,6 +156,10 @@ def collect(
             asked = selection.collected
         else:
             source, env = source_of(suite, tasks_file, correct)
+        if instances is not None:
+            if selection is not None or correct is not None:
+                raise BadInput("--instances is that of the run; leave it out")
+            env["instances"] = instances
         source = chosen_tasks(source, named("--types", types), named("--scenes", scenes))
         fitted = fitted_tasks(source, env["backend"])
         if correct is not None:

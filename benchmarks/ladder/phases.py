@@ -129,6 +129,7 @@ class _Plan:
                 f"data/{number}",
                 *("collect", "--suite", self.settings.suite),
                 *("--parts", ",".join(row.collect.parts)),
+                *self._instances,
                 *self._collecting(row.collect.limit),
             )
 
@@ -179,14 +180,14 @@ class _Plan:
         return (
             *("bench", "--suite", suite, "--agent", f"hf:{model}"),
             *(() if limit is None else ("--limit", str(limit))),
-            *(
-                ("--instances", settings.evaluation.instances)
-                if settings.evaluation.instances
-                else ()
-            ),
+            *self._instances,
             *("--seed", str(settings.seed), "--concurrency", str(settings.concurrency)),
             *_overrides(*settings.play),
         )
+
+    @property
+    def _instances(self) -> tuple[str, ...]:
+        return ("--instances", self.settings.instances) if self.settings.instances else ()
 
     def _data_options(self, data: Sequence[str]) -> tuple[str, ...]:
         return tuple(each for one in data for each in ("--data", self._at(one)))

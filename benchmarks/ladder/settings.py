@@ -95,7 +95,6 @@ class Evaluation(_Settings):
     Attributes:
         suite: whose rooms the training did not see.
         limit: how many tasks; None for all.
-        instances: which object a type name means; "" for the suite's own choice.
         faults: fault rates of further evaluations, after the stages from the second on.
         base: whether the model at the foot is measured, too.
         set: overrides of the agent's settings.
@@ -103,7 +102,6 @@ class Evaluation(_Settings):
 
     suite: str = "er-1k"
     limit: Positive | None = None
-    instances: str = "explore"
     faults: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
     base: bool = True
     set: tuple[str, ...] = ()
@@ -116,6 +114,8 @@ class LadderSettings(_Settings):
         description: for people.
         base: the model at its foot.
         suite: the tasks of the training, and the arguments of ``collect`` beside.
+        instances: which object a type name means, ``target`` or ``explore``; "" for the suites' own
+            choice.
         dialect, language: of the conversations.
         seed: of everything that is drawn.
         workers: processes that play.
@@ -128,6 +128,7 @@ class LadderSettings(_Settings):
     description: str = ""
     base: Base
     suite: str = "train"
+    instances: str = "explore"
     dialect: str = "paper"
     language: Language = "en"
     seed: int = Field(0, ge=0, lt=2**32)
