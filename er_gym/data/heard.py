@@ -32,6 +32,8 @@ _TASK = re.compile(
 )
 _CHINESE = re.compile(r"[\u4e00-\u9fff]")
 _BEGINS = r"(?:^|(?<=[\s.!?…。！？”\"']))"
+"""Where a sentence of er-gym's own may begin: what a model thinks need not end in a full stop."""
+_BEGINS_SENTENCE = r"(?:^|(?<=[.!?…。！？\n])\s*)"
 _LONGEST_INSTRUCTION = 300
 
 
@@ -102,7 +104,9 @@ def thoughts_of(reply: str, language: Language, *, first: bool) -> list[ThoughtR
     own = _openers(language)
     kinds, pattern, closers = own if own[1].match(said) else _stock()
     said = closers.sub("", said).strip()
-    places = [(found.start(), found.end(), found[0].lower()) for found in pattern.finditer(said)]
+    places = [
+        (found.start(), found.end(), found[0].strip().lower()) for found in pattern.finditer(said)
+    ]
     keeps = kinds is _stock()[0]  # the paper's phrases are parts of sentences
     found: list[ThoughtRecord] = []
     head = said[: places[0][0]] if places else said
@@ -145,7 +149,7 @@ def _openers(language: Language) -> _Openers:
                 opener.lower(): kind for kind, all_ in texts.openers.items() for opener in all_
             }
             closers += texts.closers
-    return kinds, _any_of(kinds), _last_of(closers)
+    return kinds, _any_of(kinds, _BEGINS), _last_of(closers)
 
 
 @lru_cache(maxsize=1)
@@ -153,12 +157,12 @@ def _stock() -> _Openers:
     file = config_directory("dialects") / "heard.yaml"
     heard = validated(Heard, read_yaml(file), f"{file}:")
     kinds = {opener.lower(): kind for kind, openers in heard.openers.items() for opener in openers}
-    return kinds, _any_of(kinds), _last_of(heard.closers)
+    return kinds, _any_of(kinds, _BEGINS_SENTENCE), _last_of(heard.closers)
 
 
-def _any_of(openers: Mapping[str, ThoughtKind]) -> re.Pattern[str]:
+def _any_of(openers: Mapping[str, ThoughtKind], begins: str) -> re.Pattern[str]:
     longest = sorted(openers, key=len, reverse=True)
-    return re.compile(f"{_BEGINS}(?:{'|'.join(map(re.escape, longest))})", re.IGNORECASE)
+    return re.compile(f"{begins}(?:{'|'.join(map(re.escape, longest))})", re.IGNORECASE)
 
 
 def _last_of(closers: list[str]) -> re.Pattern[str]:

@@ -100,7 +100,7 @@ def _scan(path: Path, text: mmap.mmap, starts: array[int], ends: array[int]) -> 
     place = len(_MARK) if text[: len(_MARK)] == _MARK else 0
     opening = _gap(text, place)
     in_list = text[opening : opening + 1] == b"["
-    depth = last = 0
+    depth = 0
     last = opening + 1 if in_list else opening
     for token in _TOKEN.finditer(text, last):
         sign = text[token.start() : token.start() + 1]
@@ -118,7 +118,7 @@ def _scan(path: Path, text: mmap.mmap, starts: array[int], ends: array[int]) -> 
         else:
             depth -= 1
             if depth < 0:
-                last = token.start()
+                depth = 0
                 break
             if not depth:
                 last = token.end()

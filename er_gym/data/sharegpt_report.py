@@ -88,7 +88,7 @@ class Report:
         """The report for people: what there is, then a line for each kind of problem."""
         lines = [
             f"{self.path}: {self.samples:,} samples, {self.replies:,} replies, {self.pictures:,} "
-            f"pictures; {self.with_feedback:,} samples with {FEEDBACK_TOKEN}"
+            f"pictures; samples with {FEEDBACK_TOKEN}: {self.with_feedback:,}"
         ]
         for kind, count in self.counts.items():
             lines.append(f"{count:,} {TOLD[kind]}: {'; '.join(self.first[kind])}")
