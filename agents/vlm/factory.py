@@ -29,7 +29,7 @@ _WHAT = "agent"
 _NOT_COMPARED: Mapping[str, Any] = {
     "server": {"base_url", "key_from", "timeout", "connect", "tries", "requests_per_minute"},
     "local": {"device_map", "batch", "wait"},
-    "prompts": {"dataset"},
+    "prompts": {"dataset", "dialect"},
     "prices": True,
 }
 """Settings that change when and where a model answers, but not its replies. The digest stands for
@@ -76,11 +76,11 @@ class AgentFactory:
         budget: Budget | None = None,
     ) -> None:
         from agents.vlm.matching import Matcher
-        from agents.vlm.prompts import load_prompts
+        from agents.vlm.prompts import prompts_for
 
         resolve_client(name)  # a wrong name is told before a wrong prompt
         self.name, self.settings = name, settings
-        self.prompts = load_prompts(settings.prompts)
+        self.prompts = prompts_for(settings)
         self._matcher = Matcher(settings.matching)
         self._matcher.prepare()
         self._session = ModelSession(name, settings, directory, budget)

@@ -11,7 +11,7 @@ from typing import Any
 from agents.vlm.clients.budget import Budget
 from agents.vlm.clients.session import ModelSession
 from agents.vlm.factory import AgentFactory, comparable_settings, load_settings
-from agents.vlm.prompts import load_prompts
+from agents.vlm.prompts import prompts_for
 from agents.vlm.settings import AgentSettings
 from benchmarks.cli.vlm_options import VLMOptions
 from er_gym.rollout.events import EventListener
@@ -57,7 +57,7 @@ class VLMRun:
     @property
     def comparable_settings(self) -> dict[str, Any]:
         """The settings that decide its replies."""
-        return comparable_settings(self.settings, load_prompts(self.settings.prompts).digest)
+        return comparable_settings(self.settings, prompts_for(self.settings).digest)
 
     @property
     def env(self) -> dict[str, Any]:
