@@ -1,6 +1,6 @@
 """Write ten thoughts of a collection, with the pictures that they are about, into docs/data.md.
 
-    python -m benchmarks.pages.thoughts DIR
+python -m benchmarks.pages.thoughts DIR
 """
 
 from __future__ import annotations

@@ -159,9 +159,7 @@ def _story(knowledge: Knowledge, thing: str) -> dict[str, Any]:
     return story
 
 
-def _ended(
-    knowledge: Knowledge, thing: str, puts: Sequence[tuple[str, str]], toggled: bool
-) -> str:
+def _ended(knowledge: Knowledge, thing: str, puts: Sequence[tuple[str, str]], toggled: bool) -> str:
     """What the agent can point at when it ends."""
     verb, place = knowledge.subgoal.verb, knowledge.subgoal.place
     if verb == verbs.PUT and puts and puts[-1][0] == thing and same_type(puts[-1][1], place):
