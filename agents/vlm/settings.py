@@ -164,6 +164,8 @@ class Local(_Settings):
         dtype, device_map, attention: arguments of ``from_pretrained``.
         batch: the largest number of episodes whose turns are generated together.
         wait: seconds that a batch waits for further requests.
+        reuse: whether what the model computed for the earlier turns of a conversation is kept for
+            its next turn; it does not change a reply beyond rounding.
     """
 
     adapter: str = ""
@@ -172,6 +174,7 @@ class Local(_Settings):
     attention: str = ""
     batch: Positive = 8
     wait: float = Field(0.02, ge=0)
+    reuse: bool = True
 
 
 class AgentSettings(_Settings):
