@@ -66,11 +66,20 @@ class Prompts(_Settings):
         profile: a directory of ``configs/prompts``, or a path to one like it.
         language: ``en`` or ``zh``.
         dataset: a training file in the paper's format, whose texts are used instead.
+        dialect: a dialect by name or folder (:mod:`er_gym.data.dialects`), whose texts are used
+            instead: a model that was tuned on training files of a dialect plays with it.
     """
 
     profile: str = "default"
     language: Literal["en", "zh"] = "en"
     dataset: str = ""
+    dialect: str = ""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Prompts:
+        if self.dataset and self.dialect:
+            raise ValueError("dataset and dialect are both given; give one of them")
+        return self
 
 
 class Sampling(_Settings):
@@ -155,6 +164,8 @@ class Local(_Settings):
         dtype, device_map, attention: arguments of ``from_pretrained``.
         batch: the largest number of episodes whose turns are generated together.
         wait: seconds that a batch waits for further requests.
+        reuse: whether what the model computed for the earlier turns of a conversation is kept for
+            its next turn; it does not change a reply beyond rounding.
     """
 
     adapter: str = ""
@@ -163,6 +174,7 @@ class Local(_Settings):
     attention: str = ""
     batch: Positive = 8
     wait: float = Field(0.02, ge=0)
+    reuse: bool = True
 
 
 class AgentSettings(_Settings):
@@ -190,4 +202,6 @@ class AgentSettings(_Settings):
     @property
     def obs_mode(self) -> str:
         """The observation mode that the agent needs of the environment."""
-        return "rgb" if self.sees == "pictures" else "text"
+        if self.sees == "pictures":
+            return "rgb"
+        return "objects" if self.prompts.dialect else "text"

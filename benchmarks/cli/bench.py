@@ -167,7 +167,8 @@ def bench(
             taken=fitted.substitutions,
         )
     report_set_aside(asked.name, aside, fitted.substitutions)
-    for note in fitted.notes:
+    tuned_for = vlm_run.tuned_for if vlm_run else None
+    for note in (*fitted.notes, *([f"settings of {tuned_for}"] if tuned_for else [])):
         console.print(note, style="dim", soft_wrap=True)
     if samples > 1 and vlm_run and not vlm_run.settings.sampling.temperature:
         print_problem(

@@ -15,6 +15,7 @@ from transformers.processing_utils import ProcessorMixin
 
 from agents.vlm.clients.adapters import ADAPTER, adapter_chain, with_adapter
 from agents.vlm.settings import AgentSettings, Local
+from agents.vlm.tuned_model import model_directory
 
 _MODEL_FILES = {".json", ".jinja", ".txt", ".model", ".safetensors", ".bin"}
 _LONGEST_WORDS = 300  # characters of a library's, in an error
@@ -47,12 +48,13 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
 
     Args:
         path: a directory that ``save_pretrained`` wrote, of a whole model or of an adapter; or a
-            model's name on the Hugging Face hub.
+            model's name on the Hugging Face hub; or a finished run of ``er-gym finetune``.
         settings: of the agent.
 
     Raises:
         ValueError: the model or adapter does not exist, is broken, or does not fit the settings.
     """
+    path = model_directory(path)
     local, sees = settings.local, settings.sees == "pictures"
     is_here = Path(path).is_dir()
     if not is_here and (path.startswith(("/", ".", "~")) or path.count("/") > 1):
