@@ -93,7 +93,10 @@ def make_model(
         eos_token_id=ends, pad_token_id=ends[1], do_sample=False
     )
     directory.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=directory.parent, prefix=f".{directory.name}-") as folder:
+    with (
+        quiet_libraries(),
+        tempfile.TemporaryDirectory(dir=directory.parent, prefix=f".{directory.name}-") as folder,
+    ):
         made = Path(folder) / "model"
         tokenizer.save_pretrained(made)
         model.save_pretrained(made)
