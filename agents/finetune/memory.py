@@ -1,7 +1,7 @@
 """How much memory fine-tuning takes: bytes from a model's configuration and the plan, no weights.
 
-The formula counts what transformers, PEFT and PyTorch keep, for decoder models with gated MLPs, such
-as Llama and Qwen, and for the vision towers of Qwen2-VL, Qwen2.5-VL and Qwen3-VL.
+The formula counts what transformers, PEFT and PyTorch keep, for decoder models with gated MLPs,
+such as Llama and Qwen, and for the vision towers of Qwen2-VL, Qwen2.5-VL and Qwen3-VL.
 
 ==============  ==================================================================================
 weights         2 bytes a parameter that stays as it is, in bfloat16; 4 in float32, and for one
@@ -209,16 +209,19 @@ def trained_parameters(model: ModelNumbers, plan: Plan) -> int:
 
 def _activations(model: ModelNumbers, plan: Plan, rows: int, small: int) -> int:
     """Bytes that wait for the backward pass, and those of the vision tower, which may not."""
+    full = plan.lora_rank is None
     # Full fine-tuning has embeddings in float32, and so what runs from layer to layer.
-    stream = small if plan.lora_rank is not None else 4
-    norms = 2 * model.hidden * (2 * 4 + small)  # each keeps its input and its output in float32
-    attention = small * (model.hidden + 6 * model.attended + 3 * model.keys)
-    mlp = small * (model.hidden + 4 * model.intermediate)
-    layer = norms + attention + mlp + stream * 2 * model.hidden
+    stream = 4 if full else small
+    # A norm keeps its input in float32; its result, as what comes next reads it; and, if it learns
+    # itself, what its weights are multiplied with.
+    norms = 2 * model.hidden * ((8 if full else 4) + small)
+    attention = small * 2 * (model.attended + model.keys)  # queries and result, keys and values
+    mlp = small * 4 * model.intermediate  # gate, its activation, the other half, the product
+    layer = norms + attention + mlp
     if plan.checkpointing:
-        found = rows * (model.layers * stream * model.hidden + 2 * layer)
+        found = rows * ((model.layers + 2) * stream * model.hidden + 2 * layer)
     else:
-        found = rows * model.layers * layer
+        found = rows * (model.layers * layer + 2 * stream * model.hidden)
     if model.vision is not None:
         patches = plan.batch * plan.patches
         wide = small * (8 * model.vision.hidden + 3 * model.vision.intermediate)
