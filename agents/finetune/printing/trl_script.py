@@ -46,7 +46,7 @@ class RunArguments:
     meaning: str = "feedback: the last action failed"
 
 
-class TurnCollator(DataCollatorForVisionLanguageModeling):  # type: ignore[misc]
+class TurnCollator(DataCollatorForVisionLanguageModeling):
     """Gives loss to the turns of the assistant that are to be learnt, and to nothing else."""
 
     def torch_call(self, examples: list[dict[str, Any]]) -> dict[str, Any]:
@@ -63,13 +63,14 @@ class TurnCollator(DataCollatorForVisionLanguageModeling):  # type: ignore[misc]
 
 def main(run: RunArguments, training: SFTConfig, chosen: ModelConfig) -> None:
     """Load, train, save."""
-    processor = AutoProcessor.from_pretrained(chosen.model_name_or_path)
+    weights = str(chosen.model_name_or_path)
+    processor = AutoProcessor.from_pretrained(weights)
     processor.image_processor.size = {
         "shortest_edge": run.min_pixels,
         "longest_edge": run.max_pixels,
     }
     model = AutoModelForImageTextToText.from_pretrained(
-        chosen.model_name_or_path,
+        weights,
         dtype=chosen.dtype,
         attn_implementation=chosen.attn_implementation,
     )
@@ -134,4 +135,5 @@ def adapter(model: Any, chosen: ModelConfig, new: list[int]) -> LoraConfig:
 
 
 if __name__ == "__main__":
-    main(*TrlParser((RunArguments, SFTConfig, ModelConfig)).parse_args_and_config())
+    parts: Any = (RunArguments, SFTConfig, ModelConfig)
+    main(*TrlParser(parts).parse_args_and_config())

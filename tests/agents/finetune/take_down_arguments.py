@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import sys
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -18,16 +19,11 @@ PACKAGES = {"llama-factory": "llamafactory", "ms-swift": "ms-swift", "trl": "trl
 
 def _classes(program: str) -> list[Any]:
     if program == "llama-factory":
-        from llamafactory.hparams.parser import _TRAIN_ARGS
-
-        return list(_TRAIN_ARGS)
+        return list(import_module("llamafactory.hparams.parser")._TRAIN_ARGS)
     if program == "ms-swift":
-        from swift.arguments import SftArguments
-
-        return [SftArguments]
-    from trl import ModelConfig, SFTConfig
-
-    return [SFTConfig, ModelConfig]
+        return [import_module("swift.arguments").SftArguments]
+    trl = import_module("trl")
+    return [trl.SFTConfig, trl.ModelConfig]
 
 
 def take_down(program: str) -> dict[str, Any]:
