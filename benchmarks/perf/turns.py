@@ -70,8 +70,9 @@ def main(
             f"{decisions / middle:.2f} replies/s"
         )
     alike = sum(one == other for one, other in zip(*replies.values(), strict=True))
+    faster = statistics.median(seconds[False]) / statistics.median(seconds[True])
     click.echo(
-        f"{statistics.median(seconds[False]) / statistics.median(seconds[True]):.2f} times as fast; "
+        f"{faster:.2f} times as fast; "
         f"{alike} of {decisions} replies are the same; {Path(model).name}"
     )
 
