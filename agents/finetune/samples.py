@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from agents.finetune.settings import DataSettings
 from er_gym.data.chat import Chat
@@ -25,12 +26,14 @@ class Samples:
         folder: what the paths of their pictures are relative to.
         prompts: settings of a model agent's prompts, by which the agent converses as here
             (``prompts`` of :class:`agents.vlm.settings.AgentSettings`).
+        recorded: the settings of the collection that their pictures were recorded with.
         left_out: how many conversations have no turn that is learnt, and are not among them.
     """
 
     chats: tuple[Chat, ...]
     folder: Path
     prompts: Mapping[str, str]
+    recorded: Mapping[str, Any] = field(default_factory=dict)
     left_out: int = 0
 
     @property
@@ -91,7 +94,8 @@ def _of_collection(collection: Collection, settings: DataSettings) -> Samples:
         raise ValueError(f"{collection.path}: {error}; set data.dialect or data.language") from None
     languages = Counter(each.language for each in trajectories)
     language = settings.language or languages.most_common(1)[0][0]
-    return Samples(chats, collection.path, {"dialect": settings.dialect, "language": language})
+    prompts = {"dialect": settings.dialect, "language": language}
+    return Samples(chats, collection.path, prompts, collection.manifest.settings)
 
 
 def _taken(collection: Collection, settings: DataSettings) -> Sequence[Trajectory]:

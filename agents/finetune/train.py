@@ -57,6 +57,7 @@ from agents.finetune.settings import FinetuneSettings, Lora
 from agents.finetune.tokens import EncodedChat, Encoder, check_lengths
 from agents.vlm.clients.adapters import adapter_chain, with_adapter
 from agents.vlm.clients.checkpoint import one_line
+from agents.vlm.tuned_model import recorded_pictures
 from er_gym.locking import exclusive_use
 
 TRAINED = "trained.safetensors"
@@ -654,10 +655,9 @@ def _agent(settings: FinetuneSettings, samples: Samples) -> dict[str, Any]:
     """How the model was taught to converse, as settings of a model agent."""
     found: dict[str, Any] = {"prompts": dict(samples.prompts), "sees": samples.sees}
     if samples.sees == "pictures":
-        found["pictures"] = {
-            "min_pixels": settings.data.min_pixels,
-            "max_pixels": settings.data.max_pixels,
-        }
+        found["pictures"] = recorded_pictures(
+            samples.recorded, settings.data.min_pixels, settings.data.max_pixels
+        )
     return found
 
 

@@ -161,7 +161,7 @@ def _adapter(directory: str) -> Path:
 def _identity(path: str, adapters: Sequence[Path], settings: AgentSettings, model: Any) -> str:
     """See :class:`Checkpoint`. Size and time stand for a file's content, since hashing takes
     long."""
-    what = {
+    what: dict[str, Any] = {
         "client": "transformers",
         "model": _files(path) or [[path, getattr(model.config, "_commit_hash", None)]],
         "adapter": [each for adapter in adapters for each in _files(str(adapter))] or None,
@@ -177,6 +177,9 @@ def _identity(path: str, adapters: Sequence[Path], settings: AgentSettings, mode
             },
         ),
     }
+    pictures = settings.pictures
+    if pictures.model_bounds != (pictures.min_pixels, pictures.max_pixels):
+        what["model_bounds"] = pictures.model_bounds
     return json.dumps(what, sort_keys=True)
 
 

@@ -205,11 +205,11 @@ class LocalClient:
                 f"{self._name} was loaded without vision, since the agent's setting sees is text, "
                 "but the conversation has a picture"
             )
-        bounds = self._settings.pictures
+        least, most = self._settings.pictures.model_bounds
         try:
             seen = self._image_processor(
                 [Image.open(BytesIO(each.data)).convert("RGB") for each in pictures],
-                size={"shortest_edge": bounds.min_pixels, "longest_edge": bounds.max_pixels},
+                size={"shortest_edge": least, "longest_edge": most},
                 return_tensors="pt",
             )
         except (OSError, ValueError) as error:

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from agents.expert.course import Intent
@@ -15,11 +16,14 @@ from agents.vlm.agent import VLMAgent
 from agents.vlm.chat import Message, Picture
 from agents.vlm.clients.scripted import ScriptedClient
 from agents.vlm.matching import Matcher
+from agents.vlm.pictures import encode
 from agents.vlm.prompts import load_prompts, prompts_for
 from agents.vlm.settings import AgentSettings, Pictures, Prompts
+from agents.vlm.tuned_model import recorded_pictures
 from er_gym import EmbodiedEnv
 from er_gym.data.chat import Chat
 from er_gym.data.dialects import load_dialect
+from er_gym.data.pictures import encode_picture
 from er_gym.data.trajectory import Language, Subgoal, ThoughtRecord, Trajectory
 from er_gym.envs.actions import Action
 from er_gym.envs.solver import Solver
@@ -212,6 +216,16 @@ def test_an_action_that_no_object_allows_is_told_as_it_is_recorded(
     sent = told(env, played[0], settings("paper"), replies)
     [text] = sent[-1].parts
     assert "'open Bread' names no action" in str(text)  # as the environment answers
+
+
+def test_pictures_are_sent_as_a_collection_has_them() -> None:
+    collection = {"pictures": {"format": "jpeg", "quality": 80}, "env": {"width": 800}}
+    found = Pictures.model_validate(recorded_pictures(collection, 3_136, 50_000))
+    drawn = np.random.default_rng(0).integers(0, 256, (450, 800, 3), dtype=np.uint8)
+    assert encode(drawn, found).data == encode_picture(drawn, quality=80)
+    assert (found.model_bounds, found.width) == ((3_136, 50_000), 800)
+    with pytest.raises(ValueError, match="model_min_pixels 9 is more than model_max_pixels 8"):
+        Pictures(model_min_pixels=9, model_max_pixels=8)
 
 
 def test_settings_that_do_not_fit_a_dialect(tmp_path: Path) -> None:

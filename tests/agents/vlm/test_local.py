@@ -204,8 +204,10 @@ def test_tokens_of_pictures(
     assert both[1].usage.prompt - both[0].usage.prompt == tokens + 2
 
 
-def test_bounds_of_pictures_are_the_settings(client: Clients) -> None:
-    model = client(sampling={"max_tokens": 1}, pictures={"min_pixels": 784, "max_pixels": 7_840})
+@pytest.mark.parametrize("prefix", ["", "model_"])
+def test_bounds_of_pictures_are_the_settings(client: Clients, prefix: str) -> None:
+    bounds = {f"{prefix}min_pixels": 784, f"{prefix}max_pixels": 7_840}
+    model = client(sampling={"max_tokens": 1}, pictures=bounds)
     both = [model.reply([user("Look", *more)], 0) for more in ((), (picture(800, 450),))]
     assert both[1].usage.prompt - both[0].usage.prompt == 4 * 2 + 2
 
