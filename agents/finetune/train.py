@@ -14,7 +14,7 @@ import os
 import re
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -111,7 +111,7 @@ class Result:
 def train(
     settings: FinetuneSettings,
     model: Path,
-    data: Path,
+    data: Sequence[Path],
     out: Path,
     *,
     ignore_memory: bool = False,
@@ -123,7 +123,7 @@ def train(
     Args:
         settings: of the run.
         model: a model directory, or a finished run.
-        data: what is learnt from, see :func:`agents.finetune.samples.open_samples`.
+        data: what is learnt from, one after the other, see :func:`agents.finetune.samples.open_samples`.
         out: the run directory.
         ignore_memory: train although it will probably not fit into the memory.
         report: is told each time that something is logged.
@@ -144,7 +144,7 @@ def train(
         settings=settings_as_json(settings),
         model=str(files.path),
         model_digest=files.digest,
-        data=str(data.resolve()),
+        data=[str(path.resolve()) for path in data],
         data_digest=samples.digest,
         history=files.history,
         er_gym=er_gym.__version__,
@@ -189,7 +189,7 @@ def _train(
     encoder = Encoder(tokenizer, files.template, files.image_processor, image_token, settings.data)
     chats = [encoder.encode(chat) for chat in samples.chats]
     chats = [chat for chat in chats if chat.learnt_tokens]
-    check_lengths(chats, settings.data.max_length, manifest.data)
+    check_lengths(chats, settings.data.max_length, ", ".join(manifest.data))
     say(_about(chats, samples))
 
     # -- devices: as the launcher, DeepSpeed or FSDP wants them; on a GPU in bfloat16 --
@@ -238,9 +238,7 @@ def _train(
         ),
         run,
         settings.training.keep,
-        data_collator=Collator(
-            samples.folder, files.image_processor, image_token, settings.data, padding
-        ),
+        data_collator=Collator(files.image_processor, image_token, settings.data, padding),
         train_dataset=EncodedChats(chats),
     )
     trainer.accelerator.wait_for_everyone()

@@ -79,7 +79,7 @@ def dialect(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture(scope="session")
 def chats(played: Collection, dialect: str) -> tuple[Chat, ...]:
-    return open_samples(played.path, DataSettings(dialect=dialect)).chats
+    return open_samples([played.path], DataSettings(dialect=dialect)).chats
 
 
 @pytest.fixture(scope="session")

@@ -26,7 +26,7 @@ from agents.finetune.models import model_names
 from agents.finetune.printing import PROGRAMS, write_files
 from agents.finetune.printing.sources import open_source, released
 from agents.finetune.settings import FinetuneSettings, load_settings
-from benchmarks.cli.finetune_print import PRINTABLE, finetune_print
+from benchmarks.cli.finetune import PRINTABLE, finetune
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import Collection
 from er_gym.data.sharegpt_files import open_sharegpt
@@ -252,9 +252,9 @@ def test_the_command(collection: Collection, tmp_path: Path) -> None:
     assert tuple(PROGRAMS) == PRINTABLE
     given = ["--print", "trl", "--config", "stage1", "--set", "data.parts=[]", "--model"]
     rest = ["--data", str(collection.path), "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(finetune_print, [*given, "qwen3-vl-2b", *rest])
+    result = CliRunner().invoke(finetune, [*given, "qwen3-vl-2b", *rest])
     assert result.exit_code == 0, result.output
     names = [Path(line).name for line in result.output.splitlines()]
     assert names == ["README.md", "sft.yaml", "train.py", "train.sh", "zero3.json"]
-    again = CliRunner().invoke(finetune_print, [*given, "qwen3-vl-2b", *rest])
+    again = CliRunner().invoke(finetune, [*given, "qwen3-vl-2b", *rest])
     assert "is not empty; choose another output" in again.output
