@@ -19,6 +19,7 @@ import transformers
 from tokenizers import Regex, Tokenizer, decoders, models, pre_tokenizers, trainers
 
 from agents.finetune.architecture import BYTES, Architecture
+from agents.finetune.libraries import quiet_libraries
 
 PAD, BEGIN, END = "<|endoftext|>", "<|im_start|>", "<|im_end|>"
 FEEDBACK = "<|feedback|>"

@@ -12,8 +12,9 @@ from benchmarks.cli.options import Place, Words, overrides_option
 from benchmarks.cli.terminal import echo
 
 if TYPE_CHECKING:
+    from agents.finetune.loop import Progress
     from agents.finetune.settings import FinetuneSettings
-    from agents.finetune.train import Progress, Result
+    from agents.finetune.train import Result
 
 PRINTABLE = ("llama-factory", "ms-swift", "trl", "deepspeed")
 """As in ``agents.finetune.printing``, which is too slow to import for ``--help``; a test
@@ -33,8 +34,8 @@ compares."""
     required=True,
     type=Words(),
     metavar="DIR",
-    help="The model: a directory that save_pretrained wrote, or an earlier run; with --print also a "
-    "name, such as qwen2-vl-7b.",
+    help="The model: a directory that save_pretrained wrote, or an earlier run; for --print also a "
+    "name such as qwen2-vl-7b.",
 )
 @click.option(
     "--data",
