@@ -117,7 +117,7 @@ class Collator:
         count = sum(len(tokens) for tokens, _ in rows)
         batch: dict[str, Any] = {"input_ids": ids, "labels": labels, "tokens": count}
         pictures = [picture for chat in chats for picture in chat.pictures]
-        if pictures:
+        if pictures and self.image_token is not None:
             batch |= self._pixels(pictures)
             batch["mm_token_type_ids"] = ids.eq(self.image_token).int()
         return batch

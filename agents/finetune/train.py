@@ -363,13 +363,14 @@ def _load(files: ModelFiles, settings: FinetuneSettings, dtype: str) -> Any:
         else transformers.AutoModelForCausalLM
     )
     try:
-        network, told = maker.from_pretrained(
+        loaded: Any = maker.from_pretrained(
             files.base,
             dtype=getattr(torch, dtype),
             attn_implementation=settings.model.attention or None,
             local_files_only=True,
             output_loading_info=True,
         )
+        network, told = loaded  # a pair, for output_loading_info
         for adapter in adapter_chain(files.path)[1]:
             network = with_adapter(network, adapter, merge=True)
     except Exception as error:  # what broken files make of the libraries can be any exception
@@ -555,7 +556,7 @@ class _Trainer(transformers.Trainer):
             elif self.args.should_save:
                 network = self.accelerator.unwrap_model(self.model)
                 if isinstance(network, peft.PeftModel):
-                    network.save_pretrained(folder, save_embedding_layers=False)
+                    network.save_pretrained(str(folder), save_embedding_layers=False)
                 else:
                     network.config.use_cache = True
                     network.to(files.config.dtype or torch.float32).save_pretrained(folder)
