@@ -26,7 +26,7 @@ WRITER = "imported"
 _KIND_OF_TAG = {tag: kind for kind, tag in TAG_OF_KIND.items()}
 _TAGGED = re.compile(rf"<({'|'.join(_KIND_OF_TAG)})>(.*?)</\1>", re.DOTALL)
 _DECIDED = re.compile(rf"<{DECISION}>[^<>]*</{DECISION}>[\s.]*\Z")
-_SLOT = re.compile(r"(\{(?:picture|task|actions|action|feedback)\})")
+_SLOT = re.compile(r"(\{(?:picture|scene|task|actions|action|feedback)\})")
 _TASK = re.compile(
     r"\bTask\s*[:：]\s*(?:[\"“”'](.+?)[\"“”']\s*(?=\n|$|Available)|([^\n]+))", re.DOTALL
 )
@@ -69,7 +69,7 @@ def user_message(text: str, *, first: bool, shows: bool) -> UserMessage:
     Args:
         text: the message, with or without places of pictures.
         first: whether it is the first.
-        shows: whether it shows a picture.
+        shows: whether it shows a picture; True in a conversation without pictures.
     """
     bare = text.replace(IMAGE, "").strip()
     for language, name, pattern in _patterns():
