@@ -24,6 +24,7 @@ from benchmarks.cli.errors import (
     interrupted_by_sigterm,
     print_problem,
 )
+from benchmarks.cli.finetune_print import finetune_print
 from benchmarks.cli.inspect import inspect
 from benchmarks.cli.options import scorer_option
 from benchmarks.cli.player import player
@@ -91,6 +92,7 @@ cli.add_command(render)
 cli.add_command(play)
 cli.add_command(tasks)
 cli.add_command(train_rl)
+cli.add_command(finetune_print)
 cli.add_command(serve)
 cli.add_command(match_server)
 cli.add_command(inspect)
