@@ -26,7 +26,7 @@ WRITER = "imported"
 _KIND_OF_TAG = {tag: kind for kind, tag in TAG_OF_KIND.items()}
 _TAGGED = re.compile(rf"<({'|'.join(_KIND_OF_TAG)})>(.*?)</\1>", re.DOTALL)
 _DECIDED = re.compile(rf"<{DECISION}>[^<>]*</{DECISION}>[\s.]*\Z")
-_SLOT = re.compile(r"(\{(?:picture|task|actions|action|feedback)\})")
+_SLOT = re.compile(r"(\{(?:picture|scene|task|actions|action|feedback)\})")
 _TASK = re.compile(
     r"\bTask\s*[:：]\s*(?:[\"“”'](.+?)[\"“”']\s*(?=\n|$|Available)|([^\n]+))", re.DOTALL
 )
@@ -35,6 +35,8 @@ _BEGINS = r"(?:^|(?<=[\s.!?…。！？”\"']))"
 """Where a sentence of er-gym's own may begin: what a model thinks need not end in a full stop."""
 _BEGINS_SENTENCE = r"(?:^|(?<=[.!?…。！？\n])\s*)"
 _LONGEST_INSTRUCTION = 300
+_FEWEST_OWN = 20
+"""The fewest characters that a dialect's text has beside its slots, to be known by them."""
 
 
 class Heard(BaseModel):
@@ -69,7 +71,7 @@ def user_message(text: str, *, first: bool, shows: bool) -> UserMessage:
     Args:
         text: the message, with or without places of pictures.
         first: whether it is the first.
-        shows: whether it shows a picture.
+        shows: whether it shows a picture; True in a conversation without pictures.
     """
     bare = text.replace(IMAGE, "").strip()
     for language, name, pattern in _patterns():
@@ -83,7 +85,7 @@ def user_message(text: str, *, first: bool, shows: bool) -> UserMessage:
             )
     if first:
         task = _TASK.search(bare)
-        told = (task[1] or task[2]).strip() if task else " ".join(bare.split())
+        told = (task[1] or task[2]).strip() if task else bare.partition("\n")[0].strip()
         return UserMessage(task=told[:_LONGEST_INSTRUCTION])
     before, token, after = bare.partition(FEEDBACK_TOKEN)
     if token or not shows:
@@ -178,6 +180,8 @@ def _patterns() -> tuple[tuple[Language, str, re.Pattern[str]], ...]:
     for language, texts in _dialects():
         for name in ("first", "failed", "astray", "observed", "forward", "after"):
             text = getattr(texts, name).replace("{picture}", "").strip()
+            if len(_SLOT.sub("", text)) < _FEWEST_OWN:  # it would fit anything
+                continue
             found[language, name, text] = re.compile(_as_pattern(text), re.DOTALL)
     return tuple((language, name, each) for (language, name, _), each in found.items())
 

@@ -120,8 +120,9 @@ def trajectory_of(chat: Chat) -> Trajectory:
     """
     said = [turn for turn in chat.turns if turn.role != "system"]
     users, replies = said[::2], said[1::2]
+    blind = not chat.pictures
     heard = [
-        user_message(user.text, first=not index, shows=bool(user.pictures))
+        user_message(user.text, first=not index, shows=bool(user.pictures) or blind)
         for index, user in enumerate(users)
     ]
     language = heard[0].language or language_of("".join(reply.text for reply in replies))
