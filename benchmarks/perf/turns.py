@@ -3,7 +3,8 @@
     python -m benchmarks.perf.turns MODEL [--conversations 8 --turns 12 --set local.batch=4]
 
 The model answers the same conversations with ``local.reuse`` on and off, by turns, so that both see
-the same machine. What it says ends at ``--tokens``, so that models with random weights will do.
+the same machine. Where other programs keep the machine busy, compare the processor's seconds. What
+the model says ends at ``--tokens``, so that models with random weights will do.
 """
 
 from __future__ import annotations
@@ -51,6 +52,7 @@ def main(
     given = ("sampling.max_tokens=" + str(tokens), *overrides)
     settings = load_settings(agent_config, given, settings_file(f"hf:{model}"))
     seconds: dict[bool, list[float]] = {False: [], True: []}
+    busy: dict[bool, list[float]] = {False: [], True: []}
     replies: dict[bool, list[str]] = {False: [], True: []}
     for number in range(rounds):
         for reuse in (False, True) if number % 2 else (True, False):
@@ -58,21 +60,26 @@ def main(
             client = LocalClient(model, settings.model_copy(update={"local": local}))
             with closing(client):
                 _played(client, settings, 1, 2, size)  # the first request is slower
-                began = time.perf_counter()
+                began, before = time.perf_counter(), time.process_time()
                 replies[reuse] = list(_played(client, settings, conversations, turns, size))
                 seconds[reuse].append(time.perf_counter() - began)
+                busy[reuse].append(time.process_time() - before)
     decisions = conversations * turns
     for reuse, times in seconds.items():
         middle = statistics.median(times)
         each = ", ".join(f"{one:.1f}" for one in times)
         click.echo(
             f"reuse {'on ' if reuse else 'off'}: {decisions} replies in {middle:.1f} s ({each}): "
-            f"{decisions / middle:.2f} replies/s"
+            f"{decisions / middle:.2f} replies/s, {statistics.median(busy[reuse]):.1f} s of the "
+            "processor"
         )
     alike = sum(one == other for one, other in zip(*replies.values(), strict=True))
-    faster = statistics.median(seconds[False]) / statistics.median(seconds[True])
+    faster, lighter = (
+        statistics.median(times[False]) / statistics.median(times[True])
+        for times in (seconds, busy)
+    )
     click.echo(
-        f"{faster:.2f} times as fast; "
+        f"{faster:.2f} times as fast, {lighter:.2f} times by the processor's seconds; "
         f"{alike} of {decisions} replies are the same; {Path(model).name}"
     )
 
