@@ -24,6 +24,7 @@ PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["
 MAY_USE = {
     "er_gym": (),
     "er_gym/writing.py": ("charts",),
+    "er_gym/data/exports": ("data", "minari"),
     "agents": (),
     "agents/rl": ("rl",),
     "agents/vlm": ("vlm",),
@@ -32,6 +33,8 @@ MAY_USE = {
     "benchmarks": (),
     "benchmarks/scoring/charts.py": ("charts",),
     "benchmarks/scoring/curves.py": ("charts",),
+    "benchmarks/scoring/data_charts.py": ("charts",),
+    "benchmarks/scoring/drawing.py": ("charts",),
     "benchmarks/cli/inspect.py": ("inspect",),
     "benchmarks/inspect_secrets.py": ("inspect",),
     "benchmarks/inspect_task.py": ("inspect",),

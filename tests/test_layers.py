@@ -12,8 +12,9 @@ _BASE = {"er_gym.writing", "er_gym.locking", "er_gym.plugins"}
 _TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
 _ROLLOUT = {*_ENVS, "er_gym", "er_gym.rollout"}
-_AGENTS = {*_ROLLOUT, "agents"}
-_SCORING = {*_ROLLOUT, "benchmarks.scoring", "benchmarks.cli.terminal"}
+_DATA = {*_ROLLOUT, "er_gym.data"}
+_AGENTS = {*_DATA, "agents"}
+_SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.cli.terminal"}
 _COMMAND = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.cli"}
 _SCRIPTS = {*_COMMAND, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "benchmarks.pages"}
 ALLOWED = {
@@ -26,6 +27,7 @@ ALLOWED = {
     "er_gym.envs": _ENVS,
     "er_gym": _ENVS,
     "er_gym.rollout": _ROLLOUT,
+    "er_gym.data": _DATA,
     "agents": _AGENTS,
     "benchmarks.scoring": _SCORING,
     "benchmarks.cli.terminal": {*_ENVS, "benchmarks.cli.terminal"},

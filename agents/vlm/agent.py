@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture
+from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture, model_reply
 from agents.vlm.matching import Matcher
 from agents.vlm.parsing import ParsedReply, parse
 from agents.vlm.pictures import encode
@@ -22,7 +22,7 @@ from agents.vlm.record import (
 )
 from agents.vlm.settings import AgentSettings
 from er_gym.envs.actions import NO_ACTION, Action, applies
-from er_gym.rollout.agent import Decision, ModelReply
+from er_gym.rollout.agent import Decision
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import CONVERSATIONS, PICTURES
 from er_gym.tasks import verbs
@@ -98,15 +98,12 @@ class VLMAgent:
             )
         )
         thought = "\n".join(f"{each.kind}: {each.text}" for each in parsed.thoughts)
-        took = ModelReply(
-            model=reply.model,
-            seconds=reply.seconds,
-            prompt_tokens=reply.usage.prompt,
-            completion_tokens=reply.usage.completion,
-            cost=reply.cost,
-            cached=reply.from_cache,
-        )
-        return Decision(action or _unreadable_action(parsed, said), thought, took)
+        return Decision(action or _unreadable_action(parsed, said), thought, model_reply(reply))
+
+    @property
+    def rounds(self) -> Sequence[RoundRecord]:
+        """The replies of the episode so far, oldest first."""
+        return self._rounds
 
     # -- messages to the model -------------------------------------------------------------------
 

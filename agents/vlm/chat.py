@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, Protocol, TypeAlias
 
+from er_gym.rollout.agent import ModelReply
+
 Role = Literal["system", "user", "assistant"]
 
 
@@ -110,6 +112,18 @@ class Reply:
     model: str = ""
     seconds: float = 0.0
     from_cache: bool = False
+
+
+def model_reply(reply: Reply) -> ModelReply:
+    """What a reply cost, as decisions and trajectories state it."""
+    return ModelReply(
+        model=reply.model,
+        seconds=reply.seconds,
+        prompt_tokens=reply.usage.prompt,
+        completion_tokens=reply.usage.completion,
+        cost=reply.cost,
+        cached=reply.from_cache,
+    )
 
 
 class ModelError(Exception):

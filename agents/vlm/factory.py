@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
-import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agents import configs
-from agents.vlm.chat import Client
 from agents.vlm.clients.registry import agent_name_forms, is_model_agent, resolve_client
+from agents.vlm.clients.session import ModelSession
 from agents.vlm.record import without_secrets
-from agents.vlm.settings import AgentSettings, Prices
+from agents.vlm.settings import AgentSettings
 from er_gym.rollout.events import Cost
-from er_gym.rollout.run_directory import REPLIES, SERVER_EVENTS, SPENDING
 
 if TYPE_CHECKING:
     from agents.vlm.agent import VLMAgent
     from agents.vlm.clients.budget import Budget
-    from agents.vlm.clients.supervisor import ServerEvent
-    from er_gym.rollout.json_lines import JsonLines
 
 __all__ = [
     "AgentFactory",
@@ -83,34 +78,13 @@ class AgentFactory:
         from agents.vlm.matching import Matcher
         from agents.vlm.prompts import load_prompts
 
-        kind, opened = resolve_client(name)
+        resolve_client(name)  # a wrong name is told before a wrong prompt
         self.name, self.settings = name, settings
         self.prompts = load_prompts(settings.prompts)
         self._matcher = Matcher(settings.matching)
         self._matcher.prepare()
-        self._events: JsonLines | None = None
-        self._keeping = threading.Lock()
-        self._directory = directory
-        try:
-            from agents.vlm.clients.budget import Budget, Ledger
-            from agents.vlm.clients.supervisor import RequestSupervisor
-
-            asked = budget or Budget()
-            self.supervisor = RequestSupervisor(asked.max_minutes)
-            self._ledger = Ledger(asked, settings.prices if kind.priced else Prices())
-            client = kind.open(opened, settings, self._ledger, self.supervisor)
-            self.client: Client = client
-            if directory is not None:
-                from agents.vlm.clients.reply_cache import ReplyCache
-
-                self._ledger.open(directory / SPENDING)
-                self.supervisor.log_event = self._keep
-                self.client = ReplyCache(client, directory / REPLIES)
-        except ImportError as error:
-            raise ValueError(
-                f"agent {name} needs {error.name}, which is not installed: "
-                f"pip install '{kind.install}'"
-            ) from error
+        self._session = ModelSession(name, settings, directory, budget)
+        self.client, self.supervisor = self._session.client, self._session.supervisor
 
     def agent(self, seed: int) -> VLMAgent:
         """An agent for an episode."""
@@ -123,32 +97,11 @@ class AgentFactory:
     @property
     def cost(self) -> Cost | None:
         """The cost of the run so far; None without a directory."""
-        if self._directory is None:
-            return None
-        spent = self._ledger.spent
-        return Cost(
-            requests=spent.requests,
-            tokens=spent.usage.total,
-            cost=spent.cost,
-            estimated=spent.usage.estimated,
-        )
+        return self._session.cost
 
     def close(self) -> None:
         """Close the client, the ledger and the event log."""
-        self.client.close()
-        self._ledger.close()
-        if self._events is not None:
-            self._events.close()
-
-    def _keep(self, server_event: ServerEvent) -> None:
-        """Append an event to the log; the first event creates the file."""
-        from er_gym.rollout.json_lines import JsonLines
-
-        assert self._directory is not None
-        # A full disk is reported where it loses data that matters.
-        with contextlib.suppress(OSError, ValueError), self._keeping:
-            self._events = self._events or JsonLines(self._directory / SERVER_EVENTS)
-            self._events.add(server_event.model_dump_json())
+        self._session.close()
 
 
 def comparable_settings(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:

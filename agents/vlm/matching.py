@@ -18,10 +18,10 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from agents.vlm.name_embeddings import NameEmbeddings
-from agents.vlm.names_en import MODIFIERS, NAMES_EN
-from agents.vlm.names_zh import NAMES_ZH
 from agents.vlm.settings import Matching
-from agents.vlm.shared_names import SHARED_EN, SHARED_ZH
+from er_gym.data.names_en import MODIFIERS, NAMES_EN
+from er_gym.data.names_zh import NAMES_ZH
+from er_gym.data.shared_names import SHARED_EN, SHARED_ZH
 from er_gym.thor import OBJECT_TYPES
 
 MatchMethod: TypeAlias = Literal["exact", "alias", "fuzzy", "meaning", "none"]

@@ -10,8 +10,8 @@ from os.path import expanduser, isdir
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.vlm.names_en import NAMES_EN
-from agents.vlm.shared_names import SHARED_EN
+from er_gym.data.names_en import NAMES_EN
+from er_gym.data.shared_names import SHARED_EN
 from er_gym.thor import OBJECT_TYPES
 
 _REMEMBERED = 4096

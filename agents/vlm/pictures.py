@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from io import BytesIO
 from math import ceil, floor, sqrt
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from PIL import Image
 
 from agents.vlm.chat import Picture
 from agents.vlm.settings import Pictures
+from er_gym.data.pictures import encode_picture
 
 FACTOR = 28
 """Qwen2-VL and Qwen2.5-VL divide a picture into squares of this side, in pixels: one token each."""
@@ -66,10 +66,13 @@ def encode(rgb: NDArray[np.uint8], settings: Pictures) -> Picture:
         )
     height, width, _ = rgb.shape
     size = fitted(width, height, settings)
-    image = Image.fromarray(rgb)
-    if size != image.size:
-        image = image.resize(size, Image.Resampling.LANCZOS)
-    options: dict[str, Any] = {"quality": settings.quality} if settings.format == "jpeg" else {}
-    file = BytesIO()
-    image.save(file, settings.format, **options)
-    return Picture(file.getvalue(), f"image/{settings.format}", *size)
+    data = encode_picture(rgb, size, form=settings.format, quality=settings.quality)
+    return Picture(data, f"image/{settings.format}", *size)
+
+
+def within_bounds(picture: Picture, settings: Pictures) -> Picture:
+    """A picture, encoded anew if it has too many or too few pixels for the settings."""
+    if fitted(picture.width, picture.height, settings) == (picture.width, picture.height):
+        return picture
+    with Image.open(BytesIO(picture.data)) as image:
+        return encode(np.asarray(image.convert("RGB")), settings)

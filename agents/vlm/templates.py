@@ -7,15 +7,11 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-import traceback
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from agents.vlm.prompt_set import (
-    IMAGE,
-    IMAGE_MARK,
     THOUGHTS,
     Decide,
     LastAction,
@@ -23,20 +19,14 @@ from agents.vlm.prompt_set import (
     TurnContext,
     without_marks,
 )
+from agents.vlm.template_files import LARGEST, TemplateFiles
 from er_gym.tasks import verbs
 from er_gym.tasks.reading import parse_yaml, read_text
 from er_gym.tasks.suites import config_directory
 from er_gym.tasks.verbs import Verb
 
-if TYPE_CHECKING:
-    from agents.vlm.sandbox import BoundedEnvironment
-
 _TEMPLATES = ("system.jinja", "first.jinja", "next.jinja", "feedback.jinja")
 _ACTIONS = "actions.yaml"
-_LARGEST = 1 << 16
-"""The largest template, in bytes."""
-_LONGEST = 200_000
-"""The longest turn, in characters."""
 
 
 @dataclass(frozen=True)
@@ -52,17 +42,16 @@ class Templates:
     """Prompts from Jinja templates; a :class:`~agents.vlm.prompt_set.PromptSet`.
 
     Attributes:
-        files: the path of each template, by name.
+        files: the templates.
         actions: the actions that prompts list.
     """
 
     name: str
     digest: str
     about: str
-    files: Mapping[str, Path] = field(repr=False)
+    files: TemplateFiles = field(repr=False)
     actions: tuple[ActionRow, ...] = field(repr=False)
     after_observe: int | None = field(default=None, init=False)
-    environment: BoundedEnvironment = field(repr=False, compare=False)
 
     def system(self, *, decide: Decide, sees: Sees) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
@@ -81,42 +70,9 @@ class Templates:
         return self._render("feedback.jinja", problem=problem, decide=decide)
 
     def _render(self, template: str, *, pictures: int = 0, **variables: Any) -> str:
-        given = {
-            name: without_marks(value) if isinstance(value, str) else value
-            for name, value in variables.items()
-        }
-        self.environment.begin()
-        try:
-            text = self.environment.get_template(template).render(
-                **given, pictures=pictures, actions=self.actions, thoughts=THOUGHTS
-            )
-        except Exception as error:  # a template can raise anything
-            raise ValueError(
-                f"{self._place(error, template)}: {type(error).__name__}: "
-                f"{' '.join(str(error).split())}"
-            ) from None
-        text = text.strip()
-        if len(text) > _LONGEST:
-            raise ValueError(
-                f"{self.files[template]}: makes a turn of {len(text):,} characters; "
-                f"{_LONGEST:,} are allowed"
-            )
-        if text.count(IMAGE_MARK) != pictures:
-            raise ValueError(
-                f"{self.files[template]}: {IMAGE} occurs {text.count(IMAGE_MARK)} times, but "
-                f"{{{{ pictures }}}} is {pictures}; write it once for each picture"
-            )
-        return text
-
-    def _place(self, error: Exception, template: str) -> str:
-        """The file in which a template failed, with the line if it is known."""
-        places = {str(path) for path in self.files.values()}
-        lines = [
-            f"{frame.filename}:{frame.lineno}"
-            for frame in traceback.extract_tb(error.__traceback__)
-            if frame.filename in places
-        ]
-        return lines[-1] if lines else str(self.files[template])
+        return self.files.render(
+            template, pictures=pictures, actions=self.actions, thoughts=THOUGHTS, **variables
+        )
 
 
 def directory_of(profile: str, language: str) -> Path:
@@ -140,14 +96,11 @@ def directory_of(profile: str, language: str) -> Path:
 
 def load_templates(directory: Path) -> Templates:
     """Read the templates of a directory, and render each once as a check."""
-    files = {file.name: file for file in sorted(directory.glob("*.jinja"))}
-    missing = {*_TEMPLATES} - files.keys()
-    if missing:
-        raise ValueError(f"{directory} lacks {min(missing)}; copy it from another set of prompts")
+    files = TemplateFiles.read(directory, _TEMPLATES)
     listed = directory / _ACTIONS
-    sources = {file.name: read_text(file, _LARGEST) for file in (*files.values(), listed)}
-    actions = _rows(sources[_ACTIONS], listed, directory.name)
-    digest = hashlib.sha256(repr(sorted(sources.items())).encode())
+    stated = read_text(listed, LARGEST)
+    actions = _rows(stated, listed, directory.name)
+    digest = hashlib.sha256(repr(sorted([*files.sources.items(), (_ACTIONS, stated)])).encode())
     if verbs.ADDED:
         digest.update(repr(actions).encode())
     templates = Templates(
@@ -156,49 +109,9 @@ def load_templates(directory: Path) -> Templates:
         about=f"prompts of {directory}",
         files=files,
         actions=actions,
-        environment=_environment(files, sources),
     )
     _try_out(templates)
     return templates
-
-
-def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> BoundedEnvironment:
-    """The environment of templates that were read once, so that the digest fits what is
-    rendered."""
-    try:
-        from jinja2 import FunctionLoader, StrictUndefined, TemplateSyntaxError
-
-        from agents.vlm.sandbox import BoundedEnvironment
-    except ImportError as error:
-        raise ValueError(
-            f"prompts need {error.name}, which is not installed: pip install 'er-gym[vlm]'"
-        ) from error
-
-    def source(name: str) -> tuple[str, str, None] | None:
-        if name not in files:
-            return None
-        return without_marks(sources[name]).replace(IMAGE, IMAGE_MARK), str(files[name]), None
-
-    environment = BoundedEnvironment(
-        loader=FunctionLoader(source),
-        undefined=StrictUndefined,
-        autoescape=False,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    for name, file in files.items():
-        environment.begin()
-        try:
-            environment.get_template(name)
-        except TemplateSyntaxError as error:
-            problem = " ".join((error.message or "").split())
-            raise ValueError(f"{file}:{error.lineno}: not a valid template: {problem}") from None
-        except Exception as error:  # RecursionError, SyntaxError, OverflowError: nested too deeply
-            problem = " ".join(str(error).split())[:200]
-            raise ValueError(
-                f"{file}: not a valid template: {type(error).__name__}: {problem}"
-            ) from None
-    return environment
 
 
 def _rows(text: str, file: Path, language: str) -> tuple[ActionRow, ...]:

@@ -46,6 +46,7 @@ _WHOLE = {
     ("play",): ("--seed",),
     ("tasks", "show", "mini"): ("--limit",),
     ("tasks", "verify", "mini"): ("--workers",),
+    ("data", "verify", "../files/run-hostile"): ("--workers", "--limit", "--tasks-file"),
     GENERATE: ("--total", "--layouts", "--per-layout", "--seed", "--workers"),
     TRAIN: ("--seed",),
     SERVE: ("--port", "--context", "--pictures", "--gpus"),
@@ -53,6 +54,7 @@ _WHOLE = {
 }
 _REAL = ("", "x", "nan", "-inf", "inf", "1e999", "-1", "--1", HOSTILE)
 _REALS = {
+    MINI: ("--faults",),
     SPEAKS: ("--max-usd", "--max-minutes"),
     RENDER: ("--fov",),
     SERVE: ("--patience",),
@@ -61,6 +63,7 @@ _REALS = {
 _CHOICES = {
     MINI: (
         "--protocol",
+        "--faults",
         "--scorer",
         "--backend",
         "--instances",
@@ -121,6 +124,8 @@ def lines() -> Iterator[Line]:
         ("tasks", "nonsense"), ("player", HOSTILE), ("player", "install", "--python", "/nowhere"),
         ("player", "install", "--python", HOSTILE), ("inspect",), ("envs", "x"), ("suites", "x"),
         ("doctor", HOSTILE), ("play", "x"), ("tasks", "show"), ("tasks", "convert", "mini"),
+        ("data", "stats", HOSTILE), ("data", "verify", "../files"), ("data", "show", "../files"),
+        ("data", "show", "../files/run-hostile", "--trajectory", HOSTILE),
     ):  # fmt: skip
         yield Line(words)
     for options, values in ((_WHOLE, _WORDS), (_REALS, _REAL), (_CHOICES, ("", HOSTILE, "[/]"))):

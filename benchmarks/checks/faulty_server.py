@@ -27,9 +27,10 @@ class Exchange(BaseHTTPRequestHandler):
 
     protocol_version = "HTTP/1.1"
     faulty: FaultyServer
+    body: bytes
 
     def do_POST(self) -> None:
-        self.rfile.read(int(self.headers.get("Content-Length", 0)))
+        self.body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
         with self.faulty.lock:
             self.faulty.count += 1
             number = self.faulty.count

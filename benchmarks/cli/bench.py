@@ -23,6 +23,7 @@ from benchmarks.cli.options import (
     EXISTING_FILE,
     Place,
     Words,
+    faults_option,
     protocol_option,
     scorer_option,
     seed_option,
@@ -36,6 +37,7 @@ from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
 if TYPE_CHECKING:
     from benchmarks.cli.progress import Progress
     from benchmarks.cli.vlm_run import VLMRun
+    from er_gym.envs.faults import Faults
     from er_gym.rollout.events import Cost
     from er_gym.rollout.run_directory import Manifest, RunDirectory
     from er_gym.rollout.runner import RunSummary
@@ -73,6 +75,7 @@ _directory = Place(file_okay=False, path_type=Path)
     "--instances", help="Which object a type name means: target or explore.  [default: the suite's]"
 )
 @protocol_option
+@faults_option
 @scorer_option
 @with_vlm_options
 def bench(
@@ -90,6 +93,7 @@ def bench(
     trust: bool,
     instances: str | None,
     protocol: str,
+    faults: Faults | None,
     scorer: str,
     vlm_options: VLMOptions,
 ) -> int:
@@ -122,7 +126,15 @@ def bench(
         if trust and not agent.startswith(RL_PREFIX):
             raise BadInput(f"--trust is for trained policies, {RL_PREFIX}RUN, not for {agent}")
         env = _env_kwargs(
-            asked, agent, seed, vlm_run, protocol, trust, backend=backend, instances=instances
+            asked,
+            agent,
+            seed,
+            vlm_run,
+            protocol,
+            trust,
+            faults,
+            backend=backend,
+            instances=instances,
         )
         fitted = resolve_tasks(asked.tasks, env["backend"])
         aside = (*asked.set_aside, *fitted.set_aside)
@@ -271,6 +283,7 @@ def _env_kwargs(
     vlm_run: VLMRun | None,
     protocol: str,
     trust: bool,
+    faults: Faults | None,
     **given: str | None,
 ) -> dict[str, Any]:
     """The environment's arguments: the suite's, overridden by the options that were given, and the
@@ -287,6 +300,10 @@ def _env_kwargs(
     if protocol_named(protocol).chooses_instances:
         env.pop("instances", None)
     env |= {name: value for name, value in given.items() if value is not None}
+    if faults is not None:
+        env["faults"] = faults
+    if not env.get("faults", 0):  # likewise
+        env.pop("faults", None)
     if env["backend"] not in BACKENDS:
         raise ValueError(
             f"unknown backend {env['backend']!r}; choose one of: {', '.join(BACKENDS)}"
@@ -306,10 +323,9 @@ def _vlm_run(agent: str, vlm_options: VLMOptions) -> VLMRun | None:
 
     if is_model_agent(agent):
         return VLMRun.of(agent, vlm_options)
-    given = [name for name, value in vars(vlm_options).items() if value not in (None, ())]
-    if given:
-        option = "--set" if given[0] == "overrides" else f"--{given[0].replace('_', '-')}"
+    if vlm_options.given:
         raise BadInput(
-            f"{option} is for vision-language agents, such as openai:MODEL, not for {agent}"
+            f"{vlm_options.given[0]} is for vision-language agents, such as openai:MODEL, not for "
+            f"{agent}"
         )
     return None

@@ -14,6 +14,8 @@ from typing import NoReturn
 import click
 
 from benchmarks.cli.bench import bench
+from benchmarks.cli.collect import collect
+from benchmarks.cli.data import data
 from benchmarks.cli.doctor import doctor
 from benchmarks.cli.errors import (
     INTERRUPTED,
@@ -82,6 +84,7 @@ def cli(context: click.Context, version: bool) -> None:
 
 
 cli.add_command(bench)
+cli.add_command(collect)
 cli.add_command(player)
 cli.add_command(doctor)
 cli.add_command(render)
@@ -91,6 +94,7 @@ cli.add_command(train_rl)
 cli.add_command(serve)
 cli.add_command(match_server)
 cli.add_command(inspect)
+cli.add_command(data)
 
 
 @cli.command()

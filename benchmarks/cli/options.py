@@ -9,6 +9,8 @@ from typing import Any
 
 import click
 
+from benchmarks.cli.errors import BadInput
+
 SCORER_CHOICES = ("both", "paper", "corrected")
 """As in ``benchmarks.scoring.report``, which is too slow to import for ``--help``; a test
 compares."""
@@ -31,6 +33,30 @@ protocol_option = click.option(
     show_default=True,
     help="The rules of an episode; paper uses those of the paper's evaluation program, to compare "
     "results with its table.",
+)
+
+
+class FaultsType(click.ParamType):
+    """Rates of faults: ``0.1``, or ``navigate=0.2,open=0.1``."""
+
+    name = "RATES"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        from er_gym.envs.faults import parse_faults
+
+        if not isinstance(value, str):
+            return value
+        try:
+            return parse_faults(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+faults_option = click.option(
+    "--faults",
+    type=FaultsType(),
+    metavar="RATE | KIND=RATE,…",
+    help="Let actions go wrong at this rate, such as 0.1 or navigate=0.2,open=0.1.  [default: 0]",
 )
 
 _MOST_WORKERS = 256
@@ -86,6 +112,13 @@ def overrides_option(example: str) -> Any:
 def split(*lists: str | None) -> list[str]:
     """The words of comma-separated lists."""
     return [word.strip() for text in lists for word in (text or "").split(",") if word.strip()]
+
+
+def named(option: str, text: str | None) -> list[str]:
+    """The words of an option's comma-separated list; empty only if the option was not given."""
+    if text is not None and not split(text):
+        raise BadInput(f"{option} {text!r} names nothing; name one, or leave it out")
+    return split(text)
 
 
 class Place(click.Path):

@@ -1,4 +1,4 @@
-"""The options of ``er-gym bench`` for vision-language agents."""
+"""The options of ``er-gym bench`` and ``er-gym collect`` for models."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from benchmarks.cli.options import (
 
 @dataclass(frozen=True)
 class VLMOptions:
-    """The options of ``er-gym bench`` for vision-language agents."""
+    """The options for a model: its settings, its server, and what it may spend."""
 
     agent_config: str | None = None
     overrides: Sequence[str] = ()
@@ -31,6 +31,14 @@ class VLMOptions:
     max_usd: float | None = None
     max_tokens: int | None = None
     max_minutes: float | None = None
+
+    @property
+    def given(self) -> list[str]:
+        """The options that the command line names."""
+        fields = [name for name, value in vars(self).items() if value not in (None, ())]
+        return [
+            "--set" if name == "overrides" else f"--{name.replace('_', '-')}" for name in fields
+        ]
 
 
 _VLM_OPTIONS = (

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.vlm.clients.budget import Budget
+from agents.vlm.clients.session import ModelSession
 from agents.vlm.factory import AgentFactory, comparable_settings, load_settings
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import AgentSettings
@@ -68,6 +69,10 @@ class VLMRun:
     def factory(self, run: Path) -> AgentFactory:
         """What makes the agents of a run; it keeps replies and bills in the run directory."""
         return AgentFactory(self.name, self.settings, run, self.budget)
+
+    def session(self, run: Path) -> ModelSession:
+        """The model alone, for callers with prompts of their own."""
+        return ModelSession(self.name, self.settings, run, self.budget)
 
     def play(
         self,

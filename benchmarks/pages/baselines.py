@@ -328,7 +328,6 @@ about object types that training never names. Training tasks are a sample of tho
 was trained on.
 
 Times are from the start of training to its end, evaluations included, on {machine()}.
-`er-gym tasks generate --suite train` makes the suite `train` once, in about 3 minutes.
 
 {shown}
 

@@ -63,13 +63,11 @@ class Moment:
 
 
 class ActionHandler(Protocol):
-    """How actions are judged and carried out in one episode.
+    """How actions are judged and carried out in one episode."""
 
-    Attributes:
-        navigated_to: the id of the object last navigated to, ``""`` at first.
-    """
-
-    navigated_to: str
+    @property
+    def navigated_to(self) -> str:
+        """The id of the object last navigated to, ``""`` at first."""
 
     def available_objects(self, perception: Perception) -> AvailableObjects:
         """The objects that the agent can navigate to and interact with now."""

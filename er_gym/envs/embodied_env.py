@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 
 from er_gym.envs import object_selection
 from er_gym.envs.actions import ACTIONS, AnyAction
-from er_gym.envs.arguments import flag, number, one_of, short_repr, whole_number
+from er_gym.envs.arguments import flag, number, one_of, whole_number
 from er_gym.envs.episode import Episode, EpisodeSettings, ResetResult, StepResult
 from er_gym.envs.errors import ResetNeeded
+from er_gym.envs.faults import FaultPlan, Faults, fault_rates
 from er_gym.envs.observations import parse_obs_mode, sensors_of
 from er_gym.envs.perception import SENSORS
 from er_gym.envs.protocol import DEFAULT, protocol_named
+from er_gym.envs.reset_options import checked_options
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import TaskType
@@ -129,6 +131,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     - ``render_device``: the device that the embedded engine draws with, the same for all
       environments of a process: ``"cpu"``, or ``"gpu"`` on a machine that has one with EGL.
     - ``annotate``: write the object types into the pictures, as set-of-marks prompting does.
+    - ``faults``: the rate from 0 to 1 at which actions go wrong, or a rate for each kind, such as
+      ``{"navigate": 0.2, "open": 0.1}`` (:mod:`er_gym.envs.faults`).
 
     ## Version History
     - v0: the first version.
@@ -156,6 +160,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         annotate: bool = False,
         render_device: str = "cpu",
         render_mode: str | None = None,
+        faults: Faults = 0.0,
     ) -> None:
         EzPickle.__init__(
             self, episode_source, task_type=task_type, obs_mode=obs_mode, backend=backend,
@@ -163,6 +168,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             visibility_distance=visibility_distance, instances=instances, protocol=protocol,
             max_steps=max_steps, step_penalty=step_penalty, illegal_penalty=illegal_penalty,
             annotate=annotate, render_device=render_device, render_mode=render_mode,
+            faults=faults,
         )  # fmt: skip
         # Check every argument before anything is started.
         one_of("instances", instances, object_selection.POLICIES)
@@ -183,6 +189,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         step_penalty = number("step_penalty", step_penalty, 0)
         illegal_penalty = number("illegal_penalty", illegal_penalty, 0)
         max_steps = None if max_steps is None else whole_number("max_steps", max_steps, 1)
+        self.set_faults(faults)
         self._task_type: TaskType | None = None
         if task_type is not None:
             self._task_type = look_up_type(task_type)
@@ -239,10 +246,21 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                 on.
             gymnasium.error.Error: the seed is not a whole number of at least 0.
         """
-        checked = _checked({} if options is None else options)
+        checked = checked_options({} if options is None else options)
         with self._lock:
             super().reset(seed=seed)
-            return self._begin(self._choose(**checked))
+            task = self._choose(**checked)
+            return self._begin(task, self._faults_with(seed))
+
+    def set_faults(self, faults: Faults, *, seed: int | None = None) -> None:
+        """Set the faults of the episodes that ``reset`` begins from now on.
+
+        Args:
+            faults: see Arguments; ValueError if a rate is out of its range.
+            seed: chooses other faults for the same seeds of ``reset``.
+        """
+        seeds = () if seed is None else (whole_number("the seed of faults", seed, 0),)
+        self._faults = FaultPlan(fault_rates(faults), seeds)
 
     def step(self, action: AnyAction) -> StepResult:
         """Do an action: an index, an :class:`~er_gym.envs.actions.Action` or its text.
@@ -333,6 +351,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                 "random": (self._np_random, self._np_random_seed, self.action_space),
                 "no_episode": self._no_episode,
                 "episode": episode and (episode.task, self._actions_taken, episode.fingerprint),
+                "faults": (self._faults, episode and episode.faults),
             }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -342,9 +361,10 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             gymnasium.error.Error: the replay led elsewhere, as in another version of er-gym.
         """
         EzPickle.__setstate__(self, state)
+        self._faults, faults = state.get("faults", (self._faults, None))
         if state["episode"] is not None:
             task, actions, fingerprint = state["episode"]
-            self._begin(task)
+            self._begin(task, faults)
             episode = self._current("copying")
             for action in actions:
                 self._do(episode, action)
@@ -365,11 +385,18 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             raise ResetNeeded(f"{self._no_episode}: call reset() before {before}")
         return self._episode
 
-    def _begin(self, task: Task) -> ResetResult:
+    def _faults_with(self, seed: int | None) -> FaultPlan | None:
+        """The faults of an episode that is begun with this seed; None draws one."""
+        if not self._faults.rates:
+            return None
+        own = int(self.np_random.integers(2**63)) if seed is None else seed
+        return replace(self._faults, seed=(own, *self._faults.seed))
+
+    def _begin(self, task: Task, faults: FaultPlan | None) -> ResetResult:
         self._no_episode = _BROKEN_OFF  # until this has succeeded
         self._actions_taken = []
         controller = self._started_controller(task.scene)
-        self._episode = Episode(self._settings, task, controller, self._backend)
+        self._episode = Episode(self._settings, task, controller, self._backend, faults)
         answer = self._episode.begin()
         self._no_episode = ""
         return answer
@@ -414,24 +441,6 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         if scene not in (None, wanted.scene):
             raise ValueError(f"task {wanted.id} plays in {wanted.scene}, not in {scene}")
         return wanted
-
-
-def _checked(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    if not isinstance(options, Mapping):
-        raise ValueError(
-            f"options at reset are {short_repr(options)}; give a dictionary such as "
-            "{'scene': 'FloorPlan1'}"
-        )
-    unknown = sorted(short_repr(name) for name in options if name not in ("task", "scene", "suite"))
-    if unknown:
-        raise ValueError(f"unknown option {unknown[0]} at reset; there are: task, scene, suite")
-    for name, kinds in (("task", Task | str), ("scene", str)):
-        if not isinstance(options.get(name), kinds | None) or options.get(name) == "":
-            raise ValueError(
-                f"option {name!r} at reset is {short_repr(options[name])}; give a "
-                f"{'Task or its id' if name == 'task' else 'scene such as FloorPlan1'}"
-            )
-    return options
 
 
 def verification_env() -> EmbodiedEnv:

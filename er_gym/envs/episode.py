@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs import skills
-from er_gym.envs.action_handler import EpisodeSetup, Moment
+from er_gym.envs.action_handler import ActionHandler, EpisodeSetup, Moment
 from er_gym.envs.actions import Action, AnyAction
+from er_gym.envs.faults import FaultPlan, FaultyActionHandler
 from er_gym.envs.info import Info, LegalActions
 from er_gym.envs.legality import KnownTypes
 from er_gym.envs.observations import MAX_REPEATS, Memory, Observation, Situation, goal_row
@@ -75,9 +77,11 @@ class Episode:
         task: what is asked.
         controller: a controller in any scene; the episode resets it to the task's scene.
         backend: the name of the controller's backend.
+        faults: which actions go wrong; None for none.
 
     Attributes:
         task: what is asked.
+        faults: which actions go wrong; None for none.
         perception: what the agent perceived last.
         end_reason: why the episode is over, ``""`` while it is not.
     """
@@ -85,12 +89,20 @@ class Episode:
     perception: Perception
 
     def __init__(
-        self, settings: EpisodeSettings, task: Task, controller: Any, backend: str
+        self,
+        settings: EpisodeSettings,
+        task: Task,
+        controller: Any,
+        backend: str,
+        faults: FaultPlan | None = None,
     ) -> None:
         self.task = task
         self.end_reason = ""
+        self.faults = faults
         self._settings, self._protocol = settings, settings.protocol
         self._controller, self._backend = controller, backend
+        self._faulty: FaultyActionHandler | None = None
+        self._fault = ""
         self._progress = Progress.start(Criteria.of(task))
         self._known = KnownTypes(task.navigable_objects)
         self._steps = 1
@@ -105,9 +117,11 @@ class Episode:
         floor = skills.reachable(controller, (self._backend, task.scene, settings.grid_size))
         pose = self._protocol.start(bounds, floor)
         self._memory = Memory(pose, goal_row(task.instruction))
-        self._handler = self._protocol.action_handler(
+        self._handler: ActionHandler = self._protocol.action_handler(
             EpisodeSetup(task, controller, floor, pose, settings.grid_size, settings.instances)
         )
+        if self.faults is not None:
+            self._handler = self._faulty = self.faults.handler(self._handler, self._known)
         placed = skills.place(controller, pose)
         self._perceive(placed)
         feedback = "You look around the room."
@@ -137,6 +151,7 @@ class Episode:
 
     def step(self, understood: Action | None, text: str) -> StepResult:
         """Do an action that :meth:`understand` returned."""
+        self._fault = ""
         if understood is None:
             return self._not_understood(text)
         self._unknown_replies = 0
@@ -156,6 +171,7 @@ class Episode:
             object_id, outcome = self._handler.execute(
                 understood, Moment(self.perception, self._available, self._progress.left)
             )
+            self._fault = "" if self._faulty is None else self._faulty.fault
         self._memory.act(understood, outcome.success)
         self._perceive(outcome)
         reward = self._judge(understood, outcome, object_id) - self._settings.step_penalty
@@ -252,14 +268,20 @@ class Episode:
                 name: None if view.frame is None else np.array(self.picture(view))
                 for name, view in views.items()
             }
-        obs = self._observation(feedback, success, info)
+        obs = self._observation(feedback, success, info, views or {})
         return obs, reward, terminated, truncated, cast(dict[str, Any], info)
 
     def picture(self, perception: Perception) -> NDArray[np.uint8] | None:
         """The frame, annotated with object types if the environment asks for it."""
         return perception.annotated if self._settings.annotate else perception.frame
 
-    def _observation(self, feedback: str, success: bool, info: Info) -> dict[str, Any]:
+    def _observation(
+        self,
+        feedback: str,
+        success: bool,
+        info: Info,
+        views: Mapping[str, Perception] = MappingProxyType({}),
+    ) -> dict[str, Any]:
         """Build the observation, and add to ``info`` what explains it."""
         situation = Situation(
             perception=self.perception,
@@ -273,6 +295,7 @@ class Episode:
             steps=self._steps,
             max_steps=self._step_limit,
             annotate=self._settings.annotate,
+            views=views,
         )
         for kind in self._settings.observations.values():
             cast(dict[str, Any], info).update(kind.info(situation))
@@ -282,7 +305,7 @@ class Episode:
         self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
     ) -> Info:
         mask = self.action_mask()
-        return {
+        info: Info = {
             "task": self.task,
             "action": action,
             "action_text": text,
@@ -303,6 +326,9 @@ class Episode:
             "max_steps": self._step_limit,
             "end_reason": self.end_reason,
         }
+        if self._faulty is not None:
+            info["fault"] = self._fault
+        return info
 
 
 def _feedback(action: Action, outcome: skills.Outcome) -> str:

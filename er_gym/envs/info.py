@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs.actions import ACTIONS, INDEX, Action, parse
+from er_gym.envs.object_view import ObjectView
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.task import KeyAction, Task
 
@@ -105,9 +106,17 @@ class Info(_Always, total=False):
 
     end_appended: bool
     """After ``step``: whether the paper's protocol appended an ``end`` to the episode."""
+    fault: str
+    """In an environment with faults: the kind of fault that was injected into the action, ``""``
+    for none (:mod:`er_gym.envs.faults`). It is for records: an agent should not read it."""
     views: dict[str, NDArray[np.uint8] | None]
     """After ``observe``: the picture of each view by its direction, (height, width, 3) uint8; None
     where none is drawn."""
+    object_views: tuple[ObjectView, ...]
+    """With the observation ``objects``: the objects in view without the held one and the floor,
+    nearest first."""
+    object_views_around: dict[str, tuple[ObjectView, ...]]
+    """With the observation ``objects``, after ``observe``: the same for each direction."""
     instance_ids: tuple[str, ...]
     """With the observation ``instance``: the object id for each of its numbers, ``""`` for 0 and
     for what is not in the picture."""

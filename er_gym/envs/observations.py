@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from er_gym.envs.actions import Action
 from er_gym.envs.arguments import short_repr
 from er_gym.envs.legality import AvailableObjects, KnownTypes
+from er_gym.envs.object_view import FEATURES as OBJECT_FEATURES
+from er_gym.envs.object_view import object_features
 from er_gym.envs.perception import SENSORS, Perception
 from er_gym.plugins import PluginError, Registry, is_dotted
 from er_gym.tasks import verbs
@@ -163,6 +165,7 @@ class Situation:
     Attributes:
         at: index of the type last navigated to, None before that.
         annotate: whether object types are written into pictures.
+        views: after ``observe``, what the agent perceived in each direction.
     """
 
     perception: Perception
@@ -176,6 +179,7 @@ class Situation:
     steps: int
     max_steps: int
     annotate: bool = False
+    views: Mapping[str, Perception] = field(default_factory=dict)
 
     @property
     def picture(self) -> NDArray[np.uint8] | None:
@@ -325,6 +329,14 @@ def _instance_ids(situation: Situation) -> dict[str, Any]:
     return {"instance_ids": tuple(ids)}
 
 
+def _object_views(situation: Situation) -> dict[str, Any]:
+    around = {name: view.object_views for name, view in situation.views.items()}
+    return {
+        "object_views": situation.perception.object_views,
+        **({"object_views_around": around} if around else {}),
+    }
+
+
 def _nothing_to_tell(situation: Situation) -> Mapping[str, Any]:
     return {}
 
@@ -387,6 +399,13 @@ OBSERVATIONS: Registry[Observation] = Registry(
             _instance,
             needs=("instances",),
             info=_instance_ids,
+        ),
+        "objects": Observation(
+            lambda width, height: spaces.Box(
+                -1.0, 1.0, (len(TYPES), len(OBJECT_FEATURES)), np.float32
+            ),
+            lambda situation: object_features(situation.perception),
+            info=_object_views,
         ),
         "state": Observation(
             lambda width, height: spaces.Box(-1.0, 1.0, (len(STATE_LAYOUT),), np.float32), _state

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs.annotate import annotated
+from er_gym.envs.object_view import ObjectView, views_of_objects
 from er_gym.tasks.task import AgentPose
 from er_gym.thor.objects import TYPES, ObjectTable, objects_of
 
@@ -80,6 +81,11 @@ class Perception:
     def visible_names(self) -> tuple[str, ...]:
         """The names of the visible object types, in alphabetical order."""
         return type_names(self.visible_types)
+
+    @cached_property
+    def object_views(self) -> tuple[ObjectView, ...]:
+        """The objects in view without the held one and the floor, nearest first."""
+        return views_of_objects(self)
 
     @property
     def held_name(self) -> str:

@@ -205,6 +205,14 @@ class RunDirectory:
         write_atomic(path, told.model_dump_json(indent=1) + "\n")
         return path
 
+    def has(self, task_id: str) -> bool:
+        """Whether there is a record of a task's episode, crashed or not; it is written last."""
+        return self._file(task_id).is_file()
+
+    def forget(self, task_id: str) -> None:
+        """Remove the record of a task's episode, so that the task is played again."""
+        self._file(task_id).unlink(missing_ok=True)
+
     def attach(
         self, task_id: str, attachments: Mapping[str, bytes], folders: Sequence[str]
     ) -> None:

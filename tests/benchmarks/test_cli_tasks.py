@@ -20,7 +20,7 @@ import pytest
 from PIL import Image
 from support import run_python, with_ids
 
-from er_gym.tasks import TASK_TYPES, Task, TaskFileError, load_suite, suite_from_file
+from er_gym.tasks import TASK_TYPES, Task, TaskFileError, load_suite, suite_from_file, suites
 from er_gym.tasks.describe import describe
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.jsonl_format import digest, read_tasks, write_tasks
@@ -136,7 +136,11 @@ def test_limits_are_given_as_ranges(er_gym: Command, tmp_path: Path) -> None:
     assert "distractors" not in header  # what says nothing is not told
 
 
-def test_a_suite_that_is_made_is_found_afterwards(er_gym: Command, tmp_path: Path) -> None:
+def test_a_suite_that_is_made_is_found_afterwards(
+    er_gym: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As if train did not come with er-gym.
+    monkeypatch.setattr(suites, "_DATA", suites._DATA.with_name("nothing"))
     with pytest.raises(TaskFileError, match="run: er-gym tasks generate --suite train") as caught:
         load_suite("train")
     assert str(tmp_path / "home" / "suites") in str(caught.value)
@@ -161,7 +165,7 @@ def test_a_suite_that_is_made_is_found_afterwards(er_gym: Command, tmp_path: Pat
     assert {(task.scene, task.type.name) for task in suite.tasks} == {
         ("FloorPlan5", "single_pickup")
     }
-    assert suite.env == load_suite("er-1k").env
+    assert suite.env == suites.suite_config("er-1k").env
     card = file.with_name("train.md").read_text(encoding="utf-8")
     assert "\n# train\n\nGenerated tasks." in card  # not what the suite says
     (command,) = [line for line in card.splitlines() if line.startswith("er-gym tasks generate")]

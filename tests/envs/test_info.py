@@ -34,7 +34,10 @@ def infos(env: EmbodiedEnv, task: Task) -> Iterator[tuple[dict[str, Any], dict[s
 
 def test_info_has_the_documented_entries_and_no_others(env: EmbodiedEnv) -> None:
     always = Info.__required_keys__
-    assert set(get_type_hints(Info)) == always | {"end_appended", "views", "instance_ids"}
+    assert set(get_type_hints(Info)) == always | {
+        *("end_appended", "fault", "views"),
+        *("object_views", "object_views_around", "instance_ids"),
+    }
     _, info = env.reset(seed=0, options={"task": TASKS[0]})
     assert info.keys() == always
     assert env.step("dance")[-1].keys() == always | {"end_appended"}

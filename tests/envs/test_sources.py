@@ -19,7 +19,7 @@ from er_gym.envs.embodied_env import EmbodiedEnv, verification_env
 from er_gym.envs.generated_source import TRAINING, GeneratedSource
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.rollout.verification import make_verifier
-from er_gym.tasks import TASK_TYPES, Task, TaskType, jsonl_format, load_suite, paper_format
+from er_gym.tasks import TASK_TYPES, Task, TaskType, jsonl_format, load_suite, paper_format, suites
 from er_gym.tasks.splits import TRAINING_SCENES, UNSEEN_TYPES, subject_types
 from er_gym.tasks.suite_spec import SuiteSpec
 
@@ -212,6 +212,7 @@ def test_a_source_that_is_not_there_is_told_at_once(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("ER_GYM_HOME", str(tmp_path))
+    monkeypatch.setattr(suites, "_DATA", tmp_path)  # as if no suite came with er-gym
     with pytest.raises(ValueError, match=message):
         EmbodiedEnv(source)
 

@@ -112,7 +112,7 @@ def test_a_seed_gives_the_same_bytes_in_any_process() -> None:
     [
         (
             {"obs_mode": "rgb+smell"},
-            "unknown obs_mode 'rgb\\+smell'.*rgb, depth, instance, state, text",
+            "unknown obs_mode 'rgb\\+smell'.*rgb, depth, instance, objects, state, text",
         ),
         ({"instances": "any"}, "unknown instances 'any'.*target, explore"),
         ({"render_mode": "human"}, r"unknown render_mode 'human'.*rgb_array"),

@@ -18,6 +18,7 @@ from er_gym.tasks import (
     TaskFileError,
     load_suite,
     suite_from_file,
+    suites,
     task_type,
     verbs,
 )
@@ -143,6 +144,7 @@ def test_a_suite_that_is_not_made_says_how_to_make_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ER_GYM_HOME", str(tmp_path))
+    monkeypatch.setattr(suites, "_DATA", tmp_path)  # as if it did not come with er-gym
     with pytest.raises(TaskFileError, match="run: er-gym tasks generate --suite train"):
         load_suite("train")
     (tmp_path / "suites").mkdir()

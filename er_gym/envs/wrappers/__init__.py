@@ -1,4 +1,4 @@
-"""Wrappers for learning: the instruction as a vector, and a reward that tells more.
+"""Wrappers: the instruction as a vector, a reward that tells more, and actions that go wrong.
 
 ::
 
@@ -10,7 +10,8 @@ Nothing heavy is imported before an encoder that needs it is made.
 """
 
 from er_gym.envs.wrappers.encoders import Encoder, make_encoder
+from er_gym.envs.wrappers.faults import FaultInjection
 from er_gym.envs.wrappers.instruction import InstructionEmbedding
 from er_gym.envs.wrappers.shaping import KeyActionShaping
 
-__all__ = ["Encoder", "InstructionEmbedding", "KeyActionShaping", "make_encoder"]
+__all__ = ["Encoder", "FaultInjection", "InstructionEmbedding", "KeyActionShaping", "make_encoder"]

@@ -14,10 +14,10 @@ from support import NO_MODELS, in_one_test
 
 from agents.vlm import matching
 from agents.vlm.matching import Match, Matcher
-from agents.vlm.names_en import NAMES_EN
-from agents.vlm.names_zh import NAMES_ZH
 from agents.vlm.settings import Matching
-from agents.vlm.shared_names import SHARED_EN, SHARED_ZH
+from er_gym.data.names_en import NAMES_EN
+from er_gym.data.names_zh import NAMES_ZH
+from er_gym.data.shared_names import SHARED_EN, SHARED_ZH
 from er_gym.thor import OBJECT_TYPES
 
 pytest.importorskip("rapidfuzz", reason="needs RapidFuzz: pip install 'er-gym[vlm]'")

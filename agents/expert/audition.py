@@ -1,0 +1,117 @@
+"""Auditions: candidates are played without pictures and thoughts, to see which will be taken.
+
+Two thirds of the candidates are not taken: their object was in view from the beginning, nothing
+went wrong, the explorer did not find it. An audition costs a tenth of an episode with pictures. An
+episode comes out the same as its audition, since both have the same seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import groupby
+from typing import Any
+
+from agents.expert.acceptance import PlayedCourse, rejection
+from agents.expert.candidates import Candidate
+from agents.expert.corrections import beginning_of
+from agents.expert.silent import SilentAgent
+from agents.expert.thought_kinds import ThoughtKinds
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.rollout.play import episode_seed, play_episode
+from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.worker_pool import LostJob, run_jobs
+
+ATTEMPT = "attempt"
+"""What corrections name as the run of an episode that was only attempted."""
+_MOST_AT_ONCE = 60
+"""A job has at most this many candidates, so that a worker that dies loses little."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What came of an audition.
+
+    Attributes:
+        candidate: the candidate; a correction has the beginning that it corrects now.
+        reason: why it would not be taken, ``""`` if it will be.
+    """
+
+    candidate: Candidate
+    reason: str = ""
+
+
+def audition(
+    candidates: Sequence[Candidate],
+    *,
+    env: Mapping[str, Any],
+    seed: int,
+    kinds: ThoughtKinds,
+    most_actions: int,
+    workers: int,
+) -> Iterator[Verdict]:
+    """Play candidates silently in worker processes; yields the verdicts as they come.
+
+    Args:
+        candidates: of one part.
+        env: keyword arguments of the part's environment, without ``obs_mode``.
+        seed: the run's, from which an episode's seed is derived.
+        kinds: draws how tasks end.
+        most_actions: longer trajectories are not taken.
+        workers: the number of processes.
+
+    Raises:
+        WorkerSetupError: the environment cannot be made.
+    """
+    make = partial(_Auditions, dict(env), seed, kinds, most_actions)
+    with closing(run_jobs(make, [*_jobs(candidates)], workers=workers)) as results:
+        for job, result in results:
+            if isinstance(result, LostJob):
+                yield from (Verdict(each, "its audition crashed") for each in job)
+            else:
+                yield from result
+
+
+def _jobs(candidates: Iterable[Candidate]) -> Iterator[tuple[Candidate, ...]]:
+    """Candidates of one room each, so that only one worker warms the room up."""
+    ordered = sorted(candidates, key=lambda each: (each.task.scene, each.id))
+    for _, group in groupby(ordered, key=lambda each: each.task.scene):
+        together = tuple(group)
+        for first in range(0, len(together), _MOST_AT_ONCE):
+            yield together[first : first + _MOST_AT_ONCE]
+
+
+class _Auditions:
+    """Plays the candidates of a job in one environment."""
+
+    def __init__(
+        self, env: dict[str, Any], seed: int, kinds: ThoughtKinds, most_actions: int
+    ) -> None:
+        self._env = EmbodiedEnv((), **{**env, "obs_mode": SilentAgent.obs_mode})
+        self._seed, self._kinds, self._most = seed, kinds, most_actions
+
+    def __call__(self, job: Sequence[Candidate]) -> list[Verdict]:
+        return [self._verdict(each) for each in job]
+
+    def _verdict(self, candidate: Candidate) -> Verdict:
+        if candidate.actor == "corrector" and candidate.beginning is None:
+            beginning = beginning_of(self._play(candidate))
+            if beginning.problem:
+                return Verdict(candidate, f"attempt: {beginning.problem}")
+            candidate = replace(
+                candidate, beginning=beginning, run=ATTEMPT, episode=candidate.id, strength=None
+            )
+        episode = self._play(candidate)
+        course = PlayedCourse.of_episode(episode, candidate.kind, candidate.mode)
+        return Verdict(candidate, rejection(course, self._most))
+
+    def _play(self, candidate: Candidate) -> EpisodeRecord:
+        seed = episode_seed(self._seed, candidate.id)
+        agent = SilentAgent(candidate.course(seed, self._kinds))
+        return play_episode(self._env, agent, candidate.played_task, seed)
+
+    def close(self) -> None:
+        """Close the environment."""
+        self._env.close()

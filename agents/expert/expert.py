@@ -1,0 +1,213 @@
+"""The expert's course: it knows where things are, and searches as if it did not."""
+
+from __future__ import annotations
+
+from random import Random
+
+from agents.expert.course import Intent
+from agents.expert.legs import Leg
+from agents.expert.places import (
+    DrawnPlaces,
+    PlaceChooser,
+    candidates,
+    draw_places,
+    plan_of,
+)
+from agents.expert.task_course import GiveUp, Intents, TaskCourse
+from agents.expert.thought_kinds import Check
+from agents.scripted.searcher import search_priors
+from er_gym.data.trajectory import Purpose
+from er_gym.envs.actions import Action
+from er_gym.tasks import verbs
+from er_gym.tasks.task import Task
+
+_MOST_WRONG = 3
+"""After this many wrong places the expert looks around, then goes to the right one."""
+
+
+class ExpertCourse(TaskCourse):
+    """Follows a plan of places in which the right one has its index by the mode.
+
+    As in the paper (arXiv 2503.21696): the first search follows the mode; each later search has as
+    many places, the right one at a random index. Wrong places are plausible ones. If the right
+    place is not known when its turn comes, the expert looks around. In kind ``b`` the course is the
+    key actions and nothing else; where that is impossible it is given up.
+
+    Args:
+        task: the task.
+        kind: ``a``, ``b`` or ``c``, for the later searches.
+        mode: the first plan (:data:`agents.expert.kinds.MODES`).
+        random: draws places.
+        check: how the task ends.
+        retries, repeats: see :class:`~agents.expert.task_course.TaskCourse`.
+        strict: whether kind ``b`` is given up where it needs more than the key actions.
+        places: chooses the wrong places.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        kind: str,
+        mode: str,
+        random: Random,
+        *,
+        check: Check = "",
+        retries: int = 0,
+        repeats: float = 0.0,
+        strict: bool | None = None,
+        places: PlaceChooser = DrawnPlaces(),  # noqa: B008 (has no state)
+    ) -> None:
+        super().__init__(
+            task,
+            random,
+            check=check,
+            retries=retries,
+            repeats=repeats,
+            strict=kind == "b" if strict is None else strict,
+        )
+        self._kind, self._mode, self._places = kind, mode, places
+        self._searches = 0
+
+    def _find(self, leg: Leg) -> Intents:
+        if leg.hidden:
+            return (yield from self._search(leg))
+        purpose = "carry" if self.view.held else "approach"
+        for _ in range(2):
+            place = self._known(leg.place)
+            if place:
+                yield from self._go(place, "carry" if purpose == "carry" else "approach")
+                return True
+            yield from self._show_place(leg, ())
+        raise GiveUp
+
+    def _search(self, leg: Leg) -> Intents:
+        """Go through the plan until the right place is reached."""
+        plan = self._plan(leg)
+        wrong: list[str] = []
+        for number, place in enumerate(plan):
+            right = self._known(leg.place)
+            if place == leg.place or self._in_view(leg.thing) or len(wrong) >= _MOST_WRONG:
+                break
+            rest = tuple(right if each == leg.place and right else each for each in plan[number:])
+            wrong.append(place)
+            if place in self.view.navigable and (yield from self._visit(place, leg, rest)):
+                if any(key.verb == verbs.OPEN for key in leg.actions):
+                    raise GiveUp  # the task is about another object of the type
+                break
+        place = self._known(leg.place)
+        if not place:
+            yield from self._show_place(leg, tuple(wrong))
+            place = self._known(leg.place)
+        if not place:
+            raise GiveUp
+        if self._in_view(leg.thing):
+            return (yield from self._go(place, "approach"))
+        left = [each for each in plan if each not in wrong and each != leg.place]
+        return (yield from self._go(place, "search", (place, *left)))
+
+    def _plan(self, leg: Leg) -> list[str]:
+        self._searches += 1
+        if self._kind == "b":
+            mode = self._mode if self._searches == 1 else "1"
+        elif self._searches == 1:
+            if self._in_view(leg.thing) and "0" in self._mode:
+                raise GiveUp  # nobody searches elsewhere for what is in view
+            mode = self._mode
+        else:
+            wrong = len(self._mode) - 1
+            index = self._random.randint(0, wrong)
+            mode = "0" * index + "1" + "0" * (wrong - index)
+        plausible = candidates(leg.thing, self.view.navigable, without=[leg.place])
+        wrong_places = self._places.choose(leg.thing, plausible, mode.count("0"), self._random)
+        return plan_of(mode, leg.place, wrong_places)
+
+    def _show_place(self, leg: Leg, visited: tuple[str, ...]) -> Intents:
+        """Look around, and once more from another place, until the right place is known."""
+        if self._strict:
+            raise GiveUp
+        yield from self._look_around()
+        if self._known(leg.place):
+            return True
+        others = candidates(leg.thing, self.view.navigable, without=[leg.place, *visited])
+        for place in draw_places(others, 1, self._random, temperature=0.0):
+            yield from self._visit(place, leg, (place,))
+            if not self._known(leg.place):
+                yield from self._look_around()
+        return bool(self._known(leg.place))
+
+
+class CorrectedCourse(ExpertCourse):
+    """Repeats the beginning of a failed episode up to its first wrong action, then does it rightly.
+
+    Args:
+        task: the task.
+        beginning: the actions, the first wrong one last.
+        random, check: see :class:`ExpertCourse`.
+    """
+
+    def __init__(
+        self, task: Task, beginning: tuple[Action, ...], random: Random, check: Check = ""
+    ) -> None:
+        super().__init__(task, "corrected", "1", random, check=check, strict=False)
+        self._beginning = beginning
+
+    def _prelude(self) -> Intents:
+        done = self.view.done
+        for action in self._beginning:
+            done = self.view.done
+            yield self._replayed(action)
+        if self.view.done > done:
+            raise GiveUp  # nothing is wrong here: a fault made the action fail in the episode
+        yield from self._free_hand()
+        return True
+
+    def _replayed(self, action: Action) -> Intent:
+        """The intent that a replayed action seems to have."""
+        leg = next(
+            (one for one in self._legs if any(key in self.view.left for key in one.actions)),
+            self._legs[-1],
+        )
+        self._subgoal = leg.subgoal
+        purpose = replayed_purpose(action, self.view.held)
+        if purpose == "search" and self._in_view(leg.thing):
+            purpose = "approach"
+        return Intent(
+            action,
+            purpose,
+            self._subgoal,
+            plan=(action.object_type,) if action.verb == verbs.NAVIGATE else (),
+            train=False,
+        )
+
+    def _free_hand(self) -> Intents:
+        """Put down what the wrong action took."""
+        wanted = {key.actual_type for key in self._task.key_actions if key.verb == verbs.PICKUP}
+        held = self.view.held
+        if not held or held in wanted:
+            return True
+        receptacles = (name for name in self.view.reach if search_priors.has(name, "receptacle"))
+        for place in sorted(receptacles):
+            down = Intent(Action(verbs.PUT, place), "put down", self._subgoal)
+            if down.action in self.view.legal and (yield from self._do(down)):
+                return True
+        raise GiveUp
+
+
+def replayed_purpose(action: Action, held: str) -> Purpose:
+    """Why somebody may have taken an action, given the type of the held object."""
+    if action.verb == verbs.NAVIGATE:
+        return "carry" if held else "search"
+    if action.verb == verbs.OPEN:
+        return "open to put" if held else "open to look"
+    return _PURPOSES.get(action.verb, "use")
+
+
+_PURPOSES: dict[str, Purpose] = {
+    verbs.PICKUP: "take",
+    verbs.PUT: "put",
+    verbs.TOGGLE: "switch",
+    verbs.CLOSE: "close again",
+    verbs.OBSERVE: "look around",
+    verbs.MOVE_FORWARD: "get closer",
+    verbs.END: "finish",
+}

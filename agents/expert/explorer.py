@@ -1,0 +1,184 @@
+"""An explorer's course: it does not know where things are, and searches likely places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, radians
+from random import Random
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from agents.expert.course import Intent
+from agents.expert.legs import Leg
+from agents.expert.places import candidates, draw_places
+from agents.expert.task_course import GiveUp, Intents, TaskCourse
+from agents.expert.thought_kinds import Check
+from er_gym.envs.actions import Action
+from er_gym.envs.object_view import ObjectView
+from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import same_type
+from er_gym.tasks.task import KeyAction, Task
+
+_SHOWN = 2
+"""How many places a plan names."""
+_LOOKS = 2
+"""How often an explorer looks around in one search."""
+_LOSES_HEART = 0.5
+"""The share of careless explorers that end the episode after a place that does not fit."""
+
+
+class Strength(BaseModel):
+    """How well an explorer plays.
+
+    Attributes:
+        share: of the trajectories that explorers of this strength play.
+        temperature: 0 goes to the likeliest place first; larger is more random.
+        forgets: the share of places visited that it may visit again.
+        blunders: the share of searches and actions at which it does something wrong: it goes to an
+            unlikely place, takes another object, forgets to open a container, or ends too early.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    share: float = Field(default=1.0, ge=0, allow_inf_nan=False)
+    temperature: float = Field(default=1.0, ge=0, allow_inf_nan=False)
+    forgets: float = Field(default=0.0, ge=0, le=1)
+    blunders: float = Field(default=0.0, ge=0, le=1)
+
+
+class ExplorerCourse(TaskCourse):
+    """Searches places by their likelihood until the object is in view.
+
+    It knows what is to be done, but not where things are.
+
+    Args:
+        task: the task.
+        strength: how well it plays.
+        random: draws places and blunders.
+        check: how the task ends.
+        must_search: whether the episode ends at once if the first thing to be searched for is in
+            view from the beginning, since nothing is explored then.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        strength: Strength,
+        random: Random,
+        check: Check = "",
+        *,
+        must_search: bool = False,
+    ) -> None:
+        super().__init__(task, random, check=check)
+        self._strength, self._must_search = strength, must_search
+
+    def _find(self, leg: Leg) -> Intents:
+        tried: list[str] = []
+        looks = 0
+        if leg.hidden and self._must_search and self._in_view(leg.thing):
+            raise GiveUp
+        self._must_search = self._must_search and not leg.hidden
+        if self._random.random() < self._strength.blunders:
+            yield from self._stray(leg)
+        while True:
+            if self._ready(leg):
+                return True
+            near = self._way_to(leg)
+            if near and near not in tried:
+                tried.append(near)
+                if (yield from self._approach(near, leg)):
+                    return True
+                continue
+            places = self._next_places(leg, tried)
+            if not places or (len(tried) >= 3 and looks == 0 and not near):
+                if looks >= _LOOKS:
+                    raise GiveUp
+                looks += 1
+                yield from self._look_around()
+                continue
+            if self._random.random() >= self._strength.forgets:
+                tried.append(places[0])
+            yield from self._visit(places[0], leg, tuple(places))
+
+    def _stray(self, leg: Leg) -> Intents:
+        """Go to an unlikely place, and perhaps lose heart there."""
+        weighted = [(place, 1.0) for place, _ in candidates(leg.thing, self.view.navigable)]
+        for place in draw_places(weighted, 1, self._random):
+            yield from self._visit(place, leg, (place,))
+        if not leg.actions or self._random.random() < _LOSES_HEART:
+            raise GiveUp
+        return False
+
+    def _approach(self, near: str, leg: Leg) -> Intents:
+        yield from self._go(near, "carry" if self.view.held else "approach")
+        if not self._ready(leg):
+            yield from self._look_inside(near, leg)
+        return self._ready(leg)
+
+    def _ready(self, leg: Leg) -> bool:
+        """Whether the leg's first key action can be done, or its object is within reach."""
+        left = [key for key in leg.actions if key in self.view.left]
+        if not left:
+            return self._within_reach(leg.thing)
+        first = left[0]
+        if first.verb == verbs.OPEN and leg.hidden:
+            # The explorer has opened the container itself when it looked inside.
+            return any(self._legal(key) is not None for key in left[1:2])
+        return self._legal(first) is not None
+
+    def _way_to(self, leg: Leg) -> str:
+        """Where to go for an object whose place is known: named, or in view."""
+        if not leg.hidden:
+            return self._known(leg.place)
+        views = self._views()
+        for view in views:
+            if same_type(view.object_type, leg.thing):
+                names = [view.on, view.object_type, *_nearest_to(view, self._ahead())]
+                return next((name for name in names if name in self.view.navigable), "")
+        return ""
+
+    def _ahead(self) -> Sequence[ObjectView]:
+        views: Sequence[ObjectView] = self.view.info["object_views"]
+        return views
+
+    def _views(self) -> list[ObjectView]:
+        around = self.view.info.get("object_views_around", {})
+        return [*self._ahead(), *(view for each in around.values() for view in each)]
+
+    def _next_places(self, leg: Leg, tried: list[str]) -> list[str]:
+        weighted = candidates(leg.thing, self.view.navigable, without=tried)
+        return draw_places(weighted, _SHOWN, self._random, self._strength.temperature)
+
+    def _do_key(self, key: KeyAction, leg: Leg) -> Intents:
+        if self._random.random() < self._strength.blunders:
+            yield from self._blunder(key, leg)
+        return (yield from super()._do_key(key, leg))
+
+    def _blunder(self, key: KeyAction, leg: Leg) -> Intents:
+        """Do something wrong that a careless player does."""
+        if key.verb == verbs.PICKUP:
+            others = [
+                name
+                for name in sorted(self.view.reach)
+                if name != key.actual_type and Action(verbs.PICKUP, name) in self.view.legal
+            ]
+            if others:
+                wrong = Action(verbs.PICKUP, self._random.choice(others))
+                return (yield from self._do(Intent(wrong, "take", self._subgoal)))
+        if key.verb == verbs.OPEN and self.view.held:
+            early = Action(verbs.PUT, key.actual_type)
+            return (yield from self._do(Intent(early, "put", self._subgoal)))
+        if key.verb in (verbs.PUT, verbs.TOGGLE, verbs.CLOSE):
+            raise GiveUp  # it takes the task for done
+        return False
+
+
+def _nearest_to(goal: ObjectView, views: Sequence[ObjectView]) -> list[str]:
+    """The types of the objects in view, those nearest to an object in view first."""
+
+    def apart(view: ObjectView) -> float:
+        angle = radians(view.bearing - goal.bearing)
+        square = view.distance**2 + goal.distance**2
+        return square - 2 * view.distance * goal.distance * cos(angle)
+
+    return [view.object_type for view in sorted(views, key=apart)]

@@ -1,0 +1,85 @@
+"""How varied the grounded writer's thoughts are, and how long one takes.
+
+It plays episodes with :mod:`benchmarks.checks.thought_episodes`, writes their thoughts, and prints
+the share of distinct sentences, the most frequent thoughts and sentences, the words a thought, and
+the milliseconds a thought::
+
+    python -m benchmarks.checks.thought_variety --episodes 2000 --language en
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections import Counter
+
+from agents.expert.writers.base import ThoughtRequest, ThoughtWriter, WrittenThoughts
+from agents.expert.writers.grounded import sentences, words
+from agents.expert.writers.registry import WRITERS
+from benchmarks.checks.thought_episodes import played, written
+from er_gym.data.critic import Refusal, check
+
+
+class _Timed:
+    """A writer that adds up the time of another."""
+
+    def __init__(self, writer: ThoughtWriter) -> None:
+        self.name = writer.name
+        self._writer = writer
+        self.seconds = 0.0
+
+    def write(self, request: ThoughtRequest) -> WrittenThoughts:
+        """See :class:`~agents.expert.writers.base.ThoughtWriter`."""
+        start = time.perf_counter()
+        thoughts = self._writer.write(request)
+        self.seconds += time.perf_counter() - start
+        return thoughts
+
+
+def main() -> None:
+    """Play, write, count, print."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--episodes", type=int, default=300)
+    parser.add_argument("--language", choices=("en", "zh"), default="en")
+    parser.add_argument("--suite", default="train")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--top", type=int, default=10, help="how many frequent ones to print")
+    parser.add_argument("--check", action="store_true", help="let the critic check each thought")
+    arguments = parser.parse_args()
+    writer = _Timed(WRITERS.get("grounded")())
+    said, thoughts = Counter[str](), Counter[str]()
+    lengths: list[int] = []
+    refused: list[tuple[Refusal, str, ThoughtRequest]] = []
+    for number, (task, turns) in enumerate(
+        played(arguments.episodes, arguments.seed, arguments.suite)
+    ):
+        story = written(writer, turns, task.instruction, arguments.language, number)
+        for request, records in story:
+            for record, limit in zip(records, request.limits, strict=True):
+                thoughts[record.text] += 1
+                said.update(sentences(record.text, arguments.language))
+                lengths.append(words(record.text, arguments.language))
+                if arguments.check:
+                    found = check(record.text, record.kind, request.knowledge, limit=limit)
+                    refused += [(each, record.text, request) for each in found]
+    total, cuts = sum(thoughts.values()), statistics.quantiles(lengths, n=20)
+    print(f"episodes {arguments.episodes:,}, thoughts {total:,}, sentences {sum(said.values()):,}")
+    print(f"distinct sentences {len(said) / sum(said.values()):.1%}")
+    print(f"distinct thoughts {len(thoughts) / total:.1%}")
+    print(f"words a thought: median {statistics.median(lengths)}, 5 % {cuts[0]}, 95 % {cuts[-1]}")
+    print(f"milliseconds a thought {1000 * writer.seconds / total:.2f}")
+    for name, counts in (("thoughts", thoughts), ("sentences", said)):
+        print(f"most frequent {name}:")
+        for text, count in counts.most_common(arguments.top):
+            print(f"  {count / counts.total():.2%} {text}")
+    if arguments.check:
+        print(f"refused by the critic: {len(refused):,}")
+        for code, count in Counter(each.code for each, _, _ in refused).most_common():
+            print(f"  {code}: {count:,}")
+        for refusal, text, request in refused[: arguments.top]:
+            print(f"  {refusal.code}: {refusal.detail}\n    {request.knowledge.decision}: {text}")
+
+
+if __name__ == "__main__":
+    main()

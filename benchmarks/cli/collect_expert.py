@@ -1,0 +1,234 @@
+"""The options of ``er-gym collect`` for a model, and the players that they ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field, replace
+from functools import reduce
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from benchmarks.cli.errors import BadInput, bad_input
+from benchmarks.cli.options import Words
+from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
+
+if TYPE_CHECKING:
+    from agents.expert.players import Players
+    from benchmarks.cli.vlm_run import VLMRun
+    from er_gym.data.trajectory import Language
+    from er_gym.rollout.events import Cost
+
+_CONFIG = "expert"
+"""The settings of a model that writes thoughts, unless ``--agent-config`` names others."""
+
+
+@dataclass(frozen=True)
+class ExpertOptions:
+    """The options of a model that writes thoughts, names places, or decides."""
+
+    expert: str | None = None
+    places: str | None = None
+    decisions: str | None = None
+    hint: str | None = None
+    strict_thoughts: bool = False
+    vlm: VLMOptions = field(default_factory=VLMOptions)
+
+    @property
+    def decides(self) -> bool:
+        """Whether the model decides every action."""
+        return self.decisions == "model"
+
+
+_OPTIONS = (
+    click.option(
+        "--expert",
+        type=Words(),
+        metavar="CLIENT:MODEL",
+        help="A model that writes the thoughts: openai:MODEL, hf:PATH. The options from "
+        "--agent-config on are for it.",
+    ),
+    click.option(
+        "--places",
+        type=click.Choice(["likely", "model"]),
+        help="Who names the wrong places of a search: the likelihoods or the model.  "
+        "[default: likely]",
+    ),
+    click.option(
+        "--decisions",
+        type=click.Choice(["plan", "model"]),
+        help="Who decides the actions: the expert's plan, or the model, of which what succeeds is "
+        "kept.  [default: plan]",
+    ),
+    click.option(
+        "--hint",
+        type=click.Choice(["none", "plan"]),
+        help="What a model that decides is told beside the task.  [default: none]",
+    ),
+    click.option(
+        "--strict-thoughts",
+        is_flag=True,
+        help="Of a model that decides, take only what the critic finds no fault in.",
+    ),
+)
+
+
+def with_expert_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add these options to a command, which gets them as one argument ``expert_options``."""
+
+    def with_options(vlm_options: VLMOptions, **given: Any) -> Any:
+        names = [name for name in ExpertOptions.__dataclass_fields__ if name != "vlm"]
+        options = ExpertOptions(**{name: given.pop(name) for name in names}, vlm=vlm_options)
+        return command(expert_options=options, **given)
+
+    with_options.__doc__ = command.__doc__
+    with_options.__name__ = command.__name__
+    added: Callable[..., Any] = with_vlm_options(with_options)
+    return reduce(lambda made, option: option(made), reversed(_OPTIONS), added)
+
+
+@dataclass(frozen=True)
+class ExpertRun:
+    """A model that takes part in a collection.
+
+    Attributes:
+        options: of the command line.
+        run: the model, its settings and its budget.
+        language: of the thoughts.
+    """
+
+    options: ExpertOptions
+    run: VLMRun
+    language: Language
+
+    @staticmethod
+    def of(options: ExpertOptions, language: Language) -> ExpertRun | None:
+        """From the options; None if no model takes part.
+
+        Raises:
+            BadInput: options do not fit together.
+            ValueError: a setting does not fit.
+        """
+        if options.expert is None:
+            _refuse_without_model(options)
+            return None
+        from agents.expert.writers.model import check_settings
+        from agents.vlm.clients.budget import Ledger
+        from agents.vlm.clients.registry import resolve_client
+        from benchmarks.cli.vlm_run import VLMRun
+
+        kind, _ = resolve_client(options.expert)
+        _refuse_misfits(options, options.expert)
+        vlm = options.vlm
+        if not options.decides:
+            vlm = replace(vlm, agent_config=vlm.agent_config or _CONFIG)
+        run = VLMRun.of(options.expert, vlm)
+        prompts = run.settings.prompts.model_copy(update={"language": language})
+        run = replace(run, settings=run.settings.model_copy(update={"prompts": prompts}))
+        if not options.decides:
+            check_settings(run.settings)
+        if kind.priced:
+            Ledger(run.budget, run.settings.prices)  # says whether prices are missing
+        return ExpertRun(options, run, language)
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """What the collection's manifest states of it; no secrets."""
+        from agents.expert.writers.prompts import load_writer_prompts
+        from agents.vlm.factory import comparable_settings
+
+        own = load_writer_prompts(self.language).digest
+        options = self.options
+        stated: dict[str, Any] = {"name": self.run.name, "decisions": options.decisions or "plan"}
+        if options.decides:
+            hint = options.hint or "none"
+            more = {} if hint == "none" else {"hint_digest": own}
+            return {
+                **stated,
+                **more,
+                "hint": hint,
+                "strict_thoughts": options.strict_thoughts,
+                "settings": self.run.comparable_settings,
+            }
+        return {
+            **stated,
+            "places": options.places or "likely",
+            "settings": comparable_settings(self.run.settings, own),
+        }
+
+    @property
+    def env(self) -> Mapping[str, Any]:
+        """The environment's arguments that the settings ask for."""
+        return {name: value for name, value in self.run.env.items() if name != "obs_mode"}
+
+    @contextmanager
+    def players(
+        self, directory: Path, say: Callable[[object], None]
+    ) -> Iterator[tuple[Players, Callable[[], Cost | None]]]:
+        """Who plays, and a function that says what that has cost.
+
+        Args:
+            directory: of the collection; it keeps replies and bills.
+            say: hears, from any thread, what the user should know of the server.
+        """
+        from agents.expert.writers.prompts import load_writer_prompts
+        from er_gym.rollout.agent import CannotGoOn
+
+        prompts, options = load_writer_prompts(self.language), self.options
+        opens = self.run.factory if options.decides else self.run.session
+        with bad_input(CannotGoOn):  # no key, no such model
+            asked: Any = opens(directory)
+        asked.supervisor.show = say
+        with closing(asked):
+            if options.decides:
+                from agents.expert.decider import Deciders
+
+                hint = options.hint == "plan"
+                players: Players = Deciders(asked, prompts, hint, options.strict_thoughts)
+            else:
+                players = self._thinkers(asked, prompts)
+            yield players, lambda: asked.cost
+
+    def _thinkers(self, session: Any, prompts: Any) -> Players:
+        from agents.expert.model_places import ModelPlaces
+        from agents.expert.players import Thinkers
+        from agents.expert.writers.model import ModelWriter
+
+        writer = ModelWriter(session.name, session.client, self.run.settings, prompts)
+        if self.options.places == "model":
+            # An audition does not know which places the model will name.
+            return Thinkers(
+                lambda: writer,
+                lambda seed: ModelPlaces(session.client, prompts, seed),
+                think_later=True,
+            )
+        return Thinkers(lambda: writer)
+
+
+def _refuse_without_model(options: ExpertOptions) -> None:
+    given = [
+        *(["--places model"] if options.places == "model" else ()),
+        *(["--decisions model"] if options.decides else ()),
+        *(["--hint"] if options.hint else ()),
+        *(["--strict-thoughts"] if options.strict_thoughts else ()),
+        *options.vlm.given,
+    ]
+    if given:
+        raise BadInput(f"{given[0]} is for a model: give --expert, such as --expert openai:MODEL")
+
+
+def _refuse_misfits(options: ExpertOptions, name: str) -> None:
+    if options.decides:
+        if options.places:
+            raise BadInput("--places is for --decisions plan: a model that decides has no plan")
+        return
+    alone = [
+        *([f"--hint {options.hint}"] if options.hint else ()),
+        *(["--strict-thoughts"] if options.strict_thoughts else ()),
+        *(["--prompts-from"] if options.vlm.prompts_from else ()),
+        *([f"--expert {name}"] if name.startswith("recorded:") else ()),
+    ]
+    if alone:
+        raise BadInput(f"{alone[0]} is for a model that decides: give --decisions model, too")

@@ -1,0 +1,218 @@
+"""``er-gym data``: count trajectories, verify them, look at them, export them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from benchmarks.cli.data_export import export
+from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
+from benchmarks.cli.options import Place, force_option, workers_option
+from benchmarks.cli.terminal import echo, stdout, terminal
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from er_gym.data.collection import Collection
+    from er_gym.data.trajectory import Trajectory
+    from er_gym.tasks.task import Task
+
+FORMATS = ("table", "md", "json")
+_MOST_LINES = 20
+"""How many differences are printed."""
+_CLOSE = 3
+"""How many ids like a mistyped one are named."""
+_directory = Place(file_okay=False, path_type=Path)
+_collection = click.argument("collection", metavar="DIR", type=_directory)
+
+
+@click.group()
+def data() -> None:
+    """Trajectories that er-gym collect has written: count, verify, show, export."""
+
+
+data.add_command(export)
+
+
+@data.command()
+@_collection
+@click.option("--format", "layout", type=click.Choice(FORMATS), default="table", show_default=True)
+@click.option("--plots", type=_directory, help="Draw the charts into this folder, as PNG.")
+@force_option
+def stats(collection: Path, layout: str, plots: Path | None, force: bool) -> None:
+    """Count trajectories, thoughts and transitions, beside the paper's figures."""
+    import json
+
+    from benchmarks.scoring.data_tables import statistics_tables
+    from benchmarks.scoring.tables import as_markdown, print_tables
+    from er_gym.data.statistics import statistics
+
+    with bad_input(ImportError):
+        found = statistics(_opened(collection))
+        if not found.trajectories:
+            raise BadInput(f"{collection} holds no trajectory yet; run er-gym collect again")
+        if layout == "json":
+            echo(json.dumps(found.as_dict(), indent=1, ensure_ascii=False))
+        elif layout == "md":
+            echo(as_markdown(statistics_tables(found)), nl=False)
+        else:
+            print_tables(statistics_tables(found), stdout())
+        if plots is not None:
+            from benchmarks.scoring.data_charts import draw_statistics
+
+            for file in draw_statistics(found, plots, force=force):
+                echo(file, err=layout != "table")
+
+
+@data.command()
+@_collection
+@click.option("--pictures/--no-pictures", default=True, help="Whether pictures are compared, too.")
+@click.option("--limit", type=click.IntRange(min=1), help="Verify only the first N trajectories.")
+@click.option(
+    "--tasks-file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="The task file that was played, if it is no bundled suite.",
+)
+@workers_option
+def verify(
+    collection: Path, pictures: bool, limit: int | None, tasks_file: Path | None, workers: int
+) -> int:
+    """Replay every trajectory, and say where anything comes out differently.
+
+    Compared are what the agent saw, the results and rewards of its actions, faults, feedback, and
+    pictures. Checked are the thoughts, by the critic, and the course: kind b is the key actions
+    and nothing else, what must succeed does, and every fault is recovered. Exit code 1 if there is
+    a difference.
+    """
+    from contextlib import closing
+    from itertools import islice
+
+    from benchmarks.cli.progress import Progress
+    from er_gym.data.line_index import lines_of
+    from er_gym.data.verify import Totals
+    from er_gym.data.verify import verify as verdicts_of
+    from er_gym.rollout.worker_pool import WorkerSetupError
+
+    with bad_input():
+        opened = _opened(collection)
+        tasks = _tasks(opened, tasks_file)
+        number = sum(1 for _ in islice(lines_of(opened), limit))
+        opened.parts()
+        if not number:
+            raise BadInput(f"{collection} holds no trajectory yet; run er-gym collect again")
+    totals, lines = Totals(), 0
+    try:
+        with (
+            Progress(terminal(stderr=True), str(collection), number) as progress,
+            closing(
+                verdicts_of(opened, tasks, pictures=pictures, limit=limit, workers=workers)
+            ) as verdicts,
+        ):
+            for verdict in verdicts:
+                totals.add(verdict)
+                progress.episode(not verdict.problems)
+                for problem in verdict.problems:
+                    lines += 1
+                    if lines <= _MOST_LINES:
+                        print_problem(f"{verdict.id}: {problem}")
+    except WorkerSetupError as error:
+        raise click.ClickException(str(error)) from error
+    if lines > _MOST_LINES:
+        print_problem(f"and {lines - _MOST_LINES:,} more")
+    echo(
+        f"{collection}: {totals.trajectories - totals.wrong:,} of {totals.trajectories:,} "
+        f"trajectories come out as they were recorded ({totals.turns:,} actions, "
+        f"{totals.pictures:,} pictures, {totals.thoughts:,} thoughts)"
+    )
+    if not pictures:
+        echo("Pictures were not compared.")
+    if not totals.thoughts:
+        echo("Thoughts were not checked: there are none, or no critic.")
+    return CRASHED if totals.wrong else 0
+
+
+@data.command()
+@_collection
+@click.option("--trajectory", "trajectory_id", required=True, metavar="ID", help="Which to show.")
+@click.option(
+    "--out",
+    type=Place(dir_okay=False, path_type=Path),
+    help="Draw pictures and thoughts into this file, PNG or JPEG.",
+)
+@click.option(
+    "--font",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="A TrueType or OpenType font for --out.",
+)
+@force_option
+def show(
+    collection: Path, trajectory_id: str, out: Path | None, font: Path | None, force: bool
+) -> None:
+    """Print a trajectory turn by turn, or draw it as a strip of pictures and thoughts."""
+    from benchmarks.scoring.data_show import print_trajectory
+    from er_gym.data.strips import draw_strip
+    from er_gym.writing import check_output, picture_format, write_picture
+
+    with bad_input():
+        opened = _opened(collection)
+        trajectory = _trajectory(opened, trajectory_id)
+        if out is None:
+            print_trajectory(trajectory, stdout())
+            return
+        picture_format(out)
+        check_output(out, force=force)
+        write_picture(out, draw_strip(trajectory, collection, font), force=force)
+    echo(out)
+
+
+# -- parts ----------------------------------------------------------------------------------------
+
+
+def _opened(path: Path) -> Collection:
+    from er_gym.data.collection import Collection
+
+    return Collection.open(path)
+
+
+def _trajectory(collection: Collection, wanted: str) -> Trajectory:
+    """The trajectory of an id; BadInput names ids that are close to it if there is none."""
+    from difflib import get_close_matches
+
+    from er_gym.data.line_index import lines_of, trajectory_at
+
+    ids = []
+    for line in lines_of(collection):
+        if line.id == wanted:
+            return trajectory_at(collection, line.offset)
+        ids.append(line.id)
+    if not ids:
+        raise BadInput(f"{collection.path} holds no trajectory yet; run er-gym collect again")
+    close = get_close_matches(wanted, ids, _CLOSE, cutoff=0.0) or ids[:_CLOSE]
+    raise BadInput(
+        f"no trajectory {wanted!r:.100} among the {len(ids):,} in {collection.path}; "
+        f"close to it are: {', '.join(close)}"
+    )
+
+
+def _tasks(collection: Collection, tasks_file: Path | None) -> Sequence[Task]:
+    """The tasks of the suite that was played."""
+    from er_gym.tasks.suites import load_suite, suite_from_file, suite_registry
+
+    told = collection.manifest
+    if tasks_file is not None:
+        suite = suite_from_file(tasks_file)
+    elif told.suite in suite_registry().names():
+        suite = load_suite(told.suite)
+    else:
+        raise BadInput(
+            f"{collection.path} was played in tasks of a file, {told.suite!r:.100}; give it with "
+            "--tasks-file"
+        )
+    if suite.digest != told.suite_digest:
+        raise BadInput(
+            f"the tasks of {suite.name!r:.100} are not those that {collection.path} was played in; "
+            "give the same file with --tasks-file, or the version of er-gym that collected it"
+        )
+    return suite.tasks

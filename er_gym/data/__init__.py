@@ -1,0 +1,1 @@
+"""Trajectories for training: records, critic, statistics, exports."""

@@ -1,0 +1,400 @@
+"""What a thought may not claim: one small function for each sort of claim.
+
+Each takes the clauses of a thought and what the agent knew, and tells the faults. A claim about a
+name that stands for several types is right if it is right for one of them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from er_gym.data.mentions import Mention, all_alike, named_in
+from er_gym.data.phrases import MARK, Phrases
+from er_gym.data.reading import Clause
+from er_gym.data.thought import Refusal, Thought, name_of
+from er_gym.data.trajectory import SeenObject
+from er_gym.tasks import verbs
+from er_gym.thor import OBJECT_TYPES
+
+PARTS: Mapping[str, frozenset[str]] = {
+    "Drawer": frozenset(
+        {"Dresser", "Desk", "SideTable", "TVStand", "CounterTop", "CoffeeTable", "ShelvingUnit"}
+    ),
+    "Shelf": frozenset(
+        {"ShelvingUnit", "Dresser", "Desk", "SideTable", "TVStand", "Cabinet", "Fridge"}
+    ),
+    "StoveBurner": frozenset({"CounterTop", "StoveKnob"}),
+    "SinkBasin": frozenset({"Sink", "CounterTop"}),
+    "Sink": frozenset({"SinkBasin", "CounterTop"}),
+    "BathtubBasin": frozenset({"Bathtub"}),
+    "Cabinet": frozenset({"CounterTop", "Sink"}),
+}
+"""Receptacles that are parts of others: what lies in a Drawer is in the Dresser."""
+
+
+# -- what is seen, and where it is -----------------------------------------------------------------
+
+
+def unseen(thought: Thought) -> Iterator[Refusal]:
+    """Claims to see what is not and was not in view, or says where it is."""
+    phrases = thought.phrases
+    for clause in thought.clauses:
+        strange = [each for each in clause.mentions if not each.types & thought.seen]
+        if not strange:
+            continue
+        if clause.is_fact and not clause.wanted:
+            for mention in strange:
+                if not mention.types & thought.mentionable:
+                    yield _not_seen(mention)
+        if clause.guessed or clause.negated:
+            continue
+        for phrase in phrases.seen:
+            for match in phrase.finditer(clause.text):
+                if _wanted_before(clause, match, phrases) or clause.intended:
+                    continue
+                for mention in _subjects(clause, match, phrases):
+                    if mention in strange:
+                        yield _not_seen(mention)
+
+
+def hidden(thought: Thought) -> Iterator[Refusal]:
+    """Says as a fact where something is that was never in view, or what a container holds that was
+    never opened."""
+    phrases = thought.phrases
+    for clause in thought.clauses:
+        if clause.guessed or clause.negated:
+            continue
+        if not clause.intended:
+            for phrase in phrases.located:
+                for match in phrase.finditer(clause.text):
+                    for mention in _subjects(clause, match, phrases):
+                        if not mention.types & thought.seen and not _is_given(thought, mention):
+                            yield _nowhere(mention)
+        for match in _matches(clause, (*phrases.on, *phrases.out_of)):
+            if match.re not in phrases.out_of and (
+                clause.intended or _is_placing(clause, match, phrases)
+            ):
+                continue
+            (holder,) = clause.named(match, "y")
+            for mention in _subjects(clause, match, phrases):
+                if mention.types & thought.seen or _is_given(thought, mention):
+                    continue
+                yield Refusal(
+                    "hidden",
+                    f"The agent cannot know that {name_of(mention)} is in or on {name_of(holder)}: "
+                    "it was never in view. Say that it may be there, or leave it out.",
+                )
+
+
+def inside(thought: Thought) -> Iterator[Refusal]:
+    """Tells what is in a container that is shut and that the agent has not opened."""
+    for mention, holder in _told_to_be_on(thought):
+        if not _is_shut(thought, holder) or not mention.types & thought.seen:
+            continue
+        if not any(each.on in holder.types for _, each in thought.things(mention.types)):
+            yield Refusal(
+                "hidden",
+                f"The agent cannot know that {name_of(mention)} is in {name_of(holder)}: "
+                "it is closed and was not opened.",
+            )
+
+
+def support(thought: Thought) -> Iterator[Refusal]:
+    """Says that something in view lies in or on another thing than it does."""
+    for mention, holder in _told_to_be_on(thought):
+        wrong = _not_on(thought, mention, holder)
+        if wrong:
+            yield Refusal(
+                "support", f"{name_of(mention)} is not in or on {name_of(holder)}: {wrong}."
+            )
+
+
+def _told_to_be_on(thought: Thought) -> Iterator[tuple[Mention, Mention]]:
+    """What is told as a fact to be in or on something now, with that."""
+    phrases = thought.phrases
+    for clause in thought.clauses:
+        if not clause.is_fact or clause.past:
+            continue
+        for match in _matches(clause, phrases.on):
+            if not _is_placing(clause, match, phrases):
+                (holder,) = clause.named(match, "y")
+                for mention in _subjects(clause, match, phrases):
+                    yield mention, holder
+
+
+def side(thought: Thought) -> Iterator[Refusal]:
+    """Says that something in view is on a side where it is not."""
+    for clause in thought.clauses:
+        if not clause.mentions or clause.guessed or clause.negated or clause.past:
+            continue
+        for direction, nearly, groups in _sides(clause, thought.phrases):
+            wrong = []
+            for mention in groups:
+                places = {
+                    each.side if view == "ahead" else view
+                    for view, each in thought.things(mention.types)
+                }
+                fits = (
+                    not places
+                    or direction in places
+                    or (nearly and "ahead" in places)
+                    or _bears_there(thought, mention, clause, direction)
+                )
+                wrong.append("" if fits else f"{name_of(mention)} is {_directions(places)}")
+            if wrong and all(wrong):
+                yield Refusal("side", f"{wrong[0]}, not {_directions({direction})}.")
+
+
+def _bears_there(thought: Thought, mention: Mention, clause: Clause, direction: str) -> bool:
+    """Whether a thing that the clause names lies on the one that is mentioned, on that side.
+
+    Large furniture is on both sides of the view; its centre is not where a thing on it is.
+    """
+    return any(
+        each.on in all_alike(mention.types) and direction == (each.side if at == "ahead" else at)
+        for other in clause.mentions
+        for at, each in thought.things(other.types)
+    )
+
+
+def denied(thought: Thought) -> Iterator[Refusal]:
+    """Claims not to see what is in view."""
+    for clause in thought.clauses:
+        if clause.guessed or clause.past:
+            continue
+        for match in _matches(clause, thought.phrases.denied):
+            for mention in clause.named(match, "x"):
+                if mention.types <= thought.known.in_view:
+                    yield Refusal("unseen", f"{name_of(mention)} is in view; do not say it is not.")
+
+
+def count(thought: Thought) -> Iterator[Refusal]:
+    """Claims that there are more of something in view than there are."""
+    for clause in thought.clauses:
+        if not clause.is_fact or clause.past or clause.wanted:
+            continue
+        for match in thought.phrases.counted.finditer(clause.text):
+            (mention,) = clause.named(match, "x")
+            there = sum(1 for _ in thought.things(mention.types))
+            if 0 < there < thought.phrases.numbers[match["n"]]:
+                yield Refusal("count", f"Only {there} of {name_of(mention)} can be seen.")
+
+
+# -- states and the hand ---------------------------------------------------------------------------
+
+
+def state(thought: Thought) -> Iterator[Refusal]:
+    """Says that something in view is open, closed, on or off, and it is not."""
+    phrases = thought.phrases
+    for clause in thought.clauses:
+        if clause.guessed or clause.past:
+            continue
+        claims: list[tuple[Mention, re.Match[str]]] = [
+            (clause.named(match, "x")[0], match) for match in _matches(clause, phrases.states)
+        ]
+        of_it = phrases.it_states.search(clause.text) if clause.it else None
+        if clause.it and of_it:
+            claims.append((clause.it, of_it))
+        for mention, match in claims:
+            said = match.groupdict()
+            word = next((word for word in _STATES if said.get(word)), "on")
+            wrong = _is_not(thought, mention, word, bool(match["no"]))
+            if wrong:
+                yield Refusal("state", f"{name_of(mention)} {wrong}; say so, or leave it out.")
+
+
+def hand(thought: Thought) -> Iterator[Refusal]:
+    """Says that it holds what it does not, or that its hand is empty when it is not."""
+    phrases, held = thought.phrases, thought.known.held
+    truth = f"the agent holds {held}" if held else "the hand is empty"
+    for clause in thought.clauses:
+        if clause.guessed or clause.past:
+            continue
+        if held and not clause.intended and phrases.empty_hand.search(clause.text):
+            yield Refusal("held", f"The hand is not empty: {truth}.")
+        lost = _matches(clause, phrases.not_held)
+        for match in lost:
+            for mention in _subjects(clause, match, phrases):
+                if mention.types <= thought.held:
+                    yield Refusal("held", f"Do not deny it: {truth}.")
+        for match in _matches(clause, phrases.held):
+            senses = (phrases.negation, phrases.intention, phrases.goal)
+            if any(clause.says_before(sense, match.end()) for sense in senses):
+                continue
+            for mention in clause.named(match, "xs", "x"):
+                if not mention.types & thought.held:
+                    yield Refusal("held", f"{name_of(mention)} is not in the hand: {truth}.")
+
+
+# -- helpers ---------------------------------------------------------------------------------------
+
+
+def _matches(clause: Clause, phrases: Iterable[re.Pattern[str]]) -> list[re.Match[str]]:
+    if MARK not in clause.text:
+        return []
+    return [match for phrase in phrases for match in phrase.finditer(clause.text)]
+
+
+def _wanted_before(clause: Clause, match: re.Match[str], phrases: Phrases) -> bool:
+    """Whether the clause says before the match that the thing is only wanted."""
+    return bool(
+        phrases.goal.search(
+            clause.text[: match.start()] + clause.text[match.start() :].split(MARK)[0]
+        )
+    )
+
+
+def _subjects(clause: Clause, match: re.Match[str], phrases: Phrases) -> list[Mention]:
+    """The names that a match is about; "at the sink, the mug is ..." is about the mug alone."""
+    found = clause.named(match, "xs")
+    if phrases.of_other.search(clause.text[: match.start("xs")]):
+        return found[-1:]
+    return found
+
+
+def _is_placing(clause: Clause, match: re.Match[str], phrases: Phrases) -> bool:
+    """Whether the thing is being put there, or looked for there, rather than lying there."""
+    return bool(phrases.placing.search(clause.text[: match.start("xs")]))
+
+
+def _is_given(thought: Thought, mention: Mention) -> bool:
+    """Whether the instruction says where the thing is ("that is in the Drawer")."""
+    return bool(_GIVEN.search(thought.known.instruction)) and bool(
+        mention.types & all_alike(named_in(thought.known.instruction))
+    )
+
+
+_GIVEN = re.compile(r"\bthat (?:is|are|lies) (?:in|on)\b|\bfrom (?:the|inside)\b|里的|上的")
+
+
+def _not_seen(mention: Mention) -> Refusal:
+    return Refusal(
+        "unseen",
+        f"{name_of(mention)} is not and was not in view. Leave it out, or say that it may be "
+        "there.",
+    )
+
+
+def _nowhere(mention: Mention) -> Refusal:
+    return Refusal(
+        "hidden",
+        f"The agent cannot know where {name_of(mention)} is: it was never in view. Say where it "
+        "may be, or leave it out.",
+    )
+
+
+def _is_shut(thought: Thought, holder: Mention) -> bool:
+    """Whether all things of that name in view are closed, and the agent never opened one."""
+    there = [each for _, each in thought.things(holder.types)]
+    touched = (verbs.OPEN, verbs.CLOSE, verbs.PUT)
+    return (
+        bool(there)
+        and all(each.open is False for each in there)
+        and not any(thought.done(verb, holder.types) for verb in touched)
+    )
+
+
+def _holders(thought: Thought, each: SeenObject, view: Sequence[SeenObject]) -> set[str]:
+    """The types of all that a thing in view lies in or on, innermost first."""
+    found: set[str] = set()
+    upwards = [each.on]
+    while upwards:
+        holder = upwards.pop()
+        if holder and holder not in found:
+            found.add(holder)
+            found |= PARTS.get(holder, frozenset())
+            upwards += [other.on for other in view if other.type == holder]
+    return {*all_alike(each for each in found if each in OBJECT_TYPES)}
+
+
+def _not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
+    """Where a thing in view lies, if it does not lie on the holder that is claimed; else ``""``."""
+    there = list(thought.things(mention.types))
+    if not there:
+        if mention.types & thought.held:
+            return "it is in the hand"
+        return ""
+    if thought.done(verbs.PUT, holder.types) and thought.done(verbs.PICKUP, mention.types):
+        return ""  # another one may be in view
+    where = set()
+    for direction, each in there:
+        if "pickupable" not in OBJECT_TYPES[each.type].properties:
+            return ""
+        holders = _holders(thought, each, thought.views[direction])
+        if holders & holder.types:
+            return ""
+        if not each.on and not holder.types & thought.in_view:
+            return ""  # what it lies on is out of view
+        where.add(f"it is on {each.on}" if each.on else "it does not lie on it")
+    return " or ".join(sorted(where))
+
+
+def _is_not(thought: Thought, mention: Mention, word: str, negated: bool) -> str:
+    """What is so, if nothing of that name in view is in that state; else ``""``."""
+    wanted, attributes = _STATES[word]
+    wanted = wanted != negated
+    there = [each for _, each in thought.things(mention.types)]
+    states = [
+        [getattr(each, name) for name in attributes if getattr(each, name) is not None]
+        for each in there
+    ]
+    if not states or any(not one or wanted in one for one in states):
+        return ""
+    is_open = there[0].open is not None and "open" in attributes
+    words = ("closed", "open") if is_open else ("switched off", "switched on")
+    return f"is {words[not wanted]}"
+
+
+_STATES: Mapping[str, tuple[bool, tuple[str, ...]]] = {
+    "open": (True, ("open",)),
+    "closed": (False, ("open",)),
+    "on": (True, ("toggled",)),
+    "off": (False, ("toggled",)),
+    "loose_open": (True, ("open", "toggled")),
+    "loose_closed": (False, ("open", "toggled")),
+}
+"""A word for a state, by its group in the phrases: whether it is so, and the attributes of
+:class:`~er_gym.data.trajectory.SeenObject` that it is about. Chinese says open of what is on."""
+
+
+def _directions(places: Iterable[str]) -> str:
+    words = {"left": "on the left", "right": "on the right", "behind": "behind the agent"}
+    return " or ".join(sorted(words.get(place, "straight ahead") for place in places))
+
+
+def _sides(clause: Clause, phrases: Phrases) -> Iterator[tuple[str, bool, list[Mention]]]:
+    """The directions that a clause tells: each with whether it is only nearly so, and the names of
+    which one must be there."""
+    found = sorted(
+        (match.start(), match.end(), direction)
+        for direction, phrase in phrases.sides.items()
+        for match in phrase.finditer(clause.text)
+    )
+    for k, (start, end, direction) in enumerate(found):
+        nearly = bool(phrases.nearly.search(clause.text[:start]))
+        begin = found[k - 1][1] if k else 0
+        stop = found[k + 1][0] if k + 1 < len(found) else len(clause.text)
+        leading = not clause.among(0, found[0][0]) or (
+            phrases.is_so.match(clause.text, end) and clause.among(end, stop)
+        )
+        if leading:
+            for place, mention in _pairs(clause, end, stop):
+                if not phrases.of_other.search(clause.text[end:place]):
+                    yield direction, nearly, [mention]
+                    break
+        else:
+            nearest = list(_pairs(clause, begin, start))
+            if nearest:
+                own = [
+                    mention
+                    for place, mention in nearest
+                    if not phrases.of_other.search(clause.text[begin:place])
+                ]
+                yield direction, nearly, [nearest[-1][1], *own[-1:]]
+
+
+def _pairs(clause: Clause, start: int, end: int) -> Iterator[tuple[int, Mention]]:
+    for place, mention in zip(clause.places, clause.mentions, strict=True):
+        if start <= place < end:
+            yield place, mention

@@ -1,0 +1,234 @@
+"""A collection: a directory of trajectories and their pictures.
+
+::
+
+    data/x/collection.json                     what is collected
+    data/x/trajectories.jsonl                  the trajectories, one a line
+    data/x/parts/PART/                         a run directory for each part, with
+    data/x/parts/PART/trajectories/ID.json     every trajectory as it was played, and
+    data/x/parts/PART/pictures/ID/000.jpeg     its pictures
+
+Parts are ordinary run directories (:mod:`er_gym.rollout.run_directory`), so that collecting can be
+interrupted and continued like any run. ``trajectories.jsonl`` holds those trajectories that are
+taken, in the order of the parts, and is replaced as a whole.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from er_gym.data.trajectory import Trajectory
+from er_gym.locking import LOCK
+from er_gym.rollout.run_directory import EPISODES, RunDirectory, RunDirectoryError
+from er_gym.tasks.errors import TaskFileError
+from er_gym.tasks.reading import read_bytes, read_text
+from er_gym.writing import file_stem, make_folder, write_atomic
+
+MANIFEST = "collection.json"
+TRAJECTORIES = "trajectories.jsonl"
+PARTS = "parts"
+PLAYED = "trajectories"
+"""The folder of a part that holds every trajectory as it was played."""
+
+
+class CollectionError(ValueError):
+    """The directory cannot be used as a collection; the message says why and what to do."""
+
+
+class CollectionManifest(BaseModel):
+    """What is collected. Two commands with equal manifests may share a directory.
+
+    Attributes:
+        format: the version of this layout.
+        suite: the suite's name, and ``suite_digest`` of its tasks' content.
+        settings: all that decides what the trajectories are: recipe, writer, language, faults ...
+        seed: the seed from which everything is drawn.
+        er_gym: the version of the package.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    format: Literal["er-gym/collection/1"] = "er-gym/collection/1"
+    suite: str
+    suite_digest: str
+    settings: dict[str, Any] = {}
+    seed: int
+    er_gym: str
+
+
+class Collection:
+    """A collection, opened with :meth:`create` to add to it or :meth:`open` to read.
+
+    Attributes:
+        path: the directory.
+        manifest: what is collected.
+    """
+
+    def __init__(self, path: Path, manifest: CollectionManifest) -> None:
+        self.path = path
+        self.manifest = manifest
+
+    @classmethod
+    def create(cls, path: Path, manifest: CollectionManifest) -> Collection:
+        """Start a collection in a directory, or continue it if it is the same.
+
+        Raises:
+            CollectionError: another collection, or something else, is there; nothing is changed.
+            OSError: the directory cannot be made or written to.
+        """
+        begun = (path / MANIFEST).exists()
+        if begun and not _is_bare(path):
+            theirs = cls.open(path).manifest.model_dump(mode="json")
+            ours = manifest.model_dump(mode="json")
+            if theirs != ours:
+                raise CollectionError(
+                    f"{path} holds another collection: {_difference(theirs, ours)}; choose "
+                    "another --out, or repeat that command"
+                )
+        elif not begun and path.exists() and {each.name for each in path.iterdir()} - {LOCK}:
+            raise CollectionError(
+                f"{path} is not empty and holds no {MANIFEST}; choose another --out"
+            )
+        else:
+            make_folder(path)
+            write_atomic(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
+        return cls(path, manifest)
+
+    @classmethod
+    def open(cls, path: Path) -> Collection:
+        """Open a collection to read it.
+
+        Raises:
+            CollectionError: there is none.
+        """
+        try:
+            text = read_text(path / MANIFEST)
+            return cls(path, CollectionManifest.model_validate_json(text))
+        except TaskFileError as error:
+            raise CollectionError(
+                f"{path} is not a collection of trajectories: {error}; give the directory that "
+                "was er-gym collect's --out"
+            ) from error
+        except ValidationError as error:
+            raise CollectionError(
+                f"{path / MANIFEST} is not a collection's manifest: {_first_problem(error)}"
+            ) from error
+
+    def part_path(self, part: str) -> Path:
+        """The run directory of a part."""
+        return self.path / PARTS / part
+
+    def parts(self) -> dict[str, RunDirectory]:
+        """The parts that have begun, by name, in alphabetical order.
+
+        Raises:
+            CollectionError: the manifest of a part is damaged.
+        """
+        try:
+            return {
+                path.name: RunDirectory.open(path)
+                for path in sorted((self.path / PARTS).glob("*"))
+                if path.is_dir()
+            }
+        except RunDirectoryError as error:
+            raise CollectionError(str(error)) from error
+
+    def played(self, part: str, trajectory_id: str) -> Trajectory:
+        """A trajectory of a part as it was played, taken or not.
+
+        Raises:
+            CollectionError: it is not there, or it is damaged.
+        """
+        file = self.part_path(part) / PLAYED / f"{file_stem(trajectory_id)}.json"
+        try:
+            return Trajectory.model_validate_json(read_bytes(file))
+        except (TaskFileError, ValidationError) as error:
+            raise CollectionError(f"{file}: {_first_problem(error)}") from error
+
+    def has_pictures(self, trajectory: Trajectory) -> bool:
+        """Whether all pictures of a trajectory are there."""
+        pictures = (picture for turn in trajectory.turns for picture in turn.pictures)
+        return all((self.path / picture.path).is_file() for picture in pictures)
+
+    def write(self, trajectories: Iterable[Trajectory]) -> int:
+        """Replace ``trajectories.jsonl`` as a whole, and return how many lines it has.
+
+        Memory does not grow with their number.
+        """
+        draft = self.path / f".{TRAJECTORIES}.draft"
+        count = 0
+        try:
+            with draft.open("w", encoding="utf-8", newline="\n") as file:
+                for trajectory in trajectories:
+                    file.write(trajectory.model_dump_json() + "\n")
+                    count += 1
+                file.flush()
+                os.fsync(file.fileno())
+            draft.replace(self.path / TRAJECTORIES)
+        finally:
+            draft.unlink(missing_ok=True)
+        return count
+
+    def trajectories(self) -> Iterator[Trajectory]:
+        """The trajectories that are taken, in order, one at a time.
+
+        Raises:
+            CollectionError: the file is not there, or a line is damaged; the message names it.
+        """
+        path = self.path / TRAJECTORIES
+        try:
+            file = path.open("rb")
+        except OSError as error:
+            raise CollectionError(
+                f"{path} cannot be read ({error.strerror}); er-gym collect writes it when it ends "
+                "or is interrupted: run the same command again"
+            ) from error
+        with file:
+            for number, line in enumerate(file, 1):
+                try:
+                    yield Trajectory.model_validate_json(line)
+                except ValidationError as error:
+                    raise CollectionError(f"{path}:{number}: {_first_problem(error)}") from error
+
+
+def _difference(theirs: Any, ours: Any, name: str = "") -> str:
+    """The first difference between two manifests, in words."""
+    if isinstance(theirs, dict) and isinstance(ours, dict):
+        for key in (*theirs, *ours):
+            if theirs.get(key, _ABSENT) != ours.get(key, _ABSENT):
+                inner = f"{name}.{key}" if name else str(key)
+                return _difference(theirs.get(key, _ABSENT), ours.get(key, _ABSENT), inner)
+    return f"its {name} is {theirs!r:.300}, this one's {ours!r:.300}"
+
+
+class _Absent:
+    def __repr__(self) -> str:
+        return "not given"
+
+
+_ABSENT = _Absent()
+
+
+def _is_bare(path: Path) -> bool:
+    """Whether a directory holds nothing that was collected, as after a command that was stopped
+    before its first episode. Another command may begin there."""
+    file = path / TRAJECTORIES
+    if {entry.name for entry in path.iterdir()} - {MANIFEST, TRAJECTORIES, PARTS, LOCK}:
+        return False
+    if file.is_symlink() or (file.exists() and not (file.is_file() and not file.stat().st_size)):
+        return False
+    return next((path / PARTS).glob(f"*/{EPISODES}/*"), None) is None
+
+
+def _first_problem(error: Exception) -> str:
+    """The first complaint of an exception, in one line."""
+    if not isinstance(error, ValidationError):
+        return " ".join(str(error).split())
+    first = error.errors(include_url=False, include_input=False)[0]
+    where = ".".join(map(str, first["loc"])) or "the line"
+    return f"{where}: {first['msg']}"

@@ -1,0 +1,244 @@
+"""What a thought may not say about actions: those done, and the one decided on."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from er_gym.data.mentions import Mention, all_alike
+from er_gym.data.reading import Clause
+from er_gym.data.thought import Refusal, Thought, name_of
+from er_gym.tasks import verbs
+from er_gym.thor import OBJECT_TYPES
+
+_PAST_VERB = {
+    verbs.OPEN: "open",
+    verbs.CLOSE: "close",
+    verbs.PICKUP: "pick up",
+    verbs.PUT: "put anything in or on",
+    verbs.TOGGLE: "switch",
+    verbs.NAVIGATE: "go to",
+    "searched": "search",
+}
+_NEAR = 4
+"""Letters before a claim in which a negation is one of it."""
+_RECENT = 3
+"""So many actions ago, a failure can still be spoken of."""
+
+
+# -- what was done ---------------------------------------------------------------------------------
+
+
+def history(thought: Thought) -> Iterator[Refusal]:
+    """Claims to have done what was not done."""
+    for clause in thought.clauses:
+        if clause.asks or clause.conditional or clause.hedged or not clause.mentions:
+            continue
+        for verb, phrases in thought.phrases.did.items():
+            for phrase in phrases:
+                for match in phrase.finditer(clause.text):
+                    if clause.negated and thought.phrases.negation.search(
+                        clause.text, max(0, match.start() - _NEAR), match.end()
+                    ):
+                        continue
+                    for mention in clause.named(match, "y" if verb == verbs.PUT else "x"):
+                        if not _has_done(thought, verb, mention):
+                            yield Refusal(
+                                "history",
+                                f"The agent did not {_PAST_VERB[verb]} {name_of(mention)} before. "
+                                "Do not claim it.",
+                            )
+
+
+def _has_done(thought: Thought, verb: str, mention: Mention) -> bool:
+    known, types = thought.known, all_alike(mention.types)
+    if verb == verbs.PICKUP and types & thought.held:
+        return True
+    if verb == verbs.NAVIGATE and known.at in types:
+        return True
+    if verb in (verbs.OPEN, verbs.CLOSE) and thought.done(verbs.TOGGLE, types):
+        return True
+    if verb != "searched":
+        return thought.done(verb, types)
+    if known.at in types or any(
+        thought.done(each, types)
+        for each in (verbs.NAVIGATE, verbs.OPEN, verbs.CLOSE, verbs.PUT, verbs.TOGGLE)
+    ):
+        return True
+    # What cannot be opened is searched by looking at it from near by.
+    opens = any("openable" in OBJECT_TYPES[each].properties for each in mention.types)
+    return not opens and any(place for each in types for place in (known.seen.get(each),))
+
+
+def outcome(thought: Thought) -> Iterator[Refusal]:
+    """Claims that the last action succeeded when it failed, or the other way round."""
+    actions = thought.known.actions
+    last = thought.known.last
+    failed_lately = any(not each.success for each in actions[-_RECENT:])
+    phrases = thought.phrases
+    admits = any(phrases.failing.search(each.text) for each in thought.clauses if not each.guessed)
+    for clause in thought.clauses:
+        if clause.guessed and "seem" not in clause.text:
+            continue
+        if phrases.failed.search(clause.text) and not failed_lately:
+            yield Refusal(
+                "history",
+                "No action failed: do not say that one did."
+                if last
+                else "Nothing was done yet: do not say that an action failed.",
+            )
+        if last is None or last.success or admits:
+            continue
+        said = phrases.succeeded.search(clause.text)
+        senses = (phrases.negation, phrases.intention)
+        if said and not any(clause.says_before(sense, said.start()) for sense in senses):
+            yield Refusal(
+                "history", f"The last action, {last.action}, failed; say so, or say nothing."
+            )
+
+
+# -- what is decided -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Decided:
+    """An action that a thought decides on.
+
+    Attributes:
+        act: a key of :attr:`er_gym.data.phrases.Phrases.acts`.
+        thing: what it is to be done to.
+        text: as it is written.
+        clause: where it stands.
+        weak: whether it may be a need of the task rather than a decision.
+        later: whether it is not the next step.
+    """
+
+    act: str
+    thing: Mention | None
+    text: str
+    clause: Clause
+    weak: bool
+    later: bool
+
+
+def decision(thought: Thought) -> Iterator[Refusal]:
+    """Decides on another action than the one that is taken."""
+    known, phrases = thought.known, thought.phrases
+    decided = [each for each in _decided(thought) if each.act != "look around" or each.clause.last]
+    fitting = [each for each in decided if _fits(thought, each)]
+    others = [each for each in decided if each not in fitting and not each.later]
+    wrong = None
+    if decided and not fitting:
+        strong = [each for each in others if not each.weak]
+        wrong = strong[-1] if strong else next((each for each in others if each.clause.last), None)
+    elif others:
+        first = [each for each in others if phrases.first.search(each.clause.text)]
+        replaced = [
+            each
+            for each in others
+            if each is decided[-1] and phrases.instead.search(each.clause.text)
+        ]
+        wrong = next(iter((*first, *replaced)), None)
+    if wrong is not None:
+        yield Refusal(
+            "decision",
+            f"The thought decides to “{wrong.text}”, but the next action is {known.decision}.",
+        )
+    if known.decision.verb != verbs.END and known.purpose != "check":
+        for clause in thought.clauses:
+            if clause.guessed or clause.negated or clause.intended:
+                continue
+            if phrases.over.search(clause.text):
+                yield Refusal(
+                    "decision", f"The task is not done: the next action is {known.decision}."
+                )
+
+
+def _decided(thought: Thought) -> Iterator[Decided]:
+    """All actions that a thought decides on, in order."""
+    phrases = thought.phrases
+    for clause in thought.clauses:
+        if clause.asks:
+            continue
+        for start in phrases.decides.finditer(clause.text):
+            rest = clause.text[start.end() :]
+            skipped = phrases.before_act.match(rest)
+            body = rest[skipped.end() :] if skipped else rest.lstrip(" ,，")
+            offset = len(clause.text) - len(body)
+            for act, phrase in phrases.acts.items():
+                match = phrase.match(body)
+                if match is None:
+                    continue
+                thing = None
+                groups = {"x", "x2"} & match.re.groupindex.keys()
+                at = max((match.start(group) for group in groups), default=-1)
+                if at >= 0:
+                    thing = next(iter(clause.among(at + offset, at + offset + 1)), None)
+                before = clause.text[: start.end()] + (skipped.group() if skipped else "")
+                yield Decided(
+                    act,
+                    thing,
+                    _unmasked(match.group(), clause, offset),
+                    clause,
+                    bool(phrases.weak.search(start.group())),
+                    bool(phrases.later.search(before))
+                    or clause.conditional
+                    or bool(phrases.later.match(body[match.end() :].lstrip(" ,"))),
+                )
+                break
+
+
+def _unmasked(text: str, clause: Clause, offset: int) -> str:
+    names = iter(clause.among(offset, offset + len(text)))
+    return re.sub("§", lambda _: next(names).text, text).strip()
+
+
+_ABOUT = {"go", "visit", "check", "open", "toggle", "slice"}
+
+
+def _fits(thought: Thought, decided: Decided) -> bool:
+    """Whether an action that a thought decides on is the one that is taken, or begins with it."""
+    known = thought.known
+    verb, target = known.decision.verb, known.decision.object_type
+    things = all_alike(decided.thing.types) if decided.thing else frozenset()
+    same = not decided.thing or target in things
+    act = decided.act
+    if verb == verbs.OBSERVE:
+        return act == "look around" or (act == "check" and not decided.thing)
+    if verb == verbs.END:
+        return act == "end"
+    if verb == verbs.MOVE_FORWARD:
+        near = act in ("go", "visit", "check", "take") and known.purpose in ("get closer", "check")
+        return act == "forward" or near
+    if act in ("look around", "end"):
+        return False
+    if act == "forward":
+        return verb == verbs.NAVIGATE
+    if act in ("go", "visit"):
+        return same and verb in (verbs.NAVIGATE, verbs.OPEN, verbs.PICKUP, verbs.TOGGLE)
+    if act == "check":
+        return same and verb in (verbs.NAVIGATE, verbs.OPEN)
+    if act == "open":
+        return same and verb in (verbs.OPEN, verbs.NAVIGATE, verbs.TOGGLE)
+    if act == "close":
+        return same and verb in (verbs.CLOSE, verbs.NAVIGATE, verbs.TOGGLE)
+    if act == "put":
+        return same and verb in (verbs.PUT, verbs.NAVIGATE, verbs.OPEN)
+    if act == "take":
+        return _takes(thought, things, verb, target)
+    verb_of = {"toggle": verbs.TOGGLE, "slice": verbs.SLICE}
+    return same and verb in (verb_of[act], verbs.NAVIGATE)
+
+
+def _takes(thought: Thought, things: frozenset[str], verb: str, target: str) -> bool:
+    """Whether an action leads to taking a thing: picking it up, or going to where it lies."""
+    if verb == verbs.PICKUP:
+        return target in things
+    holders = {each.on for _, each in thought.things(things)} | {
+        thought.known.seen.get(each, "") for each in things
+    }
+    return verb in (verbs.NAVIGATE, verbs.OPEN) and (
+        target in things
+        or bool(all_alike(each for each in holders if each in OBJECT_TYPES) & {target})
+    )

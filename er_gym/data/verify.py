@@ -1,0 +1,220 @@
+"""Verifies a collection: every trajectory is replayed, its course and its thoughts are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import groupby, islice
+from pathlib import Path
+
+from er_gym.data import critic
+from er_gym.data.collection import Collection, CollectionError
+from er_gym.data.course_checks import course_problems
+from er_gym.data.knowledge import knowledge_at
+from er_gym.data.line_index import Line, lines_of, trajectory_at
+from er_gym.data.replay import replay
+from er_gym.data.trajectory import Trajectory
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.rollout.play import one_line
+from er_gym.rollout.processes import Terminated
+from er_gym.rollout.worker_pool import LostJob, run_jobs
+from er_gym.tasks.resolve import resolve_tasks
+from er_gym.tasks.task import Task
+
+MOST_WORDS = 200
+"""The longest thought that the paper asks for, in words."""
+_AT_ONCE = 16
+"""Trajectories of one room that a worker is given at once."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What was found about one trajectory.
+
+    Attributes:
+        id: the trajectory's.
+        problems: in a line each; empty if all is equal and right.
+        turns, pictures, thoughts: how many were compared or checked.
+    """
+
+    id: str
+    problems: tuple[str, ...]
+    turns: int = 0
+    pictures: int = 0
+    thoughts: int = 0
+
+
+@dataclass
+class Totals:
+    """Sums of verdicts.
+
+    Attributes:
+        trajectories, turns, pictures, thoughts: how many were checked.
+        wrong: how many trajectories have problems.
+    """
+
+    trajectories: int = 0
+    turns: int = 0
+    pictures: int = 0
+    thoughts: int = 0
+    wrong: int = 0
+
+    def add(self, verdict: Verdict) -> None:
+        """Count a verdict."""
+        self.trajectories += 1
+        self.turns += verdict.turns
+        self.pictures += verdict.pictures
+        self.thoughts += verdict.thoughts
+        self.wrong += bool(verdict.problems)
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Trajectories of one part and room, and the tasks of those that have one."""
+
+    part: str
+    lines: tuple[Line, ...]
+    tasks: Mapping[str, Task] = field(default_factory=dict)
+
+
+def verify(
+    collection: Collection,
+    tasks: Iterable[Task],
+    *,
+    pictures: bool = True,
+    limit: int | None = None,
+    workers: int = 1,
+) -> Generator[Verdict, None, None]:
+    """Verify the trajectories of a collection; the verdicts come in no particular order.
+
+    Args:
+        collection: the collection.
+        tasks: the suite's.
+        pictures: whether pictures are compared; without them it is several times as fast.
+        limit: verify only the first so many.
+        workers: how many processes, at least 1.
+
+    Raises:
+        CollectionError: the collection is damaged.
+        WorkerSetupError: the environment cannot be made.
+    """
+    lines = list(islice(lines_of(collection), limit))
+    collection.parts()  # a damaged part is told before anything is played
+    batches = _batches(lines, tasks)
+    make = partial(_Worker, collection.path, pictures)
+    with closing(run_jobs(make, batches, workers=workers)) as results:
+        for batch, verdicts in results:
+            if isinstance(verdicts, LostJob):
+                died = f"the worker process died with exit code {verdicts.exitcode}"
+                yield from (Verdict(line.id, (died,)) for line in batch.lines)
+            else:
+                yield from verdicts
+
+
+def thought_problems(trajectory: Trajectory) -> Iterator[str]:
+    """What the critic has against a trajectory's thoughts, in a line each."""
+    for index, turn in enumerate(trajectory.turns):
+        if not turn.thoughts:
+            continue
+        knowledge = knowledge_at(
+            trajectory.turns,
+            index,
+            instruction=trajectory.instruction,
+            language=trajectory.language,
+        )
+        for thought in turn.thoughts:
+            for refusal in critic.check(thought.text, thought.kind, knowledge, limit=MOST_WORDS):
+                yield f"turn {index}: {thought.kind}: {refusal.code}: {refusal.detail}"
+
+
+def _batches(lines: Sequence[Line], tasks: Iterable[Task]) -> list[_Batch]:
+    """The work, in portions that keep a worker's room warm."""
+    wanted = {line.task_id for line in lines}
+    fitted = resolve_tasks(task for task in tasks if task.id in wanted)
+    by_id = {task.id: task for task in fitted.tasks}
+    ordered = sorted(lines, key=lambda line: (line.part, line.scene, line.task_id, line.offset))
+    batches = []
+    for (part, _), group in groupby(ordered, key=lambda line: (line.part, line.scene)):
+        rest = list(group)
+        for first in range(0, len(rest), _AT_ONCE):
+            some = tuple(rest[first : first + _AT_ONCE])
+            its_tasks = {
+                line.task_id: by_id[line.task_id] for line in some if line.task_id in by_id
+            }
+            batches.append(_Batch(part, some, its_tasks))
+    return batches
+
+
+class _Worker:
+    """Verifies batches, in one environment for the part at hand."""
+
+    def __init__(self, path: Path, pictures: bool) -> None:
+        self._collection = Collection.open(path)
+        self._parts = self._collection.parts()
+        self._folder = path if pictures else None
+        self._critic_works = True
+        self._part = ""
+        self._env: EmbodiedEnv | None = None
+
+    def __call__(self, batch: _Batch) -> list[Verdict]:
+        return [
+            self._verdict(line, batch.tasks.get(line.task_id), batch.part) for line in batch.lines
+        ]
+
+    def _verdict(self, line: Line, task: Task | None, part: str) -> Verdict:
+        try:
+            trajectory = trajectory_at(self._collection, line.offset)
+        except CollectionError as error:
+            return Verdict(line.id, (str(error),))
+        problems = [*course_problems(trajectory)]
+        if task is None:
+            problems.append(f"the suite has no task {line.task_id!r:.80} that can be played")
+        elif part not in self._parts:
+            problems.append(f"the collection has no part {part!r:.80}")
+        else:
+            problems += self._caught(lambda: replay(self._of(part), task, trajectory, self._folder))
+        problems += self._thoughts_checked(trajectory)
+        thoughts = sum(len(turn.thoughts) for turn in trajectory.turns)
+        return Verdict(
+            line.id,
+            tuple(problems),
+            turns=trajectory.actions,
+            pictures=trajectory.pictures if self._folder else 0,
+            thoughts=thoughts if self._critic_works else 0,
+        )
+
+    def _thoughts_checked(self, trajectory: Trajectory) -> list[str]:
+        if not self._critic_works:
+            return []
+        try:
+            return self._caught(lambda: thought_problems(trajectory))
+        except NotImplementedError:
+            self._critic_works = False
+            return []
+
+    def _caught(self, check: Callable[[], Iterable[str]]) -> list[str]:
+        """The problems that a check finds; an exception is one."""
+        try:
+            return list(check())
+        except (Terminated, NotImplementedError):
+            raise
+        except Exception as error:  # damaged records may raise anything
+            self.close()
+            return [one_line(error)]
+
+    def _of(self, part: str) -> EmbodiedEnv:
+        """The environment of a part; that of the part before is closed."""
+        if self._env is None or self._part != part:
+            self.close()
+            modes = ("rgb", "objects") if self._folder else ("objects",)
+            env = {**self._parts[part].manifest.env, "obs_mode": "+".join(modes)}
+            self._part, self._env = part, EmbodiedEnv((), **env)
+        return self._env
+
+    def close(self) -> None:
+        """Close the environment."""
+        env, self._env = self._env, None
+        if env is not None:
+            env.close()

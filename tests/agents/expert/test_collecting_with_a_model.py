@@ -1,0 +1,229 @@
+"""``er-gym collect --expert``, end to end: a server that misbehaves, a local model, a recording."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("openai", reason="needs the extra vlm")
+
+from click.testing import CliRunner
+from small_suite import NAME, small
+
+from agents.expert.decider import Deciders
+from benchmarks.checks.expert_server import collect_with_faults, wrong_thoughts
+from benchmarks.checks.scripted_expert import ScriptedExpert, answers, good, scripted_expert
+from benchmarks.cli.main import cli
+from er_gym.data.collection import Collection
+from er_gym.data.trajectory import Trajectory
+
+SMALL = ("--set", "pictures.width=64", "--set", "pictures.height=48")
+
+
+def collect(out: Path, *more: str) -> Any:
+    command = ["collect", "--suite", NAME, "--parts", "imitation", "--workers", "1"]
+    command += ["--out", str(out), *more]
+    return CliRunner().invoke(cli, command, standalone_mode=False)
+
+
+def with_expert(url: str, out: Path, *more: str) -> Any:
+    return collect(out, "--expert", "openai:scripted", "--base-url", url, *SMALL, *more)
+
+
+def trajectories(out: Path) -> list[Trajectory]:
+    return list(Collection.open(out).trajectories())
+
+
+@pytest.fixture
+def server() -> Iterator[ScriptedExpert]:
+    """A model that does as it is asked."""
+    with scripted_expert() as one:
+        yield one
+
+
+def test_eight_trajectories_with_a_server_that_misbehaves(tmp_path: Path) -> None:
+    """The program in benchmarks/checks collects two hundred."""
+    more = ("--suite", NAME, "--parts", "imitation", "--types", "single_search", "--workers", "1")
+    outcome = collect_with_faults(tmp_path, 8, *more, seed=1, bad=0.5, budget=0.05)
+    assert outcome.problems == ()
+    assert outcome.trajectories == 8
+    assert outcome.thoughts["openai:scripted"] > outcome.thoughts["grounded"] > 0
+    assert {"leak", "missing", "tags"} <= set(outcome.refusals)
+
+
+def test_what_will_not_be_taken_costs_nothing(tmp_path: Path, server: ScriptedExpert) -> None:
+    result = with_expert(server.url, tmp_path, "--limit", "3", "--types", "pickup_and_put")
+    assert result.return_value == 0, result.output
+    taken = trajectories(tmp_path)
+    assert len(taken) == 3
+    # One request for each turn of what is taken, none for what is not.
+    assert server.count == sum(len(each.turns) for each in taken)
+    assert server.count == sum(each.cost.requests for each in taken)
+    assert all(not list(wrong_thoughts(each)) for each in taken)
+    played = list((tmp_path / "parts" / "imitation" / "trajectories").glob("*.json"))
+    assert len(played) >= 3
+
+
+def test_the_manifest_states_the_model_and_no_secret(
+    tmp_path: Path, server: ScriptedExpert, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
+    more = ("--limit", "1", "--types", "single_search", "--places", "model")
+    result = with_expert(f"{server.url}?code=very-secret", tmp_path, *more)
+    assert result.return_value == 0, result.output
+    stated = Collection.open(tmp_path).manifest.settings["expert"]
+    assert stated["name"] == "openai:scripted"
+    assert (stated["decisions"], stated["places"]) == ("plan", "model")
+    assert stated["settings"]["sampling"]["temperature"] == 0.9
+    assert len(stated["settings"]["prompts_digest"]) == 64
+    everything = b"".join(file.read_bytes() for file in tmp_path.rglob("*") if file.is_file())
+    assert b"very-secret" not in everything
+    other = with_expert(server.url, tmp_path, *more, "--set", "sampling.temperature=0.1")
+    assert "holds another collection" in str(other.exception)
+
+
+NEEDS_A_MODEL = [
+    ("--base-url", "http://127.0.0.1:1/v1"),
+    ("--max-usd", "1"),
+    ("--set", "sampling.top_p=0.5"),
+    ("--places", "model"),
+    ("--decisions", "model"),
+    ("--hint", "plan"),
+    ("--strict-thoughts",),
+]
+MISFITS = [
+    (("--expert", "openai:m"), "there is no key: set OPENAI_API_KEY"),
+    (("--expert", "gpt-4o"), "not a model agent; give openai:MODEL"),
+    (("--expert", "openai:m", "--hint", "plan"), "--hint plan is for a model that decides"),
+    (("--expert", "openai:m", "--strict-thoughts"), "give --decisions model, too"),
+    (("--expert", "recorded:x"), "--expert recorded:x is for a model that decides"),
+    (("--expert", "openai:m", "--decisions", "model", "--places", "model"), "has no plan"),
+    (("--expert", "openai:m", "--decisions", "model", "--kinds", "a"), "plays one kind"),
+    (("--expert", "openai:m", "--writer", "x:Y"), "give --writer x:Y or --expert"),
+    (("--expert", "openai:m", "--max-usd", "1"), "--max-usd needs prices"),
+    (("--expert", "openai:m", "--set", "decide=json"), "leave decide out"),
+]
+
+
+@pytest.mark.parametrize("options", NEEDS_A_MODEL, ids=lambda each: each[0])
+def test_options_for_a_model_need_one(tmp_path: Path, options: Sequence[str]) -> None:
+    result = collect(tmp_path / "x", *options)
+    assert "is for a model: give --expert" in str(result.exception)
+    assert str(result.exception).startswith(options[0])
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(("options", "message"), MISFITS, ids=[each[1] for each in MISFITS])
+def test_options_that_do_not_go_together(
+    tmp_path: Path, options: Sequence[str], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    result = collect(tmp_path / "x", *options)
+    assert message in str(result.exception)
+    assert not list((tmp_path / "x").glob("*.json"))  # the directory is free for the next try
+
+
+def test_a_model_that_decides_with_the_plan_as_a_hint(
+    tmp_path: Path, server: ScriptedExpert
+) -> None:
+    more = ("--limit", "4", "--decisions", "model", "--hint", "plan")
+    result = with_expert(server.url, tmp_path, *more)
+    assert result.return_value == 0, result.output
+    taken = trajectories(tmp_path)
+    assert len(taken) == 4
+    for each in taken:
+        assert (each.kind, each.part, each.actor) == ("model", "model", "openai:scripted")
+        assert "For you alone" not in each.model_dump_json()
+        assert each.cost.requests == len(each.turns)
+        assert all(turn.pictures for turn in each.turns)
+        writers = {thought.writer for turn in each.turns for thought in turn.thoughts}
+        assert writers == {"openai:scripted"}
+        assert {thought.kind for turn in each.turns for thought in turn.thoughts} == {"planning"}
+
+
+def test_with_strict_thoughts_a_lie_is_not_taken(tmp_path: Path) -> None:
+    def liar(messages: Sequence[Mapping[str, Any]]) -> str:
+        lie = "<Planning>I can see a BaseballBat and a ToiletPaperHanger right in front of me. "
+        return good(messages).replace("<Planning>", lie)
+
+    more = ("--limit", "1", "--types", "single_search", "--decisions", "model", "--hint", "plan")
+    with ScriptedExpert(answers(liar)) as server:
+        with_expert(server.url, tmp_path, *more)
+    (one,) = trajectories(tmp_path)
+    assert all("unseen" in thought.refused for turn in one.turns for thought in turn.thoughts)
+    prompts: Any = None
+    factory: Any = None
+    assert Deciders(factory, prompts).rejection(one, 30) == ""
+    assert "critic" in Deciders(factory, prompts, strict=True).rejection(one, 30)
+    assert Deciders(factory, prompts).rejection(one, 1) == "too long"
+
+
+def test_an_action_that_was_refused_is_not_learnt_from(tmp_path: Path) -> None:
+    def clumsy(messages: Sequence[Mapping[str, Any]]) -> str:
+        if len(messages) == 2:
+            return "<Thinking>Is it here?</Thinking><DecisionMaking>open Fridge</DecisionMaking>"
+        return good([*messages[:2], *messages[4:]])
+
+    more = ("--limit", "1", "--types", "single_search", "--decisions", "model", "--hint", "plan")
+    with ScriptedExpert(answers(clumsy)) as server:
+        result = with_expert(server.url, tmp_path, *more)  # no room of the suite has a fridge
+    assert result.return_value == 0, result.output
+    (one,) = trajectories(tmp_path)
+    assert [turn.train for turn in one.turns] == [turn.success for turn in one.turns]
+    assert not one.turns[0].success
+
+
+def test_a_recorded_run_becomes_trajectories(tmp_path: Path) -> None:
+    task = next(each for each in small().tasks if each.type.name == "single_pickup")
+    actions = [f"{key.verb} {key.actual_type}".strip() for key in task.key_actions]
+
+    def knows(messages: Sequence[Mapping[str, Any]]) -> str:
+        done = sum(message["role"] == "assistant" for message in messages)
+        thought = f"<Planning>I go on with my {'very ' * done}first idea.</Planning>"
+        return f"{thought}<DecisionMaking>{actions[done]}</DecisionMaking>"
+
+    run = tmp_path / "run"
+    with ScriptedExpert(answers(knows)) as server:
+        command = [
+            "bench", "--suite", NAME, "--task-ids", task.id, "--agent", "openai:scripted",
+            "--base-url", server.url, "--out", str(run), *SMALL,
+        ]  # fmt: skip
+        assert CliRunner().invoke(cli, command, standalone_mode=False).return_value == 0
+    more = ("--limit", "1", "--types", "single_pickup", "--scenes", task.scene)
+    out = tmp_path / "out"
+    decided = ("--expert", f"recorded:{run}", "--decisions", "model", *SMALL)
+    result = collect(out, *more, *decided)
+    assert result.return_value == 0, result.output
+    (one,) = trajectories(out)
+    assert [str(turn.action) for turn in one.turns] == actions
+    assert [turn.thoughts[0].text for turn in one.turns][1] == "I go on with my very first idea."
+
+
+def test_a_local_model_writes_or_is_stood_in_for(tmp_path: Path) -> None:
+    pytest.importorskip("transformers", reason="needs the extra local")
+    pytest.importorskip("torch", reason="needs the extra local")
+    helper = Path(__file__).parents[1] / "vlm" / "tiny_qwen.py"
+    spec = importlib.util.spec_from_file_location("tiny_qwen_here", helper)
+    assert spec is not None
+    assert spec.loader is not None
+    tiny_qwen = importlib.util.module_from_spec(spec)
+    sys.modules["tiny_qwen_here"] = tiny_qwen
+    spec.loader.exec_module(tiny_qwen)
+    model = tiny_qwen.make_tiny_qwen(tmp_path / "model")
+    out = tmp_path / "out"
+    more = ("--limit", "2", "--kinds", "b", "--types", "single_search", *SMALL)
+    result = collect(out, *more, "--expert", f"hf:{model}", "--set", "sampling.max_tokens=8")
+    assert result.return_value == 0, result.output
+    assert re.search(r"tokens in \d+ replies", result.output)
+    thoughts = [t for each in trajectories(out) for turn in each.turns for t in turn.thoughts]
+    assert {each.writer for each in thoughts} == {"grounded"}  # it speaks at random
+    assert all(len(each.refused) >= 3 for each in thoughts)
+    ledger = (out / "spending.jsonl").read_text().splitlines()
+    assert sum(json.loads(line)["completion"] for line in ledger) > 0

@@ -1,0 +1,78 @@
+"""Minari's own library reads what is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("minari", reason="needs the extra minari")
+pytest.importorskip("h5py", reason="needs the extra minari")
+
+import minari
+
+from er_gym.data.collection import Collection
+from er_gym.data.exports import ExportError, ExportOptions, export
+from er_gym.envs.actions import ACTIONS, INDEX
+from er_gym.envs.embodied_env import EmbodiedEnv
+
+
+def test_episodes_are_those_of_the_trajectories(
+    collection: Collection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenes = [each.scene for each in collection.trajectories()]
+    summary = export(
+        collection, "minari", tmp_path / "out", ExportOptions(held_out=tuple(scenes[:2]))
+    )
+    assert summary.left_out == {}
+    assert summary.samples == {"train": len(scenes) - 2, "validation": 2}
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "out"))
+    by_id = {each.id: each for each in collection.trajectories()}
+    env = EmbodiedEnv("mini", obs_mode="state")
+    for name, count in summary.samples.items():
+        dataset = minari.load_dataset(f"er-gym/{name}-v0")
+        assert dataset.total_episodes == count
+        assert dataset.observation_space == env.observation_space
+        assert dataset.action_space == env.action_space
+        about = list(dataset.storage.get_episode_metadata(range(count)))
+        for episode, told in zip(dataset.iterate_episodes(), about, strict=True):
+            was = by_id[told["trajectory"]]
+            assert episode.actions.tolist() == [INDEX[turn.action] for turn in was.turns]
+            assert episode.rewards.tolist() == [turn.reward for turn in was.turns]
+            assert episode.terminations.tolist() == [False] * (was.actions - 1) + [True]
+            states = episode.observations["state"]
+            assert states.shape == (was.actions + 1, *env.observation_space["state"].shape)
+            assert states.dtype == np.float32
+            assert len(np.unique(states, axis=0)) > 2
+            assert str(told["task"]) == was.task_id
+        assert list(dataset.storage.metadata["actions"]) == [str(action) for action in ACTIONS]
+    env.close()
+
+
+def test_what_turns_out_otherwise_is_left_out(collection: Collection, tmp_path: Path) -> None:
+    first, second, third, *_ = collection.trajectories()
+    other = Collection.create(tmp_path / "other", collection.manifest)
+    (other.path / "parts").symlink_to(collection.path / "parts")
+    wrong = first.turns[-1].model_copy(update={"reward": 7.0})
+    unread = second.turns[0].model_copy(update={"verb": "error", "object_type": ""})
+    other.write(
+        [
+            first.model_copy(update={"turns": [*first.turns[:-1], wrong]}),
+            second.model_copy(update={"turns": [unread, *second.turns[1:]]}),
+            third.model_copy(update={"task_id": "gone"}),
+            third,
+        ]
+    )
+    summary = export(other, "minari", tmp_path / "out")
+    assert summary.samples == {"train": 1}
+    assert sum(summary.left_out.values()) == 3
+    assert len(summary.left_out) == 3
+
+
+def test_another_suite_is_said(collection: Collection, tmp_path: Path) -> None:
+    manifest = collection.manifest.model_copy(update={"suite_digest": "0"})
+    other = Collection.create(tmp_path / "other", manifest)
+    other.write(collection.trajectories())
+    with pytest.raises(ExportError, match=r"are not those that .* was played in"):
+        export(other, "minari", tmp_path / "out")
