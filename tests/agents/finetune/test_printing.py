@@ -19,7 +19,7 @@ from click.testing import CliRunner
 
 sys.path.append(str(Path(__file__).parents[2]))  # for the helpers beside the tests
 
-from exported_collection import play_collection
+from played_collection import make_collection
 
 import agents.finetune.printing.trl as trl_files
 from agents.finetune.models import model_names
@@ -38,7 +38,8 @@ YAML = {"llama-factory": "train.yaml", "ms-swift": "train.yaml", "trl": "sft.yam
 @pytest.fixture(scope="module")
 def collection(tmp_path_factory: pytest.TempPathFactory) -> Collection:
     """Two conversations: one with a turn that is not learnt and ``<|feedback|>``, one without."""
-    return play_collection(tmp_path_factory.mktemp("collection") / "played", 2)
+    folder = tmp_path_factory.mktemp("collection") / "played"
+    return make_collection(folder, parts=["mixed"], width=128, height=72)
 
 
 def settings_of(config: str, *overrides: str) -> FinetuneSettings:
