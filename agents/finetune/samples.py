@@ -95,6 +95,10 @@ def open_samples(paths: Sequence[Path], settings: DataSettings) -> Samples:
 def _opened(path: Path, settings: DataSettings) -> _Source:
     if (path / MANIFEST).is_file():
         return _of_collection(Collection.open(path), settings)
+    if not path.exists():
+        raise ValueError(
+            f"{path} does not exist; give what er-gym collect wrote, or a ShareGPT file"
+        )
     if path.is_dir() and not (path / "dataset_info.json").is_file():
         raise ValueError(
             f"{path} holds neither a collection ({MANIFEST}) nor dataset_info.json; give what "

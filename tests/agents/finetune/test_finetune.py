@@ -19,7 +19,7 @@ import yaml
 from click.testing import CliRunner
 from test_tokens import by_hand
 
-from agents.finetune import run_files
+from agents.finetune import loop, run_files
 from agents.finetune import train as training
 from agents.finetune.model_files import open_model
 from agents.finetune.run_files import RunFiles
@@ -127,7 +127,7 @@ def test_eight_trajectories_are_learnt_by_heart(
     result = train(settings(*steps, *more), models(family), [data.path], tmp_path / "run")
     assert result.updates == 128
     assert result.first_loss > 2
-    assert result.loss < 0.1
+    assert result.loss < 0.2
     before, after = weights(models(family)), weights(result.path / "model")
     if kind == "full":  # the eyes are as they were, and all else has learnt
         same = {
@@ -159,11 +159,11 @@ def killed(run: Callable[[], Result], place: str, at: int) -> None:
             return counting
 
         if place == "checkpoint":  # written, and not yet in its place
-            training.move_into_place = counted(run_files.move_into_place)  # type: ignore[assignment]
+            loop.move_into_place = counted(run_files.move_into_place)  # type: ignore[assignment]
         elif place == "update":
-            training.mean_loss = counted(training.mean_loss)  # type: ignore[assignment]
+            loop.mean_loss = counted(loop.mean_loss)  # type: ignore[assignment]
         else:  # all is learnt, the result half written
-            training.write_agent_files = counted(training.write_agent_files)  # type: ignore[assignment]
+            loop.write_agent_files = counted(loop.write_agent_files)  # type: ignore[assignment]
         run()
 
     process = multiprocessing.get_context("fork").Process(target=child)
@@ -320,7 +320,7 @@ def test_bad_input_is_told_in_a_line(
         ("--model", tmp_path / "unfinished", "is a fine-tuning run that is not finished"),
         ("--model", spoken, "was taught with dialect tags, and the data is in dialect"),
         ("--model", models("qwen2"), "no vision: give one that has, or a data.dialect without"),
-        ("--data", "nowhere", "nowhere is not a collection"),
+        ("--data", "nowhere", "nowhere does not exist"),
         ("--data", models(), "is not a collection"),
         (
             "--set",
@@ -334,7 +334,7 @@ def test_bad_input_is_told_in_a_line(
         ("--config", "stage9", "there is no fine-tuning run 'stage9'"),
         ("--out", tmp_path / "taken", "is not empty and holds no finetune.json"),
     ):
-        given = {"--config": "stage1", "--model": models(), "--data": [played.path], "--out": out}
+        given = {"--config": "stage1", "--model": models(), "--data": played.path, "--out": out}
         words = [f"{word}" for pair in (given | {option: value}).items() for word in pair]
         quick = [f"--set={each}" for each in (*QUICK, f"data.dialect={dialect}")]
         last = [option, str(value)] if option == "--set" else []
