@@ -49,7 +49,10 @@ MAY_USE = {
 """Folder or file to the extras whose packages it may import, besides the core's; the longest that
 fits counts."""
 
-NOT_OURS_TO_REQUIRE = {"wandb": "asked for by a setting, whose error says what to install"}
+NOT_OURS_TO_REQUIRE = {
+    "deepspeed": "used where a setting has asked for it",
+    "wandb": "asked for by a setting, whose error says what to install",
+}
 
 USED_OTHERWISE = {
     "accelerate": "transformers places a model by it",
