@@ -15,6 +15,11 @@ def on_gpu() -> bool:
     return torch.cuda.is_available()
 
 
+def is_first() -> bool:
+    """Whether this is the first of the processes that a launcher started, or the only one."""
+    return os.environ.get("RANK", "0") == "0"
+
+
 def free_memory() -> int:
     """Bytes that training may take: the GPU's, or those of the machine or of its container."""
     if on_gpu():

@@ -84,7 +84,7 @@ def train(
     *,
     ignore_memory: bool = False,
     report: Callable[[Progress], None] = lambda progress: None,
-    say: Callable[[str], None] = lambda text: None,
+    say: Callable[[str], None] | None = None,
 ) -> Result:
     """Fine-tune a model, or continue the same run.
 
@@ -96,7 +96,7 @@ def train(
         out: the run directory.
         ignore_memory: train although it will probably not fit into the memory.
         report: is told each time that something is logged.
-        say: is told in a sentence what goes on.
+        say: is told in a sentence what goes on; both in the first process of several.
 
     Raises:
         ValueError: settings, model and data do not go together, or there is not enough memory.
@@ -119,7 +119,9 @@ def train(
         er_gym=er_gym.__version__,
     )
     run = RunFiles(out)
-    first = os.environ.get("RANK", "0") == "0"  # of the processes that a launcher started
+    first = machine.is_first()
+    if say is None or not first:
+        say = _to_nobody
     with ExitStack() as stack:
         if first:
             stack.enter_context(exclusive_use(out))
@@ -384,6 +386,10 @@ def _with_lora(
         raise ValueError(f"model.lora does not fit the model: {one_line(error)}") from None
     network.peft_config["default"].base_model_name_or_path = str(files.path)
     return network
+
+
+def _to_nobody(text: str) -> None:
+    """Say nothing."""
 
 
 # -- the result ------------------------------------------------------------------------------------

@@ -120,7 +120,8 @@ def finetune(
             f"interrupted; {left or 'nothing had been saved, and nothing is left behind'}"
         )
         return INTERRUPTED
-    _say_result(result)
+    if training.machine.is_first():
+        _say_result(result)
     return 0
 
 
