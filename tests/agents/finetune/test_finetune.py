@@ -321,7 +321,7 @@ def test_bad_input_is_told_in_a_line(
         ("--model", spoken, "was taught with dialect tags, and the data is in dialect"),
         ("--model", models("qwen2"), "no vision: give one that has, or a data.dialect without"),
         ("--data", "nowhere", "nowhere does not exist"),
-        ("--data", models(), "is not a collection"),
+        ("--data", models(), "holds neither a collection"),
         (
             "--set",
             "data.parts=[imitation]",
