@@ -33,6 +33,7 @@ from rich.table import Table
 from tokenizers import Tokenizer, decoders, models, pre_tokenizers, trainers
 from torch.profiler import ProfilerActivity, profile
 
+from agents.finetune.batches import Order
 from agents.finetune.memory import ModelNumbers, numbers_of
 from agents.finetune.samples import open_samples
 from agents.finetune.settings import DataSettings, load_settings
@@ -160,24 +161,26 @@ def part_of(name: str) -> str:
 @click.option("--hidden", default=256, show_default=True)
 @click.option("--layers", default=6, show_default=True)
 @click.option("--words", default=2_000, show_default=True)
-@click.option("--batch", default=8, show_default=True)
+@click.option("--batch", default=4, show_default=True)
 @click.option("--epochs", default=3, show_default=True)
 @click.option("--rounds", default=3, show_default=True)
+@click.option("--limit", type=int, help="The most conversations.  [default: all]")
 @click.option("--threads", default=os.cpu_count() or 1, show_default=True)
 def main(
     data: Path, dialect: str, hidden: int, layers: int, words: int, batch: int, epochs: int,
-    rounds: int, threads: int,
+    rounds: int, limit: int | None, threads: int,
 ) -> None:  # fmt: skip
     """Measure, and print two tables."""
     torch.set_num_threads(threads)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         text = blind(Collection.open(data), folder / "data")
-        samples = open_samples([text.path], DataSettings(dialect=dialect))
+        samples = open_samples([text.path], DataSettings(dialect=dialect, limit=limit))
         make_model(folder / "model", samples.chats, hidden, layers, words)
         tokenizer = transformers.AutoTokenizer.from_pretrained(folder / "model")
         settings = load_settings("stage1", [
-            "data.parts=[]", f"data.dialect={dialect}", f"training.batch={batch}",
+            "data.parts=[]", f"data.dialect={dialect}", f"data.limit={limit or 'null'}",
+            f"training.batch={batch}",
             "training.checkpointing=false", "training.learning_rate=0.001",
             "training.log_every=1000", "training.save_every=100000",
         ])  # fmt: skip
@@ -213,9 +216,15 @@ def main(
         with profile(activities=[ProfilerActivity.CPU]) as seen:
             learn(epochs)
     console = Console(width=None if sys.stdout.isatty() else 110)
+    order = list(Order([chat.length for chat in chats], batch, 0, buckets=True))
+    batches = [
+        [chats[i].length for i in order[at : at + batch]] for at in range(0, len(order), batch)
+    ]
+    filled = sum(map(sum, batches)) / sum(max(each) * len(each) for each in batches)
     console.print(
         f"{model.parameters / 1e6:.1f} M parameters, {len(chats)} conversations of "
-        f"{rows // batch:,} tokens on average, {batch} in a batch; {threads} threads"
+        f"{rows // batch:,} tokens on average, {batch} in a batch, of which {1 - filled:.0%} "
+        f"is padding; {threads} threads"
     )
     table = Table(title=f"wanted: a share of at least {WANTED:.0%}")
     table.add_column("what")
