@@ -26,11 +26,19 @@ MAY_USE = {
     "er_gym/writing.py": ("charts",),
     "er_gym/data/exports": ("data", "minari"),
     "agents": (),
+    "agents/finetune": ("finetune",),
+    "agents/finetune/printing/trl_script.py": ("finetune", "trl"),
     "agents/rl": ("rl",),
     "agents/vlm": ("vlm",),
+    "agents/vlm/clients/adapters.py": ("local",),
     "agents/vlm/clients/checkpoint.py": ("local",),
+    "agents/vlm/clients/kept_turns.py": ("local",),
     "agents/vlm/clients/local.py": ("local",),
+    "agents/vlm/clients/padded_batch.py": ("local",),
+    "agents/vlm/clients/seeded_sampling.py": ("local",),
+    "agents/vlm/merging.py": ("local",),
     "benchmarks": (),
+    "benchmarks/ladder/chart.py": ("charts",),
     "benchmarks/scoring/charts.py": ("charts",),
     "benchmarks/scoring/curves.py": ("charts",),
     "benchmarks/scoring/data_charts.py": ("charts",),
@@ -47,7 +55,10 @@ MAY_USE = {
 """Folder or file to the extras whose packages it may import, besides the core's; the longest that
 fits counts."""
 
-NOT_OURS_TO_REQUIRE = {"wandb": "asked for by a setting, whose error says what to install"}
+NOT_OURS_TO_REQUIRE = {
+    "deepspeed": "used where a setting has asked for it",
+    "wandb": "asked for by a setting, whose error says what to install",
+}
 
 USED_OTHERWISE = {
     "accelerate": "transformers places a model by it",

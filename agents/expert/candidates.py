@@ -40,8 +40,10 @@ class Candidate:
         explorer: the name of an explorer's strength.
         strength: how well the explorer plays.
         beginning: of the failed episode that is corrected.
-        run: where the failed episode is, ``episode`` its task id there.
+        run: where the failed episode is, ``episode`` its key there. Of an episode that is replayed:
+            the path of its run.
         repeats: the share of actions that are repeated without need.
+        seed: of the episode; None for one that follows from the collection's seed.
     """
 
     id: str
@@ -57,6 +59,7 @@ class Candidate:
     run: str = ""
     episode: str = ""
     repeats: float = 0.0
+    seed: int | None = None
 
     @property
     def played_task(self) -> Task:

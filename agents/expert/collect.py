@@ -21,6 +21,7 @@ from agents.expert.players import Players, PlaySettings
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
 from er_gym.data.collection import Collection, CollectionError
 from er_gym.data.trajectory import Trajectory
+from er_gym.envs.actions import Action
 from er_gym.rollout.events import Cost, EventListener
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.run_directory import Manifest, RunDirectory, locked_run_directory
@@ -200,16 +201,20 @@ def correction_strata(
     by_id = {task.id: task for task in tasks}
     candidates: list[Candidate] = []
     left_out: dict[str, int] = {}
+    begun: set[tuple[str, tuple[Action, ...]]] = set()
     for episode in run_directory.episodes():
         task = by_id.get(episode.task_id)
         beginning = beginning_of(episode)
         problem = beginning.problem if task else "its task is not among the suite's"
+        if not problem and (episode.task_id, beginning.actions) in begun:
+            problem = "another sample of its task begins alike"
+        begun.add((episode.task_id, beginning.actions))
         if task is None or problem:
             left_out[problem] = left_out.get(problem, 0) + 1
             continue
         candidates.append(
             Candidate(
-                id=f"{task.id}-{CORRECTED}",
+                id=f"{episode.key}-{CORRECTED}",
                 part=CORRECTIONS,
                 actor="corrector",
                 task=task,
@@ -217,7 +222,7 @@ def correction_strata(
                 kind=CORRECTED,
                 beginning=beginning,
                 run=run_directory.path.resolve().name,
-                episode=episode.task_id,
+                episode=episode.key,
             )
         )
     if not candidates:
@@ -385,6 +390,7 @@ class Collector:
             parallelism=self._parallelism,
             listeners=self._listeners,
             cost=self._cost,
+            seeds={each.id: each.seed for each in chosen.values() if each.seed is not None},
         )
         self.summary.played += summary.played
         self.summary.crashed += [f"{each.task_id}: {each.error}" for each in summary.crashed]

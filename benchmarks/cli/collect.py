@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from benchmarks.cli.collect_expert import ExpertOptions, ExpertRun, with_expert_options
+from benchmarks.cli.collect_select import Selection, SelectOptions, with_select_options
 from benchmarks.cli.errors import (
     CRASHED,
     INTERRUPTED,
@@ -20,7 +22,7 @@ from benchmarks.cli.errors import (
     report_set_aside,
 )
 from benchmarks.cli.options import Place, Words, named, seed_option, workers_option
-from benchmarks.cli.terminal import terminal
+from benchmarks.cli.terminal import stdout, terminal
 
 if TYPE_CHECKING:
     from agents.expert.collect import CollectSettings, CollectSummary, Stratum
@@ -55,6 +57,11 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 @click.option("--types", metavar="TYPE,…", help="Only tasks of these types.")
 @click.option("--scenes", metavar="SCENE,…", help="Only tasks in these scenes.")
 @click.option(
+    "--instances",
+    type=click.Choice(("target", "explore")),
+    help="Which object a type name means.  [default: the suite's]",
+)
+@click.option(
     "--writer",
     type=Words(),
     default="grounded",
@@ -81,6 +88,7 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
     metavar="RUN",
     help="Correct the failed episodes of a run of er-gym bench; give no --recipe.",
 )
+@with_select_options
 @workers_option
 @seed_option
 @with_expert_options
@@ -94,6 +102,7 @@ def collect(
     kinds: str | None,
     types: str | None,
     scenes: str | None,
+    instances: str | None,
     writer: str,
     thoughts: str,
     language: str,
@@ -101,6 +110,7 @@ def collect(
     workers: int,
     seed: int,
     expert_options: ExpertOptions,
+    select_options: SelectOptions,
 ) -> int:
     """Collect trajectories with pictures and thoughts, to train on.
 
@@ -108,7 +118,8 @@ def collect(
     default recipe has the parts and proportions of the paper's training set. The same command
     continues a collection; a larger --limit extends it. `er-gym data` shows, verifies and exports
     collections. With --expert, a model writes the thoughts; what it replied and cost stays in the
-    directory.
+    directory. With --select, successful episodes of any agent become trajectories; with --correct,
+    failed ones are corrected.
     """
     from agents.expert.collect import Collector
     from benchmarks.cli.collect_choice import chosen_recipe, chosen_tasks, fitted_tasks, source_of
@@ -123,17 +134,38 @@ def collect(
 
     console = terminal(stderr=True)
     with bad_input():
+        selection = Selection.of(
+            select_options,
+            recipe,
+            expert_options.strict_thoughts,
+            {
+                "--correct": correct is not None,
+                "--parts": parts is not None,
+                "--kinds": kinds is not None,
+                "--expert": expert_options.expert is not None,
+            },
+        )
+        if selection is not None:
+            expert_options = replace(expert_options, strict_thoughts=False)
         model = ExpertRun.of(expert_options, language)  # type: ignore[arg-type]
         if model is not None:
             _refuse_misfits(model, writer, kinds, correct)
-        source, env = source_of(suite, tasks_file, correct)
+        asked: Recipe | None = None
+        if selection is not None:
+            source, env = selection.source(suite, tasks_file)
+            asked = selection.collected
+        else:
+            source, env = source_of(suite, tasks_file, correct)
+        if instances is not None:
+            if selection is not None or correct is not None:
+                raise BadInput("--instances is that of the run; leave it out")
+            env["instances"] = instances
         source = chosen_tasks(source, named("--types", types), named("--scenes", scenes))
         fitted = fitted_tasks(source, env["backend"])
-        asked = None
-        if correct is None:
-            asked = chosen_recipe(recipe, named("--parts", parts), named("--kinds", kinds))
-        else:
+        if correct is not None:
             _refuse_recipe({"--recipe": recipe, "--parts": parts, "--kinds": kinds})
+        elif selection is None:
+            asked = chosen_recipe(recipe, named("--parts", parts), named("--kinds", kinds))
         settings, manifest = _settings(
             source,
             fitted.tasks,
@@ -145,8 +177,13 @@ def collect(
             seed=seed,
             writer=writer,
             table=thoughts,
+            stated_too=selection.stated if selection else {},
         )
-        strata, left_out = _strata(settings, correct, limit, model)
+        if selection is not None:
+            screening, strata = selection.strata(settings.tasks, limit, seed)
+            left_out: dict[str, int] = {}
+        else:
+            strata, left_out = _strata(settings, correct, limit, model)
         make_writer = _make_writer(writer)
     report_set_aside(source.name, fitted.set_aside, fitted.substitutions)
     for reason, number in left_out.items():
@@ -161,6 +198,8 @@ def collect(
             _players(model, make_writer, out, shown) as ready,
         ):
             players, cost = ready
+            if selection is not None:
+                players = selection.players(make_writer, strata)
             collector = Collector(
                 collection,
                 settings,
@@ -177,6 +216,9 @@ def collect(
                     summary = collector.collect()
             finally:
                 bill = cost()
+            if selection is not None:
+                summary.missing.clear()  # the table says why
+                yields = selection.report(screening, strata, collection, players, limit)
     except WorkerSetupError as error:
         raise click.ClickException(str(error)) from error
     except (CollectionError, RunDirectoryError, Locked, ForeignFile) as error:
@@ -195,6 +237,10 @@ def collect(
     if bill:
         console.print(str(bill))
     console.print(_in_words(summary, out / TRAJECTORIES), soft_wrap=True)
+    if selection is not None:
+        from benchmarks.scoring.tables import print_tables
+
+        print_tables([yields], stdout())
     for (part, task_type), number in summary.missing.items():
         print_problem(
             f"{part}: {number} trajectories{f' of {task_type}' if task_type else ''} are missing; "
@@ -221,6 +267,7 @@ def _settings(
     seed: int,
     writer: str,
     table: str,
+    stated_too: Mapping[str, Any],
 ) -> tuple[CollectSettings, CollectionManifest]:
     """What decides the trajectories, and the manifest that states it."""
     from agents.expert.collect import CollectSettings, corrections_recipe
@@ -255,6 +302,7 @@ def _settings(
             "pictures": pictures.model_dump(mode="json", include={"format", "quality"}),
             **({} if correct is None else {"corrects": _name_of(correct)}),
             **({} if model is None else {"expert": model.stated}),
+            **stated_too,
         },
         seed=seed,
         er_gym=__version__,

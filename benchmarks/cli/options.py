@@ -61,6 +61,8 @@ faults_option = click.option(
 
 _MOST_WORKERS = 256
 """Each worker takes 100 MB or more."""
+MOST_SAMPLES = 10_000
+"""More samples of a task than anybody plays; a larger number is a slip of the fingers."""
 MOST_SEED = 2**32 - 1
 """The largest seed that NumPy's and PyTorch's generators accept."""
 

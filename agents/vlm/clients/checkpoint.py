@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
-import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,16 +13,13 @@ from typing import Any
 import transformers
 from transformers.processing_utils import ProcessorMixin
 
+from agents.vlm.clients.adapters import ADAPTER, adapter_chain, with_adapter
 from agents.vlm.settings import AgentSettings, Local
+from agents.vlm.tuned_model import model_directory
 
 _MODEL_FILES = {".json", ".jinja", ".txt", ".model", ".safetensors", ".bin"}
 _LONGEST_WORDS = 300  # characters of a library's, in an error
-_OLD_WEIGHT_NAMES = {
-    r"^visual\.": "model.visual.",
-    r"^model\.(?!language_model\.|visual\.)": "model.language_model.",
-}
-"""The weight names in adapters for Qwen2-VL and Qwen2.5-VL that were trained with transformers 4.51
-or older, and today's names. For whole models transformers converts them itself."""
+_TOKENIZER = "tokenizer_config.json"
 
 
 @dataclass(frozen=True)
@@ -50,12 +47,14 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
     """Load a model; a local directory needs no network.
 
     Args:
-        path: a directory that ``save_pretrained`` wrote, or a model's name on the Hugging Face hub.
+        path: a directory that ``save_pretrained`` wrote, of a whole model or of an adapter; or a
+            model's name on the Hugging Face hub; or a finished run of ``er-gym finetune``.
         settings: of the agent.
 
     Raises:
         ValueError: the model or adapter does not exist, is broken, or does not fit the settings.
     """
+    path = model_directory(path)
     local, sees = settings.local, settings.sees == "pictures"
     is_here = Path(path).is_dir()
     if not is_here and (path.startswith(("/", ".", "~")) or path.count("/") > 1):
@@ -64,13 +63,16 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
             "Hugging Face hub"
         )
     where = {"local_files_only": is_here}
+    whole, adapters = adapter_chain(Path(path)) if is_here else (Path(path), ())
+    base = str(whole) if is_here else path
+    if local.adapter:
+        adapters = (*adapters, _adapter(local.adapter))
+    # An adapter may have brought tokens of its own, and then it has a tokenizer that knows them.
+    words = next((str(a) for a in reversed(adapters) if (a / _TOKENIZER).is_file()), base)
     with _errors_in_one_line(f"{path} cannot be loaded"):
-        config = transformers.AutoConfig.from_pretrained(path, **where)
-        tokenizer = transformers.AutoTokenizer.from_pretrained(path, **where)
-        # Some processors have their own template with pictures. If it comes in several variants,
-        # the tokenizer's own template is the one for chat.
-        template = ProcessorMixin.get_processor_dict(path, **where)[0].get("chat_template")
-        template = template if isinstance(template, str) else None
+        config = transformers.AutoConfig.from_pretrained(base, **where)
+        tokenizer = transformers.AutoTokenizer.from_pretrained(words, **where)
+        template = template_of(words, **where) or template_of(base, **where)
     has_vision = getattr(config, "vision_config", None) is not None
     if sees and not has_vision:
         raise ValueError(f"{path} has no vision; set the agent's setting sees to text")
@@ -79,7 +81,7 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
     with _errors_in_one_line(f"{path} cannot be loaded"):
         # With Pillow: a whole AutoProcessor needs torchvision, for videos only.
         image_processor = (
-            transformers.AutoImageProcessor.from_pretrained(path, backend="pil", **where)
+            transformers.AutoImageProcessor.from_pretrained(base, backend="pil", **where)
             if sees
             else None
         )
@@ -89,7 +91,7 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
             f"({type(image_processor).__name__}); run it on a server"
         )
     with _errors_in_one_line(f"{path} cannot be loaded"):
-        model = _model(path, has_vision, local, where)
+        model = _model(base, has_vision, local, where)
     ends, pad = _end_tokens(model, tokenizer), tokenizer.pad_token_id
     model.generation_config = transformers.GenerationConfig(
         do_sample=False,
@@ -98,10 +100,21 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
         pad_token_id=min(ends, default=None) if pad is None else pad,
         repetition_penalty=model.generation_config.repetition_penalty,
     )
-    if local.adapter:
-        model = _adapted(model, local.adapter)
-    identity = _identity(path, settings, model)
+    for number, adapter in enumerate(adapters, 1):
+        with _errors_in_one_line(f"the adapter {adapter} does not fit the model"):
+            model = with_adapter(model, adapter, merge=number < len(adapters))
+    identity = _identity(base, adapters, settings, model)
     return Checkpoint(model.eval(), tokenizer, image_processor, template, ends, identity)
+
+
+def template_of(path: str, **where: bool) -> str | None:
+    """A processor's own chat template; None for the tokenizer's.
+
+    Some processors have their own template with pictures. If it comes in several variants, the
+    tokenizer's own template is the one for chat.
+    """
+    found = ProcessorMixin.get_processor_dict(path, **where)[0].get("chat_template")
+    return found if isinstance(found, str) else None
 
 
 def one_line(error: Exception) -> str:
@@ -135,32 +148,23 @@ def _end_tokens(model: Any, tokenizer: Any) -> frozenset[int]:
     return frozenset(ends - {None})
 
 
-def _adapted(model: Any, adapter: str) -> Any:
-    try:
-        import peft
-    except ImportError:
-        raise ValueError("local.adapter needs peft: pip install 'er-gym[local]'") from None
-    if not (Path(adapter) / "adapter_config.json").is_file():
+def _adapter(directory: str) -> Path:
+    if importlib.util.find_spec("peft") is None:
+        raise ValueError("local.adapter needs peft: pip install 'er-gym[local]'")
+    if not (Path(directory) / ADAPTER).is_file():
         raise ValueError(
-            f"local.adapter {adapter} is not an adapter; give a directory with adapter_config.json"
+            f"local.adapter {directory} is not an adapter; give a directory with {ADAPTER}"
         )
-    with (
-        _errors_in_one_line(f"local.adapter {adapter} does not fit the model"),
-        warnings.catch_warnings(),
-    ):
-        # peft only warns about an adapter that lacks some of its weights.
-        warnings.filterwarnings("error", message="Found missing adapter keys")
-        names = _OLD_WEIGHT_NAMES if model.config.model_type in ("qwen2_vl", "qwen2_5_vl") else None
-        return peft.PeftModel.from_pretrained(model, adapter, key_mapping=names)
+    return Path(directory)
 
 
-def _identity(path: str, settings: AgentSettings, model: Any) -> str:
+def _identity(path: str, adapters: Sequence[Path], settings: AgentSettings, model: Any) -> str:
     """See :class:`Checkpoint`. Size and time stand for a file's content, since hashing takes
     long."""
-    what = {
+    what: dict[str, Any] = {
         "client": "transformers",
         "model": _files(path) or [[path, getattr(model.config, "_commit_hash", None)]],
-        "adapter": _files(settings.local.adapter) if settings.local.adapter else None,
+        "adapter": [each for adapter in adapters for each in _files(str(adapter))] or None,
         "dtype": str(model.dtype),
         "attention": settings.local.attention,
         "settings": settings.model_dump(
@@ -173,6 +177,9 @@ def _identity(path: str, settings: AgentSettings, model: Any) -> str:
             },
         ),
     }
+    pictures = settings.pictures
+    if pictures.model_bounds != (pictures.min_pixels, pictures.max_pixels):
+        what["model_bounds"] = pictures.model_bounds
     return json.dumps(what, sort_keys=True)
 
 

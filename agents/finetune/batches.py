@@ -1,0 +1,142 @@
+"""Batches: the order of conversations, and their tokens and pictures as tensors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch.utils.data import Dataset, Sampler
+
+from agents.finetune.settings import DataSettings
+from agents.finetune.tokens import EncodedChat, expanded
+from er_gym.data.pictures import open_picture
+from er_gym.data.trajectory import PictureRecord
+
+_POOL = 64
+"""Batches among which conversations of similar length are found: the more, the less padding, and
+the less random who meets whom."""
+
+
+class Order(Sampler[int]):
+    """The order of the conversations in an epoch: drawn from the seed and the epoch alone.
+
+    Consecutive ``batch`` indices are a batch. With ``buckets``, they are of similar length; the
+    batches themselves come in random order, an incomplete one last.
+
+    Args:
+        lengths: of the conversations.
+        batch: conversations in a batch.
+        seed: of the order.
+        buckets: whether the conversations of a batch are of similar length.
+    """
+
+    def __init__(self, lengths: Sequence[int], batch: int, seed: int, buckets: bool) -> None:
+        self._lengths = np.asarray(lengths)
+        self._batch, self._seed, self._buckets = batch, seed, buckets
+        self._epoch = 0
+
+    def set_epoch(self, epoch: int) -> None:
+        """Choose the epoch; the trainer calls it before each."""
+        self._epoch = epoch
+
+    def __len__(self) -> int:
+        return len(self._lengths)
+
+    def __iter__(self) -> Iterator[int]:
+        draw = np.random.default_rng([self._seed, self._epoch])
+        order = draw.permutation(len(self._lengths))
+        if not self._buckets:
+            return iter(order.tolist())
+        last = order[len(order) - len(order) % self._batch :]
+        pool = self._batch * _POOL
+        batches: list[Any] = []
+        for start in range(0, len(order) - len(last), pool):
+            among = order[start : min(start + pool, len(order) - len(last))]
+            by_length = among[np.argsort(self._lengths[among], kind="stable")]
+            batches += by_length.reshape(-1, self._batch).tolist()
+        mixed = [batches[i] for i in draw.permutation(len(batches))]
+        return iter([each for batch in mixed for each in batch] + last.tolist())
+
+
+class EncodedChats(Dataset[EncodedChat]):
+    """The conversations, for a data loader."""
+
+    def __init__(self, chats: Sequence[EncodedChat]) -> None:
+        self._chats = chats
+
+    def __len__(self) -> int:
+        return len(self._chats)
+
+    def __getitem__(self, index: int) -> EncodedChat:
+        return self._chats[index]
+
+
+@dataclass(frozen=True)
+class Collator:
+    """Makes a batch of conversations: reads their pictures and pads their tokens.
+
+    Padding stands on the right, where no token of a causal model sees it; so the batch has no
+    attention mask, without which attention is faster.
+
+    Attributes:
+        image_processor, image_token: the model's; None where it does not see.
+        settings: bounds of pictures.
+        padding: the token that fills rows up.
+    """
+
+    image_processor: Any
+    image_token: int | None
+    settings: DataSettings
+    padding: int
+
+    def __call__(self, chats: Sequence[EncodedChat]) -> dict[str, Any]:
+        """A batch.
+
+        Returns:
+            ``input_ids`` and ``labels`` (conversations, longest), labels -100 where there is no
+            loss; ``tokens``, how many are no padding; with pictures, ``pixel_values`` (patches,
+            values of a patch), ``image_grid_thw`` (pictures, 3) and ``mm_token_type_ids``
+            (conversations, longest), 1 for a picture's token.
+
+        Raises:
+            ValueError: a picture cannot be read, or is not of its record's size.
+        """
+        rows = [expanded(chat, self.image_token) for chat in chats]
+        longest = max(len(ids) for ids, _ in rows)
+        ids = torch.full((len(rows), longest), self.padding)
+        labels = torch.full((len(rows), longest), -100)
+        for row, (tokens, wanted) in enumerate(rows):
+            ids[row, : len(tokens)] = torch.from_numpy(tokens)
+            labels[row, : len(tokens)] = torch.from_numpy(wanted)
+        count = sum(len(tokens) for tokens, _ in rows)
+        batch: dict[str, Any] = {"input_ids": ids, "labels": labels, "tokens": count}
+        pictures = [picture for chat in chats for picture in chat.pictures]
+        if pictures and self.image_token is not None:
+            batch |= self._pixels(pictures)
+            batch["mm_token_type_ids"] = ids.eq(self.image_token).int()
+        return batch
+
+    def _pixels(self, pictures: Sequence[PictureRecord]) -> dict[str, Any]:
+        """Pictures as patches, exactly as agents/vlm/clients/local.py makes them at play."""
+        images = []
+        for record in pictures:
+            image = open_picture(Path(record.path))
+            if image.size != (record.width, record.height):
+                raise ValueError(
+                    f"{record.path} is {image.width} × {image.height} pixels, but "
+                    f"its record says {record.width} × {record.height}; collect the data again"
+                )
+            images.append(image)
+        bounds = {
+            "shortest_edge": self.settings.min_pixels,
+            "longest_edge": self.settings.max_pixels,
+        }
+        seen = self.image_processor(images, size=bounds, return_tensors="pt")
+        return {
+            "pixel_values": seen["pixel_values"],
+            "image_grid_thw": seen["image_grid_thw"],
+        }

@@ -1,0 +1,55 @@
+"""What the machine has: memory to train in, and what is used of it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import torch
+
+_CGROUP = Path("/sys/fs/cgroup")
+
+
+def on_gpu() -> bool:
+    """Whether training runs on a GPU."""
+    return torch.cuda.is_available()
+
+
+def is_first() -> bool:
+    """Whether this is the first of the processes that a launcher started, or the only one."""
+    return os.environ.get("RANK", "0") == "0"
+
+
+def free_memory() -> int:
+    """Bytes that training may take: the GPU's, or those of the machine or of its container."""
+    if on_gpu():
+        return int(torch.cuda.mem_get_info()[0])
+    free = [os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")]
+    for line in _lines(Path("/proc/meminfo")):
+        if line.startswith("MemAvailable:"):
+            free = [int(line.split()[1]) * 1024]
+    limit = "".join(_lines(_CGROUP / "memory.max")).strip()
+    used = "".join(_lines(_CGROUP / "memory.current")).strip()
+    if limit.isdigit() and used.isdigit():
+        cached = sum(
+            int(line.split()[1])
+            for line in _lines(_CGROUP / "memory.stat")
+            if line.startswith("inactive_file ")
+        )
+        free.append(int(limit) - int(used) + cached)
+    return min(free)
+
+
+def used_memory() -> int:
+    """Bytes in use: the most so far on the GPU, or this process's on a CPU."""
+    if on_gpu():
+        return int(torch.cuda.max_memory_allocated())
+    pages = "".join(_lines(Path("/proc/self/statm"))).split()
+    return int(pages[1]) * os.sysconf("SC_PAGE_SIZE") if pages else 0
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []

@@ -1,0 +1,217 @@
+"""The directory of a fine-tuning run.
+
+::
+
+    RUN/finetune.json                  what is tuned on what, with which settings
+    RUN/checkpoints/checkpoint-500/    all that is needed to continue; only whole ones are here
+    RUN/metrics.jsonl                  the logged values, a line each
+    RUN/logs/                          the same for TensorBoard
+    RUN/model/                         the result; it is there when the run is finished
+
+Folders are written beside their place and moved there, so a kill leaves whole ones and drafts,
+whose names begin with a dot; drafts are removed when the run goes on.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from agents.finetune.model_files import MANIFEST, MODEL, History
+from er_gym.locking import LOCK
+from er_gym.tasks.reading import read_bytes
+from er_gym.writing import make_folder, write_atomic
+
+CHECKPOINTS, LOGS, METRICS = "checkpoints", "logs", "metrics.jsonl"
+_CHECKPOINT = re.compile(r"checkpoint-(\d+)")
+
+
+class RunConflict(ValueError):
+    """The directory holds something else; the message says what to do."""
+
+
+class Manifest(BaseModel):
+    """What is tuned on what. Two commands with equal manifests may share a directory.
+
+    Attributes:
+        format: the version of this layout.
+        settings: of the run.
+        model: the directory of the model at the start; ``model_digest``: of its files.
+        data: the data's directories; ``data_digest``: of their conversations.
+        history: what the model had been through before.
+        er_gym: the version of the package.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    format: Literal["er-gym/finetune/1"] = "er-gym/finetune/1"
+    settings: dict[str, Any]
+    model: str
+    model_digest: str
+    data: list[str]
+    data_digest: str
+    history: History = History()
+    er_gym: str
+
+
+class RunFiles:
+    """A run directory.
+
+    Attributes:
+        path: the directory.
+        checkpoints: the folder of its checkpoints.
+        model: where its result will be.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.checkpoints = path / CHECKPOINTS
+        self.model = path / MODEL
+
+    @property
+    def finished(self) -> bool:
+        """Whether the result is there."""
+        return self.model.is_dir()
+
+    def last_checkpoint(self) -> Path | None:
+        """The newest checkpoint; None if there is none."""
+        return max(self._all_checkpoints(), key=_updates, default=None)
+
+    def check(self, manifest: Manifest) -> None:
+        """Raise RunConflict if the directory holds another run, or anything else.
+
+        A run without a checkpoint has learnt nothing, and may be replaced.
+        """
+        if not self.path.exists():
+            return
+        if not (self.path / MANIFEST).is_file():
+            if any(each.name != LOCK for each in self.path.iterdir()):
+                raise RunConflict(
+                    f"{self.path} is not empty and holds no {MANIFEST}; choose another --out"
+                )
+            return
+        try:
+            there = Manifest.model_validate_json(read_bytes(self.path / MANIFEST))
+        except ValidationError as error:
+            raise RunConflict(
+                f"{self.path / MANIFEST} is not a fine-tuning run's: "
+                f"{error.errors()[0]['msg']}; choose another --out"
+            ) from None
+        if not (self.finished or self.last_checkpoint()):
+            return
+        differ = [*_differences(there.settings, manifest.settings)]
+        if there.model_digest != manifest.model_digest:
+            differ.append(f"the model was {there.model}, now {manifest.model}, with other files")
+        if there.data_digest != manifest.data_digest:
+            differ.append(f"the data was {there.data}, now {manifest.data}, with other content")
+        if differ:
+            raise RunConflict(
+                f"{self.path} holds another run ({', '.join(differ)}); choose another --out, or "
+                "repeat its command"
+            )
+
+    def begin(self, manifest: Manifest) -> None:
+        """Write the manifest, if this run is new, and remove what a kill left half-written."""
+        make_folder(self.checkpoints)
+        for folder in (self.path, self.checkpoints):
+            for draft in folder.glob(".*.draft"):
+                shutil.rmtree(draft)
+        if self.last_checkpoint() is None:
+            shutil.rmtree(self.path / LOGS, ignore_errors=True)
+            (self.path / METRICS).unlink(missing_ok=True)
+            write_atomic(self.path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
+
+    def withdraw(self) -> None:
+        """Remove the files of a run without a checkpoint."""
+        if self.last_checkpoint() is None and not self.finished:
+            for folder in (self.checkpoints, self.path / LOGS):
+                shutil.rmtree(folder, ignore_errors=True)
+            for name in (METRICS, MANIFEST):
+                (self.path / name).unlink(missing_ok=True)
+
+    def prune(self, keep: int) -> None:
+        """Remove all but the newest checkpoints."""
+        for old in sorted(self._all_checkpoints(), key=_updates)[:-keep]:
+            # Moved first, so that a kill leaves no half of it under its name.
+            shutil.rmtree(old.rename(draft_of(old)))
+
+    def rewind_metrics(self, updates: int) -> None:
+        """Remove the lines of ``metrics.jsonl`` after an update, and a half-written one."""
+        lines = [line for line in self.metrics() if line["update"] <= updates]
+        if (self.path / METRICS).exists():
+            write_atomic(self.path / METRICS, "".join(json.dumps(each) + "\n" for each in lines))
+
+    def metrics(self) -> list[dict[str, Any]]:
+        """The whole lines of ``metrics.jsonl``."""
+        found = []
+        try:
+            lines = (self.path / METRICS).read_text(encoding="utf-8").splitlines()
+        except FileNotFoundError:
+            return []
+        for line in lines:
+            try:
+                found.append(json.loads(line))
+            except ValueError:  # a kill came while it was written
+                continue
+        return found
+
+    def _all_checkpoints(self) -> list[Path]:
+        return [each for each in self.checkpoints.glob("*") if _CHECKPOINT.fullmatch(each.name)]
+
+
+def draft_of(folder: Path) -> Path:
+    """Where a folder is written before it is moved to its place."""
+    return folder.with_name(f".{folder.name}.draft")
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """Write a folder whole or not at all: fill the folder that this gives."""
+    draft = draft_of(folder)
+    shutil.rmtree(draft, ignore_errors=True)
+    draft.mkdir(parents=True)
+    try:
+        yield draft
+        move_into_place(draft, folder)
+    except BaseException:
+        shutil.rmtree(draft, ignore_errors=True)
+        raise
+
+
+def move_into_place(draft: Path, folder: Path) -> None:
+    """Move a folder, once its files are on the disk, to where there is none."""
+    for file in draft.rglob("*"):
+        _sync(file)
+    _sync(draft)
+    os.rename(draft, folder)
+    _sync(folder.parent)
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _updates(checkpoint: Path) -> int:
+    found = _CHECKPOINT.fullmatch(checkpoint.name)
+    return int(found[1]) if found else -1
+
+
+def _differences(one: dict[str, Any], other: dict[str, Any], path: str = "") -> Iterator[str]:
+    for name in sorted({*one, *other}):
+        a, b = one.get(name), other.get(name)
+        if isinstance(a, dict) and isinstance(b, dict):
+            yield from _differences(a, b, f"{path}{name}.")
+        elif a != b:
+            yield f"{path}{name} was {a}, now {b}"

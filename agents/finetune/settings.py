@@ -1,0 +1,162 @@
+"""The settings of a fine-tuning run: one validated YAML file. Imports no model library.
+
+er-gym's own files are ``configs/finetune/NAME.yaml``. Every field has a default. ``er-gym finetune
+--config stage1 --set training.epochs=2`` overrides a field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from agents import configs
+from er_gym.data.trajectory import Language
+
+KIND = "finetune"
+_WHAT = "fine-tuning run"
+Stage: TypeAlias = Literal["imitation", "exploration", "reflection"]
+"""The paper's three stages, in order; they make the Interactor, the Explorer and the Reasoner."""
+STAGES: tuple[Stage, ...] = ("imitation", "exploration", "reflection")
+Mask: TypeAlias = Literal["turns", "released"]
+"""Which turns of the assistant get loss, see :class:`DataSettings`."""
+
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Positive = Annotated[int, Field(gt=0, le=2**31)]
+Rate = Annotated[float, Field(gt=0, le=10)]
+
+
+class _Settings(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Lora(_Settings):
+    """A low-rank adapter (PEFT's names).
+
+    Attributes:
+        rank, alpha, dropout: of the adapter. The paper's code has rank 8; LLaMA-Factory, which it
+            uses, takes twice the rank for alpha.
+        targets: ``all-linear`` for all linear layers of the language model, or the names of layers.
+    """
+
+    rank: Positive = 8
+    alpha: Positive = 16
+    dropout: Fraction = 0.0
+    targets: Literal["all-linear"] | tuple[str, ...] = "all-linear"
+
+
+class ModelSettings(_Settings):
+    """The model that is tuned.
+
+    Attributes:
+        lora: the adapter; None for full fine-tuning.
+        freeze: parts of a vision-language model that do not learn: ``vision`` is the vision tower,
+            ``projector`` what turns its features into the language model's.
+        dtype: ``auto`` is bfloat16 on a GPU that has it and float32 on a CPU.
+        attention: of ``from_pretrained``; "" for the library's choice.
+    """
+
+    lora: Lora | None = None
+    freeze: tuple[Literal["vision", "projector"], ...] = ("vision", "projector")
+    dtype: Literal["auto", "bfloat16", "float32"] = "auto"
+    attention: str = ""
+
+
+class DataSettings(_Settings):
+    """What is learnt from.
+
+    Attributes:
+        parts: of a collection; all if empty.
+        dialect: how trajectories are put into words (:mod:`er_gym.data.dialects`); its words are
+            also the prompts with which the tuned model plays.
+        language: of the dialect's texts; None for that of the thoughts.
+        mask: ``turns``: the turns that the trajectories mark ``train`` get loss, so that in the
+            third stage the faulty step and all before it get none, as the paper describes.
+            ``released``: all turns after the first ``<|feedback|>`` get loss, and if there is none,
+            all; so does the paper's released code.
+        max_length: the most tokens of a conversation. A longer one is an error: to cut it would cut
+            pictures.
+        min_pixels, max_pixels: a picture with fewer or more is scaled.
+        limit: the most conversations; None for all.
+    """
+
+    parts: tuple[str, ...] = ()
+    dialect: str = "paper"
+    language: Language | None = None
+    mask: Mask = "turns"
+    max_length: Positive = 32_768
+    min_pixels: Positive = 3_136
+    max_pixels: Positive = 180_000
+    limit: Positive | None = None
+
+    @model_validator(mode="after")
+    def _bounds_in_order(self) -> DataSettings:
+        if self.min_pixels > self.max_pixels:
+            raise ValueError(
+                f"min_pixels {self.min_pixels} is more than max_pixels {self.max_pixels}"
+            )
+        return self
+
+
+class TrainingSettings(_Settings):
+    """How it is learnt: parameters of transformers' ``TrainingArguments``, with their meaning.
+
+    Attributes:
+        learning_rate, epochs, weight_decay, max_grad_norm: as there.
+        batch, accumulation: conversations a device and step, and steps an update.
+        warmup: the share of the updates in which the learning rate rises; then it follows a cosine.
+        checkpointing: whether activations are computed again instead of stored.
+        buckets: whether the conversations of a batch are of similar length.
+        save_every, log_every: in updates. A checkpoint is also written at the end.
+        keep: how many checkpoints stay.
+        seed: of the order and of all new weights.
+        deepspeed, fsdp: a DeepSpeed configuration file, and FSDP options, for several GPUs; "" for
+            none.
+    """
+
+    learning_rate: Rate = 1e-5
+    epochs: float = Field(1.0, gt=0, le=10_000)
+    weight_decay: Fraction = 0.0
+    max_grad_norm: float = Field(1.0, gt=0)
+    batch: Positive = 1
+    accumulation: Positive = 1
+    warmup: Fraction = 0.1
+    checkpointing: bool = True
+    buckets: bool = True
+    save_every: Positive = 500
+    log_every: Positive = 2
+    keep: Positive = 2
+    seed: int = Field(0, ge=0, lt=2**32)
+    deepspeed: str = ""
+    fsdp: str = ""
+
+
+class FinetuneSettings(_Settings):
+    """A fine-tuning run.
+
+    Attributes:
+        stage: which of the paper's stages it is; None for a run outside them.
+        after: the stage that the model must have gone through; None for any model.
+        model, data, training: see their classes.
+    """
+
+    stage: Stage | None = None
+    after: Stage | None = None
+    model: ModelSettings = ModelSettings()
+    data: DataSettings = DataSettings()
+    training: TrainingSettings = TrainingSettings()
+
+
+def config_names() -> tuple[str, ...]:
+    """The names of er-gym's own fine-tuning configurations, in alphabetical order."""
+    return configs.names(KIND)
+
+
+def load_settings(name: str, overrides: Sequence[str] = ()) -> FinetuneSettings:
+    """Read a run's settings from a file of ``configs/finetune`` by name, or from any file by path.
+
+    Raises:
+        ValueError: the file does not exist, or the file or an override is invalid.
+    """
+    return configs.load(FinetuneSettings, configs.file_of(KIND, name, _WHAT), _WHAT, overrides)

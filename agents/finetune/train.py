@@ -1,0 +1,418 @@
+"""Fine-tunes a model on conversations, from its settings, or continues where it was.
+
+Read it from top to bottom: :func:`train` is the whole run. The loop is that of transformers'
+``Trainer``, which knows accelerate, DeepSpeed and FSDP. TRL's ``SFTTrainer`` builds on the same.
+What it adds are labels and batches, which are our own here, for the flags of turns; and its loss,
+which on a CPU (TRL 1.16) computes the scores of every token, learnt or not.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import peft
+import torch
+import transformers
+from transformers.trainer_utils import set_seed
+
+import er_gym
+from agents.finetune import machine
+from agents.finetune.batches import Collator, EncodedChats, Order
+from agents.finetune.feedback import FEEDBACK, add_feedback, add_rows, needs_feedback
+from agents.finetune.libraries import fast_arithmetic, quiet_libraries
+from agents.finetune.loop import FinetuneTrainer, Progress, TrainingLog, is_sharded
+from agents.finetune.memory import Memory, Plan, memory, numbers_of, size
+from agents.finetune.model_files import (
+    History,
+    ModelFiles,
+    StageRecord,
+    check_prompts,
+    check_stage,
+    open_model,
+    settings_as_json,
+)
+from agents.finetune.run_files import (
+    Manifest,
+    RunFiles,
+)
+from agents.finetune.samples import Samples, open_samples
+from agents.finetune.settings import FinetuneSettings, Lora
+from agents.finetune.tokens import EncodedChat, Encoder, check_lengths
+from agents.vlm.clients.adapters import adapter_chain, with_adapter
+from agents.vlm.clients.checkpoint import one_line
+from agents.vlm.tuned_model import recorded_pictures
+from er_gym.locking import exclusive_use
+
+_EYES = {"vision": r"model\.visual\.(?!.*merger)", "projector": r"model\.visual\..*merger"}
+"""Names of the weights of each part that the settings can freeze."""
+_MOST_READERS = 8
+
+
+@dataclass(frozen=True)
+class Result:
+    """A finished run.
+
+    Attributes:
+        path: the run directory.
+        conversations, left_out: how many were learnt, and how many have nothing to be learnt.
+        updates: how many there were in all.
+        first_loss, loss: the first and the last that were logged.
+        new: whether anything was left to do.
+    """
+
+    path: Path
+    conversations: int
+    left_out: int
+    updates: int
+    first_loss: float
+    loss: float
+    new: bool
+
+
+def train(
+    settings: FinetuneSettings,
+    model: Path,
+    data: Sequence[Path],
+    out: Path,
+    *,
+    ignore_memory: bool = False,
+    report: Callable[[Progress], None] = lambda progress: None,
+    say: Callable[[str], None] | None = None,
+) -> Result:
+    """Fine-tune a model, or continue the same run.
+
+    Args:
+        settings: of the run.
+        model: a model directory, or a finished run.
+        data: what is learnt from, one after the other
+            (:func:`agents.finetune.samples.open_samples`).
+        out: the run directory.
+        ignore_memory: train although it will probably not fit into the memory.
+        report: is told each time that something is logged.
+        say: is told in a sentence what goes on; both in the first process of several.
+
+    Raises:
+        ValueError: settings, model and data do not go together, or there is not enough memory.
+        RunConflict: the directory holds another run.
+        Locked: another process trains in the directory.
+        KeyboardInterrupt: Ctrl-C; what was learnt since the last checkpoint is lost.
+    """
+    # -- files alone: what is wrong with them is said before anything is written or loaded --
+    files = open_model(model)
+    check_stage(files, settings.after)
+    samples = open_samples(data, settings.data)
+    check_prompts(files, samples.prompts)
+    manifest = Manifest(
+        settings=settings_as_json(settings),
+        model=str(files.path),
+        model_digest=files.digest,
+        data=[str(path.resolve()) for path in data],
+        data_digest=samples.digest,
+        history=files.history,
+        er_gym=er_gym.__version__,
+    )
+    run = RunFiles(out)
+    first = machine.is_first()
+    if say is None or not first:
+        say = _to_nobody
+    with ExitStack() as stack:
+        if first:
+            stack.enter_context(exclusive_use(out))
+        stack.enter_context(quiet_libraries())
+        run.check(manifest)
+        if run.finished:
+            return _result(run, samples, new=False)
+        try:
+            return _train(
+                settings, files, samples, run, manifest, first, ignore_memory, report, say
+            )
+        except BaseException:
+            if first:
+                run.withdraw()
+            raise
+
+
+def _train(
+    settings: FinetuneSettings,
+    files: ModelFiles,
+    samples: Samples,
+    run: RunFiles,
+    manifest: Manifest,
+    first: bool,
+    ignore_memory: bool,
+    report: Callable[[Progress], None],
+    say: Callable[[str], None],
+) -> Result:
+    # -- tokens: all conversations, whole --
+    tokenizer = files.tokenizer
+    feedback = needs_feedback(samples.chats)
+    is_new = feedback and FEEDBACK not in tokenizer.get_vocab()
+    if is_new:
+        add_feedback(tokenizer)
+    image_token = files.config.image_token_id if files.has_vision else None
+    encoder = Encoder(tokenizer, files.template, files.image_processor, image_token, settings.data)
+    chats = [encoder.encode(chat) for chat in samples.chats]
+    chats = [chat for chat in chats if chat.learnt_tokens]
+    check_lengths(chats, settings.data.max_length, ", ".join(manifest.data))
+    say(_about(chats, samples))
+
+    # -- devices: as the launcher, DeepSpeed or FSDP wants them; on a GPU in bfloat16 --
+    dtype = settings.model.dtype
+    if dtype == "auto":
+        has = machine.on_gpu() and torch.cuda.is_bf16_supported()
+        dtype = "bfloat16" if has else "float32"
+    arguments = _arguments(settings, run, dtype)
+    needed = _memory(settings, files, chats, dtype, arguments.world_size)
+    free = machine.free_memory()
+    if needed.total > free and not ignore_memory:
+        raise ValueError(
+            f"this would take about {needed}, and {size(free)} of "
+            f"{'GPU memory' if machine.on_gpu() else 'memory'} are free; set a lower "
+            "training.batch, training.checkpointing=true, model.lora.rank=8 or a lower "
+            "data.max_pixels, take a smaller model, or give --ignore-memory"
+        )
+    say(f"memory, estimated: {needed}")
+
+    # -- the model: its weights, the token <|feedback|>, and what learns --
+    set_seed(settings.training.seed)
+    network = _load(files, settings, dtype)
+    if is_new:
+        add_rows(network, tokenizer)
+    _freeze(network, settings)
+    if settings.model.lora is not None:
+        network = _with_lora(network, settings.model.lora, settings, files, tokenizer, feedback)
+    if dtype == "bfloat16" and not is_sharded(arguments):
+        for weight in network.parameters():
+            if weight.requires_grad:
+                weight.data = weight.data.float()  # small steps would be lost in bfloat16
+
+    # -- the loop --
+    if first:
+        run.begin(manifest)
+    padding = tokenizer.pad_token_id
+    padding = padding if padding is not None else (tokenizer.eos_token_id or 0)
+    trainer = FinetuneTrainer(
+        network,
+        arguments,
+        Order(
+            [chat.length for chat in chats],
+            settings.training.batch,
+            settings.training.seed,
+            settings.training.buckets,
+        ),
+        run,
+        settings.training.keep,
+        data_collator=Collator(files.image_processor, image_token, settings.data, padding),
+        train_dataset=EncodedChats(chats),
+    )
+    trainer.accelerator.wait_for_everyone()
+    last = run.last_checkpoint()
+    done = int(last.name.rpartition("-")[2]) if last else 0
+    if first:
+        run.rewind_metrics(done)
+        trainer.add_callback(TrainingLog(run, trainer, done, report))
+    if last is not None:
+        say(f"continues after update {done:,}")
+    with fast_arithmetic():
+        trainer.train(resume_from_checkpoint=str(last) if last else None)
+
+    # -- the result --
+    loss = run.metrics()[-1]["loss"] if first else 0.0
+    record = StageRecord(
+        stage=settings.stage,
+        run=str(run.path.resolve()),
+        data=manifest.data,
+        data_digest=manifest.data_digest,
+        settings=manifest.settings,
+        conversations=len(chats),
+        updates=trainer.state.global_step,
+        loss=loss,
+    )
+    history = History(runs=(*files.history.runs, record))
+    trainer.write_result(files, history, _agent(settings, samples), tokenizer)
+    return _result(run, samples, new=True)
+
+
+# -- settings as transformers has them -------------------------------------------------------------
+
+
+def _arguments(
+    settings: FinetuneSettings, run: RunFiles, dtype: str
+) -> transformers.TrainingArguments:
+    training, lora = settings.training, settings.model.lora is not None
+    gpu = machine.on_gpu()
+    vision_learns = "vision" not in settings.model.freeze and not lora
+    try:
+        return transformers.TrainingArguments(
+            output_dir=str(run.checkpoints),
+            learning_rate=training.learning_rate,
+            num_train_epochs=training.epochs,
+            weight_decay=training.weight_decay,
+            max_grad_norm=training.max_grad_norm,
+            per_device_train_batch_size=training.batch,
+            gradient_accumulation_steps=training.accumulation,
+            lr_scheduler_type="cosine",
+            warmup_steps=min(training.warmup, 0.999),  # below 1 it is a share of the updates
+            activation_checkpointing=training.checkpointing,
+            activation_checkpointing_kwargs={"use_reentrant": False},
+            optim="adamw_torch_fused",
+            bf16=dtype == "bfloat16",
+            use_cpu=not gpu,
+            save_strategy="steps",
+            save_steps=training.save_every,
+            logging_steps=training.log_every,
+            logging_nan_inf_filter=False,  # TrainingLog says so
+            seed=training.seed,
+            deepspeed=training.deepspeed or None,
+            fsdp=training.fsdp or None,
+            # A conversation without pictures leaves a vision tower that learns without gradients.
+            ddp_find_unused_parameters=vision_learns,
+            dataloader_num_workers=min(_MOST_READERS, (os.cpu_count() or 1) - 1) if gpu else 0,
+            dataloader_pin_memory=gpu,
+            remove_unused_columns=False,
+            label_names=["labels"],
+            report_to="none",
+            disable_tqdm=True,
+            log_level="error",
+        )
+    except (OSError, ImportError, json.JSONDecodeError) as error:
+        raise ValueError(f"training.deepspeed or training.fsdp: {one_line(error)}") from None
+
+
+def _memory(
+    settings: FinetuneSettings, files: ModelFiles, chats: list[EncodedChat], dtype: str, gpus: int
+) -> Memory:
+    merge = files.image_processor.merge_size**2 if files.has_vision else 1
+    plan = Plan(
+        precision="bfloat16" if dtype == "bfloat16" else "float32",
+        lora_rank=settings.model.lora.rank if settings.model.lora else None,
+        freeze=settings.model.freeze,
+        checkpointing=settings.training.checkpointing,
+        batch=min(settings.training.batch, len(chats)),
+        tokens=max(chat.length for chat in chats),
+        learnt=max(chat.learnt_tokens for chat in chats),
+        patches=max(sum(chat.picture_tokens) for chat in chats) * merge,
+        gpus=gpus if settings.training.deepspeed or settings.training.fsdp else 1,
+        on_gpu=machine.on_gpu(),
+    )
+    return memory(numbers_of(files.config.to_dict()), plan)
+
+
+def _about(chats: list[EncodedChat], samples: Samples) -> str:
+    tokens, learnt = (
+        sum(getattr(each, name) for each in chats) for name in ("length", "learnt_tokens")
+    )
+    pictures = sum(len(each.pictures) for each in chats)
+    left = f"; {samples.left_out:,} without a turn to learn left out" if samples.left_out else ""
+    return (
+        f"{len(chats):,} conversations, {pictures:,} pictures, {tokens:,} tokens, of which "
+        f"{learnt:,} are learnt; the longest has {max(each.length for each in chats):,}{left}"
+    )
+
+
+# -- the model -------------------------------------------------------------------------------------
+
+
+def _load(files: ModelFiles, settings: FinetuneSettings, dtype: str) -> Any:
+    """The model with its weights; adapters beneath are merged into it."""
+    maker = (
+        transformers.AutoModelForImageTextToText
+        if files.has_vision
+        else transformers.AutoModelForCausalLM
+    )
+    network: Any
+    told: Any
+    try:
+        loaded: Any = maker.from_pretrained(
+            files.base,
+            dtype=getattr(torch, dtype),
+            attn_implementation=settings.model.attention or None,
+            local_files_only=True,
+            output_loading_info=True,
+        )
+        network, told = loaded  # a pair, for output_loading_info
+        for adapter in adapter_chain(files.path)[1]:
+            network = with_adapter(network, adapter, merge=True)
+    except Exception as error:  # what broken files make of the libraries can be any exception
+        raise ValueError(f"{files.path} cannot be loaded: {one_line(error)}") from None
+    if missing := sorted(told["missing_keys"]):
+        raise ValueError(
+            f"{files.base}: {len(missing)} of its weights are missing, such as {missing[0]}"
+        )
+    return network
+
+
+def _freeze(network: Any, settings: FinetuneSettings) -> None:
+    frozen = [re.compile(_EYES[part]) for part in settings.model.freeze]
+    for name, weight in network.named_parameters():
+        weight.requires_grad = not any(each.match(name) for each in frozen)
+
+
+def _with_lora(
+    network: Any,
+    lora: Lora,
+    settings: FinetuneSettings,
+    files: ModelFiles,
+    tokenizer: Any,
+    feedback: bool,
+) -> Any:
+    """The model with an adapter that learns, and with it the rows of ``<|feedback|>``."""
+    trained: dict[str, list[int]] | None = None
+    if feedback:
+        token = [tokenizer.convert_tokens_to_ids(FEEDBACK)]
+        trained = {"embed_tokens": token}
+        if not network.config.tie_word_embeddings:
+            trained["lm_head"] = token
+    frozen = "|".join(_EYES[part] for part in settings.model.freeze)
+    config = peft.LoraConfig(
+        task_type="CAUSAL_LM",
+        r=lora.rank,
+        lora_alpha=lora.alpha,
+        lora_dropout=lora.dropout,
+        target_modules=lora.targets if isinstance(lora.targets, str) else list(lora.targets),
+        exclude_modules=f"({frozen}).*" if files.has_vision and frozen else None,
+        trainable_token_indices=trained,
+    )
+    try:
+        network = peft.get_peft_model(network, config)
+    except ValueError as error:
+        raise ValueError(f"model.lora does not fit the model: {one_line(error)}") from None
+    network.peft_config["default"].base_model_name_or_path = str(files.path)
+    return network
+
+
+def _to_nobody(text: str) -> None:
+    """Say nothing."""
+
+
+# -- the result ------------------------------------------------------------------------------------
+
+
+def _agent(settings: FinetuneSettings, samples: Samples) -> dict[str, Any]:
+    """How the model was taught to converse, as settings of a model agent."""
+    found: dict[str, Any] = {"prompts": dict(samples.prompts), "sees": samples.sees}
+    if samples.sees == "pictures":
+        found["pictures"] = recorded_pictures(
+            samples.recorded, settings.data.min_pixels, settings.data.max_pixels
+        )
+    return found
+
+
+def _result(run: RunFiles, samples: Samples, *, new: bool) -> Result:
+    lines = run.metrics()
+    return Result(
+        path=run.path,
+        conversations=len(samples.chats),
+        left_out=samples.left_out,
+        updates=lines[-1]["update"],
+        first_loss=lines[0]["loss"],
+        loss=lines[-1]["loss"],
+        new=new,
+    )

@@ -1,0 +1,250 @@
+"""Measures how much of the machine's rate of matrix multiplication goes into fine-tuning.
+
+    er-gym collect --suite mini --out runs/data --limit 24
+    python -m benchmarks.perf.finetune --data runs/data
+
+A tiny language model learns the collection's conversations, without pictures, with the real
+trainer. Its multiplications are counted: those of its layers, forward and backward, of attention,
+and of the output embedding for the tokens that get loss. Padding does not count, and neither does
+what is computed again with checkpointing. Beside it, the same machine multiplies matrices of the
+same sizes. The two take turns, and the median of the rounds is printed, by the clock and by
+processor time, which other programs on the machine disturb less; then where the time goes.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+import torch
+import transformers
+from rich.console import Console
+from rich.table import Table
+from tokenizers import Tokenizer, decoders, models, pre_tokenizers, trainers
+from torch.profiler import ProfilerActivity, profile
+
+from agents.finetune.batches import Order
+from agents.finetune.memory import ModelNumbers, numbers_of
+from agents.finetune.samples import open_samples
+from agents.finetune.settings import DataSettings, load_settings
+from agents.finetune.tokens import EncodedChat, Encoder
+from agents.finetune.train import train
+from er_gym.data.chat import Chat
+from er_gym.data.collection import Collection
+
+WANTED = 0.6
+SPECIAL = ("<|endoftext|>", "<|im_start|>", "<|im_end|>", "<|feedback|>")
+TEMPLATE = (
+    "{% for message in messages %}<|im_start|>{{ message.role }}\n{{ message.content }}<|im_end|>\n"
+    "{% endfor %}{% if add_generation_prompt %}<|im_start|>assistant\n{% endif %}"
+)
+PARTS = {
+    "matrix products": ("mm", "addmm", "bmm", "matmul", "linear"),
+    "attention": ("scaled_dot_product", "flash_attention"),
+    "optimizer": ("Optimizer.step", "fused_adam", "clip", "norm", "foreach"),
+    "batches": ("enumerate(DataLoader)",),
+}
+"""Parts of the time, and words in the names of what they consist of."""
+
+
+@dataclass(frozen=True)
+class Spent:
+    """Seconds by the clock and of processor time, for some multiplications.
+
+    Attributes:
+        work: additions and multiplications of numbers.
+        clock, processor: seconds.
+    """
+
+    work: float
+    clock: float
+    processor: float
+
+
+def timed(work: float, call: Callable[[], Any]) -> Spent:
+    clock, processor = time.perf_counter(), time.process_time()
+    call()
+    return Spent(work, time.perf_counter() - clock, time.process_time() - processor)
+
+
+def blind(collection: Collection, to: Path) -> Collection:
+    """The same trajectories without pictures."""
+    made = Collection.create(to, collection.manifest)
+    made.write(
+        each.model_copy(
+            update={"turns": [turn.model_copy(update={"pictures": []}) for turn in each.turns]}
+        )
+        for each in collection.trajectories()
+    )
+    return made
+
+
+def make_model(to: Path, chats: tuple[Chat, ...], hidden: int, layers: int, words: int) -> None:
+    """A Qwen2 with random weights whose tokenizer knows the words of the conversations."""
+    text = Tokenizer(models.BPE())
+    text.pre_tokenizer = pre_tokenizers.ByteLevel(add_prefix_space=False)
+    text.decoder = decoders.ByteLevel()
+    alphabet = pre_tokenizers.ByteLevel.alphabet()
+    text.train_from_iterator(
+        (turn.text for chat in chats for turn in chat.turns),
+        trainers.BpeTrainer(vocab_size=words, initial_alphabet=alphabet, show_progress=False),
+    )
+    tokenizer = transformers.PreTrainedTokenizerFast(
+        tokenizer_object=text, eos_token="<|im_end|>", pad_token="<|endoftext|>",
+        additional_special_tokens=list(SPECIAL),
+    )  # fmt: skip
+    tokenizer.chat_template = TEMPLATE
+    tokenizer.save_pretrained(to)
+    config = transformers.Qwen2Config(
+        hidden_size=hidden, intermediate_size=3 * hidden, num_hidden_layers=layers,
+        num_attention_heads=max(1, hidden // 64), num_key_value_heads=max(1, hidden // 128),
+        vocab_size=len(tokenizer), max_position_embeddings=8_192, tie_word_embeddings=True,
+    )  # fmt: skip
+    transformers.Qwen2ForCausalLM(config).float().save_pretrained(to)
+
+
+def work_of(model: ModelNumbers, chats: list[EncodedChat]) -> float:
+    """Additions and multiplications of one pass over the conversations, forward and backward."""
+    found = 0.0
+    for chat in chats:
+        layers = model.linear * chat.length
+        attention = model.layers * model.attended * chat.length**2  # two products, half of it seen
+        scores = model.hidden * model.vocabulary * chat.learnt_tokens
+        found += 2 * 3 * (layers + attention + scores)
+    return found
+
+
+def products(model: ModelNumbers, rows: int) -> tuple[float, Callable[[], None]]:
+    """All products of the model's layers for so many tokens, forward and backward, and nothing
+    else; returns their work, too."""
+    h, wide, q, k = model.hidden, model.intermediate, model.attended, model.keys
+    sizes = [(h, q), (h, k), (h, k), (q, h), (h, wide), (h, wide), (wide, h)]
+    inputs = {size: torch.randn(rows, size) for size in {h, wide, q, k}}
+    weights = [torch.randn(out, into) for into, out in sizes]
+
+    def multiply() -> None:
+        for weight in weights:
+            out, into = weight.shape
+            torch.mm(inputs[into], weight.T)
+            torch.mm(inputs[out], weight)
+            torch.mm(inputs[out].T, inputs[into])
+
+    work = sum(6.0 * rows * into * out for into, out in sizes)
+    return work, multiply
+
+
+def repeat(call: Callable[[], None], times: int) -> None:
+    for _ in range(times):
+        call()
+
+
+def part_of(name: str) -> str:
+    for part, words in PARTS.items():
+        if any(word in name for word in words):
+            return part
+    return "the rest: norms, activations, loss, copies"
+
+
+@click.command()
+@click.option("--data", required=True, type=click.Path(path_type=Path, exists=True))
+@click.option("--dialect", default="tags", show_default=True)
+@click.option("--hidden", default=256, show_default=True)
+@click.option("--layers", default=6, show_default=True)
+@click.option("--words", default=2_000, show_default=True)
+@click.option("--batch", default=4, show_default=True)
+@click.option("--epochs", default=3, show_default=True)
+@click.option("--rounds", default=3, show_default=True)
+@click.option("--limit", type=int, help="The most conversations.  [default: all]")
+@click.option("--threads", default=os.cpu_count() or 1, show_default=True)
+def main(
+    data: Path, dialect: str, hidden: int, layers: int, words: int, batch: int, epochs: int,
+    rounds: int, limit: int | None, threads: int,
+) -> None:  # fmt: skip
+    """Measure, and print two tables."""
+    torch.set_num_threads(threads)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        text = blind(Collection.open(data), folder / "data")
+        samples = open_samples([text.path], DataSettings(dialect=dialect, limit=limit))
+        make_model(folder / "model", samples.chats, hidden, layers, words)
+        tokenizer = transformers.AutoTokenizer.from_pretrained(folder / "model")
+        settings = load_settings("stage1", [
+            "data.parts=[]", f"data.dialect={dialect}", f"data.limit={limit or 'null'}",
+            f"training.batch={batch}",
+            "training.checkpointing=false", "training.learning_rate=0.001",
+            "training.log_every=1000", "training.save_every=100000",
+        ])  # fmt: skip
+        encoder = Encoder(tokenizer, TEMPLATE, None, None, settings.data)
+        chats = [encoder.encode(chat) for chat in samples.chats]
+        model = numbers_of(transformers.AutoConfig.from_pretrained(folder / "model").to_dict())
+        work = work_of(model, chats)
+        number = iter(range(1_000))
+
+        def learn(passes: int) -> None:
+            training = settings.training.model_copy(update={"epochs": float(passes)})
+            train(
+                settings.model_copy(update={"training": training}),
+                folder / "model", [text.path], folder / f"run-{next(number)}",
+            )  # fmt: skip
+
+        rows = sum(chat.length for chat in chats) // len(chats) * batch
+        product_work, multiply = products(model, rows)
+        learn(1)
+        multiply()
+        shares: defaultdict[str, list[float]] = defaultdict(list)
+        for _ in range(rounds):
+            # What starting costs is the same for one pass and for more.
+            short, long = (timed(work * n, partial(learn, n)) for n in (1, 1 + epochs))
+            times = max(1, int(long.work / product_work / 4))
+            alone = timed(product_work * times, partial(repeat, multiply, times))
+            for name in ("clock", "processor"):
+                into = (long.work - short.work) / (getattr(long, name) - getattr(short, name))
+                rate = alone.work / getattr(alone, name)
+                shares[f"{name}: training, GFLOP/s"].append(into / 1e9)
+                shares[f"{name}: matrix products, GFLOP/s"].append(rate / 1e9)
+                shares[f"{name}: share"].append(into / rate)
+        with profile(activities=[ProfilerActivity.CPU]) as seen:
+            learn(epochs)
+    console = Console(width=None if sys.stdout.isatty() else 110)
+    order = list(Order([chat.length for chat in chats], batch, 0, buckets=True))
+    batches = [
+        [chats[i].length for i in order[at : at + batch]] for at in range(0, len(order), batch)
+    ]
+    filled = sum(map(sum, batches)) / sum(max(each) * len(each) for each in batches)
+    console.print(
+        f"{model.parameters / 1e6:.1f} M parameters, {len(chats)} conversations of "
+        f"{rows // batch:,} tokens on average, {batch} in a batch, of which {1 - filled:.0%} "
+        f"is padding; {threads} threads"
+    )
+    table = Table(title=f"wanted: a share of at least {WANTED:.0%}")
+    table.add_column("what")
+    table.add_column("median", justify="right")
+    table.add_column("rounds", justify="right")
+    for name, values in shares.items():
+        form = "{:.0%}" if name.endswith("share") else "{:.1f}"
+        each = ", ".join(form.format(value) for value in values)
+        table.add_row(name, form.format(statistics.median(values)), each)
+    console.print(table)
+    spent: defaultdict[str, float] = defaultdict(float)
+    for event in seen.key_averages():
+        spent[part_of(event.key)] += event.self_cpu_time_total
+    table = Table(title="where the time goes (the profiler's own included)")
+    table.add_column("part")
+    table.add_column("share", justify="right")
+    for name, value in sorted(spent.items(), key=lambda each: -each[1]):
+        table.add_row(name, f"{value / sum(spent.values()):.0%}")
+    console.print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,201 @@
+"""Tokens and masks, compared with what is put together by hand and with what is read at play."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from agents.finetune.batches import Collator, Order
+from agents.finetune.feedback import add_feedback
+from agents.finetune.model_files import open_model
+from agents.finetune.settings import DataSettings
+from agents.finetune.tokens import FEEDBACK, EncodedChat, Encoder, check_lengths, expanded
+from agents.vlm.chat import Message, Picture
+from agents.vlm.clients.local import LocalClient
+from agents.vlm.settings import AgentSettings
+from er_gym.data.chat import Chat, ChatTurn
+from er_gym.data.collection import Collection
+
+BOUNDS = {"min_pixels": 784, "max_pixels": 4_704}
+
+
+def encoder(path: Path, **changes: Any) -> Encoder:
+    files = open_model(path)
+    add_feedback(files.tokenizer)
+    image_token = getattr(files.config, "image_token_id", None)
+    settings = DataSettings(**BOUNDS, **changes)
+    return Encoder(files.tokenizer, files.template, files.image_processor, image_token, settings)
+
+
+def by_hand(made: Encoder, chat: Chat, learnt: Sequence[bool]) -> tuple[list[int], list[bool]]:
+    """Tokens and mask put together piece by piece, in Qwen's format."""
+    special = made.tokenizer.convert_tokens_to_ids
+    start, stop, (line,) = special("<|im_start|>"), special("<|im_end|>"), made.tokens("\n")
+    look = [special(f"<|{each}|>") for each in ("vision_start", "image_pad", "vision_end")]
+    ids: list[int] = []
+    wanted: list[bool] = []
+    flags = iter(learnt)
+    for turn in chat.turns:
+        head = [start, *made.tokens(turn.role), line]
+        said: list[int] = []
+        for part in turn.parts:
+            said += made.tokens(part) if isinstance(part, str) else look
+        flag = next(flags) if turn.role == "assistant" else False
+        ids += [*head, *said, stop, line]
+        wanted += [*[False] * len(head), *[flag] * (len(said) + 1), False]
+    return ids, wanted
+
+
+def test_the_turns_that_are_marked_get_loss_and_nothing_else(
+    models: Any, chats: tuple[Chat, ...]
+) -> None:
+    made = encoder(models())
+    assert not all(chat.trains_all for chat in chats)
+    for chat in chats:
+        ids, wanted = by_hand(made, chat, chat.train)
+        found = made.encode(chat)
+        assert found.ids.tolist() == ids
+        assert found.learnt.tolist() == wanted
+
+
+def test_the_released_mask_learns_all_that_is_said_after_the_first_feedback(
+    models: Any, chats: tuple[Chat, ...]
+) -> None:
+    made = encoder(models(), mask="released")
+    feedback = made.tokenizer.convert_tokens_to_ids(FEEDBACK)
+    told = 0
+    for chat in chats:
+        ids, wanted = by_hand(made, chat, [True] * len(chat.train))
+        if feedback in ids:
+            told += 1
+            until = ids.index(feedback) + 1
+            assert any(wanted[:until])
+            wanted[:until] = [False] * until
+        found = made.encode(chat)
+        assert (found.ids.tolist(), found.learnt.tolist()) == (ids, wanted)
+    assert 0 < told < len(chats)
+
+
+def test_what_is_learnt_is_what_is_read_at_play(
+    models: Any, played: Collection, chats: tuple[Chat, ...]
+) -> None:
+    """Token for token and pixel for pixel, at every turn, as the agent's client makes them."""
+    path = models()
+    made = encoder(path)
+    local = {"dtype": "float32", "device_map": "cpu"}
+    settings = AgentSettings.model_validate({"pictures": BOUNDS, "local": local})
+    client = LocalClient(str(path), settings)
+    files = open_model(path)
+    image_token = files.config.image_token_id
+    collate = Collator(files.image_processor, image_token, DataSettings(**BOUNDS), 0)
+    for chat in (each for each in chats if FEEDBACK not in " ".join(t.text for t in each.turns)):
+        encoded = made.encode(chat)
+        ids, labels = expanded(encoded, image_token)
+        batch = collate([encoded])
+        assert batch["input_ids"].tolist() == [ids.tolist()]
+        messages = [_message(turn, played.path) for turn in chat.turns]
+        for place, turn in enumerate(chat.turns):
+            if turn.role != "assistant":
+                continue
+            row = client._row(messages[:place], 0)
+            assert row.ids == ids[: len(row.ids)].tolist()
+            said = made.tokens(turn.text + "<|im_end|>")
+            after = slice(len(row.ids), len(row.ids) + len(said))
+            assert ids[after].tolist() == said
+            assert labels[after].tolist() == (said if turn.train else [-100] * len(said))
+            assert row.new_pixels is not None
+            assert torch.equal(row.new_pixels, batch["pixel_values"][: len(row.new_pixels)])
+    client.close()
+
+
+def _message(turn: ChatTurn, folder: Path) -> Message:
+    parts = [
+        part
+        if isinstance(part, str)
+        else Picture((folder / part.path).read_bytes(), "image/jpeg", part.width, part.height)
+        for part in turn.parts
+    ]
+    return Message(turn.role, tuple(parts))
+
+
+def test_the_length_is_known_without_reading_pictures(
+    models: Any, played: Collection, chats: tuple[Chat, ...]
+) -> None:
+    made = encoder(models())
+    files = open_model(models())
+    image_token = files.config.image_token_id
+    collate = Collator(files.image_processor, image_token, DataSettings(**BOUNDS), 0)
+    encoded = [made.encode(chat) for chat in chats]
+    assert [collate([each])["tokens"] for each in encoded] == [each.length for each in encoded]
+    grids = collate(encoded)["image_grid_thw"].prod(dim=1) // 4
+    assert grids.tolist() == [count for each in encoded for count in each.picture_tokens]
+
+
+def test_what_is_too_long_is_named(models: Any, chats: tuple[Chat, ...]) -> None:
+    encoded = [encoder(models()).encode(chat) for chat in chats]
+    lengths = sorted(each.length for each in encoded)
+    longest = max(encoded, key=lambda each: each.length)
+    check_lengths(encoded, lengths[-1], "data")
+    with pytest.raises(ValueError, match=r"has .* tokens") as error:
+        check_lengths(encoded, lengths[-1] - 3, "data")
+    assert f"{longest.id} has {longest.length:,} tokens" in str(error.value)
+    assert ": 3 more than data.max_length" in str(error.value)
+    assert f"set data.max_length={longest.length} " in str(error.value)
+    assert "others" not in str(error.value)
+    with pytest.raises(ValueError, match=f"and {len(chats) - 2} others"):
+        check_lengths(encoded, lengths[1] - 1, "data")
+
+
+def test_a_template_that_rewrites_earlier_turns_is_refused(models: Any) -> None:
+    files = open_model(models("qwen2"))
+    forgetful = files.template.replace(
+        "{{ message.content }}",
+        "{{ message.content if loop.last or message.role == 'user' else '…' }}",
+    )
+    assert forgetful != files.template
+    with pytest.raises(ValueError, match="writes a turn otherwise once the conversation goes on"):
+        Encoder(files.tokenizer, forgetful, None, None, DataSettings())
+
+
+def test_a_text_only_model_refuses_pictures(models: Any, chats: tuple[Chat, ...]) -> None:
+    with pytest.raises(ValueError, match="no vision: give one that has"):
+        encoder(models("qwen2")).encode(chats[0])
+
+
+# -- batches ---------------------------------------------------------------------------------------
+
+
+def test_batches_are_of_similar_length_and_hold_everything_once() -> None:
+    lengths = np.random.default_rng(0).integers(100, 1_000, 203)
+    order = Order(lengths.tolist(), 4, seed=0, buckets=True)
+    first = list(order)
+    assert sorted(first) == list(range(203))
+    assert first == list(Order(lengths.tolist(), 4, seed=0, buckets=True))
+    order.set_epoch(1)
+    assert list(order) != first
+    plain = list(Order(lengths.tolist(), 4, seed=0, buckets=False))
+    assert _padding(lengths, first) < 0.1 < _padding(lengths, plain)
+
+
+def _padding(lengths: Any, order: list[int]) -> float:
+    """The share of padding in batches of four."""
+    batches = [lengths[order[start : start + 4]] for start in range(0, len(order), 4)]
+    return 1 - sum(each.sum() for each in batches) / sum(each.max() * len(each) for each in batches)
+
+
+def test_a_picture_of_another_size_than_its_record_is_refused(
+    models: Any, played: Collection, chats: tuple[Chat, ...]
+) -> None:
+    files = open_model(models())
+    collate = Collator(files.image_processor, files.config.image_token_id, DataSettings(), 0)
+    encoded = encoder(models()).encode(chats[0])
+    wrong = [each.model_copy(update={"width": 99}) for each in encoded.pictures]
+    with pytest.raises(ValueError, match="128 × 72 pixels, but its record says 99 × 72"):
+        collate(
+            [EncodedChat("x", encoded.ids, encoded.learnt, tuple(wrong), encoded.picture_tokens)]
+        )
