@@ -11,8 +11,13 @@ from typing import Any
 from agents.scripted.oracle import OracleAgent
 from agents.scripted.random import RandomAgent
 from agents.scripted.searcher import SearcherAgent
-from agents.vlm.factory import AgentFactory, agent_name_forms, is_model_agent
-from agents.vlm.settings import AgentSettings
+from agents.vlm.factory import (
+    AgentFactory,
+    agent_name_forms,
+    is_model_agent,
+    load_settings,
+    settings_file,
+)
 from er_gym.plugins import PluginError, Registry, reason
 from er_gym.rollout.agent import Agent, Decision
 from er_gym.tasks.task import Task
@@ -104,7 +109,7 @@ class NamedAgent:
 
 @lru_cache(maxsize=4)
 def _model_agents(name: str) -> AgentFactory:
-    return AgentFactory(name, AgentSettings())
+    return AgentFactory(name, load_settings(None, (), settings_file(name)))
 
 
 def _rl_agent(path: str, trust: bool) -> Agent:

@@ -47,6 +47,7 @@ def load(
     what: str,
     overrides: Sequence[str] = (),
     more: Mapping[str, Any] | None = None,
+    beneath: Path | None = None,
 ) -> Settings:
     """Read and validate a YAML file.
 
@@ -56,12 +57,15 @@ def load(
         what: what such a file describes, for messages.
         overrides: ``"env.types=[single_search]"``: a field's path and its value in YAML.
         more: fields by name, which take precedence over the overrides.
+        beneath: another file, whose fields hold where the first does not state them.
 
     Raises:
         ValueError: an override has no ``=`` or names an unknown field, or a value is invalid.
         TaskFileError: the file cannot be read. (It is a ValueError.)
     """
     data = {} if file is None else _read(file, what)
+    if beneath is not None:
+        data = _merged(_read(beneath, what), data)
     for text in overrides:
         path, equals, value = text.partition("=")
         if not (equals and path):
@@ -76,6 +80,15 @@ def _read(file: Path, what: str) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise ValueError(f"{file}: a {what} is a table of settings, not {data!r:.60}")
     return data
+
+
+def _merged(beneath: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Two tables of settings as one; tables within them are merged, too."""
+    found = {**beneath, **above}
+    for name in beneath.keys() & above.keys():
+        if isinstance(beneath[name], dict) and isinstance(above[name], dict):
+            found[name] = _merged(beneath[name], above[name])
+    return found
 
 
 def _put(data: dict[str, Any], path: Sequence[str], value: Any, text: str) -> None:

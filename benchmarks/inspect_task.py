@@ -46,7 +46,7 @@ from agents.vlm.chat import Message, ModelError, Part, Picture, Reply, Usage
 from agents.vlm.clients.decision_schema import REQUEST_FIELDS
 from agents.vlm.factory import load_settings
 from agents.vlm.matching import Matcher
-from agents.vlm.prompts import load_prompts
+from agents.vlm.prompts import prompts_for
 from agents.vlm.settings import AgentSettings
 from benchmarks.inspect_secrets import without_secrets
 from benchmarks.scoring.metrics import METRICS, score_episode
@@ -133,7 +133,7 @@ def episode(
     tasks: Mapping[str, Task], settings: AgentSettings, env: Mapping[str, Any], seed: int
 ) -> Solver:
     """Plays the sample's task with the model, in an environment in its own process."""
-    prompts, matcher = load_prompts(settings.prompts), Matcher(settings.matching)
+    prompts, matcher = prompts_for(settings), Matcher(settings.matching)
     matcher.prepare()
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:

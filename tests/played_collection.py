@@ -1,8 +1,14 @@
-"""Makes a collection of real episodes, with plain thoughts, for tests that read collections."""
+"""Makes a collection of real episodes, with plain thoughts, for tests that read collections.
+
+The solver plays them. In the part ``anomalies`` things go wrong. In the part ``mixed`` the agent
+first tries what is not legal, in every third episode; so a turn without a picture follows, and the
+turn of that mistake is not learnt. In every second it looks around, and every fourth is in Chinese.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +23,7 @@ from er_gym.data.trajectory import (
     Trajectory,
     Turn,
 )
+from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.solver import Solver
 from er_gym.rollout.play import episode_seed
@@ -27,10 +34,9 @@ from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
 
 SUITE = load_suite("mini")
-IMITATION = tuple(SUITE.tasks[place] for place in (0, 24, 48, 60))
-ANOMALIES = tuple(SUITE.tasks[place] for place in (61, 96, 108))
-PLACES = {"imitation": IMITATION, "anomalies": ANOMALIES}
-FAULTS = {"imitation": 0.0, "anomalies": 0.4}
+FAULTS = {"anomalies": 0.4}
+_KINDS = {"imitation": "a", "anomalies": "anomaly", "mixed": "b"}
+_ILLEGAL = Action(verbs.CLOSE, "Fridge")
 _WORDS: Mapping[Language, Mapping[ThoughtKind, str]] = {
     "en": {
         "analysis": "I look around. There is a {seen} in front of me.",
@@ -47,9 +53,40 @@ _WORDS: Mapping[Language, Mapping[ThoughtKind, str]] = {
         "verification": "让我再检查一遍：都完成了。",
     },
 }
-
-
 _STEP: Mapping[Language, str] = {"en": " This is step {number}.", "zh": "这是第 {number} 步。"}
+
+
+@dataclass(frozen=True)
+class Played:
+    """An episode to be played.
+
+    Attributes:
+        task: the task.
+        first: what the agent does before it does the task.
+        language: of the thoughts.
+    """
+
+    task: Task
+    first: tuple[Action, ...] = ()
+    language: Language = "en"
+
+
+def _episodes(part: str, language: Language) -> list[Played]:
+    tasks = SUITE.tasks
+    if part == "mixed":
+        return [
+            Played(
+                task,
+                (
+                    *(() if number % 3 else (_ILLEGAL,)),
+                    *((Action(verbs.OBSERVE),) if number % 2 else ()),
+                ),
+                "zh" if number % 4 == 3 else "en",
+            )
+            for number, task in enumerate(tasks[:: len(tasks) // 12][:12])
+        ]
+    places = {"imitation": (0, 24, 48, 60), "anomalies": (61, 96, 108)}[part]
+    return [Played(tasks[place], language=language) for place in places]
 
 
 def make_collection(
@@ -60,7 +97,7 @@ def make_collection(
     height: int = 90,
     language: Language = "en",
 ) -> Collection:
-    """Play the tasks of some parts, and write what was seen, said and done."""
+    """Play the episodes of some parts, and write what was seen, said and done."""
     manifest = CollectionManifest(
         suite=SUITE.name, suite_digest=SUITE.digest, seed=3, er_gym="0.1.0"
     )
@@ -68,7 +105,7 @@ def make_collection(
     found: list[Trajectory] = []
     for part in parts:
         env: dict[str, Any] = {"obs_mode": "rgb+objects", "width": width, "height": height}
-        if FAULTS[part]:
+        if part in FAULTS:
             env["faults"] = FAULTS[part]
         RunDirectory.create(
             collection.part_path(part),
@@ -83,38 +120,27 @@ def make_collection(
             ),
         )
         made = EmbodiedEnv((), **env)
-        found += [_played(made, task, part, path, language) for task in PLACES[part]]
+        found += [_played(made, each, part, path) for each in _episodes(part, language)]
         made.close()
     collection.write(found)
     return collection
 
 
-def _played(
-    env: EmbodiedEnv, task: Task, part: str, folder: Path, language: Language
-) -> Trajectory:
+def _played(env: EmbodiedEnv, episode: Played, part: str, folder: Path) -> Trajectory:
+    task = episode.task
     name = f"{task.id}~a"
     seed = episode_seed(3, name)
     obs, info = env.reset(seed=seed, options={"task": task})
-    solver, at, over = Solver(), "", False
+    solver, todo, at, over = Solver(), [*episode.first], "", False
     turns: list[Turn] = []
     while not over:
-        action = info["action"] if info.get("fault") else solver.next(info)[0]
-        around = info.get("views") or {"ahead": obs["rgb"]}
-        pictures: list[PictureRecord] = []
-        for direction, frame in around.items():
-            number = sum(len(turn.pictures) for turn in turns) + len(pictures)
-            place = f"{PARTS}/{part}/pictures/{name}/{number:03}.jpeg"
-            (folder / place).parent.mkdir(parents=True, exist_ok=True)
-            (folder / place).write_bytes(encode_picture(frame))
-            high, wide, _ = frame.shape
-            pictures.append(PictureRecord(path=place, direction=direction, width=wide, height=high))
-        if turns and not turns[-1].success and pictures[0].direction == "ahead":
-            last = next(one for turn in reversed(turns) for one in reversed(turn.pictures))
-            if (folder / last.path).read_bytes() == (folder / pictures[0].path).read_bytes():
-                (folder / pictures.pop().path).unlink()
+        if info.get("fault"):
+            action = info["action"]
+        else:
+            action = todo.pop(0) if todo else solver.next(info)[0]
         views = info.get("object_views_around", {})
         before = {
-            "pictures": pictures,
+            "pictures": _pictures(folder, f"{PARTS}/{part}/pictures/{name}", turns, obs, info),
             "view": [SeenObject.of(one) for one in info["object_views"]],
             "views": {name: [SeenObject.of(one) for one in seen] for name, seen in views.items()},
             "held": info["held"],
@@ -122,7 +148,7 @@ def _played(
             "interactable": list(info["interactable"]),
             "at": at,
             "purpose": _purpose(action.verb, info),
-            "thoughts": list(_thoughts(turns, info, str(action), action.verb, language)),
+            "thoughts": list(_thoughts(turns, info, str(action), action.verb, episode.language)),
             "verb": action.verb,
             "object_type": action.object_type,
         }
@@ -138,6 +164,7 @@ def _played(
                 reward=float(reward),
                 feedback=info["feedback"],
                 fault=info.get("fault", ""),
+                train=info["action_success"] or bool(info.get("fault")),
             )
         )
     record = record_episode(task, agent="expert", seed=seed, max_steps=info["max_steps"])
@@ -152,13 +179,32 @@ def _played(
         search_targets=record.search_targets or [],
         seed=seed,
         part=part,
-        kind="anomaly" if part == "anomalies" else "a",
-        language=language,
+        kind=_KINDS[part],
+        language=episode.language,
         max_steps=record.max_steps,
         turns=turns,
         success=info["success"],
         end_reason=info["end_reason"],
     )
+
+
+def _pictures(
+    folder: Path, place: str, turns: Sequence[Turn], obs: Mapping[str, Any], info: Mapping[str, Any]
+) -> list[PictureRecord]:
+    """Write the pictures of a turn; none after an action that failed and changed nothing."""
+    (folder / place).mkdir(parents=True, exist_ok=True)
+    before = [one for turn in turns for one in turn.pictures]
+    records: list[PictureRecord] = []
+    for direction, frame in (info.get("views") or {"ahead": obs["rgb"]}).items():
+        data = encode_picture(frame)
+        failed = bool(turns) and not turns[-1].success and direction == "ahead"
+        if failed and (folder / before[-1].path).read_bytes() == data:
+            continue
+        path = f"{place}/{len(before) + len(records):03}.jpeg"
+        (folder / path).write_bytes(data)
+        high, wide, _ = frame.shape
+        records.append(PictureRecord(path=path, direction=direction, width=wide, height=high))
+    return records
 
 
 def _purpose(verb: str, info: Mapping[str, Any]) -> Any:

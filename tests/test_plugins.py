@@ -179,7 +179,8 @@ def test_other_wrong_names() -> None:
     with pytest.raises(PluginError, match=r"unknown suite 'er-1'.*er-1k"):
         EmbodiedEnv("er-1")
     with pytest.raises(
-        ValueError, match=r"unknown obs_mode 'rgb\+hand'.*rgb, depth, instance, state, text, hands"
+        ValueError,
+        match=r"unknown obs_mode 'rgb\+hand'.*rgb, depth, instance, objects, state, text, hands",
     ):
         EmbodiedEnv(obs_mode="rgb+hand")
     with pytest.raises(PluginError, match="observation 'household:ECHO' is ModelClientSpec"):

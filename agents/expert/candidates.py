@@ -40,8 +40,10 @@ class Candidate:
         explorer: the name of an explorer's strength.
         strength: how well the explorer plays.
         beginning: of the failed episode that is corrected.
-        run: where the failed episode is, ``episode`` its task id there.
+        run: where the failed episode is, ``episode`` its key there. Of an episode that is replayed:
+            the path of its run.
         repeats: the share of actions that are repeated without need.
+        seed: of the episode; None for one that follows from the collection's seed.
     """
 
     id: str
@@ -57,6 +59,7 @@ class Candidate:
     run: str = ""
     episode: str = ""
     repeats: float = 0.0
+    seed: int | None = None
 
     @property
     def played_task(self) -> Task:
@@ -131,12 +134,16 @@ class CandidateSequence:
         part: as the recipe has it.
         tasks: the tasks of the type; not empty.
         seed: the collection's.
+        says_part: whether ids name the part; so they must where another part has the same kinds.
     """
 
     length = None
 
-    def __init__(self, name: str, part: Part, tasks: Sequence[Task], seed: int) -> None:
+    def __init__(
+        self, name: str, part: Part, tasks: Sequence[Task], seed: int, *, says_part: bool = False
+    ) -> None:
         self._name, self._part, self._tasks = name, part, tasks
+        self._says = f"{name}-" if says_part else ""
         self._seed = f"{seed}/{name}/{tasks[0].type.name}"
 
     def __getitem__(self, index: int) -> Candidate:
@@ -157,7 +164,7 @@ class CandidateSequence:
             if kind == EXPLORED and random.random() >= part.direct:
                 mode = SEARCH
         return Candidate(
-            id=f"{task.id}-{kind}{round_number or ''}",
+            id=f"{task.id}-{self._says}{kind}{round_number or ''}",
             part=self._name,
             actor=part.actor,
             task=task,

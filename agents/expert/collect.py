@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,6 +21,7 @@ from agents.expert.players import Players, PlaySettings
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
 from er_gym.data.collection import Collection, CollectionError
 from er_gym.data.trajectory import Trajectory
+from er_gym.envs.actions import Action
 from er_gym.rollout.events import Cost, EventListener
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.run_directory import Manifest, RunDirectory, locked_run_directory
@@ -29,10 +31,11 @@ from er_gym.tasks.types import BY_NAME
 
 CORRECTIONS = "corrections"
 """The part of the corrected episodes of a run."""
-_MOST_ROUNDS = 5
-"""Chosen candidates are played at most so many times over; they fail only by a crash."""
 _FRUITLESS_ROUNDS = 6
-"""A task type of a part of which nothing was chosen in this many rounds is given up."""
+"""A task type of a part of which nothing was chosen in this many rounds is given up; so it is if
+none of those chosen was taken in so many rounds."""
+_MOST_AT_ONCE = 20_000
+"""No more candidates of a part and task type are looked at in one round, for the memory's sake."""
 _PRIOR = 20
 """The expected share of a part weighs as much as this many candidates looked at."""
 
@@ -92,6 +95,7 @@ class Stratum:
         chosen: those that are to be played, in order.
         taken: those taken, in order.
         fruitless: rounds in a row in which none was chosen.
+        in_vain: rounds in a row in which none of the chosen was taken.
     """
 
     sequence: Candidates
@@ -101,6 +105,7 @@ class Stratum:
     chosen: list[Candidate] = field(default_factory=list)
     taken: list[Candidate] = field(default_factory=list)
     fruitless: int = 0
+    in_vain: int = 0
 
     @property
     def missing(self) -> int:
@@ -111,13 +116,23 @@ class Stratum:
     def open(self) -> bool:
         """Whether there are more candidates to look at."""
         exhausted = self.sequence.length is not None and self.looked_at >= self.sequence.length
-        return self.missing > 0 and self.fruitless < _FRUITLESS_ROUNDS and not exhausted
+        given_up = max(self.fruitless, self.in_vain) >= _FRUITLESS_ROUNDS
+        return self.missing > 0 and not given_up and not exhausted
 
     def next(self) -> list[Candidate]:
         """The candidates of the next round: as many as will probably be needed."""
         found = len(self.taken) + len(self.chosen)
         share = (found + self.expected * _PRIOR) / (self.looked_at + _PRIOR)
-        number = min(round(self.missing / share) + 1, 8 * self.missing + 8)
+        missing = min(self.missing, _MOST_AT_ONCE)
+        return self._following(min(round(missing / share) + 1, 8 * missing + 8))
+
+    def next_chosen(self) -> None:
+        """Choose as many candidates as are missing, unseen, without gaps: which candidates are
+        played must not depend on how many are wanted."""
+        self.chosen += self._following(self.missing)
+
+    def _following(self, number: int) -> list[Candidate]:
+        number = min(number, _MOST_AT_ONCE)
         if self.sequence.length is not None:
             number = min(number, self.sequence.length - self.looked_at)
         first = self.looked_at
@@ -129,6 +144,13 @@ class Stratum:
         more = fit[: self.missing]
         self.chosen += more
         self.fruitless = 0 if more else self.fruitless + 1
+
+    def take(self, fit: Sequence[Candidate]) -> None:
+        """Take those of the chosen that were played and are fit; the others are given up."""
+        if self.chosen:
+            self.in_vain = 0 if fit else self.in_vain + 1
+        self.taken += fit
+        self.chosen.clear()
 
 
 def recipe_strata(settings: CollectSettings, limit: int | None) -> dict[tuple[str, str], Stratum]:
@@ -151,15 +173,15 @@ def recipe_strata(settings: CollectSettings, limit: int | None) -> dict[tuple[st
         raise ValueError(
             f"none of the tasks is of a type that the recipe asks for: {', '.join(asked)}"
         )
-    return {
-        (part, kind): Stratum(
-            CandidateSequence(part, recipe.parts[part], by_type[kind], settings.seed),
-            number,
-            recipe.parts[part].expected,
-        )
-        for (part, kind), number in wanted.items()
-        if number
-    }
+    kinds = Counter(kind for part in recipe.parts.values() for kind in part.all_kinds)
+    strata = {}
+    for (part, kind), number in wanted.items():
+        row = recipe.parts[part]
+        alike = any(kinds[each] > 1 for each in row.all_kinds)
+        sequence = CandidateSequence(part, row, by_type[kind], settings.seed, says_part=alike)
+        if number:
+            strata[part, kind] = Stratum(sequence, number, row.expected)
+    return strata
 
 
 def correction_strata(
@@ -179,24 +201,28 @@ def correction_strata(
     by_id = {task.id: task for task in tasks}
     candidates: list[Candidate] = []
     left_out: dict[str, int] = {}
+    begun: set[tuple[str, tuple[Action, ...]]] = set()
     for episode in run_directory.episodes():
         task = by_id.get(episode.task_id)
         beginning = beginning_of(episode)
         problem = beginning.problem if task else "its task is not among the suite's"
+        if not problem and (episode.task_id, beginning.actions) in begun:
+            problem = "another sample of its task begins alike"
+        begun.add((episode.task_id, beginning.actions))
         if task is None or problem:
             left_out[problem] = left_out.get(problem, 0) + 1
             continue
         candidates.append(
             Candidate(
-                id=f"{task.id}-{CORRECTED}",
+                id=f"{episode.key}-{CORRECTED}",
                 part=CORRECTIONS,
                 actor="corrector",
                 task=task,
                 index=len(candidates),
                 kind=CORRECTED,
                 beginning=beginning,
-                run=run_directory.path.name,
-                episode=episode.task_id,
+                run=run_directory.path.resolve().name,
+                episode=episode.key,
             )
         )
     if not candidates:
@@ -251,15 +277,19 @@ class Collector:
 
         Raises:
             Stopped, WorkerSetupError, KeyboardInterrupt, OSError: as
-                :func:`er_gym.rollout.runner.run`; what was collected so far is written.
+                :func:`er_gym.rollout.runner.run`; what was collected so far is written, and what
+                an earlier command had collected stays.
+            RunDirectoryError, Locked, ForeignFile: the directory of a part cannot be used.
         """
         try:
             for part in self._settings.recipe.parts:
                 strata = [one for (name, _), one in self._strata.items() if name == part]
                 if strata:
                     self._collect_part(part, strata)
-        finally:
-            self.summary.taken = self._collection.write(self._taken())
+        except BaseException:  # Ctrl-C too
+            self.summary.taken = self._collection.write(self._taken_and_earlier())
+            raise
+        self.summary.taken = self._collection.write(self._taken())
         for key, stratum in self._strata.items():
             if stratum.missing > 0:
                 self.summary.missing[key] = stratum.missing
@@ -270,6 +300,17 @@ class Collector:
             for candidate in stratum.taken:
                 yield self._collection.played(candidate.part, candidate.id)
 
+    def _taken_and_earlier(self) -> Iterator[Trajectory]:
+        """The trajectories taken now, then those that were in the file before."""
+        now = set()
+        for trajectory in self._taken():
+            now.add((trajectory.part, trajectory.id))
+            yield trajectory
+        with suppress(CollectionError):  # there is no file yet, or it is damaged
+            for trajectory in self._collection.trajectories():
+                if (trajectory.part, trajectory.id) not in now:
+                    yield trajectory
+
     # -- one part --------------------------------------------------------------------------------
 
     def _collect_part(self, part: str, strata: Sequence[Stratum]) -> None:
@@ -278,26 +319,31 @@ class Collector:
         if row.faults:
             env["faults"] = row.faults
         with self._part_directory(part, {**env, "obs_mode": self._players.obs_mode}) as directory:
-            for _ in range(_MOST_ROUNDS):
-                while any(stratum.open for stratum in strata):
-                    self._choose(strata, env, row.most_actions)
+            while True:
+                self._choose_enough(strata, env, row.most_actions)
                 if not any(stratum.chosen for stratum in strata):
                     break
                 try:
                     self._play(directory, strata, row.most_actions)
                 finally:  # what was played before an interruption is taken, too
                     for stratum in strata:
-                        self._take(stratum, row.most_actions)
+                        self._take(directory, stratum, row.most_actions)
                     self.summary.taken = sum(len(one.taken) for one in self._strata.values())
                     self._tell(part, self.summary.taken)
+
+    def _choose_enough(self, strata: Sequence[Stratum], env: Mapping[str, Any], most: int) -> None:
+        """Choose candidates to be played until there are enough, or no more."""
+        if not self._players.scripted:
+            for stratum in strata:
+                if stratum.open:
+                    stratum.next_chosen()
+            return
+        while any(stratum.open for stratum in strata):
+            self._choose(strata, env, most)
 
     def _choose(self, strata: Sequence[Stratum], env: Mapping[str, Any], most: int) -> None:
         """Look at more candidates, and choose those that an audition shows to be fit."""
         rounds = [(stratum, stratum.next()) for stratum in strata if stratum.open]
-        if not self._players.scripted:
-            for stratum, candidates in rounds:
-                stratum.choose(candidates)
-            return
         fit: dict[str, Candidate] = {}
         for verdict in audition(
             [each for _, candidates in rounds for each in candidates],
@@ -335,6 +381,7 @@ class Collector:
     def _play(self, directory: RunDirectory, strata: Sequence[Stratum], most: int) -> None:
         """Play the chosen candidates with pictures and thoughts."""
         chosen = {each.id: each for stratum in strata for each in stratum.chosen}
+        self._forget_damaged(directory, chosen.values(), most)
         summary = run(
             directory,
             _by_scene(each.played_task for each in chosen.values()),
@@ -343,13 +390,34 @@ class Collector:
             parallelism=self._parallelism,
             listeners=self._listeners,
             cost=self._cost,
+            seeds={each.id: each.seed for each in chosen.values() if each.seed is not None},
         )
         self.summary.played += summary.played
         self.summary.crashed += [f"{each.task_id}: {each.error}" for each in summary.crashed]
 
-    def _take(self, stratum: Stratum, most: int) -> None:
+    def _forget_damaged(
+        self, directory: RunDirectory, candidates: Iterable[Candidate], most: int
+    ) -> None:
+        """Let episodes be played again whose trajectory or pictures are damaged or gone."""
+        for each in candidates:
+            if directory.has(each.id) and not self._is_whole(each, most):
+                directory.forget(each.id)
+
+    def _is_whole(self, candidate: Candidate, most: int) -> bool:
+        try:
+            trajectory = self._collection.played(candidate.part, candidate.id)
+        except CollectionError:
+            return False
+        if self._players.rejection(trajectory, most):
+            return True  # pictures of what is not taken are not kept
+        return self._collection.has_pictures(trajectory)
+
+    def _take(self, directory: RunDirectory, stratum: Stratum, most: int) -> None:
         """Take the chosen candidates that were played and came out well, in order."""
+        fit = []
         for candidate in stratum.chosen:
+            if not directory.has(candidate.id):  # its files may not be whole
+                continue
             try:
                 trajectory = self._collection.played(candidate.part, candidate.id)
             except CollectionError:  # it crashed, as the summary says, or was not played
@@ -358,8 +426,8 @@ class Collector:
             if reason:
                 self._reject(reason)
             else:
-                stratum.taken.append(candidate)
-        stratum.chosen.clear()
+                fit.append(candidate)
+        stratum.take(fit)
 
     def _reject(self, reason: str) -> None:
         self.summary.rejected[reason] = self.summary.rejected.get(reason, 0) + 1

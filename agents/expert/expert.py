@@ -152,8 +152,12 @@ class CorrectedCourse(ExpertCourse):
         self._beginning = beginning
 
     def _prelude(self) -> Intents:
+        done = self.view.done
         for action in self._beginning:
+            done = self.view.done
             yield self._replayed(action)
+        if self.view.done > done:
+            raise GiveUp  # nothing is wrong here: a fault made the action fail in the episode
         yield from self._free_hand()
         return True
 

@@ -40,8 +40,8 @@ class Strength(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    share: float = Field(default=1.0, ge=0)
-    temperature: float = Field(default=1.0, ge=0)
+    share: float = Field(default=1.0, ge=0, allow_inf_nan=False)
+    temperature: float = Field(default=1.0, ge=0, allow_inf_nan=False)
     forgets: float = Field(default=0.0, ge=0, le=1)
     blunders: float = Field(default=0.0, ge=0, le=1)
 

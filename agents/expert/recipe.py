@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from fractions import Fraction
+from math import floor
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from agents import configs
 from agents.expert.explorer import Strength
 from agents.expert.kinds import MODES
+from er_gym.envs.faults import fault_rates
 from er_gym.tasks.types import BY_NAME
 
 DEFAULT = "paper"
@@ -18,7 +21,10 @@ ANOMALY, EXPLORED, CORRECTED = "anomaly", "explored", "corrected"
 plays, a failed episode is corrected."""
 SEARCH = "search"
 """The mode of an explorer's trajectory in which something must have been searched for."""
-Share = Annotated[float, Field(ge=0)]
+_HALF = Fraction(1, 2)
+_MOST = 10_000_000
+"""A part has at most this many trajectories of a task type."""
+Share = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class Part(BaseModel):
@@ -42,7 +48,7 @@ class Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     actor: Literal["expert", "explorer", "corrector"]
-    types: dict[str, int]
+    types: dict[str, Annotated[int, Field(ge=0, le=_MOST)]]
     kinds: dict[str, Share] = {}
     explorers: dict[str, Strength] = {}
     direct: float = Field(default=0.0, ge=0, le=1)
@@ -57,9 +63,14 @@ class Part(BaseModel):
         unknown = sorted(types.keys() - BY_NAME.keys())
         if unknown:
             raise ValueError(f"unknown task type {unknown[0]!r}; there are: {', '.join(BY_NAME)}")
-        if any(number < 0 for number in types.values()) or not any(types.values()):
-            raise ValueError(f"{types} are not numbers from 0, at least one of them above 0")
+        if not any(types.values()):
+            raise ValueError(f"{types} asks for nothing; let at least one number be above 0")
         return types
+
+    @field_validator("faults", mode="before")
+    @classmethod
+    def _known_faults(cls, faults: Any) -> dict[str, float]:
+        return fault_rates(faults)
 
     @model_validator(mode="after")
     def _complete(self) -> Part:
@@ -74,6 +85,13 @@ class Part(BaseModel):
             raise ValueError(f"an {self.actor} needs explorers; name at least one with a share")
         return self
 
+    @property
+    def all_kinds(self) -> tuple[str, ...]:
+        """The kinds of trajectories that it may have."""
+        if self.actor == "expert":
+            return tuple(kind for kind, share in self.kinds.items() if share)
+        return (EXPLORED if self.actor == "explorer" else CORRECTED,)
+
 
 class Recipe(BaseModel):
     """A file in ``configs/collections``.
@@ -86,7 +104,9 @@ class Recipe(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     description: str = ""
-    parts: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$")], Part]
+    parts: Annotated[
+        dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,59}$")], Part], Field(min_length=1)
+    ]
 
     @property
     def size(self) -> int:
@@ -106,19 +126,20 @@ def load_recipe(name: str = DEFAULT) -> Recipe:
 def quotas(recipe: Recipe, limit: int | None, types: set[str]) -> dict[tuple[str, str], int]:
     """How many trajectories to take, by part and task type.
 
-    Types without tasks are left out, and the others of the part take their shares. Rounding follows
-    the largest remainder, over the whole recipe, so that the numbers sum to ``limit``.
+    Types without tasks are left out, and the others of the part take their shares. The numbers sum
+    to ``limit``; each is its share times a factor that is the same for all, rounded. With a larger
+    limit, none of them is smaller, so that a collection can grow.
 
     Args:
         recipe: the recipe.
         limit: how many in all; None for the recipe's own number.
         types: the task types that there are tasks of.
     """
-    wanted: dict[tuple[str, str], float] = {}
+    wanted: dict[tuple[str, str], Fraction] = {}
     for name, part in recipe.parts.items():
         there = {kind: number for kind, number in part.types.items() if kind in types and number}
         if there:
-            factor = sum(part.types.values()) / sum(there.values())
+            factor = Fraction(sum(part.types.values()), sum(there.values()))
             wanted |= {(name, kind): number * factor for kind, number in there.items()}
     total = sum(wanted.values())
     if not total:
@@ -126,11 +147,18 @@ def quotas(recipe: Recipe, limit: int | None, types: set[str]) -> dict[tuple[str
     return _rounded(wanted, round(total) if limit is None else limit)
 
 
-def _rounded(shares: Mapping[tuple[str, str], float], total: int) -> dict[tuple[str, str], int]:
-    """Whole numbers in the proportion of some shares that sum to ``total``."""
+def _rounded(shares: Mapping[tuple[str, str], Fraction], total: int) -> dict[tuple[str, str], int]:
+    """Whole numbers in the proportion of some shares that sum to ``total``.
+
+    The method of Webster and Sainte-Laguë: ``round(share * factor)`` with the factor that gives
+    the total. A large share may so miss its exact part of the total by more than 1 (at most by 1/2,
+    and its part of 1/2 for each of the shares). The largest remainder stays within 1, but there a
+    number may become smaller when the total grows.
+    """
     whole = sum(shares.values())
-    exact = {key: share * total / whole for key, share in shares.items()}
-    taken = {key: int(number) for key, number in exact.items()}
-    missing = total - sum(taken.values())
-    by_remainder = sorted(exact, key=lambda key: (taken[key] - exact[key], key))
-    return {key: number + (key in by_remainder[:missing]) for key, number in taken.items()}
+    taken = {key: floor(share * total / whole + _HALF) for key, share in shares.items()}
+    while sum(taken.values()) < total:
+        taken[min(shares, key=lambda key: ((taken[key] + _HALF) / shares[key], key))] += 1
+    while sum(taken.values()) > total:
+        taken[max(shares, key=lambda key: ((taken[key] - _HALF) / shares[key], key))] -= 1
+    return taken

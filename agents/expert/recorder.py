@@ -15,6 +15,7 @@ from agents.vlm.chat import Picture
 from agents.vlm.pictures import encode
 from agents.vlm.settings import Pictures
 from er_gym.data.collection import PLAYED
+from er_gym.data.dialects import shows_anew
 from er_gym.data.knowledge import Knowledge, knowledge_at
 from er_gym.data.trajectory import (
     Correction,
@@ -221,13 +222,10 @@ class TrajectoryRecorder:
             return [(name, encode(frame, self._pictures)) for name, frame in around.items()]
         picture = encode(obs["rgb"], self._pictures)
         last = self.turns[-1] if self.turns else None
-        if last is not None and not last.success and self._is_last_picture(picture):
-            return []
-        return [(AHEAD, picture)]
-
-    def _is_last_picture(self, picture: Picture) -> bool:
-        last = next(reversed(self._files.values()), b"")
-        return last == picture.data
+        shown_last = next(reversed(self._files.values()), b"")
+        if shows_anew(last is None or last.success, picture.data, shown_last):
+            return [(AHEAD, picture)]
+        return []
 
     def _picture_record(self, direction: str, picture: Picture) -> PictureRecord:
         kind = picture.media_type.removeprefix("image/")

@@ -151,6 +151,8 @@ def _event(intent: Intent, turns: Sequence[Turn]) -> Event:
     last = turns[-1]
     if not last.success:
         return "failed"
+    if intent.train and not last.train and last.purpose != "repeat" and not last.earned:
+        return "failed"  # the mistake that a correction begins with
     if intent.purpose == "repeat":
         return "careless"
     if intent.checked == "check" or intent.checked == "think and check":

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import lru_cache
 from pathlib import Path
 from random import Random
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from agents import configs
-from er_gym.data.trajectory import ThoughtKind
+from er_gym.data.trajectory import THOUGHT_KINDS, ThoughtKind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TRANSPORT
 
@@ -23,14 +23,34 @@ Event: TypeAlias = Literal[
     "begin", "earned", "fruitless", "failed", "careless", "done", "check", "think and check"
 ]
 """What a turn's thoughts respond to."""
+TaskKind: TypeAlias = Literal["single", "exposed to enclosed", "transfer", "ordered"]
+"""A kind of task, as far as its end is concerned."""
 _MOST = 4
 """A turn has no more thoughts than this."""
 
 
-def _sums_to_one(shares: dict[Any, float]) -> dict[Any, float]:
-    if abs(sum(shares.values()) - 1.0) > 1e-6:
-        raise ValueError(f"the shares {shares} sum to {sum(shares.values()):g}; let them sum to 1")
-    return shares
+Row = TypeVar("Row", dict[Any, float], tuple[float, ...])
+
+
+def _sums_to_one(row: Row) -> Row:
+    shares = row.values() if isinstance(row, dict) else row
+    if abs(sum(shares) - 1.0) > 1e-6:
+        raise ValueError(f"the shares {row} sum to {sum(shares):g}; let them sum to 1")
+    return row
+
+
+def _has_all(names: Collection[str]) -> AfterValidator:
+    """A table must have a row for each of these names."""
+
+    def check(table: dict[Any, Any]) -> dict[Any, Any]:
+        missing = [name for name in names if name not in table]
+        if missing:
+            raise ValueError(
+                f"there are only {', '.join(table) or 'no rows'}; give {', '.join(missing)}, too"
+            )
+        return table
+
+    return AfterValidator(check)
 
 
 Share: TypeAlias = Annotated[float, Field(ge=0, le=1)]
@@ -38,8 +58,11 @@ _Start: TypeAlias = Annotated[dict[ThoughtKind, Share], AfterValidator(_sums_to_
 _Next: TypeAlias = Annotated[
     dict[ThoughtKind | Literal["act"], Share], AfterValidator(_sums_to_one)
 ]
-_Limits: TypeAlias = dict[ThoughtKind, Annotated[int, Field(ge=10)]]
-_Draws: TypeAlias = tuple[Share, Share, Share]
+_Limits: TypeAlias = Annotated[
+    dict[ThoughtKind, Annotated[int, Field(ge=10)]], _has_all(THOUGHT_KINDS)
+]
+_Company: TypeAlias = Literal["alone", "together"]
+_Draws: TypeAlias = Annotated[tuple[Share, Share, Share], AfterValidator(_sums_to_one)]
 
 
 class ThoughtKinds(BaseModel):
@@ -54,10 +77,10 @@ class ThoughtKinds(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    kinds: dict[ThoughtKind, _Next]
-    events: dict[Event, _Start]
-    limits: dict[Literal["alone", "together"], _Limits]
-    checks: dict[Literal["single", "exposed to enclosed", "transfer", "ordered"], _Draws]
+    kinds: Annotated[dict[ThoughtKind, _Next], _has_all(THOUGHT_KINDS)]
+    events: Annotated[dict[Event, _Start], _has_all(get_args(Event))]
+    limits: Annotated[dict[_Company, _Limits], _has_all(get_args(_Company))]
+    checks: Annotated[dict[TaskKind, _Draws], _has_all(get_args(TaskKind))]
 
     def draw(self, event: Event, random: Random) -> tuple[ThoughtKind, ...]:
         """The kinds of a turn's thoughts, in order; at least one, and none twice."""
@@ -86,7 +109,7 @@ def _draw(shares: Mapping[Any, float], random: Random) -> Any:
     return random.choices(list(shares), list(shares.values()))[0]
 
 
-def _task_kind(task: Task) -> Literal["single", "exposed to enclosed", "transfer", "ordered"]:
+def _task_kind(task: Task) -> TaskKind:
     if task.type.ordered:
         return "ordered"
     if task.type.name == "pickup_and_put_in_closerep":

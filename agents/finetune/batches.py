@@ -83,13 +83,11 @@ class Collator:
     attention mask, without which attention is faster.
 
     Attributes:
-        folder: what the paths of pictures are relative to.
         image_processor, image_token: the model's; None where it does not see.
         settings: bounds of pictures.
         padding: the token that fills rows up.
     """
 
-    folder: Path
     image_processor: Any
     image_token: int | None
     settings: DataSettings
@@ -126,10 +124,10 @@ class Collator:
         """Pictures as patches, exactly as agents/vlm/clients/local.py makes them at play."""
         images = []
         for record in pictures:
-            image = open_picture(self.folder / record.path)
+            image = open_picture(Path(record.path))
             if image.size != (record.width, record.height):
                 raise ValueError(
-                    f"{self.folder / record.path} is {image.width} × {image.height} pixels, but "
+                    f"{record.path} is {image.width} × {image.height} pixels, but "
                     f"its record says {record.width} × {record.height}; collect the data again"
                 )
             images.append(image)

@@ -53,7 +53,7 @@ def _whole(weight: Any) -> Iterator[None]:
     if not hasattr(weight, "ds_id"):
         yield
         return
-    import deepspeed  # type: ignore[import-not-found]
+    import deepspeed
 
     with deepspeed.zero.GatheredParameters([weight], modifier_rank=0):
         yield

@@ -51,7 +51,7 @@ class StageRecord(BaseModel):
     Attributes:
         stage: the paper's stage; None for a run outside them.
         run: the run directory, as it was given.
-        data: the data's directory; ``data_digest``: of its conversations.
+        data: the data's directories; ``data_digest``: of their conversations.
         settings: of the run.
         conversations, updates: counts.
         loss: the last that was logged.
@@ -61,7 +61,7 @@ class StageRecord(BaseModel):
 
     stage: Stage | None
     run: str
-    data: str
+    data: list[str]
     data_digest: str
     settings: dict[str, Any]
     conversations: int

@@ -45,7 +45,7 @@ class Manifest(BaseModel):
         format: the version of this layout.
         settings: of the run.
         model: the directory of the model at the start; ``model_digest``: of its files.
-        data: the data's directory; ``data_digest``: of its conversations.
+        data: the data's directories; ``data_digest``: of their conversations.
         history: what the model had been through before.
         er_gym: the version of the package.
     """
@@ -56,7 +56,7 @@ class Manifest(BaseModel):
     settings: dict[str, Any]
     model: str
     model_digest: str
-    data: str
+    data: list[str]
     data_digest: str
     history: History = History()
     er_gym: str

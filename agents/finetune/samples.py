@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from agents.finetune.settings import DataSettings
-from er_gym.data.chat import Chat
-from er_gym.data.collection import Collection
+from er_gym.data.chat import Chat, ChatTurn
+from er_gym.data.collection import MANIFEST, Collection
 from er_gym.data.dialects import load_dialect
-from er_gym.data.trajectory import Trajectory
+from er_gym.data.sharegpt_files import open_sharegpt
+from er_gym.data.trajectory import PictureRecord
 
 
 @dataclass(frozen=True)
@@ -21,25 +23,20 @@ class Samples:
     """Training conversations.
 
     Attributes:
-        chats: the conversations; each has a turn that is learnt.
-        folder: what the paths of their pictures are relative to.
+        chats: the conversations; each has a turn that is learnt. The paths of their pictures are
+            absolute.
+        digest: sha256 in hex of all words, flags, and names and sizes of pictures.
         prompts: settings of a model agent's prompts, by which the agent converses as here
             (``prompts`` of :class:`agents.vlm.settings.AgentSettings`).
+        recorded: the settings of the collection that their pictures were recorded with.
         left_out: how many conversations have no turn that is learnt, and are not among them.
     """
 
     chats: tuple[Chat, ...]
-    folder: Path
+    digest: str
     prompts: Mapping[str, str]
+    recorded: Mapping[str, Any] = field(default_factory=dict)
     left_out: int = 0
-
-    @property
-    def digest(self) -> str:
-        """sha256 in hex of all words, flags, and names and sizes of pictures."""
-        told = hashlib.sha256()
-        for chat in self.chats:
-            told.update(repr((chat.id, chat.turns)).encode(errors="surrogatepass"))
-        return told.hexdigest()
 
     @property
     def sees(self) -> str:
@@ -47,63 +44,136 @@ class Samples:
         return "pictures" if any(chat.pictures for chat in self.chats) else "text"
 
 
-def open_samples(path: Path, settings: DataSettings) -> Samples:
+@dataclass(frozen=True)
+class _Source:
+    """The conversations of one place; the paths of their pictures are relative to ``folder``."""
+
+    chats: tuple[Chat, ...]
+    folder: Path
+    prompts: Mapping[str, str]
+    recorded: Mapping[str, Any] = field(default_factory=dict)
+
+
+def open_samples(paths: Sequence[Path], settings: DataSettings) -> Samples:
     """Open training data; pictures are only looked up, not read.
 
     Args:
-        path: a collection of ``er-gym collect``.
+        paths: each is a collection of ``er-gym collect``, or a ShareGPT file with pictures.
         settings: which part of it, and how it is put into words.
 
     Raises:
-        ValueError: there is nothing to learn from in it, or a picture is missing.
+        ValueError: there is nothing to learn from in it, a picture is missing, or the sources are
+            in different words.
     """
-    # The one place where other kinds of data join: whatever gives Samples.
-    samples = _of_collection(Collection.open(path), settings)
-    chats = samples.chats
+    sources = [_opened(path, settings) for path in paths]
+    _check_parts(paths, settings)
+    first = sources[0]
+    for path, source in zip(paths, sources, strict=True):
+        if source.prompts != first.prompts:
+            raise ValueError(
+                f"{path} is in other words than {paths[0]}: {_told(source.prompts)}, not "
+                f"{_told(first.prompts)}; set data.dialect and data.language, or train with one "
+                "after the other"
+            )
+    every = [(chat, source.folder) for source in sources for chat in source.chats]
+    every = every[: settings.limit]
+    found = every
     if settings.mask == "turns":
-        chats = tuple(chat for chat in chats if any(chat.train))
-    if not chats:
+        found = [(chat, folder) for chat, folder in every if any(chat.train)]
+    names = ", ".join(map(str, paths))
+    if not found:
         raise ValueError(
-            f"{path}: no turn of its {len(samples.chats):,} conversations is to be learnt; give "
+            f"{names}: no turn of its {len(every):,} conversations is to be learnt; give "
             "other data or other data.parts"
         )
-    _check_pictures(chats, samples.folder)
-    return replace(samples, chats=chats, left_out=len(samples.chats) - len(chats))
+    digest = _digest(chat for chat, _ in found)
+    chats = tuple(_with_paths(chat, folder.resolve()) for chat, folder in found)
+    _check_pictures(chats)
+    return Samples(chats, digest, first.prompts, first.recorded, len(every) - len(found))
 
 
-def _of_collection(collection: Collection, settings: DataSettings) -> Samples:
-    dialect = load_dialect(settings.dialect)
-    trajectories = list(_taken(collection, settings))
-    missing = set(settings.parts) - {each.part for each in trajectories}
-    if missing:
-        there = sorted({each.part for each in collection.trajectories()})
+def _opened(path: Path, settings: DataSettings) -> _Source:
+    if (path / MANIFEST).is_file():
+        return _of_collection(Collection.open(path), settings)
+    if not path.exists():
         raise ValueError(
-            f"{collection.path} has no trajectories of the part {', '.join(sorted(missing))}; it "
-            f"has: {', '.join(there) or 'none'}; set data.parts, such as --set "
-            f"'data.parts=[{', '.join(there)}]'"
+            f"{path} does not exist; give what er-gym collect wrote, or a ShareGPT file"
         )
-    trajectories = list(islice(trajectories, settings.limit))
-    if not trajectories:
+    if path.is_dir() and not (path / "dataset_info.json").is_file():
+        raise ValueError(
+            f"{path} holds neither a collection ({MANIFEST}) nor dataset_info.json; give what "
+            "er-gym collect wrote, or a ShareGPT file"
+        )
+    file = open_sharegpt(path)
+    chats = tuple(islice(file, settings.limit))
+    return _Source(chats, file.folder, {"dataset": str(file.path.resolve())})
+
+
+def _of_collection(collection: Collection, settings: DataSettings) -> _Source:
+    dialect = load_dialect(settings.dialect)
+    wanted = set(settings.parts)
+    trajectories = [each for each in collection.trajectories() if not wanted or each.part in wanted]
+    if not trajectories and not wanted:
         raise ValueError(f"{collection.path} has no trajectories; give another collection")
+    trajectories = trajectories[: settings.limit]
     try:
         chats = tuple(dialect.chat(each, settings.language) for each in trajectories)
     except ValueError as error:
         raise ValueError(f"{collection.path}: {error}; set data.dialect or data.language") from None
-    languages = Counter(each.language for each in trajectories)
+    languages = Counter(each.language for each in trajectories) or Counter(en=1)
     language = settings.language or languages.most_common(1)[0][0]
-    return Samples(chats, collection.path, {"dialect": settings.dialect, "language": language})
+    prompts = {"dialect": settings.dialect, "language": language}
+    return _Source(chats, collection.path, prompts, collection.manifest.settings)
 
 
-def _taken(collection: Collection, settings: DataSettings) -> Sequence[Trajectory]:
-    wanted = set(settings.parts)
-    return [each for each in collection.trajectories() if not wanted or each.part in wanted]
+def _check_parts(paths: Sequence[Path], settings: DataSettings) -> None:
+    """Refuse parts that none of the collections has. A ShareGPT file has no parts."""
+    collections = [Collection.open(path) for path in paths if (path / MANIFEST).is_file()]
+    if not (settings.parts and collections):
+        return
+    there = {each.part for collection in collections for each in collection.trajectories()}
+    missing = sorted(set(settings.parts) - there)
+    if missing:
+        names, parts = ", ".join(str(each.path) for each in collections), ", ".join(sorted(there))
+        raise ValueError(
+            f"{names} has no trajectories of the part {', '.join(missing)}; it has: "
+            f"{parts or 'none'}; set data.parts, such as --set 'data.parts=[{parts}]'"
+        )
 
 
-def _check_pictures(chats: Sequence[Chat], folder: Path) -> None:
+def _told(prompts: Mapping[str, str]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in prompts.items())
+
+
+def _digest(chats: Iterable[Chat]) -> str:
+    told = hashlib.sha256()
+    for chat in chats:
+        told.update(repr((chat.id, chat.turns)).encode(errors="surrogatepass"))
+    return told.hexdigest()
+
+
+def _with_paths(chat: Chat, folder: Path) -> Chat:
+    """The conversation with absolute paths of its pictures."""
+
+    def placed(turn: ChatTurn) -> ChatTurn:
+        if not turn.pictures:
+            return turn
+        parts = (
+            part.model_copy(update={"path": str(folder / part.path)})
+            if isinstance(part, PictureRecord)
+            else part
+            for part in turn.parts
+        )
+        return replace(turn, parts=tuple(parts))
+
+    return replace(chat, turns=tuple(map(placed, chat.turns)))
+
+
+def _check_pictures(chats: Sequence[Chat]) -> None:
     paths = {picture.path for chat in chats for picture in chat.pictures}
-    missing = sorted(path for path in paths if not (folder / path).is_file())
+    missing = sorted(path for path in paths if not Path(path).is_file())
     if missing:
         raise ValueError(
-            f"{len(missing):,} of {len(paths):,} pictures are missing, such as "
-            f"{folder / missing[0]}; copy or collect the whole data again"
+            f"{len(missing):,} of {len(paths):,} pictures are missing, such as {missing[0]}; copy "
+            "or collect the whole data again"
         )

@@ -9,29 +9,25 @@ which on a CPU (TRL 1.16) computes the scores of every token, learnt or not.
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
-import time
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import peft
-import safetensors.torch
 import torch
 import transformers
-from torch.nn import functional
-from torch.utils.tensorboard import SummaryWriter
 from transformers.trainer_utils import set_seed
 
 import er_gym
 from agents.finetune import machine
 from agents.finetune.batches import Collator, EncodedChats, Order
 from agents.finetune.feedback import FEEDBACK, add_feedback, add_rows, needs_feedback
+from agents.finetune.libraries import fast_arithmetic, quiet_libraries
+from agents.finetune.loop import FinetuneTrainer, Progress, TrainingLog, is_sharded
 from agents.finetune.memory import Memory, Plan, memory, numbers_of, size
 from agents.finetune.model_files import (
     History,
@@ -41,49 +37,22 @@ from agents.finetune.model_files import (
     check_stage,
     open_model,
     settings_as_json,
-    write_agent_files,
 )
 from agents.finetune.run_files import (
-    LOGS,
-    METRICS,
     Manifest,
     RunFiles,
-    draft_of,
-    move_into_place,
-    whole_folder,
 )
 from agents.finetune.samples import Samples, open_samples
 from agents.finetune.settings import FinetuneSettings, Lora
 from agents.finetune.tokens import EncodedChat, Encoder, check_lengths
 from agents.vlm.clients.adapters import adapter_chain, with_adapter
 from agents.vlm.clients.checkpoint import one_line
+from agents.vlm.tuned_model import recorded_pictures
 from er_gym.locking import exclusive_use
 
-TRAINED = "trained.safetensors"
-"""The weights that learn, in a checkpoint."""
 _EYES = {"vision": r"model\.visual\.(?!.*merger)", "projector": r"model\.visual\..*merger"}
 """Names of the weights of each part that the settings can freeze."""
 _MOST_READERS = 8
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a run is.
-
-    Attributes:
-        update, updates: how many are done, and of how many.
-        loss: the mean over the learnt tokens since the last report.
-        tokens_per_second: of all devices, since the last report.
-        seconds_left: as far as that tells.
-        memory: bytes in use (:func:`agents.finetune.machine.used_memory`).
-    """
-
-    update: int
-    updates: int
-    loss: float
-    tokens_per_second: float
-    seconds_left: float
-    memory: int
 
 
 @dataclass(frozen=True)
@@ -110,7 +79,7 @@ class Result:
 def train(
     settings: FinetuneSettings,
     model: Path,
-    data: Path,
+    data: Sequence[Path],
     out: Path,
     *,
     ignore_memory: bool = False,
@@ -122,7 +91,8 @@ def train(
     Args:
         settings: of the run.
         model: a model directory, or a finished run.
-        data: what is learnt from, see :func:`agents.finetune.samples.open_samples`.
+        data: what is learnt from, one after the other
+            (:func:`agents.finetune.samples.open_samples`).
         out: the run directory.
         ignore_memory: train although it will probably not fit into the memory.
         report: is told each time that something is logged.
@@ -143,7 +113,7 @@ def train(
         settings=settings_as_json(settings),
         model=str(files.path),
         model_digest=files.digest,
-        data=str(data.resolve()),
+        data=[str(path.resolve()) for path in data],
         data_digest=samples.digest,
         history=files.history,
         er_gym=er_gym.__version__,
@@ -155,7 +125,7 @@ def train(
     with ExitStack() as stack:
         if first:
             stack.enter_context(exclusive_use(out))
-        stack.enter_context(_quiet_libraries())
+        stack.enter_context(quiet_libraries())
         run.check(manifest)
         if run.finished:
             return _result(run, samples, new=False)
@@ -190,7 +160,7 @@ def _train(
     encoder = Encoder(tokenizer, files.template, files.image_processor, image_token, settings.data)
     chats = [encoder.encode(chat) for chat in samples.chats]
     chats = [chat for chat in chats if chat.learnt_tokens]
-    check_lengths(chats, settings.data.max_length, manifest.data)
+    check_lengths(chats, settings.data.max_length, ", ".join(manifest.data))
     say(_about(chats, samples))
 
     # -- devices: as the launcher, DeepSpeed or FSDP wants them; on a GPU in bfloat16 --
@@ -218,7 +188,7 @@ def _train(
     _freeze(network, settings)
     if settings.model.lora is not None:
         network = _with_lora(network, settings.model.lora, settings, files, tokenizer, feedback)
-    if dtype == "bfloat16" and not _sharded(arguments):
+    if dtype == "bfloat16" and not is_sharded(arguments):
         for weight in network.parameters():
             if weight.requires_grad:
                 weight.data = weight.data.float()  # small steps would be lost in bfloat16
@@ -228,7 +198,7 @@ def _train(
         run.begin(manifest)
     padding = tokenizer.pad_token_id
     padding = padding if padding is not None else (tokenizer.eos_token_id or 0)
-    trainer = _Trainer(
+    trainer = FinetuneTrainer(
         network,
         arguments,
         Order(
@@ -239,9 +209,7 @@ def _train(
         ),
         run,
         settings.training.keep,
-        data_collator=Collator(
-            samples.folder, files.image_processor, image_token, settings.data, padding
-        ),
+        data_collator=Collator(files.image_processor, image_token, settings.data, padding),
         train_dataset=EncodedChats(chats),
     )
     trainer.accelerator.wait_for_everyone()
@@ -249,7 +217,7 @@ def _train(
     done = int(last.name.rpartition("-")[2]) if last else 0
     if first:
         run.rewind_metrics(done)
-        trainer.add_callback(_Log(run, trainer, done, report))
+        trainer.add_callback(TrainingLog(run, trainer, done, report))
     if last is not None:
         say(f"continues after update {done:,}")
     with fast_arithmetic():
@@ -300,7 +268,7 @@ def _arguments(
             save_strategy="steps",
             save_steps=training.save_every,
             logging_steps=training.log_every,
-            logging_nan_inf_filter=False,  # _Log says so
+            logging_nan_inf_filter=False,  # TrainingLog says so
             seed=training.seed,
             deepspeed=training.deepspeed or None,
             fsdp=training.fsdp or None,
@@ -316,11 +284,6 @@ def _arguments(
         )
     except (OSError, ImportError, json.JSONDecodeError) as error:
         raise ValueError(f"training.deepspeed or training.fsdp: {one_line(error)}") from None
-
-
-def _sharded(arguments: transformers.TrainingArguments) -> bool:
-    """Whether DeepSpeed or FSDP holds the weights; then they write and read checkpoints."""
-    return bool(arguments.deepspeed or arguments.fsdp) or "ACCELERATE_USE_FSDP" in os.environ
 
 
 def _memory(
@@ -364,6 +327,8 @@ def _load(files: ModelFiles, settings: FinetuneSettings, dtype: str) -> Any:
         if files.has_vision
         else transformers.AutoModelForCausalLM
     )
+    network: Any
+    told: Any
     try:
         loaded: Any = maker.from_pretrained(
             files.base,
@@ -423,233 +388,6 @@ def _with_lora(
     return network
 
 
-class _LearntOnly:
-    """Lets the output embedding compute scores only for the places that get loss.
-
-    Those are often a tenth of the tokens, and a vocabulary is large. As a hook on the output
-    embedding it works inside of whatever wraps the model.
-    """
-
-    def __init__(self, network: Any) -> None:
-        self._places: torch.Tensor | None = None
-        network.get_output_embeddings().register_forward_pre_hook(self._choose)
-
-    @contextmanager
-    def at(self, labels: torch.Tensor) -> Iterator[None]:
-        """Within the context, scores are (1, learnt tokens, vocabulary).
-
-        Args:
-            labels: (conversations, longest), -100 where there is no loss.
-        """
-        after = torch.cat([labels[:, 1:], torch.full_like(labels[:, :1], -100)], dim=1)
-        self._places = after.ne(-100)
-        try:
-            yield
-        finally:
-            self._places = None
-
-    def _choose(self, layer: Any, inputs: tuple[torch.Tensor, ...]) -> tuple[torch.Tensor] | None:
-        hidden = inputs[0]  # (conversations, longest, size)
-        return None if self._places is None else (hidden[self._places][None],)
-
-
-def mean_loss(outputs: Any, labels: torch.Tensor, num_items_in_batch: Any = None) -> torch.Tensor:
-    """Cross entropy: the sum over the learnt tokens by the number of those in the whole update.
-
-    Args:
-        outputs: of the model, within :meth:`_LearntOnly.at`.
-        labels: (conversations, longest), -100 where there is no loss.
-        num_items_in_batch: the learnt tokens of all batches of the update; those of this if None.
-    """
-    wanted = labels[:, 1:]
-    wanted = wanted[wanted.ne(-100)]
-    scores = outputs.logits[0].float()  # (learnt tokens, vocabulary)
-    total = functional.cross_entropy(scores, wanted, reduction="sum")
-    return total / (len(wanted) if num_items_in_batch is None else num_items_in_batch)
-
-
-# -- the loop --------------------------------------------------------------------------------------
-
-
-class _Trainer(transformers.Trainer):
-    """Transformers' trainer, with our order and loss, and checkpoints that are whole or not there.
-
-    A checkpoint holds the weights that learn, by their names in the model. Transformers' own would
-    hold them by the names of older versions, and those of Qwen2-VL and Qwen2.5-VL it does not read
-    again: it would continue with the weights of the beginning, and say nothing (5.23).
-    """
-
-    def __init__(
-        self,
-        network: Any,
-        arguments: transformers.TrainingArguments,
-        order: Order,
-        run: RunFiles,
-        keep: int,
-        **more: Any,
-    ) -> None:
-        super().__init__(network, arguments, compute_loss_func=mean_loss, **more)
-        self.remove_callback(transformers.PrinterCallback)
-        self.model_accepts_loss_kwargs = False
-        self._order, self._run, self._keep = order, run, keep
-        self._learnt_only = _LearntOnly(network)
-        self.tokens = 0
-
-    def _get_train_sampler(self, train_dataset: Any = None) -> Order:
-        return self._order
-
-    def compute_loss(self, model: Any, inputs: dict[str, Any], *args: Any, **kwargs: Any) -> Any:
-        self.tokens += inputs.pop("tokens")
-        with self._learnt_only.at(inputs["labels"]):
-            return super().compute_loss(model, {**inputs, "use_cache": False}, *args, **kwargs)
-
-    def _save_checkpoint(self, model: Any, trial: Any) -> None:
-        super()._save_checkpoint(model, trial)  # into _get_output_dir
-        self.accelerator.wait_for_everyone()
-        if self.args.should_save:
-            name = f"checkpoint-{self.state.global_step}"
-            draft = Path(self._get_output_dir(trial))
-            move_into_place(draft / name, self._run.checkpoints / name)
-            draft.rmdir()
-            self._run.prune(self._keep)
-        self.accelerator.wait_for_everyone()
-
-    def _get_output_dir(self, trial: Any) -> str:
-        return str(draft_of(self._run.checkpoints / "new"))
-
-    def save_model(self, output_dir: str | None = None, _internal_call: bool = False) -> None:
-        if _sharded(self.args):
-            super().save_model(output_dir, _internal_call=True)
-        elif self.args.should_save:
-            assert output_dir is not None
-            os.makedirs(output_dir, exist_ok=True)
-            safetensors.torch.save_file(self._trained(), Path(output_dir) / TRAINED)
-
-    def _load_from_checkpoint(self, resume_from_checkpoint: str, model: Any = None) -> None:
-        if _sharded(self.args):
-            super()._load_from_checkpoint(resume_from_checkpoint, model)
-            return
-        there = safetensors.torch.load_file(Path(resume_from_checkpoint) / TRAINED)
-        trained = self._trained()
-        if there.keys() != trained.keys():
-            raise ValueError(f"{resume_from_checkpoint} does not fit the model; remove it")
-        with torch.no_grad():
-            for name, weight in trained.items():
-                weight.copy_(there[name])
-
-    def _trained(self) -> dict[str, torch.Tensor]:
-        network = self.accelerator.unwrap_model(self.model)
-        return {
-            name: weight.detach().contiguous()
-            for name, weight in network.named_parameters()
-            if weight.requires_grad
-        }
-
-    def write_result(
-        self, files: ModelFiles, history: History, agent: dict[str, Any], tokenizer: Any
-    ) -> None:
-        """Write the run's ``model/``."""
-        with ExitStack() as stack:
-            folder = draft_of(self._run.model)
-            if self.args.should_save:
-                stack.enter_context(whole_folder(self._run.model))
-            if _sharded(self.args):
-                super().save_model(str(folder), _internal_call=True)
-            elif self.args.should_save:
-                network = self.accelerator.unwrap_model(self.model)
-                if isinstance(network, peft.PeftModel):
-                    network.save_pretrained(str(folder), save_embedding_layers=False)
-                else:
-                    network.config.use_cache = True
-                    network.to(files.config.dtype or torch.float32).save_pretrained(folder)
-            if self.args.should_save:
-                for unneeded in ("training_args.bin", "README.md"):
-                    (folder / unneeded).unlink(missing_ok=True)
-                tokenizer.save_pretrained(folder)
-                write_agent_files(folder, history, agent, files)
-
-
-class _Log(transformers.TrainerCallback):
-    """Writes ``metrics.jsonl`` and TensorBoard's logs, and reports progress."""
-
-    def __init__(
-        self, run: RunFiles, trainer: _Trainer, done: int, report: Callable[[Progress], None]
-    ) -> None:
-        self._run, self._trainer, self._report = run, trainer, report
-        self._board = SummaryWriter(str(run.path / LOGS), purge_step=done + 1)
-        self._update, self._since, self._tokens = done, time.monotonic(), 0
-
-    def on_train_begin(self, args: Any, state: Any, control: Any, **more: Any) -> None:
-        self._since = time.monotonic()
-
-    def on_step_end(self, args: Any, state: Any, control: Any, **more: Any) -> None:
-        # A value is a mean since the last one. With one at each checkpoint, a run that continues
-        # from there has the same means as one that was never interrupted.
-        if control.should_save:
-            control.should_log = True
-
-    def on_log(self, args: Any, state: Any, control: Any, logs: Any = None, **more: Any) -> None:
-        if "loss" not in logs:
-            return
-        now, seen = time.monotonic(), self._trainer.tokens
-        rate = (seen - self._tokens) * args.world_size / max(now - self._since, 1e-9)
-        each = (now - self._since) / max(state.global_step - self._update, 1)
-        self._update, self._since, self._tokens = state.global_step, now, seen
-        line = {
-            "update": state.global_step,
-            "epoch": round(state.epoch, 4),
-            "loss": logs["loss"],
-            "learning_rate": logs["learning_rate"],
-            "gradient_norm": logs.get("grad_norm"),
-            "tokens_per_second": round(rate, 1),
-            "memory": machine.used_memory(),
-        }
-        with (self._run.path / METRICS).open("a", encoding="utf-8") as file:
-            file.write(json.dumps(line) + "\n")
-        for name, value in line.items():
-            if name != "update" and value is not None:
-                self._board.add_scalar(name, value, state.global_step)
-        self._board.flush()
-        if not math.isfinite(logs["loss"]):
-            raise ValueError(
-                f"the loss is {logs['loss']} at update {state.global_step}; set a lower "
-                "training.learning_rate, and start anew in another --out"
-            )
-        left = (state.max_steps - state.global_step) * each
-        self._report(
-            Progress(state.global_step, state.max_steps, logs["loss"], rate, left, line["memory"])
-        )
-
-    def on_train_end(self, args: Any, state: Any, control: Any, **more: Any) -> None:
-        self._board.close()
-
-
-@contextmanager
-def _quiet_libraries() -> Iterator[None]:
-    """Without the libraries' own progress bars, and warnings about what they ask of each other."""
-    shown = transformers.utils.logging.is_progress_bar_enabled()
-    transformers.utils.logging.disable_progress_bar()
-    try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message=".*is_gradient_checkpointing")  # peft 0.21
-            yield
-    finally:
-        if shown:
-            transformers.utils.logging.enable_progress_bar()
-
-
-@contextmanager
-def fast_arithmetic() -> Iterator[None]:
-    """Flush denormal numbers to 0 within the context."""
-    # AdamW's moments of rows that no token uses decay to denormal numbers, which makes every
-    # operation on them many times slower.
-    torch.set_flush_denormal(True)
-    try:
-        yield
-    finally:
-        torch.set_flush_denormal(False)
-
-
 def _to_nobody(text: str) -> None:
     """Say nothing."""
 
@@ -661,10 +399,9 @@ def _agent(settings: FinetuneSettings, samples: Samples) -> dict[str, Any]:
     """How the model was taught to converse, as settings of a model agent."""
     found: dict[str, Any] = {"prompts": dict(samples.prompts), "sees": samples.sees}
     if samples.sees == "pictures":
-        found["pictures"] = {
-            "min_pixels": settings.data.min_pixels,
-            "max_pixels": settings.data.max_pixels,
-        }
+        found["pictures"] = recorded_pictures(
+            samples.recorded, settings.data.min_pixels, settings.data.max_pixels
+        )
     return found
 
 

@@ -21,6 +21,8 @@ from agents.vlm.record import (
     settings_to_record,
 )
 from agents.vlm.settings import AgentSettings
+from er_gym.data.dialects import shows_anew
+from er_gym.data.scene_text import Perceived
 from er_gym.envs.actions import NO_ACTION, Action, applies
 from er_gym.rollout.agent import Decision
 from er_gym.rollout.records import EpisodeRecord
@@ -29,6 +31,7 @@ from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 
 _LONGEST_QUOTE = 200
+_AHEAD = "ahead"
 
 
 class VLMAgent:
@@ -67,9 +70,14 @@ class VLMAgent:
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Begin an episode."""
         self._task = task
-        system = self._prompts.system(decide=self._settings.decide, sees=self._settings.sees)
+        system = self._prompts.system(
+            decide=self._settings.decide, sees=self._settings.sees, task=task.instruction
+        )
         self._messages = [Message("system", (system,))] if system else []
         self._rounds: list[RoundRecord] = []
+        self._perceived: Perceived | None = None
+        self._last_picture = b""
+        self._last_action: Action | None = None
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """Tell the model the result of its last action, and return what it decides.
@@ -82,6 +90,7 @@ class VLMAgent:
         reply = self._client.reply(self._history(), self._seed)
         parsed = parse(reply.text, reply.call, self._settings.decide)
         action, problem, matched = self._resolve(parsed, info)
+        self._last_action = action
         said = "\n".join(filter(None, (reply.text, reply.call))) or "(nothing)"
         self._messages.append(Message("assistant", (said,), reply.reasoning))
         thoughts = [ThoughtRecord(kind=each.kind, text=each.text) for each in parsed.thoughts]
@@ -110,43 +119,65 @@ class VLMAgent:
     def _turn(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Message:
         """The next user message: the task, or the result of the last action."""
         assert self._task is not None
-        pictures = self._pictures(obs, info)
+        before, now = self._perceived, None
+        if self._prompts.as_recorded and self._settings.sees == "text":
+            now = self._perceived = Perceived.of(info)
         turn = TurnContext(
             task=self._task.instruction,
             decide=self._settings.decide,
             sees=self._settings.sees,
             scene_text=obs.get("text", ""),
+            now=now,
+            before=before,
             steps=info["steps"],
             max_steps=info["max_steps"],
         )
         if not self._rounds:
-            return Message("user", interleave_pictures(self._prompts.first(turn), pictures))
+            return _with_pictures(self._prompts.first(turn), self._pictures(obs, info))
         answer = {"feedback": info["feedback"], "success": bool(info["action_success"])}
         if answer["success"]:  # the paper's protocol finds something even in an unusable reply
             answer |= {"action": str(info["action"]), "problem": ""}
         last = self._rounds[-1] = self._rounds[-1].model_copy(update=answer)
         if last.problem:
-            told = self._prompts.feedback(problem=last.problem, decide=self._settings.decide)
-            return Message("user", (told,))
+            return Message("user", (self._told_problem(last.problem, info),))
+        pictures = self._pictures(obs, info, after=last)
         last_action = LastAction(
             action=last.action,
             success=last.success,
             feedback=last.feedback,
             pictures=len(pictures),
+            directions=tuple(pictures),
         )
-        return Message("user", interleave_pictures(self._prompts.next(turn, last_action), pictures))
+        return _with_pictures(self._prompts.next(turn, last_action), pictures)
 
-    def _pictures(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> list[Picture]:
-        """The pictures of a turn: the current view, and after ``observe`` also the views to the
-        right, behind and left, as many as the prompts expect."""
+    def _told_problem(self, problem: str, info: Mapping[str, Any]) -> str:
+        """The message after a reply without a usable action."""
+        if self._prompts.as_recorded and self._last_action is not None:
+            problem = info["feedback"]  # an action that no object of the type allows
+        said = info["action_text"]
+        return self._prompts.feedback(
+            problem=problem,
+            decide=self._settings.decide,
+            action="" if said.startswith(NO_ACTION) else said,
+        )
+
+    def _pictures(
+        self, obs: Mapping[str, Any], info: Mapping[str, Any], after: RoundRecord | None = None
+    ) -> dict[str, Picture]:
+        """The pictures of a turn by direction: the current view, and after ``observe`` also the
+        views to the right, behind and left, as many as the prompts expect."""
         if self._settings.sees == "text":
-            return []
-        shown = [obs["rgb"]]
-        views = list(info.get("views", {}).values())
+            return {}
+        shown = {_AHEAD: obs["rgb"]}
+        views = dict(info.get("views", {}))
         if views and self._settings.pictures.views:
             wanted = self._prompts.after_observe
-            shown = {1: shown, len(views): views}.get(wanted or 0, [*views, *shown])
-        return [encode(picture, self._settings.pictures) for picture in shown]
+            shown = {1: shown, len(views): views}.get(wanted or 0, {**views, **shown})
+        pictures = {name: encode(each, self._settings.pictures) for name, each in shown.items()}
+        before, self._last_picture = self._last_picture, [*pictures.values()][-1].data
+        if not self._prompts.as_recorded or after is None or len(pictures) > 1:
+            return pictures
+        return pictures if shows_anew(after.success, self._last_picture, before) else {}
 
     def _history(self) -> list[Message]:
         """The messages of the next request."""
@@ -220,6 +251,11 @@ def _unreadable_action(parsed: ParsedReply, said: str) -> str:
     if parsed.verb:
         return " ".join(f"{parsed.verb} {parsed.name}".split())[:_LONGEST_QUOTE]
     return NO_ACTION + said[:_LONGEST_QUOTE]
+
+
+def _with_pictures(text: str, pictures: Mapping[str, Picture]) -> Message:
+    """A message of the user, with the pictures at the text's marks."""
+    return Message("user", interleave_pictures(text, [*pictures.values()]))
 
 
 def _message_record(message: Message, folder: str, files: dict[str, bytes]) -> MessageRecord:

@@ -7,7 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agents import configs
-from agents.vlm.clients.registry import agent_name_forms, is_model_agent, resolve_client
+from agents.vlm.clients.registry import (
+    agent_name_forms,
+    is_model_agent,
+    resolve_client,
+    settings_file,
+)
 from agents.vlm.clients.session import ModelSession
 from agents.vlm.record import without_secrets
 from agents.vlm.settings import AgentSettings
@@ -23,27 +28,41 @@ __all__ = [
     "comparable_settings",
     "is_model_agent",
     "load_settings",
+    "settings_file",
 ]
 
 _WHAT = "agent"
 _NOT_COMPARED: Mapping[str, Any] = {
     "server": {"base_url", "key_from", "timeout", "connect", "tries", "requests_per_minute"},
-    "local": {"device_map", "batch", "wait"},
-    "prompts": {"dataset"},
+    "local": {"device_map", "batch", "wait", "reuse"},
+    "prompts": {"dataset", "dialect"},
     "prices": True,
 }
 """Settings that change when and where a model answers, but not its replies. The digest stands for
 the prompts."""
 
+_ADDED = ("model_min_pixels", "model_max_pixels")
+"""Settings of pictures that older versions did not have."""
 
-def load_settings(name: str | None, overrides: Sequence[str] = ()) -> AgentSettings:
+
+def load_settings(
+    name: str | None, overrides: Sequence[str] = (), beneath: Path | None = None
+) -> AgentSettings:
     """Read an agent's settings from a file of ``configs/agents`` by name, or from any file by path.
 
+    Args:
+        name: of the file; None for none.
+        overrides: see :func:`agents.configs.load`.
+        beneath: a file whose settings hold where the first does not state them
+            (:func:`agents.vlm.clients.registry.settings_file`).
+
     Raises:
-        ValueError: the file does not exist, or the file or an override is invalid.
+        ValueError: the file does not exist, or a file or an override is invalid.
     """
     file = configs.file_of("agents", name, _WHAT) if name else None
-    return configs.load(AgentSettings, file, _WHAT, overrides)
+    if beneath is not None:
+        configs.load(AgentSettings, beneath, _WHAT)  # so that an error in it names it
+    return configs.load(AgentSettings, file, _WHAT, overrides, beneath=beneath)
 
 
 class AgentFactory:
@@ -76,11 +95,11 @@ class AgentFactory:
         budget: Budget | None = None,
     ) -> None:
         from agents.vlm.matching import Matcher
-        from agents.vlm.prompts import load_prompts
+        from agents.vlm.prompts import prompts_for
 
         resolve_client(name)  # a wrong name is told before a wrong prompt
         self.name, self.settings = name, settings
-        self.prompts = load_prompts(settings.prompts)
+        self.prompts = prompts_for(settings)
         self._matcher = Matcher(settings.matching)
         self._matcher.prepare()
         self._session = ModelSession(name, settings, directory, budget)
@@ -107,4 +126,7 @@ class AgentFactory:
 def comparable_settings(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:
     """The settings that decide an agent's replies. Two runs are comparable if these are equal."""
     kept = settings.model_dump(mode="json", exclude=dict(_NOT_COMPARED))
+    for name in _ADDED:  # so that older runs, without these entries, can be continued
+        if kept["pictures"][name] is None:
+            del kept["pictures"][name]
     return {**without_secrets(settings, kept), "prompts_digest": prompts_digest}

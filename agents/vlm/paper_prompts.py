@@ -106,20 +106,25 @@ class DerivedPrompts:
     after_observe: int | None
     samples: int
     odd: int
+    as_recorded: bool = field(default=False, init=False)
     words: Words = field(repr=False)
     fallback: PromptSet = field(repr=False)
 
-    def system(self, *, decide: Decide, sees: Sees) -> str:
-        """See :class:`PromptSet`.
-
-        Raises:
-            ValueError: ``decide`` is not tags, or ``sees`` is not pictures.
-        """
+    def check(self, *, decide: Decide, sees: Sees) -> None:
+        """See :class:`PromptSet`."""
         if (decide, sees) != ("tags", "pictures"):
             raise ValueError(
                 f"the prompts of {self.name} need decide: tags and sees: pictures, not {decide} "
                 f"and {sees}; change these, or leave out prompts.dataset"
             )
+
+    def system(self, *, decide: Decide, sees: Sees, task: str = "") -> str:
+        """See :class:`PromptSet`.
+
+        Raises:
+            ValueError: ``decide`` is not tags, or ``sees`` is not pictures.
+        """
+        self.check(decide=decide, sees=sees)
         return self.words.system
 
     def first(self, turn: TurnContext) -> str:
@@ -134,7 +139,7 @@ class DerivedPrompts:
         values = {_TASK: turn.task, _ACTION: last_action.action, _FEEDBACK: last_action.feedback}
         return _with_pictures(_filled(text, values), last_action.pictures)
 
-    def feedback(self, *, problem: str, decide: Decide) -> str:
+    def feedback(self, *, problem: str, decide: Decide, action: str = "") -> str:
         """See :class:`PromptSet`. The paper's files have no such turn, so er-gym's text is used."""
         return self.fallback.feedback(problem=problem, decide=decide)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol, TypeAlias
 
 from agents.vlm.chat import Part, Picture
+from er_gym.data.scene_text import Perceived
 
 Decide: TypeAlias = Literal["tags", "tools", "json"]
 Sees: TypeAlias = Literal["pictures", "text"]
@@ -28,6 +29,8 @@ class TurnContext:
         task: the task's instruction.
         decide, sees: see :class:`~agents.vlm.settings.AgentSettings`.
         scene_text: the environment's ``text`` observation, for ``sees="text"``.
+        now: what the agent perceives, and ``before``: what it perceived before its last action;
+            for dialects without pictures.
         steps: how many steps were taken so far; ``max_steps``: the episode's step limit, 0 if
             unknown.
     """
@@ -36,6 +39,8 @@ class TurnContext:
     decide: Decide
     sees: Sees
     scene_text: str = ""
+    now: Perceived | None = None
+    before: Perceived | None = None
     steps: int = 1
     max_steps: int = 0
 
@@ -47,13 +52,14 @@ class LastAction:
     Attributes:
         action: such as ``navigate to Fridge``.
         success, feedback: the environment's answer.
-        pictures: the number of pictures that show the result.
+        pictures: the number of pictures that show the result; ``directions``: of each of them.
     """
 
     action: str
     success: bool = True
     feedback: str = ""
     pictures: int = 0
+    directions: tuple[str, ...] = ()
 
 
 class PromptSet(Protocol):
@@ -66,6 +72,8 @@ class PromptSet(Protocol):
         after_observe: the number of pictures that the model expects after ``observe``: 1 for the
             view ahead; 3 for right, behind and left; 4 for these and the view ahead. None for all
             that there are.
+        as_recorded: whether turns are told as trajectories record them: an unchanged view is not
+            shown again.
     """
 
     @property
@@ -76,9 +84,19 @@ class PromptSet(Protocol):
     def about(self) -> str: ...
     @property
     def after_observe(self) -> int | None: ...
+    @property
+    def as_recorded(self) -> bool: ...
 
-    def system(self, *, decide: Decide, sees: Sees) -> str:
-        """The system message: the model's role and the format of its replies; "" for no message."""
+    def check(self, *, decide: Decide, sees: Sees) -> None:
+        """Raise ValueError if these settings do not fit the prompts."""
+
+    def system(self, *, decide: Decide, sees: Sees, task: str = "") -> str:
+        """The system message: the model's role and the format of its replies; "" for no message.
+
+        Args:
+            decide, sees: see :class:`~agents.vlm.settings.AgentSettings`.
+            task: the task's instruction.
+        """
 
     def first(self, turn: TurnContext) -> str:
         """The first user message: the task and the first observation, as a picture or as text."""
@@ -86,11 +104,13 @@ class PromptSet(Protocol):
     def next(self, turn: TurnContext, last_action: LastAction) -> str:
         """The user message after an action."""
 
-    def feedback(self, *, problem: str, decide: Decide) -> str:
+    def feedback(self, *, problem: str, decide: Decide, action: str = "") -> str:
         """The user message after a reply without a usable action; it has no picture.
 
         Args:
             problem: what is wrong with the reply.
+            decide: see :class:`~agents.vlm.settings.AgentSettings`.
+            action: what the reply names in place of an action, ``""`` for nothing.
         """
 
 

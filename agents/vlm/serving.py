@@ -40,6 +40,8 @@ class ServeOptions:
         engine: one of :data:`ENGINES`; "" to choose by model and machine.
         name: the model's name in requests; "" for the engine's own choice.
         pictures: the most pictures in a conversation.
+        pixels: the least and the most pixels to which the model scales a picture.
+        agent_config: a file of settings with which agents play the model; "" for none.
         context: the most tokens in a conversation; None for the engine's default here.
         gpus: the number of GPUs that share the model; None for all NVIDIA GPUs.
         more: further arguments of the server.
@@ -49,6 +51,8 @@ class ServeOptions:
     engine: str = ""
     name: str = ""
     pictures: int = 40
+    pixels: tuple[int, int] = Pictures().model_bounds
+    agent_config: str = ""
     context: int | None = None
     gpus: int | None = None
     more: tuple[str, ...] = ()
@@ -120,8 +124,7 @@ class _Engine:
 
 
 def _vllm(model: str, options: ServeOptions, gpus: int) -> list[str]:
-    bounds = Pictures()
-    pixels = {"min_pixels": bounds.min_pixels, "max_pixels": bounds.max_pixels}
+    pixels = dict(zip(("min_pixels", "max_pixels"), options.pixels, strict=True))
     return [
         model,
         *("--host", HOST, "--port", str(options.port)),
@@ -237,7 +240,10 @@ def command_for(model: str, options: ServeOptions, machine: Machine) -> Command:
         name=options.name or engine.name(model),
         base_url=f"{origin}/v1",
         ready_url=f"{origin}{engine.ready}",
-        bench_options=engine.bench(options),
+        bench_options=(
+            *(("--agent-config", options.agent_config) if options.agent_config else ()),
+            *engine.bench(options),
+        ),
     )
 
 

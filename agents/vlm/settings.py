@@ -33,7 +33,11 @@ class Pictures(_Settings):
     Attributes:
         format, quality: the file format; quality is JPEG's, 1 to 95.
         min_pixels, max_pixels: a picture with fewer or more pixels is scaled as Qwen's models
-            expect, to sides that are multiples of 28.
+            expect, to sides that are multiples of 28, before it is sent.
+        model_min_pixels, model_max_pixels: the bounds to which the model itself scales what it is
+            sent, for a model in this process or one that er-gym serve starts; None for those above.
+            A tuned model is sent pictures as training files have them, and scales them as it did
+            when it was tuned.
         keep: how many of the last pictures of earlier turns stay in the conversation; None for all.
             Each older picture is replaced by a short text, which invalidates the server's prefix
             cache.
@@ -45,6 +49,8 @@ class Pictures(_Settings):
     quality: int = Field(85, ge=1, le=95)
     min_pixels: Positive = 3_136
     max_pixels: Positive = 351_232
+    model_min_pixels: Positive | None = None
+    model_max_pixels: Positive | None = None
     keep: int | None = Field(None, ge=0)
     views: bool = True
     width: Pixels | None = None
@@ -52,11 +58,23 @@ class Pictures(_Settings):
 
     @model_validator(mode="after")
     def _bounds_in_order(self) -> Pictures:
-        if self.min_pixels > self.max_pixels:
-            raise ValueError(
-                f"min_pixels {self.min_pixels} is more than max_pixels {self.max_pixels}"
-            )
+        for prefix, (least, most) in {
+            "": (self.min_pixels, self.max_pixels),
+            "model_": self.model_bounds,
+        }.items():
+            if least > most:
+                raise ValueError(
+                    f"{prefix}min_pixels {least} is more than {prefix}max_pixels {most}"
+                )
         return self
+
+    @property
+    def model_bounds(self) -> tuple[int, int]:
+        """The least and the most pixels of a picture as the model sees it."""
+        return (
+            self.min_pixels if self.model_min_pixels is None else self.model_min_pixels,
+            self.max_pixels if self.model_max_pixels is None else self.model_max_pixels,
+        )
 
 
 class Prompts(_Settings):
@@ -66,11 +84,20 @@ class Prompts(_Settings):
         profile: a directory of ``configs/prompts``, or a path to one like it.
         language: ``en`` or ``zh``.
         dataset: a training file in the paper's format, whose texts are used instead.
+        dialect: a dialect by name or folder (:mod:`er_gym.data.dialects`), whose texts are used
+            instead: a model that was tuned on training files of a dialect plays with it.
     """
 
     profile: str = "default"
     language: Literal["en", "zh"] = "en"
     dataset: str = ""
+    dialect: str = ""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Prompts:
+        if self.dataset and self.dialect:
+            raise ValueError("dataset and dialect are both given; give one of them")
+        return self
 
 
 class Sampling(_Settings):
@@ -155,6 +182,8 @@ class Local(_Settings):
         dtype, device_map, attention: arguments of ``from_pretrained``.
         batch: the largest number of episodes whose turns are generated together.
         wait: seconds that a batch waits for further requests.
+        reuse: whether what the model computed for the earlier turns of a conversation is kept for
+            its next turn; it does not change a reply beyond rounding.
     """
 
     adapter: str = ""
@@ -163,6 +192,7 @@ class Local(_Settings):
     attention: str = ""
     batch: Positive = 8
     wait: float = Field(0.02, ge=0)
+    reuse: bool = True
 
 
 class AgentSettings(_Settings):
@@ -190,4 +220,6 @@ class AgentSettings(_Settings):
     @property
     def obs_mode(self) -> str:
         """The observation mode that the agent needs of the environment."""
-        return "rgb" if self.sees == "pictures" else "text"
+        if self.sees == "pictures":
+            return "rgb"
+        return "objects" if self.prompts.dialect else "text"

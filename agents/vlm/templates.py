@@ -27,6 +27,7 @@ from er_gym.tasks.verbs import Verb
 
 _TEMPLATES = ("system.jinja", "first.jinja", "next.jinja", "feedback.jinja")
 _ACTIONS = "actions.yaml"
+_FOR_DIALECTS = ("now", "before", "directions")
 
 
 @dataclass(frozen=True)
@@ -52,20 +53,25 @@ class Templates:
     files: TemplateFiles = field(repr=False)
     actions: tuple[ActionRow, ...] = field(repr=False)
     after_observe: int | None = field(default=None, init=False)
+    as_recorded: bool = field(default=False, init=False)
 
-    def system(self, *, decide: Decide, sees: Sees) -> str:
+    def check(self, *, decide: Decide, sees: Sees) -> None:
+        """See :class:`~agents.vlm.prompt_set.PromptSet`; templates take all settings."""
+
+    def system(self, *, decide: Decide, sees: Sees, task: str = "") -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
         return self._render("system.jinja", decide=decide, sees=sees)
 
     def first(self, turn: TurnContext) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
-        return self._render("first.jinja", pictures=int(turn.sees == "pictures"), **vars(turn))
+        pictures = int(turn.sees == "pictures")
+        return self._render("first.jinja", pictures=pictures, **_variables(turn))
 
     def next(self, turn: TurnContext, last_action: LastAction) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
-        return self._render("next.jinja", **vars(turn), **vars(last_action))
+        return self._render("next.jinja", **_variables(turn), **_variables(last_action))
 
-    def feedback(self, *, problem: str, decide: Decide) -> str:
+    def feedback(self, *, problem: str, decide: Decide, action: str = "") -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
         return self._render("feedback.jinja", problem=problem, decide=decide)
 
@@ -73,6 +79,11 @@ class Templates:
         return self.files.render(
             template, pictures=pictures, actions=self.actions, thoughts=THOUGHTS, **variables
         )
+
+
+def _variables(given: TurnContext | LastAction) -> dict[str, Any]:
+    """What templates are told; ``configs/prompts/README.md`` lists it."""
+    return {name: value for name, value in vars(given).items() if name not in _FOR_DIALECTS}
 
 
 def directory_of(profile: str, language: str) -> Path:
@@ -148,6 +159,8 @@ def _try_out(templates: Templates) -> None:
             templates.first(turn)
             for pictures, success in itertools.product(numbers, (True, False)):
                 last_action = LastAction(
-                    action="navigate to Fridge", success=success, pictures=pictures
+                    action="navigate to Fridge",
+                    success=success,
+                    pictures=pictures,
                 )
                 templates.next(turn, last_action)

@@ -68,18 +68,29 @@ class Outcome:
     seconds: float
 
 
-def collect_with_faults(out: Path, limit: int, *more: str, seed: int = 0) -> Outcome:
-    """Collect with the misbehaving server: first until a budget stops it, then to the end."""
+def collect_with_faults(
+    out: Path, limit: int, *more: str, seed: int = 0, bad: float = 0.4, budget: float = BUDGET
+) -> Outcome:
+    """Collect with the misbehaving server: first until a budget stops it, then to the end.
+
+    Args:
+        out: the directory of the collection.
+        limit: how many trajectories.
+        more: further options of the command.
+        seed: of what the server does.
+        bad: the share of its answers that are no thoughts of the robot.
+        budget: the first budget, in US dollars.
+    """
     began = time.monotonic()
     problems: list[str] = []
-    with scripted_expert(bad=0.4, failing=0.15, seed=seed) as server:
+    with scripted_expert(bad=bad, failing=0.15, seed=seed) as server:
         command = [
             "collect", "--out", str(out), "--limit", str(limit), "--expert", "openai:scripted",
             "--base-url", server.url, "--concurrency", str(CONCURRENCY), "--places", "model",
             "--set", "prices.prompt=1", "--set", "prices.completion=10",
             "--set", "pictures.width=160", "--set", "pictures.height=96", *more,
         ]  # fmt: skip
-        problems += _stops_at_the_budget(command, out, server)
+        problems += _stops_at_the_budget(command, out, server, budget)
         paid_before = _ledger(out)
         result = CliRunner().invoke(cli, [*command, "--max-usd", "1000"], standalone_mode=False)
         if result.return_value != 0:
@@ -113,16 +124,19 @@ def collect_with_faults(out: Path, limit: int, *more: str, seed: int = 0) -> Out
     )
 
 
-def _stops_at_the_budget(command: list[str], out: Path, server: FaultyServer) -> Iterator[str]:
-    result = CliRunner().invoke(cli, [*command, "--max-usd", str(BUDGET)], standalone_mode=False)
+def _stops_at_the_budget(
+    command: list[str], out: Path, server: FaultyServer, budget: float
+) -> Iterator[str]:
+    limited = [*command, "--max-usd", str(budget)]
+    result = CliRunner().invoke(cli, limited, standalone_mode=False)
     if result.return_value != _STOPPED or "the budget is spent" not in result.output:
         yield f"did not stop at the budget: {result.return_value}, {result.output[-1500:]}"
     costs = [entry["cost"] for entry in _ledger(out)]
-    within = next((n for n in range(len(costs)) if sum(costs[:n]) >= BUDGET), len(costs))
+    within = next((n for n in range(len(costs)) if sum(costs[:n]) >= budget), len(costs))
     if len(costs) > within + CONCURRENCY:
         yield f"{len(costs) - within} replies were paid for after the budget was spent"
     came = server.count
-    result = CliRunner().invoke(cli, [*command, "--max-usd", str(BUDGET)], standalone_mode=False)
+    result = CliRunner().invoke(cli, limited, standalone_mode=False)
     if result.return_value != _STOPPED or server.count != came:
         yield f"a spent budget let {server.count - came} more requests through"
 

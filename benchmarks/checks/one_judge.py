@@ -26,12 +26,13 @@ from rich.table import Table
 
 from agents import make_agent
 from benchmarks.scoring.metrics import score_episode
-from benchmarks.scoring.scorers import CORRECTED, judged
+from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.protocol import PROTOCOLS
 from er_gym.envs.solver import Solver
 from er_gym.rollout.agent import Agent, Decision
+from er_gym.rollout.judgement import judged
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks import verbs

@@ -21,6 +21,7 @@ from benchmarks.cli.errors import (
 )
 from benchmarks.cli.options import (
     EXISTING_FILE,
+    MOST_SAMPLES,
     Place,
     Words,
     faults_option,
@@ -65,6 +66,13 @@ _directory = Place(file_okay=False, path_type=Path)
 )
 @click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
 @click.option(
+    "--samples",
+    type=click.IntRange(1, MOST_SAMPLES),
+    default=1,
+    show_default=True,
+    help="How often each task is played, each time with another seed.",
+)
+@click.option(
     "--task-ids", multiple=True, metavar="ID,…", help="Play these tasks; may be repeated."
 )
 @click.option("--shard", metavar="I/N", help="Play the I-th of N parts, such as 2/8.")
@@ -86,6 +94,7 @@ def bench(
     out: Path | None,
     workers: int,
     limit: int | None,
+    samples: int,
     task_ids: tuple[str, ...],
     shard: str | None,
     seed: int,
@@ -110,7 +119,7 @@ def bench(
     from er_gym import __version__
     from er_gym.rollout.agent import CannotGoOn
     from er_gym.rollout.run_directory import Manifest
-    from er_gym.rollout.runner import finished
+    from er_gym.rollout.runner import episodes_of, finished
     from er_gym.rollout.selection import Shard, select
     from er_gym.rollout.worker_pool import WorkerSetupError
     from er_gym.tasks.errors import summarise_set_aside
@@ -143,6 +152,7 @@ def bench(
         chosen = select(
             fitted.tasks, task_ids=split(*task_ids), shard=part, limit=limit, set_aside=aside
         )
+        episodes = episodes_of(chosen, samples)
         out = out or Path("runs") / f"{file_stem(asked.name)}-{file_stem(agent)}"
         manifest = Manifest(
             suite=asked.name,
@@ -157,29 +167,34 @@ def bench(
             taken=fitted.substitutions,
         )
     report_set_aside(asked.name, aside, fitted.substitutions)
-    for note in fitted.notes:
+    tuned_for = vlm_run.tuned_for if vlm_run else None
+    for note in (*fitted.notes, *([f"settings of {tuned_for}"] if tuned_for else [])):
         console.print(note, style="dim", soft_wrap=True)
+    if samples > 1 and vlm_run and not vlm_run.settings.sampling.temperature:
+        print_problem(
+            f"sampling.temperature is 0, so the {samples} samples of a task may be all alike; "
+            "give --set sampling.temperature=1.0"
+        )
 
     try:
         with _locked(out, manifest) as run_directory:
-            for line in run_directory.move_aside(task.id for task in chosen):
+            for line in run_directory.move_aside(episodes):
                 print_problem(line)
-            before = finished(run_directory, chosen)
-            succeeded = sum(episode.success for episode in before)
+            before = [each.success for each in finished(run_directory, chosen, samples)]
             title = f"{asked.name}, {agent}"
-            progress = Progress(console, title, len(chosen), len(before), succeeded)
-            prepared = _prepared_run(run_directory, chosen, workers, agent, vlm_run, trust)
+            progress = Progress(console, title, len(episodes), len(before), sum(before))
+            prepared = _prepared_run(run_directory, chosen, samples, workers, agent, vlm_run, trust)
             with prepared as (play, cost):
                 with progress:
                     outcome = play(progress)
                 bill = cost()
     except WorkerSetupError as error:
-        raise click.ClickException(f"{error}; {_left_in(out, chosen)}") from error
+        raise click.ClickException(f"{error}; {_left_in(out, chosen, samples)}") from error
     except OSError as error:  # the disk is full, the share is gone
-        raise BadInput(f"{error}; {_left_in(out, chosen)}") from error
+        raise BadInput(f"{error}; {_left_in(out, chosen, samples)}") from error
     except (KeyboardInterrupt, CannotGoOn) as error:
         why = str(error) if isinstance(error, CannotGoOn) else "interrupted"
-        print_problem(f"{why}: {_left_in(out, chosen)}")
+        print_problem(f"{why}: {_left_in(out, chosen, samples)}")
         return STOPPED if isinstance(error, CannotGoOn) else INTERRUPTED
     print_tables(tables([load_run(out)], scorer=scorer), stdout())
     if bill:
@@ -205,21 +220,22 @@ def _locked(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
         yield run_directory
 
 
-def _left_in(out: Path, chosen: Sequence[Task]) -> str:
+def _left_in(out: Path, chosen: Sequence[Task], samples: int) -> str:
     """Say in words what a run that ended early has left."""
     from er_gym.rollout.run_directory import MANIFEST, RunDirectory
     from er_gym.rollout.runner import finished
 
     if not (out / MANIFEST).exists():
         return f"no episode was played, and nothing is left in {out}"
-    done = len(finished(RunDirectory.open(out), chosen))
-    return f"{done} of {len(chosen)} episodes are in {out}; the same command continues"
+    done = len(finished(RunDirectory.open(out), chosen, samples))
+    return f"{done} of {samples * len(chosen)} episodes are in {out}; the same command continues"
 
 
 @contextmanager
 def _prepared_run(
     run_directory: RunDirectory,
     chosen: Sequence[Task],
+    samples: int,
     workers: int,
     agent: str,
     vlm_run: VLMRun | None,
@@ -235,7 +251,12 @@ def _prepared_run(
         make, parallelism = NamedAgent(agent, trust), Parallelism(workers)
         yield (
             lambda shown: run(
-                run_directory, chosen, make, parallelism=parallelism, listeners=[shown]
+                run_directory,
+                chosen,
+                make,
+                parallelism=parallelism,
+                listeners=[shown],
+                samples=samples,
             ),
             lambda: None,
         )
@@ -244,7 +265,9 @@ def _prepared_run(
         factory = vlm_run.factory(run_directory.path)
     with closing(factory):
         yield (
-            lambda shown: vlm_run.play(factory, run_directory, chosen, workers, [shown], shown.say),
+            lambda shown: vlm_run.play(
+                factory, run_directory, chosen, workers, [shown], shown.say, samples=samples
+            ),
             lambda: factory.cost,
         )
 

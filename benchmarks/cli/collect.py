@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from benchmarks.cli.collect_expert import ExpertOptions, ExpertRun, with_expert_options
+from benchmarks.cli.collect_select import Selection, SelectOptions, with_select_options
 from benchmarks.cli.errors import (
     CRASHED,
     INTERRUPTED,
@@ -17,9 +19,10 @@ from benchmarks.cli.errors import (
     BadInput,
     bad_input,
     print_problem,
+    report_set_aside,
 )
-from benchmarks.cli.options import Place, Words, seed_option, split, workers_option
-from benchmarks.cli.terminal import terminal
+from benchmarks.cli.options import Place, Words, named, seed_option, workers_option
+from benchmarks.cli.terminal import stdout, terminal
 
 if TYPE_CHECKING:
     from agents.expert.collect import CollectSettings, CollectSummary, Stratum
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
     from er_gym.data.collection import Collection, CollectionManifest
     from er_gym.rollout.events import Cost
     from er_gym.tasks.suites import Suite
+    from er_gym.tasks.task import Task
 
 LANGUAGES = ("en", "zh")
 _directory = Place(file_okay=False, path_type=Path)
@@ -45,15 +49,18 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 )
 @click.option(
     "--recipe",
-    default="paper",
-    show_default=True,
     metavar="NAME",
-    help="What is collected: a YAML file, or the name of one of er-gym's own.",
+    help="What is collected: a YAML file, or the name of one of er-gym's own.  [default: paper]",
 )
 @click.option("--parts", metavar="PART,…", help="Collect only these parts of the recipe.")
 @click.option("--kinds", metavar="a,b,c", help="Only these kinds of the expert's trajectories.")
 @click.option("--types", metavar="TYPE,…", help="Only tasks of these types.")
 @click.option("--scenes", metavar="SCENE,…", help="Only tasks in these scenes.")
+@click.option(
+    "--instances",
+    type=click.Choice(("target", "explore")),
+    help="Which object a type name means.  [default: the suite's]",
+)
 @click.option(
     "--writer",
     type=Words(),
@@ -81,6 +88,7 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
     metavar="RUN",
     help="Correct the failed episodes of a run of er-gym bench; give no --recipe.",
 )
+@with_select_options
 @workers_option
 @seed_option
 @with_expert_options
@@ -89,11 +97,12 @@ def collect(
     tasks_file: Path | None,
     out: Path,
     limit: int | None,
-    recipe: str,
+    recipe: str | None,
     parts: str | None,
     kinds: str | None,
     types: str | None,
     scenes: str | None,
+    instances: str | None,
     writer: str,
     thoughts: str,
     language: str,
@@ -101,6 +110,7 @@ def collect(
     workers: int,
     seed: int,
     expert_options: ExpertOptions,
+    select_options: SelectOptions,
 ) -> int:
     """Collect trajectories with pictures and thoughts, to train on.
 
@@ -108,26 +118,57 @@ def collect(
     default recipe has the parts and proportions of the paper's training set. The same command
     continues a collection; a larger --limit extends it. `er-gym data` shows, verifies and exports
     collections. With --expert, a model writes the thoughts; what it replied and cost stays in the
-    directory.
+    directory. With --select, successful episodes of any agent become trajectories; with --correct,
+    failed ones are corrected.
     """
     from agents.expert.collect import Collector
-    from benchmarks.cli.collect_choice import chosen_recipe, chosen_tasks, source_of
+    from benchmarks.cli.collect_choice import chosen_recipe, chosen_tasks, fitted_tasks, source_of
     from benchmarks.cli.collect_progress import CollectProgress
-    from er_gym.data.collection import TRAJECTORIES
+    from er_gym.data.collection import TRAJECTORIES, CollectionError
+    from er_gym.locking import Locked
     from er_gym.rollout.agent import CannotGoOn
     from er_gym.rollout.executor import Parallelism
+    from er_gym.rollout.run_directory import RunDirectoryError
     from er_gym.rollout.worker_pool import WorkerSetupError
+    from er_gym.writing import ForeignFile
 
     console = terminal(stderr=True)
     with bad_input():
+        selection = Selection.of(
+            select_options,
+            recipe,
+            expert_options.strict_thoughts,
+            {
+                "--correct": correct is not None,
+                "--parts": parts is not None,
+                "--kinds": kinds is not None,
+                "--expert": expert_options.expert is not None,
+            },
+        )
+        if selection is not None:
+            expert_options = replace(expert_options, strict_thoughts=False)
         model = ExpertRun.of(expert_options, language)  # type: ignore[arg-type]
         if model is not None:
             _refuse_misfits(model, writer, kinds, correct)
-        source, env = source_of(suite, tasks_file, correct)
-        source = chosen_tasks(source, split(types), split(scenes))
-        asked = chosen_recipe(recipe, split(parts), split(kinds)) if correct is None else None
+        asked: Recipe | None = None
+        if selection is not None:
+            source, env = selection.source(suite, tasks_file)
+            asked = selection.collected
+        else:
+            source, env = source_of(suite, tasks_file, correct)
+        if instances is not None:
+            if selection is not None or correct is not None:
+                raise BadInput("--instances is that of the run; leave it out")
+            env["instances"] = instances
+        source = chosen_tasks(source, named("--types", types), named("--scenes", scenes))
+        fitted = fitted_tasks(source, env["backend"])
+        if correct is not None:
+            _refuse_recipe({"--recipe": recipe, "--parts": parts, "--kinds": kinds})
+        elif selection is None:
+            asked = chosen_recipe(recipe, named("--parts", parts), named("--kinds", kinds))
         settings, manifest = _settings(
             source,
+            fitted.tasks,
             env,
             asked,
             correct,
@@ -136,9 +177,15 @@ def collect(
             seed=seed,
             writer=writer,
             table=thoughts,
+            stated_too=selection.stated if selection else {},
         )
-        strata, left_out = _strata(settings, correct, limit, model)
+        if selection is not None:
+            screening, strata = selection.strata(settings.tasks, limit, seed)
+            left_out: dict[str, int] = {}
+        else:
+            strata, left_out = _strata(settings, correct, limit, model)
         make_writer = _make_writer(writer)
+    report_set_aside(source.name, fitted.set_aside, fitted.substitutions)
     for reason, number in left_out.items():
         console.print(f"{number} episodes left out: {reason}", style="dim", soft_wrap=True)
     total = sum(stratum.quota for stratum in strata.values())
@@ -151,6 +198,8 @@ def collect(
             _players(model, make_writer, out, shown) as ready,
         ):
             players, cost = ready
+            if selection is not None:
+                players = selection.players(make_writer, strata)
             collector = Collector(
                 collection,
                 settings,
@@ -167,8 +216,13 @@ def collect(
                     summary = collector.collect()
             finally:
                 bill = cost()
+            if selection is not None:
+                summary.missing.clear()  # the table says why
+                yields = selection.report(screening, strata, collection, players, limit)
     except WorkerSetupError as error:
         raise click.ClickException(str(error)) from error
+    except (CollectionError, RunDirectoryError, Locked, ForeignFile) as error:
+        raise BadInput(f"{error}; nothing else in {out} has changed") from error
     except OSError as error:  # the disk is full, the share is gone
         raise BadInput(f"{error}; the same command continues {out}") from error
     except (KeyboardInterrupt, CannotGoOn) as error:
@@ -183,6 +237,10 @@ def collect(
     if bill:
         console.print(str(bill))
     console.print(_in_words(summary, out / TRAJECTORIES), soft_wrap=True)
+    if selection is not None:
+        from benchmarks.scoring.tables import print_tables
+
+        print_tables([yields], stdout())
     for (part, task_type), number in summary.missing.items():
         print_problem(
             f"{part}: {number} trajectories{f' of {task_type}' if task_type else ''} are missing; "
@@ -199,6 +257,7 @@ def collect(
 
 def _settings(
     suite: Suite,
+    tasks: Sequence[Task],
     env: Mapping[str, Any],
     recipe: Recipe | None,
     correct: Path | None,
@@ -208,6 +267,7 @@ def _settings(
     seed: int,
     writer: str,
     table: str,
+    stated_too: Mapping[str, Any],
 ) -> tuple[CollectSettings, CollectionManifest]:
     """What decides the trajectories, and the manifest that states it."""
     from agents.expert.collect import CollectSettings, corrections_recipe
@@ -217,7 +277,6 @@ def _settings(
     from er_gym import __version__
     from er_gym.data.collection import CollectionManifest
     from er_gym.envs.embodied_env import EmbodiedEnv
-    from er_gym.tasks.resolve import resolve_tasks
 
     if model is not None:
         env = {**env, **model.env}
@@ -241,21 +300,29 @@ def _settings(
             "language": language,
             "env": dict(env),
             "pictures": pictures.model_dump(mode="json", include={"format", "quality"}),
-            **({} if correct is None else {"corrects": correct.name}),
+            **({} if correct is None else {"corrects": _name_of(correct)}),
             **({} if model is None else {"expert": model.stated}),
+            **stated_too,
         },
         seed=seed,
         er_gym=__version__,
     )
     settings = CollectSettings(
         recipe=stated,
-        tasks=resolve_tasks(suite.tasks, env["backend"]).tasks,
+        tasks=tasks,
         env=env,
         play=PlaySettings(kinds, pictures, language),
         seed=seed,
         manifest=manifest.model_dump(mode="json"),
     )
     return settings, manifest
+
+
+def _name_of(run: Path) -> str:
+    """The name of a run directory with the digest of what it plays."""
+    from er_gym.rollout.run_directory import RunDirectory
+
+    return f"{run.resolve().name} ({RunDirectory.open(run).manifest.digest})"
 
 
 def _strata(
@@ -287,6 +354,13 @@ def _make_writer(name: str) -> NamedWriter:
     make = NamedWriter(name)
     make()
     return make
+
+
+def _refuse_recipe(options: Mapping[str, str | None]) -> None:
+    """What --correct collects needs no recipe."""
+    for option, given in options.items():
+        if given is not None:
+            raise BadInput(f"{option} is for a recipe; --correct RUN collects without one")
 
 
 def _refuse_misfits(model: ExpertRun, writer: str, kinds: str | None, correct: Path | None) -> None:

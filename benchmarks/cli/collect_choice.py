@@ -11,6 +11,7 @@ from benchmarks.cli.errors import BadInput
 
 if TYPE_CHECKING:
     from agents.expert.recipe import Recipe
+    from er_gym.tasks.resolve import ResolvedTasks
     from er_gym.tasks.suites import Suite
 
 
@@ -66,15 +67,28 @@ def chosen_tasks(suite: Suite, types: Sequence[str], scenes: Sequence[str]) -> S
         if (not wanted or task.type.name in wanted) and (not scenes or task.scene in scenes)
     )
     if not tasks:
-        raise BadInput(f"{suite.name} has no task of the types {', '.join(sorted(wanted))}")
+        where = f" in {', '.join(scenes)}" if scenes else ""
+        raise BadInput(f"{suite.name} has no task of the types {', '.join(sorted(wanted))}{where}")
     return replace(suite, tasks=tasks)
 
 
-def chosen_recipe(name: str, parts: Sequence[str], kinds: Sequence[str]) -> Recipe:
-    """The recipe with only the parts and kinds that were asked for."""
-    from agents.expert.recipe import load_recipe
+def fitted_tasks(suite: Suite, backend: str) -> ResolvedTasks:
+    """The suite's tasks with the ids of their scenes; set aside are the faulty ones, too."""
+    from er_gym.tasks.errors import summarise_set_aside
+    from er_gym.tasks.resolve import resolve_tasks
 
-    recipe = load_recipe(name)
+    fitted = resolve_tasks(suite.tasks, backend)
+    aside = (*suite.set_aside, *fitted.set_aside)
+    if aside and not fitted.tasks:
+        raise BadInput(f"{suite.name}: no task can be played: {summarise_set_aside(aside)}")
+    return replace(fitted, set_aside=aside)
+
+
+def chosen_recipe(name: str | None, parts: Sequence[str], kinds: Sequence[str]) -> Recipe:
+    """The recipe, by default the paper's, with only the parts and kinds that were asked for."""
+    from agents.expert.recipe import DEFAULT, load_recipe
+
+    recipe = load_recipe(DEFAULT if name is None else name)
     for part in parts:
         if part not in recipe.parts:
             raise BadInput(f"unknown part {part!r}; the recipe has: {', '.join(recipe.parts)}")
@@ -86,13 +100,16 @@ def chosen_recipe(name: str, parts: Sequence[str], kinds: Sequence[str]) -> Reci
 
 def _of_kinds(parts: Mapping[str, Any], kinds: Sequence[str]) -> dict[str, Any]:
     """The parts in which an expert plays these kinds, with no other kinds."""
-    known = dict.fromkeys(kind for row in parts.values() for kind in row.kinds)
+    experts = [row for row in parts.values() if row.actor == "expert"]
+    if not experts:
+        raise BadInput(f"--kinds is for parts that an expert plays, not for {', '.join(parts)}")
+    known = dict.fromkeys(kind for row in experts for kind in row.all_kinds)
     for kind in kinds:
         if kind not in known:
             raise BadInput(f"unknown kind {kind!r}; the recipe has: {', '.join(known)}")
     left = {}
     for name, row in parts.items():
         shares = {kind: share for kind, share in row.kinds.items() if kind in kinds}
-        if shares:
+        if any(shares.values()):
             left[name] = row.model_copy(update={"kinds": shares})
     return left

@@ -70,7 +70,8 @@ _OPTIONS = (
     click.option(
         "--strict-thoughts",
         is_flag=True,
-        help="Of a model that decides, take only what the critic finds no fault in.",
+        help="Of a model that decides, and with --select, take only what the critic finds no fault "
+        "in.",
     ),
 )
 

@@ -1,4 +1,4 @@
-"""``er-gym data``: count trajectories, verify them, look at them, export them."""
+"""``er-gym data``: count trajectories, verify them, look at them, export and import them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.data_export import export
+from benchmarks.cli.data_import import import_
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import Place, force_option, workers_option
 from benchmarks.cli.terminal import echo, stdout, terminal
@@ -34,6 +35,7 @@ def data() -> None:
 
 
 data.add_command(export)
+data.add_command(import_)
 
 
 @data.command()
@@ -198,9 +200,15 @@ def _trajectory(collection: Collection, wanted: str) -> Trajectory:
 
 def _tasks(collection: Collection, tasks_file: Path | None) -> Sequence[Task]:
     """The tasks of the suite that was played."""
+    from er_gym.data.sharegpt_import import SOURCE
     from er_gym.tasks.suites import load_suite, suite_from_file, suite_registry
 
     told = collection.manifest
+    if SOURCE in told.settings:
+        raise BadInput(
+            f"{collection.path} was imported from a file that does not tell poses and seeds, so "
+            "that its trajectories cannot be replayed; stats, show and export work on it"
+        )
     if tasks_file is not None:
         suite = suite_from_file(tasks_file)
     elif told.suite in suite_registry().names():

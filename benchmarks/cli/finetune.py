@@ -8,11 +8,17 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import Place, overrides_option
+from benchmarks.cli.options import Place, Words, overrides_option
 from benchmarks.cli.terminal import echo
 
 if TYPE_CHECKING:
-    from agents.finetune.train import Progress, Result
+    from agents.finetune.loop import Progress
+    from agents.finetune.settings import FinetuneSettings
+    from agents.finetune.train import Result
+
+PRINTABLE = ("llama-factory", "ms-swift", "trl", "deepspeed")
+"""As in ``agents.finetune.printing``, which is too slow to import for ``--help``; a test
+compares."""
 
 
 @click.command()
@@ -26,16 +32,18 @@ if TYPE_CHECKING:
 @click.option(
     "--model",
     required=True,
-    type=Place(path_type=Path),
+    type=Words(),
     metavar="DIR",
-    help="The model: a directory that save_pretrained wrote, or an earlier run.",
+    help="The model: a directory that save_pretrained wrote, or an earlier run; for --print also a "
+    "name such as qwen2-vl-7b.",
 )
 @click.option(
     "--data",
     required=True,
+    multiple=True,
     type=Place(path_type=Path),
-    metavar="DIR",
-    help="What is learnt: a collection of er-gym collect.",
+    metavar="PATH",
+    help="What is learnt: a collection of er-gym collect, or a ShareGPT file; may be repeated.",
 )
 @click.option(
     "--out",
@@ -48,13 +56,26 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Train although by the estimate it does not fit into the memory.",
 )
+@click.option(
+    "--print",
+    "program",
+    type=click.Choice(PRINTABLE),
+    help="Train nothing; write the complete files with which this program makes the run.",
+)
+@click.option(
+    "--gpus", type=click.IntRange(min=1), help="With --print: how many GPUs.  [default: 8, LoRA 1]"
+)
+@click.option("--copy", is_flag=True, help="With --print: copy pictures instead of linking them.")
 def finetune(
     config: str,
     overrides: tuple[str, ...],
-    model: Path,
-    data: Path,
+    model: str,
+    data: tuple[Path, ...],
     out: Path,
     ignore_memory: bool,
+    program: str | None,
+    gpus: int | None,
+    copy: bool,
 ) -> int:
     """Fine-tune a language or vision-language model on trajectories; needs the extra finetune.
 
@@ -65,6 +86,11 @@ def finetune(
 
     with bad_input():
         settings = load_settings(config, overrides)
+    if program is not None:
+        _print_run(program, settings, model, data, out, gpus, copy)
+        return 0
+    if gpus is not None or copy:
+        raise BadInput("--gpus and --copy are for --print; leave them out")
     try:
         from agents.finetune import train as training
     except ImportError as error:
@@ -76,7 +102,7 @@ def finetune(
         with bad_input():
             result = training.train(
                 settings,
-                model,
+                Path(model),
                 data,
                 out,
                 ignore_memory=ignore_memory,
@@ -97,6 +123,26 @@ def finetune(
     if training.machine.is_first():
         _say_result(result)
     return 0
+
+
+def _print_run(
+    program: str,
+    settings: FinetuneSettings,
+    model: str,
+    data: tuple[Path, ...],
+    out: Path,
+    gpus: int | None,
+    copy: bool,
+) -> None:
+    """Write the files of another program's run, and name them."""
+    from agents.finetune.printing import write_files
+
+    if len(data) > 1:
+        raise BadInput(f"--print takes one --data, not {len(data)}; print a run for each")
+    with bad_input():
+        files = write_files(program, settings, model, data[0], out, gpus=gpus, copy=copy)
+    for file in files:
+        echo(file)
 
 
 def _say_progress(progress: Progress) -> None:

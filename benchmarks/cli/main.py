@@ -26,6 +26,8 @@ from benchmarks.cli.errors import (
 )
 from benchmarks.cli.finetune import finetune
 from benchmarks.cli.inspect import inspect
+from benchmarks.cli.ladder import ladder
+from benchmarks.cli.new_model import new_model
 from benchmarks.cli.options import scorer_option
 from benchmarks.cli.player import player
 from benchmarks.cli.render import play, render
@@ -97,6 +99,8 @@ cli.add_command(serve)
 cli.add_command(match_server)
 cli.add_command(inspect)
 cli.add_command(data)
+cli.add_command(ladder)
+cli.add_command(new_model)
 
 
 @cli.command()

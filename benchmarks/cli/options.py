@@ -9,6 +9,8 @@ from typing import Any
 
 import click
 
+from benchmarks.cli.errors import BadInput
+
 SCORER_CHOICES = ("both", "paper", "corrected")
 """As in ``benchmarks.scoring.report``, which is too slow to import for ``--help``; a test
 compares."""
@@ -59,6 +61,8 @@ faults_option = click.option(
 
 _MOST_WORKERS = 256
 """Each worker takes 100 MB or more."""
+MOST_SAMPLES = 10_000
+"""More samples of a task than anybody plays; a larger number is a slip of the fingers."""
 MOST_SEED = 2**32 - 1
 """The largest seed that NumPy's and PyTorch's generators accept."""
 
@@ -110,6 +114,13 @@ def overrides_option(example: str) -> Any:
 def split(*lists: str | None) -> list[str]:
     """The words of comma-separated lists."""
     return [word.strip() for text in lists for word in (text or "").split(",") if word.strip()]
+
+
+def named(option: str, text: str | None) -> list[str]:
+    """The words of an option's comma-separated list; empty only if the option was not given."""
+    if text is not None and not split(text):
+        raise BadInput(f"{option} {text!r} names nothing; name one, or leave it out")
+    return split(text)
 
 
 class Place(click.Path):

@@ -88,27 +88,41 @@ def serve(
 ) -> int:
     """Start a server for a model, for `er-gym bench --agent openai:MODEL` to play with.
 
-    MODEL is a directory, a .gguf file or a name on a model hub. llama.cpp serves .gguf files. vLLM
-    serves other models if it is installed and there is a GPU; otherwise transformers does. The
-    server listens on 127.0.0.1 only, and ends when this command does.
+    MODEL is a directory, a run of er-gym finetune, a .gguf file or a name on a model hub. llama.cpp
+    serves .gguf files. vLLM serves other models if it is installed and there is a GPU; otherwise
+    transformers does. An adapter is first merged into its model, once, in the directory merged
+    beside it. The server listens on 127.0.0.1 only, and ends when this command does.
     """
+    from agents.vlm.factory import load_settings
+    from agents.vlm.merging import merge, merged_directory
     from agents.vlm.serving import ServeOptions, command_for, inspect_machine
+    from agents.vlm.tuned_model import agent_file, model_directory
 
     _must_be_there(model)
-    options = ServeOptions(
-        port=_usable_port(port),
-        engine=engine or "",
-        name=name,
-        pictures=pictures,
-        context=context,
-        gpus=gpus,
-        more=more,
-    )
     with bad_input():
-        command = command_for(model, options, inspect_machine(python))
+        tuned_for = agent_file(model)
+        settings = load_settings(None, (), tuned_for)
+        directory = Path(model_directory(model))
+        whole = str(merged_directory(directory)) if directory.is_dir() else model
+        options = ServeOptions(
+            port=_usable_port(port),
+            engine=engine or "",
+            name=name,
+            pictures=pictures,
+            pixels=settings.pictures.model_bounds,
+            agent_config=str(tuned_for or ""),
+            context=context,
+            gpus=gpus,
+            more=more,
+        )
+        command = command_for(whole, options, inspect_machine(python))
     if dry_run:
         echo(_as_shell(command))
         return 0
+    if directory.is_dir() and whole != str(directory):
+        echo(f"merging the adapter {directory} into {whole}", err=True)
+        with bad_input():
+            merge(directory)
     return run_server(command, patience=patience, verbose=verbose)
 
 

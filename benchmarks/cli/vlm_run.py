@@ -10,8 +10,8 @@ from typing import Any
 
 from agents.vlm.clients.budget import Budget
 from agents.vlm.clients.session import ModelSession
-from agents.vlm.factory import AgentFactory, comparable_settings, load_settings
-from agents.vlm.prompts import load_prompts
+from agents.vlm.factory import AgentFactory, comparable_settings, load_settings, settings_file
+from agents.vlm.prompts import prompts_for
 from agents.vlm.settings import AgentSettings
 from benchmarks.cli.vlm_options import VLMOptions
 from er_gym.rollout.events import EventListener
@@ -32,12 +32,15 @@ class VLMRun:
         settings: of the agent.
         budget: what may be spent.
         concurrency: how many conversations at once.
+        tuned_for: the file with the settings that the model was tuned for, which hold beneath those
+            of the command line; None if there is none.
     """
 
     name: str
     settings: AgentSettings
     budget: Budget
     concurrency: int
+    tuned_for: Path | None = None
 
     @staticmethod
     def of(name: str, options: VLMOptions) -> VLMRun:
@@ -47,17 +50,20 @@ class VLMRun:
             ValueError: a setting does not fit.
         """
         given = {"server.base_url": options.base_url, "prompts.dataset": options.prompts_from}
-        more = (f"{name}={json.dumps(str(value))}" for name, value in given.items() if value)
-        settings = load_settings(options.agent_config, (*options.overrides, *more))
+        more = [f"{name}={json.dumps(str(value))}" for name, value in given.items() if value]
+        tuned_for = settings_file(name)
+        if tuned_for is not None and options.prompts_from is not None:
+            more.append('prompts.dialect=""')  # instead of the model's own
+        settings = load_settings(options.agent_config, (*options.overrides, *more), tuned_for)
         budget = Budget(
             max_usd=options.max_usd, max_tokens=options.max_tokens, max_minutes=options.max_minutes
         )
-        return VLMRun(name, settings, budget, options.concurrency or _CONCURRENCY)
+        return VLMRun(name, settings, budget, options.concurrency or _CONCURRENCY, tuned_for)
 
     @property
     def comparable_settings(self) -> dict[str, Any]:
         """The settings that decide its replies."""
-        return comparable_settings(self.settings, load_prompts(self.settings.prompts).digest)
+        return comparable_settings(self.settings, prompts_for(self.settings).digest)
 
     @property
     def env(self) -> dict[str, Any]:
@@ -82,8 +88,9 @@ class VLMRun:
         workers: int,
         listeners: Iterable[EventListener] = (),
         say: Callable[[object], None] | None = None,
+        samples: int = 1,
     ) -> RunSummary:
-        """Play the tasks that the run directory has no finished episode of.
+        """Play the tasks that the run directory has no finished episode of, each ``samples`` times.
 
         ``say`` is called, from any thread, with messages about the server for the user; without it,
         a logger warns.
@@ -98,4 +105,5 @@ class VLMRun:
             parallelism=Parallelism(workers, self.concurrency),
             listeners=listeners,
             cost=lambda: factory.cost,
+            samples=samples,
         )

@@ -175,7 +175,7 @@ def main(
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         text = blind(Collection.open(data), folder / "data")
-        samples = open_samples(text.path, DataSettings(dialect=dialect, limit=limit))
+        samples = open_samples([text.path], DataSettings(dialect=dialect, limit=limit))
         make_model(folder / "model", samples.chats, hidden, layers, words)
         tokenizer = transformers.AutoTokenizer.from_pretrained(folder / "model")
         settings = load_settings("stage1", [
@@ -194,7 +194,7 @@ def main(
             training = settings.training.model_copy(update={"epochs": float(passes)})
             train(
                 settings.model_copy(update={"training": training}),
-                folder / "model", text.path, folder / f"run-{next(number)}",
+                folder / "model", [text.path], folder / f"run-{next(number)}",
             )  # fmt: skip
 
         rows = sum(chat.length for chat in chats) // len(chats) * batch

@@ -39,7 +39,7 @@ def _overview(found: Statistics) -> Table:
         ("thoughts", f"{found.all_thoughts:,}"),
         *(("in language " + name, f"{number:,}") for name, number in found.languages.items()),
         *(("thoughts by " + name, f"{number:,}") for name, number in found.writers.items()),
-        ("thoughts of the grounded writer in a model's place", f"{found.replaced:,}"),
+        ("thoughts by grounded after a refusal", f"{found.replaced:,}"),
         ("requests to models", f"{found.requests:,}"),
         ("tokens of prompts", f"{found.prompt_tokens:,}"),
         ("tokens of replies", f"{found.completion_tokens:,}"),

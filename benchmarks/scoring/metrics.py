@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from benchmarks.scoring.samples import effective_number, most_samples, variance_between
 from benchmarks.scoring.scorers import JUDGED_BY_NAME, Scorer, Tally
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.types import task_type
@@ -96,6 +97,7 @@ class Score:
         success: the tally's; also where the paper's program gives more than 1, as it does in a task
             whose only other key action was done and that does not ask for ``end``.
         missing: the scoring key actions that were not done, as ``"verb Type"``.
+        sample: which of the task's episodes it is, from 1.
     """
 
     task_id: str
@@ -109,6 +111,7 @@ class Score:
     steps_saved: float
     key_action_precision: float
     missing: tuple[str, ...]
+    sample: int = 1
 
 
 METRICS = (
@@ -141,6 +144,7 @@ def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
         steps_saved=steps_saved(episode),
         key_action_precision=key_action_precision(episode, counted),
         missing=tuple(missing.elements()),
+        sample=episode.sample,
     )
 
 
@@ -172,7 +176,10 @@ def wilson(successes: int, n: int) -> Estimate:
     """
     if n == 0:
         raise ValueError("no episodes: a rate needs at least one")
-    rate = successes / n
+    return _wilson(successes / n, n)
+
+
+def _wilson(rate: float, n: float) -> Estimate:
     scale = 1 + _Z**2 / n
     centre = (rate + _Z**2 / (2 * n)) / scale
     half = _Z / scale * math.sqrt(rate * (1 - rate) / n + _Z**2 / (4 * n**2))
@@ -199,14 +206,41 @@ def normal(values: Sequence[float]) -> Estimate:
     return Estimate(mean, mean - half, mean + half)
 
 
+def _between(tasks: Sequence[str], values: Sequence[float]) -> Estimate:
+    """A mean over episodes with the normal interval of the standard error between tasks."""
+    mean = math.fsum(values) / len(values)
+    variance = variance_between(tasks, values)
+    if variance is None:
+        return Estimate(mean, None, None)
+    half = _Z * math.sqrt(variance)
+    return Estimate(mean, mean - half, mean + half)
+
+
 def summarise(scores: Sequence[Score]) -> Summary:
     """Means over episodes with 95 % intervals: Wilson's for success, the normal one for the rest.
+
+    Where tasks were played several times, the intervals are those between tasks: the normal one of
+    that standard error, and Wilson's for the number of episodes of different tasks that would tell
+    as much (:mod:`benchmarks.scoring.samples`).
 
     Raises:
         ValueError: there are no scores.
     """
+    if most_samples(scores) > 1:
+        return _summarise_samples(scores)
     means = {metric: normal([getattr(each, metric) for each in scores]) for metric in METRICS[1:]}
     rate = wilson(sum(each.success for each in scores), len(scores))
+    return Summary(len(scores), {"success": rate, **means})
+
+
+def _summarise_samples(scores: Sequence[Score]) -> Summary:
+    tasks = [each.task_id for each in scores]
+    successes = [each.success for each in scores]
+    rate = _wilson(sum(successes) / len(scores), effective_number(tasks, successes))
+    means = {
+        metric: _between(tasks, [getattr(each, metric) for each in scores])
+        for metric in METRICS[1:]
+    }
     return Summary(len(scores), {"success": rate, **means})
 
 

@@ -19,8 +19,10 @@ from benchmarks.scoring.metrics import (
     summarise,
     summarise_by,
 )
-from benchmarks.scoring.scorers import CORRECTED, PAPER, SCORERS, lacks_search_targets
-from er_gym.rollout.records import EpisodeRecord
+from benchmarks.scoring.samples import TaskSamples, by, most_samples, task_samples
+from benchmarks.scoring.scorers import CORRECTED, PAPER, SCORERS
+from er_gym.rollout.judgement import lacks_search_targets
+from er_gym.rollout.records import EpisodeRecord, episode_key
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks.errors import describe_substitutions
 from er_gym.tasks.types import BY_NAME, GROUPS
@@ -36,7 +38,7 @@ class Miss:
     """An episode that failed under the ``corrected`` scorer, and why.
 
     Attributes:
-        task_id, task_type, scene: what was played.
+        task_id, task_type, scene: what was played; a later sample has its number in the id.
         end_reason: why the episode ended, ``"crashed"`` if it crashed.
         feedback: the error, or what the agent was told last.
         missing: the key actions that were not done, as ``"verb Type"``.
@@ -70,10 +72,11 @@ class RunReport:
 
     @property
     def differ(self) -> tuple[str, ...]:
-        """The ids of the tasks that the scorers score differently."""
+        """The ids of the tasks that the scorers score differently; later samples have their number
+        in the id."""
         pairs = zip(self.scores[PAPER.name], self.scores[CORRECTED.name], strict=True)
         return tuple(
-            paper.task_id
+            episode_key(paper.task_id, paper.sample)
             for paper, corrected in pairs
             if any(getattr(paper, name) != getattr(corrected, name) for name in METRICS)
         )
@@ -137,7 +140,7 @@ def load_run(path: Path) -> RunReport:
 def _miss(episode: EpisodeRecord, scored: Score) -> Miss:
     last = episode.steps[-1].feedback if episode.steps else ""
     return Miss(
-        task_id=episode.task_id,
+        task_id=episode.key,
         task_type=episode.task_type,
         scene=episode.scene,
         end_reason="crashed" if episode.error else episode.end_reason,
@@ -155,6 +158,21 @@ def slices(scores: Sequence[Score]) -> list[tuple[str, str, Summary]]:
         *(("group", *each) for each in by_group(scores).items()),
         *(("type", *each) for each in by_type(scores).items()),
     ]
+
+
+def sample_slices(scores: Sequence[Score]) -> list[tuple[str, str, TaskSamples]]:
+    """(level, name, samples) as :func:`slices`; empty if no task was played several times."""
+    samples = most_samples(scores)
+    if samples < 2:
+        return []
+    groups, types = by(scores, lambda each: each.group), by(scores, lambda each: each.task_type)
+    parts = [
+        ("overall", "all", scores),
+        *(("group", name, groups[name]) for name in GROUPS if name in groups),
+        *(("type", name, types[name]) for name in BY_NAME if name in types),
+    ]
+    found = [(level, name, task_samples(part, samples)) for level, name, part in parts]
+    return [(level, name, counted) for level, name, counted in found if counted is not None]
 
 
 def by_group(scores: Sequence[Score]) -> dict[str, Summary]:
@@ -194,12 +212,26 @@ def _run(run: RunReport) -> dict[str, Any]:
                     }
                     for level, part, summary in slices(scores)
                 ],
-                "episodes": [dataclasses.asdict(each) for each in scores],
+                **_samples(scores),
+                "episodes": [_score(each) for each in scores],
             }
             for name, scores in run.scores.items()
         },
         "misses": [dataclasses.asdict(miss) for miss in run.misses],
     }
+
+
+def _score(score: Score) -> dict[str, Any]:
+    told = dataclasses.asdict(score)
+    return told if score.sample > 1 else {key: told[key] for key in told if key != "sample"}
+
+
+def _samples(scores: Sequence[Score]) -> dict[str, Any]:
+    found = [
+        {"level": level, "name": name, **dataclasses.asdict(counted)}
+        for level, name, counted in sample_slices(scores)
+    ]
+    return {"samples": found} if found else {}
 
 
 def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = False) -> str:

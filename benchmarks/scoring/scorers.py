@@ -15,11 +15,10 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from er_gym.rollout.judgement import judged
 from er_gym.rollout.records import ERROR, EpisodeRecord, KeyActionRecord
-from er_gym.tasks.judge import Criteria, Progress, replay
 from er_gym.tasks.task import KeyAction
-from er_gym.tasks.types import task_type
-from er_gym.tasks.verbs import END, INIT, MOVE_FORWARD, NAVIGATE, OBSERVE, canonical_verb
+from er_gym.tasks.verbs import END, INIT, MOVE_FORWARD, NAVIGATE, OBSERVE
 
 JUDGED_BY_NAME = "single_search"
 """The task type whose ``end`` the paper scores only if the task's name was answered."""
@@ -134,32 +133,6 @@ def _paper(episode: EpisodeRecord) -> Tally:
 
 
 # -- corrected -------------------------------------------------------------------------------------
-
-
-def judged(episode: EpisodeRecord) -> Progress:
-    """The verdict of the environment's judge on an episode, from its record alone.
-
-    A record can lack the search targets (:func:`lacks_search_targets`). Whether the agent could
-    interact with them at ``end`` then follows from what the environment said, whose rule for that
-    has not changed.
-    """
-    kind = task_type(episode.task_type)
-    criteria = Criteria(
-        key_actions=tuple(
-            KeyAction(canonical_verb(key.verb), key.object_id, key.object_type, reward=key.reward)
-            for key in episode.key_actions
-        ),
-        ordered=kind.ordered,
-        named=frozenset(key.object_id for key in episode.key_actions if key.exact),
-        targets=frozenset(episode.search_targets or ()),
-    )
-    found = episode.success if lacks_search_targets(episode) else True
-    return replay(criteria, episode.steps, goal_holds=found and not episode.goal_unmet)
-
-
-def lacks_search_targets(episode: EpisodeRecord) -> bool:
-    """Whether the episode is a search with an old record, which lacks the search targets."""
-    return episode.search_targets is None and task_type(episode.task_type).search
 
 
 def _corrected(episode: EpisodeRecord) -> Tally:

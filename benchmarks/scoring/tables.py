@@ -13,7 +13,8 @@ from rich.text import Text
 
 from benchmarks.cli.terminal import plain
 from benchmarks.scoring.metrics import METRICS, Estimate, Score, Summary
-from benchmarks.scoring.report import BOTH, RunReport, by_group, by_type, slices
+from benchmarks.scoring.report import BOTH, RunReport, by_group, by_type, sample_slices, slices
+from benchmarks.scoring.samples import most_samples
 from er_gym.envs.protocol import DEFAULT
 from er_gym.tasks.types import BY_NAME, GROUPS
 
@@ -61,6 +62,12 @@ def tables(
         with_misses: add a table per run of the episodes without success, under ``corrected``.
     """
     found = [_overview(runs, scorer)]
+    found += [
+        _samples(run, name, scores, with_types)
+        for run in runs
+        for name, scores in run.shown(scorer).items()
+        if most_samples(scores) > 1
+    ]
     if with_types:
         found += [
             _types(run, name, scores)
@@ -111,7 +118,10 @@ def _overview(runs: Sequence[RunReport], scorer: str) -> Table:
 
 def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple[str, ...]:
     size = run.manifest.suite_size
-    n = str(size) if len(scores) == size else f"{len(scores)}/{size}"
+    tasks = len({each.task_id for each in scores})
+    n = str(size) if tasks == size else f"{tasks}/{size}"
+    if len(scores) > tasks:
+        n = f"{len(scores)} of {n}"
     head = (run.manifest.agent, run.manifest.suite, run.manifest.protocol, scorer, n)
     if not scores:
         return (*head, *[_NONE] * (4 + len(GROUPS)))
@@ -124,6 +134,34 @@ def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple
         _percent(overall["search_efficiency"].mean),
         _percent(overall["completeness"].mean),
         *(_percent(groups[name]["success"].mean) if name in groups else _NONE for name in GROUPS),
+    )
+
+
+def _samples(run: RunReport, scorer: str, scores: Sequence[Score], with_types: bool) -> Table:
+    """Success by task, where tasks were played several times."""
+    lines = [
+        (BY_NAME[name].title if level == "type" else "All" if level == "overall" else name, counted)
+        for level, name, counted in sample_slices(scores)
+        if with_types or level != "type"
+    ]
+    _, whole = lines[0]
+    number = len({each.task_id for each in scores})
+    rest = number - whole.tasks
+    return Table(
+        title=f"{run.path}, scorer {scorer}: {whole.samples} samples of each task, in %",
+        head=("", "Tasks", *(f"pass@{k}" for k in whole.pass_at), "Always"),
+        rows=tuple(
+            (
+                name,
+                str(counted.tasks),
+                *(_percent(rate) for rate in counted.pass_at.values()),
+                _percent(counted.always),
+            )
+            for name, counted in lines
+        ),
+        text_columns=1,
+        notes=(f"{rest} of {number} tasks have fewer samples and are not counted here",)
+        * (rest > 0),
     )
 
 

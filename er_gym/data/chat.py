@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, TypeVar
 
 from er_gym.data.trajectory import PictureRecord
 
 Role: TypeAlias = Literal["system", "user", "assistant"]
 Part: TypeAlias = str | PictureRecord
+Shown = TypeVar("Shown")
+"""A picture, or what stands for one."""
 IMAGE = "<image>"
 """The place of a picture in formats whose messages are plain texts."""
 
@@ -103,9 +105,9 @@ def told_by_user(chat: Chat) -> Chat:
     return replace(chat, turns=tuple(turns[:kept]))
 
 
-def joined(parts: tuple[Part, ...]) -> tuple[Part, ...]:
+def joined(parts: tuple[str | Shown, ...]) -> tuple[str | Shown, ...]:
     """The parts with neighbouring texts joined and empty ones left out."""
-    found: list[Part] = []
+    found: list[str | Shown] = []
     for part in parts:
         last = found[-1] if found else None
         if isinstance(part, str) and isinstance(last, str):

@@ -89,45 +89,38 @@ def hidden(thought: Thought) -> Iterator[Refusal]:
 
 def inside(thought: Thought) -> Iterator[Refusal]:
     """Tells what is in a container that is shut and that the agent has not opened."""
-    phrases = thought.phrases
-    for clause in thought.clauses:
-        if not clause.is_fact or clause.past:
+    for mention, holder in _told_to_be_on(thought):
+        if not _is_shut(thought, holder) or not mention.types & thought.seen:
             continue
-        for match in _matches(clause, phrases.on):
-            if _is_placing(clause, match, phrases):
-                continue
-            (holder,) = clause.named(match, "y")
-            if not _is_shut(thought, holder):
-                continue
-            for mention in _subjects(clause, match, phrases):
-                here = thought.things(mention.types)
-                if mention.types & thought.seen and not any(
-                    each.on in holder.types for _, each in here
-                ):
-                    yield Refusal(
-                        "hidden",
-                        f"The agent cannot know that {name_of(mention)} is in {name_of(holder)}: "
-                        "it is closed and was not opened.",
-                    )
+        if not any(each.on in holder.types for _, each in thought.things(mention.types)):
+            yield Refusal(
+                "hidden",
+                f"The agent cannot know that {name_of(mention)} is in {name_of(holder)}: "
+                "it is closed and was not opened.",
+            )
 
 
 def support(thought: Thought) -> Iterator[Refusal]:
     """Says that something in view lies in or on another thing than it does."""
+    for mention, holder in _told_to_be_on(thought):
+        wrong = _not_on(thought, mention, holder)
+        if wrong:
+            yield Refusal(
+                "support", f"{name_of(mention)} is not in or on {name_of(holder)}: {wrong}."
+            )
+
+
+def _told_to_be_on(thought: Thought) -> Iterator[tuple[Mention, Mention]]:
+    """What is told as a fact to be in or on something now, with that."""
     phrases = thought.phrases
     for clause in thought.clauses:
         if not clause.is_fact or clause.past:
             continue
         for match in _matches(clause, phrases.on):
-            if _is_placing(clause, match, phrases):
-                continue
-            (holder,) = clause.named(match, "y")
-            for mention in _subjects(clause, match, phrases):
-                wrong = _not_on(thought, mention, holder)
-                if wrong:
-                    yield Refusal(
-                        "support",
-                        f"{name_of(mention)} is not in or on {name_of(holder)}: {wrong}.",
-                    )
+            if not _is_placing(clause, match, phrases):
+                (holder,) = clause.named(match, "y")
+                for mention in _subjects(clause, match, phrases):
+                    yield mention, holder
 
 
 def side(thought: Thought) -> Iterator[Refusal]:

@@ -23,7 +23,8 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from er_gym.data.trajectory import Trajectory
-from er_gym.rollout.run_directory import RunDirectory, RunDirectoryError
+from er_gym.locking import LOCK
+from er_gym.rollout.run_directory import EPISODES, RunDirectory, RunDirectoryError
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.reading import read_bytes, read_text
 from er_gym.writing import file_stem, make_folder, write_atomic
@@ -80,16 +81,16 @@ class Collection:
             CollectionError: another collection, or something else, is there; nothing is changed.
             OSError: the directory cannot be made or written to.
         """
-        if (path / MANIFEST).exists():
-            there = cls.open(path).manifest
-            theirs = there.model_dump(mode="json")
-            for name, here in manifest.model_dump(mode="json").items():
-                if theirs[name] != here:
-                    raise CollectionError(
-                        f"{path} holds another collection: its {name} is {theirs[name]!r:.300}, "
-                        f"this one's {here!r:.300}; choose another --out, or repeat that command"
-                    )
-        elif path.exists() and any(entry.name != "run.lock" for entry in path.iterdir()):
+        begun = (path / MANIFEST).exists()
+        if begun and not _is_bare(path):
+            theirs = cls.open(path).manifest.model_dump(mode="json")
+            ours = manifest.model_dump(mode="json")
+            if theirs != ours:
+                raise CollectionError(
+                    f"{path} holds another collection: {_difference(theirs, ours)}; choose "
+                    "another --out, or repeat that command"
+                )
+        elif not begun and path.exists() and {each.name for each in path.iterdir()} - {LOCK}:
             raise CollectionError(
                 f"{path} is not empty and holds no {MANIFEST}; choose another --out"
             )
@@ -149,6 +150,11 @@ class Collection:
         except (TaskFileError, ValidationError) as error:
             raise CollectionError(f"{file}: {_first_problem(error)}") from error
 
+    def has_pictures(self, trajectory: Trajectory) -> bool:
+        """Whether all pictures of a trajectory are there."""
+        pictures = (picture for turn in trajectory.turns for picture in turn.pictures)
+        return all((self.path / picture.path).is_file() for picture in pictures)
+
     def write(self, trajectories: Iterable[Trajectory]) -> int:
         """Replace ``trajectories.jsonl`` as a whole, and return how many lines it has.
 
@@ -188,6 +194,35 @@ class Collection:
                     yield Trajectory.model_validate_json(line)
                 except ValidationError as error:
                     raise CollectionError(f"{path}:{number}: {_first_problem(error)}") from error
+
+
+def _difference(theirs: Any, ours: Any, name: str = "") -> str:
+    """The first difference between two manifests, in words."""
+    if isinstance(theirs, dict) and isinstance(ours, dict):
+        for key in (*theirs, *ours):
+            if theirs.get(key, _ABSENT) != ours.get(key, _ABSENT):
+                inner = f"{name}.{key}" if name else str(key)
+                return _difference(theirs.get(key, _ABSENT), ours.get(key, _ABSENT), inner)
+    return f"its {name} is {theirs!r:.300}, this one's {ours!r:.300}"
+
+
+class _Absent:
+    def __repr__(self) -> str:
+        return "not given"
+
+
+_ABSENT = _Absent()
+
+
+def _is_bare(path: Path) -> bool:
+    """Whether a directory holds nothing that was collected, as after a command that was stopped
+    before its first episode. Another command may begin there."""
+    file = path / TRAJECTORIES
+    if {entry.name for entry in path.iterdir()} - {MANIFEST, TRAJECTORIES, PARTS, LOCK}:
+        return False
+    if file.is_symlink() or (file.exists() and not (file.is_file() and not file.stat().st_size)):
+        return False
+    return next((path / PARTS).glob(f"*/{EPISODES}/*"), None) is None
 
 
 def _first_problem(error: Exception) -> str:

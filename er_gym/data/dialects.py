@@ -2,6 +2,9 @@
 
 A dialect is a folder with a file for each language, ``configs/dialects/NAME/LANGUAGE.yaml``, or one
 like it of the user's. :class:`DialectTexts` says what a file holds.
+
+:func:`system_text` and :func:`user_turn` also make the messages of an agent that plays
+(:mod:`agents.vlm.dialect_prompts`), so that a model plays with the texts that it was tuned on.
 """
 
 from __future__ import annotations
@@ -15,16 +18,16 @@ from typing import Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from er_gym.data.chat import Chat, ChatTurn, Part, joined
+from er_gym.data.chat import Chat, ChatTurn, Shown, joined
 from er_gym.data.knowledge import AROUND
+from er_gym.data.notes import NoteWords, note
+from er_gym.data.scene_text import Perceived, SceneWords, scene_text
 from er_gym.data.trajectory import (
     TAG_OF_KIND,
     THOUGHT_KINDS,
     Language,
-    PictureRecord,
     ThoughtKind,
     Trajectory,
-    Turn,
 )
 from er_gym.tasks import verbs
 from er_gym.tasks.files import validated
@@ -32,7 +35,7 @@ from er_gym.tasks.reading import read_yaml
 from er_gym.tasks.suites import config_directory
 
 _AROUND_IN_ORDER = ("right", "behind", "left")
-_SLOT = re.compile(r"\{(picture|task|actions|action|feedback)\}")
+_SLOT = re.compile(r"\{(picture|task|actions|action|feedback|scene)\}")
 _FORBIDDEN = re.compile(
     r"</?\s*(?:image|video|audio|DecisionMaking|" + "|".join(TAG_OF_KIND.values()) + r")\s*>"
     r"|<\|[^|<>]*\|>",
@@ -45,30 +48,36 @@ class DialectTexts(BaseModel):
     """The texts of a dialect in one language.
 
     ``{picture}`` is the place of a picture, ``{task}`` the instruction, ``{actions}`` the actions,
-    ``{action}`` the last action and ``{feedback}`` the environment's answer to it.
+    ``{action}`` the last action and ``{feedback}`` the environment's answer to it. ``{scene}`` is
+    what the agent perceives, in words; a dialect that has it shows no pictures.
 
     Attributes:
         thoughts: ``tags``: each thought in its tag; ``speech``: one running text, each thought
-            after one of the ``openers`` of its kind, and one of the ``closers`` at the end.
+            after one of the ``openers`` of its kind, and one of the ``closers`` at the end;
+            ``notes``: one short note in a tag, made from what the trajectory records of the turn
+            (:mod:`er_gym.data.notes`), except for thoughts of a model that decided itself, which
+            stay as they are; ``none``: the decision alone.
         system: the system message, with the actions explained; ``""`` for none.
         first: the first user turn, with the task and a picture.
         after: the user turn after an action, with a picture; ``forward``: the same after a step
             forward; ``observed``: after looking around, with three: right, behind, left.
         failed: the user turn after an action that was not done, without a picture.
         astray: the same where a picture is shown: something else was done.
-        actions: what each verb means. ``more``: the same for verbs that are listed only in
-            conversations in which they occur.
+        actions: what each verb means. ``more``: the same for verbs that are listed only where the
+            instruction speaks of them.
         item: how the system message explains an action; ``{form}`` is such as ``open <object>``.
         list_separator, sentence_separator: stand between actions in a list, and between sentences
             of running text.
         reply_told: how the user tells a reply of the assistant, ``{reply}``
             (:func:`er_gym.data.chat.told_by_user`).
         openers, closers: sentences, for ``speech``.
+        scene: the words for ``{scene}``; None for a dialect with pictures.
+        notes: the words of ``notes``.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    thoughts: Literal["tags", "speech"]
+    thoughts: Literal["tags", "speech", "notes", "none"]
     system: str
     first: str
     after: str
@@ -84,13 +93,25 @@ class DialectTexts(BaseModel):
     reply_told: str
     openers: dict[ThoughtKind, list[str]] = {}
     closers: list[str] = []
+    scene: SceneWords | None = None
+    notes: NoteWords | None = None
+
+    @property
+    def sees(self) -> Literal["pictures", "text"]:
+        """What the user's turns show."""
+        return "pictures" if self.scene is None else "text"
 
     @model_validator(mode="after")
     def _fits(self) -> DialectTexts:
-        for name, count in _PICTURES.items():
-            found = getattr(self, name).count("{picture}")
-            if found != count:
-                raise ValueError(f"{name} has {{picture}} {found} times; write it {count} times")
+        for name, pictures in _PICTURES.items():
+            text = getattr(self, name)
+            slots = {"picture": pictures, "scene": 0}
+            if self.scene is not None:
+                slots = {"picture": 0, "scene": 1}
+            for slot, count in slots.items():
+                found = text.count(f"{{{slot}}}")
+                if found != count:
+                    raise ValueError(f"{name} has {{{slot}}} {found} times; write it {count} times")
         for name, slot in (("first", "{task}"), ("reply_told", "{reply}")):
             if slot not in getattr(self, name):
                 raise ValueError(f"{name} lacks {slot}")
@@ -102,11 +123,13 @@ class DialectTexts(BaseModel):
             without = [kind for kind in THOUGHT_KINDS if not self.openers.get(kind)]
             if without or not self.closers:
                 raise ValueError(f"give openers of {without}" if without else "give closers")
+        if self.thoughts == "notes" and self.notes is None:
+            raise ValueError("thoughts are notes, but there are no words for them; give notes")
         return self
 
 
 _PICTURES = {"first": 1, "after": 1, "forward": 1, "astray": 1, "observed": 3, "failed": 0}
-"""How many pictures each text shows."""
+"""How many pictures each text shows, in a dialect with pictures."""
 
 
 def dialect_names() -> tuple[str, ...]:
@@ -128,6 +151,19 @@ class Dialect:
     name: str
     texts: Mapping[Language, DialectTexts]
 
+    def texts_in(self, language: Language) -> DialectTexts:
+        """The texts in a language.
+
+        Raises:
+            ValueError: the dialect lacks it.
+        """
+        if language not in self.texts:
+            raise ValueError(
+                f"the dialect {self.name!r} lacks the language {language!r}; it has: "
+                f"{', '.join(self.texts)}"
+            )
+        return self.texts[language]
+
     def chat(self, trajectory: Trajectory, language: Language | None = None) -> Chat:
         """The conversation of a trajectory.
 
@@ -138,37 +174,19 @@ class Dialect:
         Raises:
             ValueError: the dialect lacks the language.
         """
-        wanted = language or trajectory.language
-        if wanted not in self.texts:
-            raise ValueError(
-                f"the dialect {self.name!r} lacks the language {wanted!r}; it has: "
-                f"{', '.join(self.texts)}"
-            )
-        texts = self.texts[wanted]
-        actions = _actions(texts, trajectory)
+        texts = self.texts_in(language or trajectory.language)
         turns: list[ChatTurn] = []
-        if texts.system:
-            explained = "\n".join(
-                texts.item.replace("{form}", form).replace("{meaning}", meaning)
-                for form, meaning in actions.items()
-            )
-            turns.append(
-                ChatTurn("system", (_filled(texts.system.strip(), {"actions": explained}),))
-            )
-        listed = texts.list_separator.join(actions)
+        if system := system_text(texts, trajectory.instruction):
+            turns.append(ChatTurn("system", (system,)))
+        before: Perceived | None = None
+        last: LastDeed | None = None
         for index, turn in enumerate(trajectory.turns):
-            last = trajectory.turns[index - 1] if index else None
-            values = {
-                "task": plain(trajectory.instruction),
-                "actions": listed,
-                "action": plain(str(last.action)) if last else "",
-                "feedback": plain(last.feedback) if last else "",
-            }
-            shown = _shown(turn.pictures)
-            text = getattr(texts, _text_for(shown, last))
-            turns.append(ChatTurn("user", _with_pictures(text, shown, values)))
-            said = _reply(texts, turn, f"{trajectory.id}/{index}")
-            turns.append(ChatTurn("assistant", (said,), turn.train))
+            now = Perceived.at(turn)
+            pictures = [(each.direction, each) for each in turn.pictures]
+            told = user_turn(texts, trajectory.instruction, last, pictures, now, before)
+            turns.append(ChatTurn("user", told))
+            turns.append(ChatTurn("assistant", (_reply(texts, trajectory, index),), turn.train))
+            before, last = now, LastDeed(str(turn.action), turn.success, turn.feedback)
         return Chat(trajectory.id, tuple(turns), texts.reply_told)
 
 
@@ -195,36 +213,117 @@ def load_dialect(name: str) -> Dialect:
     return Dialect(name, texts)
 
 
-# -- the user's turns ------------------------------------------------------------------------------
+# -- the system's and the user's turns -------------------------------------------------------------
 
 
-def _shown(pictures: Sequence[PictureRecord]) -> tuple[PictureRecord, ...]:
+@dataclass(frozen=True)
+class LastDeed:
+    """The last action and what came of it.
+
+    Attributes:
+        action: such as ``navigate to Fridge``; what was said in its place, if that names no action.
+        success, feedback: the environment's answer.
+    """
+
+    action: str
+    success: bool
+    feedback: str
+
+    @property
+    def on_the_spot(self) -> bool:
+        """Whether the agent neither moves nor turns when it does this."""
+        moves = (verbs.NAVIGATE, verbs.MOVE_FORWARD, verbs.OBSERVE)
+        return not self.action.startswith(moves)
+
+
+def system_text(texts: DialectTexts, instruction: str) -> str:
+    """The system message; ``""`` for none.
+
+    Args:
+        texts: the dialect's.
+        instruction: the task. It decides which of the verbs beyond the usual ones are listed.
+    """
+    explained = "\n".join(
+        texts.item.replace("{form}", form).replace("{meaning}", meaning)
+        for form, meaning in _actions(texts, instruction).items()
+    )
+    return _filled(texts.system.strip(), {"actions": explained})
+
+
+def user_turn(
+    texts: DialectTexts,
+    instruction: str,
+    last: LastDeed | None,
+    pictures: Sequence[tuple[str, Shown]],
+    now: Perceived | None = None,
+    before: Perceived | None = None,
+) -> tuple[str | Shown, ...]:
+    """A message of the user: texts and pictures in order.
+
+    Args:
+        texts: the dialect's.
+        instruction: the task.
+        last: the last action; None in the first turn.
+        pictures: the pictures of this turn with their directions (:func:`shows_anew`).
+        now: what the agent perceives, and ``before``: what it perceived before its last action, for
+            dialects without pictures. ``now`` is None if nothing was done.
+    """
+    values = {
+        "task": plain(instruction),
+        "actions": texts.list_separator.join(_actions(texts, instruction)),
+        "action": plain(last.action) if last else "",
+        "feedback": plain(last.feedback) if last else "",
+    }
+    if texts.scene is None:
+        shown = _shown(pictures)
+        text = getattr(texts, _text_for(last, [direction for direction, _ in shown]))
+        return _with_pictures(text, [picture for _, picture in shown], values)
+    values["scene"] = ""
+    if now is not None:
+        stayed = last is not None and last.on_the_spot
+        values["scene"] = scene_text(texts.scene, now, before, stayed=stayed)
+    if last is not None and last.success:
+        values["scene"] = values["scene"] or texts.scene.same
+    around = [*now.views] if now else []
+    told = _filled(getattr(texts, _text_for(last, around)).strip(), values)
+    return (told.strip(),)
+
+
+def shows_anew(last_success: bool, picture: bytes, last_picture: bytes) -> bool:
+    """Whether the view ahead is shown at a turn: not after a failure that left it as it was.
+
+    Args:
+        last_success: whether the last action succeeded; True at first.
+        picture: the file of the view, and ``last_picture`` of the last picture shown.
+    """
+    return last_success or picture != last_picture
+
+
+def _shown(pictures: Sequence[tuple[str, Shown]]) -> list[tuple[str, Shown]]:
     """The pictures of a turn that are shown: after ``observe``, what is right, behind and left."""
-    around = [each for each in pictures if each.direction in AROUND]
-    if not around:
-        return tuple(pictures)
-    return tuple(sorted(around, key=lambda each: _AROUND_IN_ORDER.index(each.direction)))
+    around = [each for each in pictures if each[0] in AROUND]
+    return sorted(around, key=lambda each: _AROUND_IN_ORDER.index(each[0])) or [*pictures]
 
 
-def _text_for(shown: Sequence[PictureRecord], last: Turn | None) -> str:
-    """The name of the text for a user's turn after the last action."""
+def _text_for(last: LastDeed | None, directions: Sequence[str]) -> str:
+    """The name of the text for a user's turn after the last action, by what is shown."""
     if last is None:
         return "first"
     if not last.success:
-        return "astray" if shown else "failed"
-    if any(each.direction in AROUND for each in shown):
+        return "astray" if directions else "failed"
+    if any(each in AROUND for each in directions):
         return "observed"
-    return "forward" if last.verb == verbs.MOVE_FORWARD else "after"
+    return "forward" if last.action == verbs.MOVE_FORWARD else "after"
 
 
 def _with_pictures(
-    text: str, shown: Sequence[PictureRecord], values: Mapping[str, str]
-) -> tuple[Part, ...]:
+    text: str, shown: Sequence[Shown], values: Mapping[str, str]
+) -> tuple[str | Shown, ...]:
     """A text with its slots filled. Where it has too few places for the pictures, the last place
     takes the others; places without a picture are dropped."""
     first, *rest = text.strip().split("{picture}")
     left = list(shown)
-    parts: list[Part] = [_filled(first, values)]
+    parts: list[str | Shown] = [_filled(first, values)]
     for number, words in enumerate(rest, 1):
         here = left if number == len(rest) else left[:1]
         parts += here
@@ -233,17 +332,23 @@ def _with_pictures(
     return joined((*left, *parts))
 
 
-def _actions(texts: DialectTexts, trajectory: Trajectory) -> dict[str, str]:
+def _actions(texts: DialectTexts, instruction: str) -> dict[str, str]:
     """The actions of a conversation by their form, such as ``open <object>``, and what they mean:
-    those of the dialect, and any others that the trajectory has."""
+    those of the dialect, and any others that the instruction speaks of."""
     meanings = dict(texts.actions)
-    for turn in trajectory.turns:
-        if turn.verb not in meanings and turn.verb in verbs.OBJECT_VERBS:
-            meanings[turn.verb] = texts.more.get(turn.verb, turn.verb)
+    for verb in verbs.table():
+        if verb.name not in meanings and not verb.alone and _speaks_of(instruction, verb.said):
+            meanings[verb.name] = texts.more.get(verb.name, verb.name)
     return {
         f"{verb} <object>" if verb in verbs.OBJECT_VERBS else verb: meaning
         for verb, meaning in meanings.items()
     }
+
+
+def _speaks_of(text: str, phrases: Sequence[str]) -> bool:
+    """Whether a text has one of the phrases, at the beginning of a word."""
+    starts = (r"(?<![A-Za-z])" + re.escape(each) if each.isascii() else each for each in phrases)
+    return re.search("|".join(starts), text, re.IGNORECASE) is not None
 
 
 def _filled(text: str, values: Mapping[str, str]) -> str:
@@ -260,20 +365,31 @@ def plain(text: str) -> str:
 # -- the assistant's turns -------------------------------------------------------------------------
 
 
-def _reply(texts: DialectTexts, turn: Turn, key: str) -> str:
+def _reply(texts: DialectTexts, trajectory: Trajectory, index: int) -> str:
     """What the assistant says at a turn: thoughts and decision."""
+    turn = trajectory.turns[index]
     decision = f"<DecisionMaking>{turn.action}</DecisionMaking>"
     thoughts = [(each.kind, plain(each.text).strip()) for each in turn.thoughts]
-    if texts.thoughts == "tags":
+    if texts.thoughts == "notes" and texts.notes is not None and not _thinks_itself(trajectory):
+        thoughts = [note(texts.notes, trajectory, index)]
+    if texts.thoughts in ("tags", "notes"):
         tagged = (f"<{TAG_OF_KIND[kind]}>{text}</{TAG_OF_KIND[kind]}>" for kind, text in thoughts)
         return "\n".join((*tagged, decision))
-    if not thoughts:
+    if texts.thoughts == "none" or not thoughts:
         return decision
+    key = f"{trajectory.id}/{index}"
     said: list[str] = []
     for number, (kind, text) in enumerate(thoughts):
         said += (_drawn(texts.openers[kind], f"{key}/{number}"), text)
     said.append(_drawn(texts.closers, f"{key}/end"))
     return texts.sentence_separator.join(said) + "\n" + decision
+
+
+def _thinks_itself(trajectory: Trajectory) -> bool:
+    """Whether the thoughts are those of a model that decided the actions, too."""
+    return any(
+        each.writer == trajectory.actor for turn in trajectory.turns for each in turn.thoughts
+    )
 
 
 def _drawn(sentences: Sequence[str], key: str) -> str:

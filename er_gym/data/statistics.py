@@ -55,7 +55,8 @@ class Statistics:
         languages: of trajectories.
         trained_turns: how many turns are to be learnt from, and ``turns``: of how many.
         refused: why the critic refused a model's attempts, with how often.
-        replaced: how many thoughts the grounded writer wrote in a model's place.
+        replaced: how many thoughts the grounded writer wrote after the critic had refused a
+            model's, or its own first ones.
         sentences, distinct_sentences: of thoughts.
         distinct_thoughts: how many different texts thoughts have.
         most_used: the text that most thoughts have, and ``most_used_count``: how many have it.

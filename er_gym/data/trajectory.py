@@ -116,10 +116,10 @@ class ThoughtRecord(_Record):
         kind: one of :data:`THOUGHT_KINDS`.
         text: without a tag.
         writer: who wrote it: ``grounded``, or a model such as ``openai:MODEL``.
-        refused: why the critic refused a model's earlier attempts, a code each
-            (:mod:`er_gym.data.critic`). If the writer is ``grounded`` and this is not empty, the
-            grounded writer took the model's place. In a trajectory of the kind ``model``, where the
-            model decides and thinks in one reply, they are the reasons against this very thought.
+        refused: why the critic refused earlier attempts, a code each (:mod:`er_gym.data.critic`).
+            If the writer is ``grounded``, these were a model's, whose place it took, or its own. In
+            a trajectory of the kind ``model`` or ``played``, where a model decided and thought in
+            one reply, they are the reasons against this very thought.
     """
 
     kind: ThoughtKind
@@ -217,7 +217,8 @@ class Correction(_Record):
     """Where a corrected trajectory comes from.
 
     Attributes:
-        run: the name of the run directory; ``episode``: the task id of its failed episode.
+        run: the name of the run directory; ``episode``: the key of its failed episode, which is
+            the task's id, with the number of the sample where it is not the first.
         first_wrong: the index of the first turn that left the key actions.
     """
 
@@ -237,7 +238,8 @@ class Trajectory(_Record):
         seed: the seed of the episode.
         part: the part of the collection, such as ``imitation``, ``exploration``, ``anomalies``.
         kind: ``a``, ``b`` or ``c`` for the expert's kinds of search, ``explored``, ``corrected``,
-            ``model`` where a model decided, or ``played`` for episodes of other programs.
+            ``model`` where a model decided, or ``played`` for selected episodes of runs and for
+            episodes of other programs.
         mode: the expert's first plan: how many places and which is right, such as ``010``. For an
             explorer, ``search`` where nothing to be searched for was in view from the beginning.
         language: of the thoughts.
@@ -246,7 +248,7 @@ class Trajectory(_Record):
         turns: from the first action to the last, ``end`` included.
         success, end_reason: the environment's verdict.
         correction: where a corrected trajectory comes from.
-        cost: what the thoughts cost.
+        cost: what the thoughts cost; of a selected episode, what its replies cost in the run.
     """
 
     format: Literal["er-gym/trajectory/1"] = "er-gym/trajectory/1"

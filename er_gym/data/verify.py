@@ -25,6 +25,8 @@ from er_gym.tasks.task import Task
 
 MOST_WORDS = 200
 """The longest thought that the paper asks for, in words."""
+_QUOTING = ("model", "played")
+"""Kinds of trajectories with a model's own words."""
 _AT_ONCE = 16
 """Trajectories of one room that a worker is given at once."""
 
@@ -114,7 +116,12 @@ def verify(
 
 
 def thought_problems(trajectory: Trajectory) -> Iterator[str]:
-    """What the critic has against a trajectory's thoughts, in a line each."""
+    """What the critic has against a trajectory's thoughts, in a line each.
+
+    Where a model decided and thought in one reply, its thoughts stand as they are. There it is a
+    problem if the record does not say what the critic has against them.
+    """
+    quotes = trajectory.kind in _QUOTING
     for index, turn in enumerate(trajectory.turns):
         if not turn.thoughts:
             continue
@@ -125,7 +132,10 @@ def thought_problems(trajectory: Trajectory) -> Iterator[str]:
             language=trajectory.language,
         )
         for thought in turn.thoughts:
+            known = thought.refused if quotes and thought.writer != "grounded" else ()
             for refusal in critic.check(thought.text, thought.kind, knowledge, limit=MOST_WORDS):
+                if refusal.code in known:
+                    continue
                 yield f"turn {index}: {thought.kind}: {refusal.code}: {refusal.detail}"
 
 

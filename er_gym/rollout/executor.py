@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -106,10 +106,12 @@ class Assignment:
 
     Attributes:
         directory: the run directory.
-        tasks: one episode is played of each.
+        tasks: one episode is played of each. A task that is played several times is here as often,
+            each time under the key of its episode (:func:`.records.episode_key`) as its id.
         make_agent: makes the agent of an episode.
         sink: takes the episodes.
         parallelism: how much runs at once.
+        seeds: the seeds of episodes by key, where they do not follow from the run's.
     """
 
     directory: RunDirectory
@@ -117,6 +119,45 @@ class Assignment:
     make_agent: MakeAgent
     sink: EpisodeSink
     parallelism: Parallelism
+    seeds: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def episodes(self) -> EpisodeSettings:
+        """What the episodes have in common."""
+        return EpisodeSettings(self.directory.manifest, self.seeds)
+
+
+@dataclass(frozen=True)
+class EpisodeSettings:
+    """What the episodes of a run have in common; it is sent to worker processes.
+
+    Attributes:
+        manifest: the run's.
+        seeds: see :class:`Assignment`.
+    """
+
+    manifest: Manifest
+    seeds: Mapping[str, int]
+
+    def seed(self, task: Task) -> int:
+        """The seed of an episode."""
+        own = self.seeds.get(task.id)
+        return episode_seed(self.manifest.seed, task.id) if own is None else own
+
+    def unbegun(self, task: Task, error: str) -> EpisodeRecord:
+        """The record of an episode that crashed before its environment told the step limit."""
+        return record_episode(
+            task,
+            agent=self.manifest.agent,
+            seed=self.seed(task),
+            max_steps=self.manifest.env.get("max_steps"),
+            error=error,
+        )
+
+    def lost(self, task: Task, lost: LostJob) -> EpisodeRecord:
+        """The record of an episode whose worker died every time."""
+        error = f"the worker process died {lost.tries} times, last with exit code {lost.exitcode}"
+        return self.unbegun(task, error)
 
 
 class Executor(Protocol):
@@ -132,20 +173,3 @@ class Executor(Protocol):
             KeyboardInterrupt: Ctrl-C. The episodes handed over so far are saved, and no process is
                 left.
         """
-
-
-def unbegun_episode(task: Task, manifest: Manifest, error: str) -> EpisodeRecord:
-    """The record of an episode that crashed before its environment could tell the step limit."""
-    return record_episode(
-        task,
-        agent=manifest.agent,
-        seed=episode_seed(manifest.seed, task.id),
-        max_steps=manifest.env.get("max_steps"),
-        error=error,
-    )
-
-
-def lost_episode(task: Task, lost: LostJob, manifest: Manifest) -> EpisodeRecord:
-    """The record of an episode whose worker died every time."""
-    error = f"the worker process died {lost.tries} times, last with exit code {lost.exitcode}"
-    return unbegun_episode(task, manifest, error)

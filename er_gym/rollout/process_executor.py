@@ -13,13 +13,11 @@ from er_gym.rollout.agent import CannotGoOn, MakeAgent
 from er_gym.rollout.events import EventLog
 from er_gym.rollout.executor import (
     Assignment,
+    EpisodeSettings,
     PlayedEpisode,
-    lost_episode,
-    unbegun_episode,
 )
-from er_gym.rollout.play import episode_seed, one_line, play_episode
+from er_gym.rollout.play import one_line, play_episode
 from er_gym.rollout.processes import Terminated
-from er_gym.rollout.run_directory import Manifest
 from er_gym.rollout.worker_pool import LostJob, run_jobs
 from er_gym.tasks.task import Task
 
@@ -27,15 +25,15 @@ from er_gym.tasks.task import Task
 def play_in_processes(assigned: Assignment) -> None:
     """Play each task in one of ``parallelism.workers`` processes. See :class:`.Executor`."""
     make_agent, directory = assigned.make_agent, assigned.directory
-    manifest, workers = directory.manifest, assigned.parallelism.workers
+    settings, workers = assigned.episodes, assigned.parallelism.workers
     _check_picklable(make_agent)
-    worker = partial(EpisodeWorker, make_agent, manifest, directory.path)
+    worker = partial(EpisodeWorker, make_agent, settings, directory.path)
     with closing(run_jobs(worker, assigned.tasks, workers=workers)) as results:
         for task, result in results:
             if isinstance(result, _Stop):
                 raise CannotGoOn(result.message)
             if isinstance(result, LostJob):
-                played = PlayedEpisode(lost_episode(task, result, manifest))
+                played = PlayedEpisode(settings.lost(task, result))
             else:
                 played = result
             assigned.sink.save(played)
@@ -68,13 +66,13 @@ class EpisodeWorker:
 
     Args:
         make_agent: makes the agent of an episode.
-        manifest: the run's manifest.
+        settings: what the episodes have in common.
         directory: the run directory; events are appended to its stream.
     """
 
-    def __init__(self, make_agent: MakeAgent, manifest: Manifest, directory: Path) -> None:
+    def __init__(self, make_agent: MakeAgent, settings: EpisodeSettings, directory: Path) -> None:
         self._make_agent = make_agent
-        self._manifest = manifest
+        self._settings, self._manifest = settings, settings.manifest
         self._events = EventLog(directory)
         self._env: EmbodiedEnv | None = self._make_env()
 
@@ -82,7 +80,7 @@ class EpisodeWorker:
         return EmbodiedEnv((), **self._manifest.env)
 
     def __call__(self, task: Task) -> PlayedEpisode | _Stop:
-        seed = episode_seed(self._manifest.seed, task.id)
+        seed = self._settings.seed(task)
         try:
             if self._env is None:
                 self._env = self._make_env()
@@ -92,7 +90,7 @@ class EpisodeWorker:
         except Terminated:
             raise
         except (Exception, SystemExit) as error:  # it must not end the run, as in play_episode
-            return PlayedEpisode(unbegun_episode(task, self._manifest, one_line(error)))
+            return PlayedEpisode(self._settings.unbegun(task, one_line(error)))
         try:
             record = play_episode(
                 self._env,

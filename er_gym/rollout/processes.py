@@ -70,8 +70,14 @@ def _run(target: Callable[..., None], args: tuple[Any, ...]) -> None:
     """The first thing that a worker process calls."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _exit_cleanly)
-    threading.Thread(target=_follow_parent, daemon=True).start()
+    end_with_parent()
     target(*args)
+
+
+def end_with_parent() -> None:
+    """End this process once the process that started it by :data:`CONTEXT` has ended, in any way:
+    by SIGTERM, or by force after the grace period."""
+    threading.Thread(target=_follow_parent, daemon=True).start()
 
 
 def _exit_cleanly(signum: int, frame: object) -> NoReturn:
@@ -80,7 +86,6 @@ def _exit_cleanly(signum: int, frame: object) -> NoReturn:
 
 
 def _follow_parent() -> None:
-    """End this process once its parent has ended: cleanly, or by force after the grace period."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()

@@ -6,9 +6,16 @@ reader would misread takes a new ``format``.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+)
 
 from er_gym.tasks.judge import search_targets
 from er_gym.tasks.paper_records import odd_spellings
@@ -25,6 +32,12 @@ Words: TypeAlias = Annotated[str, AfterValidator(writable)]
 
 class _Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def episode_key(task_id: str, sample: int = 1) -> str:
+    """The name of an episode among those of its run: the task's id, and the number of the sample
+    where it is not the first."""
+    return task_id if sample == 1 else f"{task_id}.sample{sample}"
 
 
 class KeyActionRecord(_Record):
@@ -101,6 +114,8 @@ class EpisodeRecord(_Record):
         error: the error it crashed with, in one line; ``""`` if it did not crash.
         run: in a run directory, the digest of the run's manifest; ``""`` elsewhere, and in records
             written before this field existed.
+        sample: which of the task's episodes it is, from 1. A first episode is written without it,
+            as before runs had several.
     """
 
     format: Literal["er-gym/episode/1"] = "er-gym/episode/1"
@@ -122,6 +137,19 @@ class EpisodeRecord(_Record):
     seconds: float
     error: Words = ""
     run: str = ""
+    sample: int = Field(default=1, ge=1)
+
+    @model_serializer(mode="wrap")
+    def _without_first_sample(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        told: dict[str, Any] = handler(self)
+        if self.sample == 1:
+            told.pop("sample", None)
+        return told
+
+    @property
+    def key(self) -> str:
+        """Its name among the episodes of its run, from which those of its files are derived."""
+        return episode_key(self.task_id, self.sample)
 
     @property
     def predicted(self) -> list[StepRecord]:

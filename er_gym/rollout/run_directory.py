@@ -8,6 +8,9 @@
     runs/x/conversations/<task id>.json  the messages of a vision-language agent
     runs/x/pictures/<task id>/           the pictures that the agent was shown
 
+Where a task is played several times, the files of a later episode are named
+``<task id>.sample2`` and so on (:func:`.records.episode_key`).
+
 An agent may leave other files beside the records (:class:`.agent.LeavesAttachments`). A file is
 written under a temporary name and then moved, so each file is whole. Readers ignore the temporary
 files of a killed run. The same run continues where it stopped: :meth:`RunDirectory.read` returns
@@ -198,25 +201,31 @@ class RunDirectory:
             ) from error
 
     def write(self, episode: EpisodeRecord) -> Path:
-        """Write an episode; it replaces an earlier one of the same task."""
-        path = self._file(episode.task_id)
+        """Write an episode; it replaces an earlier one of the same task and sample."""
+        path = self._file(episode.key)
         make_folder(path.parent)
         told = episode.model_copy(update={"run": self.manifest.digest})
         write_atomic(path, told.model_dump_json(indent=1) + "\n")
         return path
 
-    def attach(
-        self, task_id: str, attachments: Mapping[str, bytes], folders: Sequence[str]
-    ) -> None:
-        """Write the files that an agent leaves; they replace earlier ones of the same task.
+    def has(self, key: str) -> bool:
+        """Whether there is a record of an episode, crashed or not; it is written last."""
+        return self._file(key).is_file()
+
+    def forget(self, key: str) -> None:
+        """Remove the record of an episode, so that it is played again."""
+        self._file(key).unlink(missing_ok=True)
+
+    def attach(self, key: str, attachments: Mapping[str, bytes], folders: Sequence[str]) -> None:
+        """Write the files that an agent leaves; they replace earlier ones of the same episode.
 
         Args:
-            task_id: the task of the episode.
+            key: of the episode.
             attachments: path in the run directory to bytes, written in this order.
-            folders: the folders for such files. The task's earlier files in them are removed.
+            folders: the folders for such files. The episode's earlier files in them are removed.
         """
-        stem = file_stem(task_id)
-        played_before = self._file(task_id).exists()
+        stem = file_stem(key)
+        played_before = self._file(key).exists()
         for folder in folders:
             shutil.rmtree(self.path / folder / stem, ignore_errors=True)
             if played_before:
@@ -239,16 +248,29 @@ class RunDirectory:
         return RunContents(tuple(episodes), tuple(unusable))
 
     def episodes(self) -> Iterator[EpisodeRecord]:
-        """All episodes of this run, sorted by file name."""
-        yield from self.read().episodes
+        """All episodes of this run, sorted by file name; each is read when it is asked for."""
+        for path in sorted((self.path / EPISODES).glob("*.json")):
+            try:
+                episode = self._episode(path)
+            except ValueError:
+                continue
+            yield episode
 
-    def move_aside(self, task_ids: Iterable[str]) -> list[str]:
-        """Rename unusable files that have the file name of an episode of these tasks.
+    def episode(self, key: str) -> EpisodeRecord:
+        """One episode of this run.
+
+        Raises:
+            ValueError: there is none, or its file is not usable; the message says why.
+        """
+        return self._episode(self._file(key))
+
+    def move_aside(self, keys: Iterable[str]) -> list[str]:
+        """Rename unusable files that have the file name of one of these episodes.
 
         Returns:
             One line for each unusable file: the reason, and whether the file was renamed.
         """
-        ways = {self._file(task_id) for task_id in task_ids}
+        ways = {self._file(key) for key in keys}
         told = []
         for one in self.read().unusable:
             then = "it is not counted"
@@ -269,8 +291,8 @@ class RunDirectory:
                 path.unlink(missing_ok=True)
         (self.path / MANIFEST).unlink()
 
-    def _file(self, task_id: str) -> Path:
-        return self.path / EPISODES / f"{file_stem(task_id)}.json"
+    def _file(self, key: str) -> Path:
+        return self.path / EPISODES / f"{file_stem(key)}.json"
 
     def _episode(self, path: Path) -> EpisodeRecord:
         """The episode in a file; a ValueError says in one line why it is not one of this run's."""
@@ -282,9 +304,9 @@ class RunDirectory:
             raise ValueError(f"broken: {_first_problem(error)}") from None
         except TaskFileError as error:
             raise ValueError(f"it cannot be read: {error}") from None
-        name = self._file(episode.task_id).name
+        name = self._file(episode.key).name
         if name != path.name:
-            raise ValueError(f"a copy: it holds the episode of {episode.task_id!r:.80}, as {name}")
+            raise ValueError(f"a copy: it holds the episode of {episode.key!r:.80}, as {name}")
         manifest = self.manifest
         if episode.run:
             told: list[tuple[str, str | int, str | int]] = [("run", episode.run, manifest.digest)]

@@ -6,15 +6,15 @@ compute, or in threads, for agents that mostly wait for a model's reply.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
 from er_gym.rollout.events import Cost, EpisodeEnded, EventListener, EventLog, RunBegun, RunEnded
 from er_gym.rollout.executor import Assignment, Executor, Parallelism, PlayedEpisode
 from er_gym.rollout.process_executor import play_in_processes
-from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.records import EpisodeRecord, episode_key
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.thread_executor import play_in_threads
 from er_gym.tasks.task import Task
@@ -50,10 +50,38 @@ class Stopped(CannotGoOn):
         self.summary = summary
 
 
-def finished(directory: RunDirectory, tasks: Iterable[Task]) -> list[EpisodeRecord]:
+def episodes_of(tasks: Iterable[Task], samples: int = 1) -> dict[str, tuple[Task, int]]:
+    """The episodes of some tasks, each task played ``samples`` times in a row.
+
+    Returns:
+        The key of each episode (:func:`.records.episode_key`) to its task and the number of its
+        sample, from 1.
+
+    Raises:
+        ValueError: two episodes would have the same key, since a task's id looks like one.
+    """
+    if samples < 1:
+        raise ValueError(f"samples is {samples}; give a whole number from 1")
+    found: dict[str, tuple[Task, int]] = {}
+    for task in tasks:
+        for sample in range(1, samples + 1):
+            key = episode_key(task.id, sample)
+            if key in found and samples > 1:
+                raise ValueError(f"two episodes would be named {key!r:.80}; rename that task")
+            found[key] = (task, sample)
+    return found
+
+
+def finished(
+    directory: RunDirectory, tasks: Iterable[Task], samples: int = 1
+) -> list[EpisodeRecord]:
     """The recorded episodes of these tasks that did not crash; they are not played again."""
-    ids = {task.id for task in tasks}
-    return [each for each in directory.episodes() if each.task_id in ids and not each.error]
+    return [*_finished(directory, episodes_of(tasks, samples))]
+
+
+def _finished(directory: RunDirectory, wanted: Container[str]) -> Iterator[EpisodeRecord]:
+    """The same, one at a time, of the episodes with these keys."""
+    return (each for each in directory.episodes() if each.key in wanted and not each.error)
 
 
 def run(
@@ -65,6 +93,8 @@ def run(
     parallelism: Parallelism = Parallelism(),  # noqa: B008 (frozen)
     listeners: Iterable[EventListener] = (),
     cost: Callable[[], Cost | None] = lambda: None,
+    samples: int = 1,
+    seeds: Mapping[str, int] | None = None,
 ) -> RunSummary:
     """Play the tasks without a finished episode in the run directory.
 
@@ -84,6 +114,9 @@ def run(
             Steps and replies are in the run directory's event stream
             (:func:`er_gym.rollout.events.read_events`).
         cost: returns what the run has cost so far; called after each episode.
+        samples: how often each task is played. The samples of a task differ in their seeds; the
+            first has the seed of a task that is played once.
+        seeds: the seeds of episodes by key, where they do not follow from the run's.
 
     Raises:
         Stopped: an agent raised :class:`~er_gym.rollout.agent.CannotGoOn`.
@@ -94,16 +127,25 @@ def run(
     """
     if executor not in EXECUTORS:
         raise ValueError(f"unknown executor {executor!r}; choose one of: {', '.join(EXECUTORS)}")
-    done = {episode.task_id for episode in finished(directory, tasks)}
-    todo = [task for task in tasks if task.id not in done]
+    wanted = episodes_of(tasks, samples)
+    done = {episode.key for episode in _finished(directory, wanted)}
+    # An episode goes through the executors as a task of its own, whose id is the episode's key.
+    todo = [
+        task if sample == 1 else replace(task, id=key)
+        for key, (task, sample) in wanted.items()
+        if key not in done
+    ]
     manifest = directory.manifest
     with closing(EventLog(directory.path, listeners)) as emit:
-        emit(RunBegun(suite=manifest.suite, agent=manifest.agent, tasks=len(tasks), done=len(done)))
-        sink = _Sink(directory, emit, cost)
+        emit(
+            RunBegun(suite=manifest.suite, agent=manifest.agent, tasks=len(wanted), done=len(done))
+        )
+        sink = _Sink(directory, emit, cost, wanted)
         stopped = ""
         try:
             if todo:
-                EXECUTORS[executor](Assignment(directory, todo, make_agent, sink, parallelism))
+                assigned = Assignment(directory, todo, make_agent, sink, parallelism, seeds or {})
+                EXECUTORS[executor](assigned)
         except CannotGoOn as stop:
             stopped = str(stop)
             raise Stopped(stopped, sink.summary(len(done))) from stop
@@ -122,12 +164,15 @@ class _Sink:
     directory: RunDirectory
     emit: EventLog
     cost: Callable[[], Cost | None]
+    wanted: Mapping[str, tuple[Task, int]]
     played: int = 0
     crashed: list[EpisodeRecord] = field(default_factory=list)
 
     def save(self, played: PlayedEpisode) -> None:
         self.directory.attach(played.record.task_id, played.attachments, played.folders)
-        self.directory.write(played.record)
+        task, sample = self.wanted[played.record.task_id]
+        stated = {"task_id": task.id, "sample": sample}
+        self.directory.write(played.record.model_copy(update=stated))
 
     def ended(self, played: PlayedEpisode) -> None:
         record = played.record

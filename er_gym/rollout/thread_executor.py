@@ -18,13 +18,11 @@ from er_gym.rollout.env_pool import EnvLost, EnvPool, RemoteEnv
 from er_gym.rollout.events import EventLog
 from er_gym.rollout.executor import (
     Assignment,
+    EpisodeSettings,
     PlayedEpisode,
-    lost_episode,
-    unbegun_episode,
 )
-from er_gym.rollout.play import episode_seed, one_line, play_episode
+from er_gym.rollout.play import one_line, play_episode
 from er_gym.rollout.records import EpisodeRecord
-from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.task import Task
 
@@ -48,7 +46,7 @@ def play_in_threads(assigned: Assignment) -> None:
         EnvPool(parallelism.workers, slots, env, deadline=parallelism.deadline) as pool,
         closing(EventLog(directory.path)) as events,
     ):
-        threads = _ThreadedRun(directory, pool, assigned.make_agent, events, todo)
+        threads = _ThreadedRun(assigned.episodes, pool, assigned.make_agent, events, todo)
         try:
             for slot in range(slots):
                 # Daemon threads: one that waits for a reply must not keep the process from ending.
@@ -92,7 +90,7 @@ class _ThreadedRun:
         stopping: set when no agent may act any more.
     """
 
-    directory: RunDirectory
+    settings: EpisodeSettings
     pool: EnvPool
     make_agent: MakeAgent
     events: EventLog
@@ -124,7 +122,7 @@ class _ThreadedRun:
 
     def _episode(self, slot: int, task: Task) -> PlayedEpisode:
         """Play a task, again with a new agent if its process dies."""
-        seed = episode_seed(self.directory.manifest.seed, task.id)
+        seed = self.settings.seed(task)
         tries = 0
         while True:
             agent: Agent | None = None
@@ -146,18 +144,18 @@ class _ThreadedRun:
                     if self.stopping.is_set():
                         raise _Stopping
                     continue
-                record = lost_episode(task, LostJob(tries, lost.exitcode), self.directory.manifest)
+                record = self.settings.lost(task, LostJob(tries, lost.exitcode))
             return PlayedEpisode.by(agent, record)
 
     def _play(self, env: RemoteEnv, task: Task, seed: int) -> tuple[Agent | None, EpisodeRecord]:
-        manifest = self.directory.manifest
+        manifest = self.settings.manifest
         try:
             agent = self.make_agent(task, seed)
             player = _Stoppable(agent, self.stopping)
         except CannotGoOn:
             raise
         except (Exception, SystemExit) as error:  # it must not end the run, as in play_episode
-            return None, unbegun_episode(task, manifest, one_line(error))
+            return None, self.settings.unbegun(task, one_line(error))
         record = play_episode(
             env,
             player,

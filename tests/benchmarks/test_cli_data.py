@@ -39,7 +39,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_verify(er_gym: ErGym, path: Path, tmp_path: Path) -> None:
-    code, out, err = er_gym("data", "verify", path, "--workers", 2)
+    code, out, err = er_gym("data", "verify", path, "--workers", 1)
     assert code == 0
     assert "7 of 7 trajectories come out as they were recorded" in out
     assert "er-gym:" not in err

@@ -89,12 +89,12 @@ def test_they_are_json(collection: Collection) -> None:
 
 
 def test_memory_does_not_grow_with_the_collection(collection: Collection, tmp_path: Path) -> None:
-    """Twenty times as many trajectories, whose texts all differ, need no twenty times as much."""
+    """Five times as many trajectories, whose texts all differ, need hardly more: the texts of one
+    copy alone are a tenth of the memory."""
 
     def peak(copies: int) -> int:
         made = Collection.create(tmp_path / str(copies), collection.manifest)
         made.write(renamed(one, n) for n in range(copies) for one in collection.trajectories())
-        statistics(made)
         tracemalloc.start()
         statistics(made)
         _, most = tracemalloc.get_traced_memory()
@@ -115,7 +115,8 @@ def test_memory_does_not_grow_with_the_collection(collection: Collection, tmp_pa
         ]
         return one.model_copy(update={"turns": turns})
 
-    assert peak(20) < 2 * peak(1)
+    statistics(collection)  # what is made once, such as tables, does not count
+    assert peak(10) < 1.3 * peak(2)
 
 
 def test_words_and_sentences() -> None:

@@ -9,22 +9,24 @@ Facts that the wordings use (``configs/thoughts``):
 - object types: ``thing`` (what the subgoal is about), ``place`` (the named destination), ``sought``
   (what is looked for: the thing, or the place once the thing is held), ``object`` (of the
   decision), ``held``, ``at``, ``last_object``, ``arrived_at`` (where a walk that went wrong ended),
-  ``next1`` … ``next4`` (the plan), ``latest`` (the place searched last in vain), ``placed`` (what
-  was put down last) and ``placed_in``; in a task of several parts ``later_thing`` and
-  ``later_place`` (of the part to come), ``done_thing`` and ``done_place`` (of the part done);
+  ``next1`` … ``next3`` (the plan without the places searched already), ``latest`` (the place
+  searched last in vain), ``placed`` (what was put down just now); in a task of several parts
+  ``later_thing`` (of the part to come), ``done_thing`` and ``done_place`` (of the part done);
 - things, each with the facts of :func:`_described`: ``object_view``, ``sought_view``,
-  ``place_view``, ``last_view`` (in view now), ``object_memory``, ``sought_memory`` (seen before);
+  ``place_view``, ``last_view`` (in view now), ``object_memory``, ``sought_memory``,
+  ``place_memory`` (seen before);
 - pools: ``view`` and its parts ``left``, ``ahead``, ``right``, ``near``; ``here`` (things that lie
   where the agent searched); ``shut`` (closed things in view); ``visited`` (searched in vain);
   ``plan``; after looking around ``to_right``, ``behind``, ``to_left``;
-- flags: ``again`` (the place was searched before), ``lies_there`` (what is sought is seen to lie at
-  the decision's object), ``elsewhere`` (the decision is not about the thing itself),
-  ``holds_thing``, ``many`` (more than one place was searched in vain), ``typical`` (people often
-  keep such a thing at the decision's object), ``far_fetched`` (they hardly do), ``unseen`` (what is
-  sought is not in view), ``several`` (the task has several parts), ``second`` (one of them is
-  done), ``earned`` (the last action did a key action), ``told`` (it has been said where what is
-  sought is), ``next_part`` (one of them has just been done, and another begins), ``first``, ``final``
-  (of this turn's thoughts), and the purpose and the outcome, as ``is_search``.
+- flags: ``again`` (the place was searched before), ``lies_there`` and ``on_last`` (what is sought
+  is seen to lie at the decision's object, at the last action's), ``elsewhere`` (the decision is not
+  about the thing itself), ``holds_thing``, ``many`` (more than one place was searched in vain),
+  ``typical`` (people often keep such a thing at the decision's object), ``far_fetched`` (they
+  hardly do), ``unseen`` (what is sought is not in view), ``several`` (the task has several parts),
+  ``second`` (one of them is done), ``earned`` (the last action did a key action), ``told`` (it has
+  been said where what is sought is), ``next_part`` (one of them has just been done, and another
+  begins), ``first``, ``final`` (of this turn's thoughts), and the purpose and the outcome, as
+  ``is_search``.
 """
 
 from __future__ import annotations
@@ -71,7 +73,8 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
     sought = place if thing and thing == knowledge.held else thing
     outcome = outcome_of(knowledge, sought)
     visited = _searched_in_vain(knowledge, outcome)
-    coming = [kind for kind in dict.fromkeys(knowledge.plan) if kind != decision.object_type]
+    done = {*visited, decision.object_type}
+    coming = [kind for kind in dict.fromkeys(knowledge.plan) if kind not in done]
     if decision.verb == verbs.NAVIGATE:
         coming = [decision.object_type, *coming]
     view = _in_view(knowledge, sought, choices)
@@ -99,14 +102,18 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
         "many": len(visited) > 1,
         "again": decision.object_type in [visit.place for visit in knowledge.visits],
         "lies_there": bool(lies_on) and same_type(lies_on, decision.object_type),
+        "on_last": last is not None
+        and bool(lies_on)
+        and same_type(lies_on, last.action.object_type),
         "plan": _pool({"o": kind} for kind in coming),
-        **{f"next{number}": kind for number, kind in enumerate(coming[:4], 1)},
+        **{f"next{number}": kind for number, kind in enumerate(coming[:3], 1)},
         **view,
         **_story(knowledge, thing),
     }
     if thing and decision.object_type in OBJECT_TYPES and thing in search_priors.placement_table():
         likelihood = search_priors.likelihood(thing, decision.object_type)
-        facts["typical"], facts["far_fetched"] = likelihood >= _TYPICAL, likelihood < _UNUSUAL
+        facts["typical"] = likelihood >= _TYPICAL and decision.object_type != "GarbageCan"
+        facts["far_fetched"] = likelihood < _UNUSUAL
     facts["earned"] = last is not None and last.earned
     facts["told"] = outcome in _TELLING
     facts[f"is_{outcome}"] = True
@@ -231,6 +238,7 @@ def _in_view(knowledge: Knowledge, sought: str, choices: random.Random) -> dict[
         "last_view": _named(switches if toggled else things, last),
         "sought_memory": _named(memory, sought),
         "object_memory": _named(memory, decided),
+        "place_memory": _named(memory, place),
         "unseen": bool(sought) and not _named(everywhere, sought),
         "view": tuple(told),
         "here": tuple(here),

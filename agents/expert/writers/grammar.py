@@ -230,7 +230,7 @@ class Table:
 
 
 _Part: TypeAlias = _Text | _Guard | _Name | _Form | _List | _Scope | _Perhaps | Rule
-_LISTS = {"some": _List("a", ""), "all": _List("the", ""), "several": _List("a", "", 2)}
+_LISTS = {"some": _List("a", ""), "all": _List("the", "", 2), "several": _List("a", "", 2)}
 
 
 @lru_cache(maxsize=4)

@@ -38,13 +38,9 @@ class GroundedWriter:
         choices = random.Random(request.seed)
         facts = facts_of(knowledge, choices)
         language = knowledge.language
-        writing = Writing(grammar(language), nouns(language), choices)
-        said = {
-            sentence
-            for turn in knowledge.earlier
-            for thought in turn
-            for sentence in sentences(thought.text, language)
-        }
+        earlier = [thought.text for turn in knowledge.earlier for thought in turn]
+        writing = Writing(grammar(language), nouns(language, "\n".join(earlier)), choices)
+        said = {sentence for text in earlier for sentence in sentences(text, language)}
         thoughts = []
         for index, (kind, limit) in enumerate(zip(request.kinds, request.limits, strict=True)):
             place = {"first": index == 0, "final": index == len(request.kinds) - 1}

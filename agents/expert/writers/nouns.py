@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -11,6 +12,7 @@ from typing import Any
 from er_gym.tasks.generate.words import HOLLOW, PLURAL, UNCOUNTED
 from er_gym.tasks.reading import read_yaml
 from er_gym.tasks.suites import config_directory
+from er_gym.thor import OBJECT_TYPES
 
 _FIRST_NAME = 0.6
 """The probability of a type's first name, where it has several."""
@@ -23,14 +25,16 @@ class Nouns(ABC):
 
     Args:
         names: object type to its names.
+        said: earlier texts of the same writer; a type keeps the name that it has there.
 
     Attributes:
         latest: the type mentioned last, ``""`` at the beginning of a text.
         earlier: the one mentioned before it.
     """
 
-    def __init__(self, names: Mapping[str, Sequence[str]]) -> None:
+    def __init__(self, names: Mapping[str, Sequence[str]], said: str = "") -> None:
         self._names = names
+        self._said = said
         self._chosen: dict[str, str] = {}
         self.latest = ""
         self.earlier = ""
@@ -49,7 +53,8 @@ class Nouns(ABC):
         if value not in self._chosen:
             first, *others = self._names[value]
             usual = not others or choices.random() < _FIRST_NAME
-            self._chosen[value] = first if usual else choices.choice(others)
+            drawn = first if usual else choices.choice(others)
+            self._chosen[value] = self._kept(value) or drawn
         form = self._short(value, form) or form
         if self.latest != value:
             self.earlier, self.latest = self.latest, value
@@ -63,9 +68,24 @@ class Nouns(ABC):
         """The form of a pronoun where it is clear what is meant, else ``""``."""
         if form == "that":
             return "it" if self.latest == value else "the"
-        if form == "to" and value in (self.latest, self.earlier):
+        if form == "to" and (self.latest == value or (self.earlier == value and self._is_carried)):
             return "there"
         return ""
+
+    @property
+    def _is_carried(self) -> bool:
+        """Whether the type mentioned last is no place that one could mean by "there"."""
+        return "pickupable" in OBJECT_TYPES[self.latest].properties
+
+    def _kept(self, value: str) -> str:
+        """The name that the type has in the earlier texts, the longest if there are several."""
+        names = self._names[value] if len(self._names[value]) > 1 else ()
+        said = [name for name in names if self._is_said(name)]
+        return max(said, key=len, default="")
+
+    @abstractmethod
+    def _is_said(self, name: str) -> bool:
+        """Whether the earlier texts have a name."""
 
     @abstractmethod
     def _formed(self, object_type: str, name: str, form: str) -> str:
@@ -85,6 +105,9 @@ _PRONOUNS = {"the": "it", "in": "in it", "into": "into it"}
 
 class EnglishNouns(Nouns):
     """See :class:`Nouns`."""
+
+    def _is_said(self, name: str) -> bool:
+        return re.search(rf"\b{re.escape(name)}\b", self._said) is not None
 
     def _short(self, value: str, form: str) -> str:
         if form in _PRONOUNS and self.latest == value and value not in PLURAL:
@@ -140,6 +163,9 @@ class EnglishNouns(Nouns):
 class ChineseNouns(Nouns):
     """See :class:`Nouns`. Names are written with their measure word: ``把 椅子``."""
 
+    def _is_said(self, name: str) -> bool:
+        return name.rpartition(" ")[2] in self._said
+
     def _formed(self, object_type: str, name: str, form: str) -> str:
         measure, _, noun = name.rpartition(" ")
         match form:
@@ -190,6 +216,6 @@ def names(language: str) -> Mapping[str, tuple[str, ...]]:
     return {kind: tuple(map(str.strip, line.split(","))) for kind, line in table.items()}
 
 
-def nouns(language: str) -> Nouns:
-    """Nouns for a piece of writing."""
-    return (ChineseNouns if language == "zh" else EnglishNouns)(names(language))
+def nouns(language: str, said: str = "") -> Nouns:
+    """Nouns for a piece of writing that follows earlier texts."""
+    return (ChineseNouns if language == "zh" else EnglishNouns)(names(language), said)

@@ -9,7 +9,7 @@ from functools import lru_cache
 from agents.expert.writers.base import ThoughtWriter
 from agents.expert.writers.checked import CheckedWriter
 from agents.expert.writers.grounded import GroundedWriter
-from er_gym.plugins import Registry
+from er_gym.plugins import PluginError, Registry, reason
 
 
 def checked_grounded() -> ThoughtWriter:
@@ -38,11 +38,25 @@ class NamedWriter:
         """The writer.
 
         Raises:
-            ValueError: there is no such writer; the message lists those there are.
+            ValueError: there is no such writer, and the message lists those there are; or what the
+                name stands for makes none.
         """
         return _writer(self.name)
 
 
 @lru_cache(maxsize=8)
 def _writer(name: str) -> ThoughtWriter:
-    return WRITERS.get(name)()
+    make = WRITERS.get(name)
+    try:
+        writer = make()
+    except Exception as error:  # another package's code can raise anything
+        raise PluginError(
+            f"writer of thoughts {name!r} cannot be made ({reason(error)}); it is called without "
+            "arguments"
+        ) from error
+    if not (isinstance(getattr(writer, "name", None), str) and hasattr(writer, "write")):
+        raise PluginError(
+            f"writer of thoughts {name!r} is {writer!r:.200}, which lacks a name or write; give "
+            f"{WRITERS.expected}"
+        )
+    return writer

@@ -15,6 +15,7 @@ from transformers.processing_utils import ProcessorMixin
 
 from agents.vlm.clients.adapters import ADAPTER, adapter_chain, with_adapter
 from agents.vlm.settings import AgentSettings, Local
+from agents.vlm.tuned_model import model_directory
 
 _MODEL_FILES = {".json", ".jinja", ".txt", ".model", ".safetensors", ".bin"}
 _LONGEST_WORDS = 300  # characters of a library's, in an error
@@ -47,12 +48,13 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
 
     Args:
         path: a directory that ``save_pretrained`` wrote, of a whole model or of an adapter; or a
-            model's name on the Hugging Face hub.
+            model's name on the Hugging Face hub; or a finished run of ``er-gym finetune``.
         settings: of the agent.
 
     Raises:
         ValueError: the model or adapter does not exist, is broken, or does not fit the settings.
     """
+    path = model_directory(path)
     local, sees = settings.local, settings.sees == "pictures"
     is_here = Path(path).is_dir()
     if not is_here and (path.startswith(("/", ".", "~")) or path.count("/") > 1):
@@ -159,7 +161,7 @@ def _adapter(directory: str) -> Path:
 def _identity(path: str, adapters: Sequence[Path], settings: AgentSettings, model: Any) -> str:
     """See :class:`Checkpoint`. Size and time stand for a file's content, since hashing takes
     long."""
-    what = {
+    what: dict[str, Any] = {
         "client": "transformers",
         "model": _files(path) or [[path, getattr(model.config, "_commit_hash", None)]],
         "adapter": [each for adapter in adapters for each in _files(str(adapter))] or None,
@@ -175,6 +177,9 @@ def _identity(path: str, adapters: Sequence[Path], settings: AgentSettings, mode
             },
         ),
     }
+    pictures = settings.pictures
+    if pictures.model_bounds != (pictures.min_pixels, pictures.max_pixels):
+        what["model_bounds"] = pictures.model_bounds
     return json.dumps(what, sort_keys=True)
 
 

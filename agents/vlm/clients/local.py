@@ -1,8 +1,8 @@
 """Runs a model with transformers in this process: Qwen2-VL, Qwen2.5-VL, Qwen3-VL and fine-tuned
 variants; for text-only agents, any language model with a chat template.
 
-Each reply processes the whole conversation again, without a cache between turns. A server with
-prefix caching (vLLM, SGLang) is faster for long episodes.
+What the model computes for the turns of a conversation is kept for its next turns
+(:mod:`agents.vlm.clients.kept_turns`), unless ``local.reuse`` is off.
 """
 
 from __future__ import annotations
@@ -13,43 +13,32 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from io import BytesIO
 from typing import Any
 
 import jinja2
 import torch
-import transformers
 from PIL import Image
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients.batching import Batcher
 from agents.vlm.clients.checkpoint import load, one_line
+from agents.vlm.clients.kept_turns import (
+    KeptConversations,
+    KeptTurns,
+    conversation_name,
+    joined_past,
+    memory_for,
+)
+from agents.vlm.clients.padded_batch import EncodedPrompt, PaddedBatch
+from agents.vlm.clients.seeded_sampling import SeededSampling
 from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.agent import CannotGoOn
 
 _THINK, _THOUGHT = "<think>", "</think>"
 _CLOSED = "the model has been closed"
-
-
-@dataclass(frozen=True)
-class _EncodedPrompt:
-    """A conversation as input of the model.
-
-    Attributes:
-        ids: token ids; a picture takes as many as it has merged patches.
-        pixels: (patches of all pictures, values of a patch); None without pictures.
-        grids: (pictures, 3): patches in time, height and width.
-        seed: the seed for sampling the reply.
-        thinking: whether the prompt ends inside a thought.
-    """
-
-    ids: list[int]
-    pixels: torch.Tensor | None
-    grids: torch.Tensor | None
-    seed: int
-    thinking: bool
 
 
 class LocalClient:
@@ -108,7 +97,9 @@ class LocalClient:
         self._tokenizer_lock = threading.Lock()  # a tokenizer is not thread-safe
         self._closing = threading.Event()
         local = settings.local
-        self._batcher: Batcher[_EncodedPrompt, Reply] = Batcher(
+        memory = memory_for(self._model) if local.reuse else 0
+        self._kept = KeptConversations(memory) if memory else None
+        self._batcher: Batcher[EncodedPrompt, Reply] = Batcher(
             self._replies, local.batch, local.wait
         )
 
@@ -135,25 +126,49 @@ class LocalClient:
         self._closing.set()
         self._batcher.close()
         self._model = None
+        if self._kept is not None:
+            self._kept.clear()
 
     # -- conversation to tokens, in the caller's thread ------------------------------------------
 
-    def _row(self, messages: Sequence[Message], seed: int) -> _EncodedPrompt:
+    def _row(self, messages: Sequence[Message], seed: int) -> EncodedPrompt:
         text = self._prompt(messages)
-        ids = self._ids(text)
-        pixels = grids = None
         pictures = [part for each in messages for part in each.parts if isinstance(part, Picture)]
-        if pictures:
-            pixels, grids = self._patches(pictures)
-        ids = self._with_image_tokens(ids, grids)
+        digests = [picture.digest for picture in pictures]
+        name = conversation_name(messages, seed)
+        kept = self._kept.take(name) if self._kept is not None else None
+        known = _grids_by_digest(kept)
+        seen = {
+            picture.digest: self._patches([picture])
+            for picture in {
+                each.digest: each for each in pictures if each.digest not in known
+            }.values()
+        }
+        known |= {digest: grid for digest, (_, grid) in seen.items()}
+        grids = torch.cat([known[each] for each in digests]) if pictures else None
+        ids, places = self._with_image_tokens(self._ids(text), grids)
         most = self._settings.sampling.max_tokens
         if len(ids) + most > self._context_length:
             raise ModelError(
                 f"the conversation has {len(ids)} tokens, which with sampling.max_tokens {most} is "
                 f"more than the {self._context_length} of {self._name}; lower pictures.keep"
             )
-        thinking = text.rstrip().endswith(_THINK)
-        return _EncodedPrompt(ids, pixels, grids, self._seed(seed, len(messages)), thinking)
+        reused = kept.usable(ids, digests, places) if kept else 0
+        new = [each for each, place in zip(pictures, places, strict=True) if place >= reused]
+        pixels = [
+            (seen[each.digest] if each.digest in seen else self._patches([each]))[0] for each in new
+        ]
+        return EncodedPrompt(
+            ids=ids,
+            pictures=digests,
+            grids=grids,
+            new_pixels=torch.cat(pixels) if pixels else None,
+            new_pictures=len(new),
+            seed=self._seed(seed, len(messages)),
+            thinking=text.rstrip().endswith(_THINK),
+            name=name,
+            past=kept.first(reused) if kept and reused else [],
+        )
 
     def _prompt(self, messages: Sequence[Message]) -> str:
         """The conversation in the model's chat format, up to the model's turn."""
@@ -190,19 +205,22 @@ class LocalClient:
                 f"{self._name} was loaded without vision, since the agent's setting sees is text, "
                 "but the conversation has a picture"
             )
-        bounds = self._settings.pictures
+        least, most = self._settings.pictures.model_bounds
         try:
             seen = self._image_processor(
                 [Image.open(BytesIO(each.data)).convert("RGB") for each in pictures],
-                size={"shortest_edge": bounds.min_pixels, "longest_edge": bounds.max_pixels},
+                size={"shortest_edge": least, "longest_edge": most},
                 return_tensors="pt",
             )
         except (OSError, ValueError) as error:
             raise ModelError(f"a picture cannot be processed: {one_line(error)}") from None
         return seen["pixel_values"], seen["image_grid_thw"]
 
-    def _with_image_tokens(self, ids: Sequence[int], grids: torch.Tensor | None) -> list[int]:
-        """The tokens, with each picture's token repeated once per merged patch."""
+    def _with_image_tokens(
+        self, ids: Sequence[int], grids: torch.Tensor | None
+    ) -> tuple[list[int], list[int]]:
+        """The tokens, with each picture's token repeated once per merged patch; and where the
+        tokens of each picture begin."""
         counts: list[int] = []
         if grids is not None:
             counts = (grids.prod(dim=1) // self._image_processor.merge_size**2).tolist()
@@ -212,10 +230,16 @@ class LocalClient:
                 f"{ids.count(self._image_token)} places for them; "
                 "no words of it may be the model's own marks"
             )
-        left = iter(counts)
-        return [
-            one for each in ids for one in [each] * (next(left) if each == self._image_token else 1)
-        ]
+        found: list[int] = []
+        places: list[int] = []
+        for each in ids:
+            if each == self._image_token:
+                count = counts[len(places)]
+                places.append(len(found))
+                found += [each] * count
+            else:
+                found.append(each)
+        return found, places
 
     def _seed(self, episode: int, messages: int) -> int:
         """The seed of one reply. With the episode's seed, all turns would use the same random
@@ -227,10 +251,12 @@ class LocalClient:
 
     # -- tokens to replies, in the batcher's thread ----------------------------------------------
 
-    def _replies(self, rows: Sequence[_EncodedPrompt]) -> list[Reply]:
+    def _replies(self, rows: Sequence[EncodedPrompt]) -> list[Reply]:
         try:
             generated = self._generate(rows)
         except RuntimeError as error:
+            if self._kept is not None:
+                self._kept.clear()  # memory may be short
             raise _explained(error, rows) from None
         if self._closing.is_set():
             raise CannotGoOn(_CLOSED)
@@ -238,28 +264,16 @@ class LocalClient:
             raise CannotGoOn(f"the minutes are over; {AGAIN}")
         return [self._reply(row, said) for row, said in zip(rows, generated, strict=True)]
 
-    def _generate(self, rows: Sequence[_EncodedPrompt]) -> list[list[int]]:
+    def _generate(self, rows: Sequence[EncodedPrompt]) -> list[list[int]]:
         """The tokens that the model generates for each row, up to an end token or the limit."""
-        longest = max(len(row.ids) for row in rows)
-        gaps = [longest - len(row.ids) for row in rows]
-        # Padded on the left with any token, since padding is masked out.
-        filled = [row.ids[:1] * gap + row.ids for row, gap in zip(rows, gaps, strict=True)]
-        ids = torch.tensor(filled)  # (rows, longest)
-        inputs = {
-            "input_ids": ids,
-            "attention_mask": torch.tensor([[0] * gap + [1] * (longest - gap) for gap in gaps]),
-        }
-        if self._image_token is not None and any(row.pixels is not None for row in rows):
-            inputs |= {
-                "pixel_values": torch.cat([row.pixels for row in rows if row.pixels is not None]),
-                "image_grid_thw": torch.cat([row.grids for row in rows if row.grids is not None]),
-                "mm_token_type_ids": ids.eq(self._image_token).int(),
-            }
+        batch = PaddedBatch(rows)
+        inputs = batch.inputs(self._model, self._image_token, positions=self._kept is not None)
+        cache = joined_past(self._model, [row.past for row in rows]) if self._kept else None
         sampling = self._settings.sampling
         choices = []
         if sampling.temperature > 0:
             choices = [
-                _SeededSampling(sampling.temperature, sampling.top_p, [row.seed for row in rows])
+                SeededSampling(sampling.temperature, sampling.top_p, [row.seed for row in rows])
             ]
 
         def closing(input_ids: torch.Tensor, scores: Any, **more: Any) -> torch.Tensor:
@@ -269,18 +283,23 @@ class LocalClient:
         device = self._model.device
         out = self._model.generate(
             **{name: each.to(device) for name, each in inputs.items()},
+            **({} if cache is None else {"past_key_values": cache}),
             generation_config=self._model.generation_config,
             logits_processor=choices,
             stopping_criteria=[closing],
         )
-        return [self._until_end(each) for each in out[:, longest:].tolist()]
+        said = [self._until_end(each) for each in out[:, batch.length :].tolist()]
+        if self._kept is not None and cache is not None:
+            for row, turns in zip(rows, batch.turns(said, cache), strict=True):
+                self._kept.keep(row.name, turns)
+        return said
 
     def _until_end(self, said: list[int]) -> list[int]:
         """The tokens up to the end token; padding follows in rows that end early."""
         ends = (place for place, each in enumerate(said, start=1) if each in self._end_tokens)
         return said[: next(ends, None)]
 
-    def _reply(self, row: _EncodedPrompt, said: Sequence[int]) -> Reply:
+    def _reply(self, row: EncodedPrompt, said: Sequence[int]) -> Reply:
         with self._tokenizer_lock:
             text = self._tokenizer.decode(
                 said, skip_special_tokens=True, clean_up_tokenization_spaces=False
@@ -291,6 +310,7 @@ class LocalClient:
             reasoning=thought,
             usage=Usage(
                 prompt=len(row.ids),
+                cached=row.reused,
                 completion=len(said),
                 reasoning=min(len(said), len(self._ids(thought))) if thought else 0,
             ),
@@ -304,32 +324,11 @@ class LocalClient:
         return ids
 
 
-class _SeededSampling:
-    """Samples the next token of each row with the row's own seed, independent of the batch.
-
-    ``generate`` would sample all rows with one generator, so a reply would depend on the other
-    conversations in the batch. Here each row's logits get Gumbel noise from the row's own
-    generator: the largest sum is then a sample from the distribution (the Gumbel-max trick), and
-    ``generate`` takes the largest.
-    """
-
-    def __init__(self, temperature: float, top_p: float, seeds: Sequence[int]) -> None:
-        self._temperature = temperature
-        self._likeliest = transformers.TopPLogitsWarper(top_p) if top_p < 1 else None
-        self._seeds = seeds
-        self._sources: list[torch.Generator] = []
-
-    def __call__(self, input_ids: torch.Tensor, scores: torch.Tensor) -> torch.Tensor:
-        """Scores with noise; both (rows, words)."""
-        scores = scores / self._temperature
-        if self._likeliest is not None:
-            scores = self._likeliest(input_ids, scores)
-        if not self._sources:  # the device is known only now
-            self._sources = [torch.Generator(scores.device).manual_seed(s) for s in self._seeds]
-        noise = torch.empty_like(scores)
-        for row, source in zip(noise, self._sources, strict=True):
-            row.exponential_(generator=source)
-        return scores - noise.log()
+def _grids_by_digest(kept: KeptTurns | None) -> dict[str, torch.Tensor]:
+    """The grids of the pictures that were processed in earlier turns, (1, 3) each."""
+    if kept is None or kept.grids is None:
+        return {}
+    return dict(zip(kept.pictures, kept.grids.split(1), strict=True))
 
 
 def _part(part: str | Picture) -> dict[str, str]:
@@ -345,7 +344,7 @@ def _without_thought(text: str, thinking: bool) -> tuple[str, str]:
     return thought.strip().removeprefix(_THINK).strip(), words.lstrip()
 
 
-def _explained(error: RuntimeError, rows: Sequence[_EncodedPrompt]) -> Exception:
+def _explained(error: RuntimeError, rows: Sequence[EncodedPrompt]) -> Exception:
     """Torch's error as the exception that the batcher expects."""
     if isinstance(error, torch.cuda.OutOfMemoryError) or "DefaultCPUAllocator" in str(error):
         tokens = max(len(row.ids) for row in rows)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from agents.vlm.tuned_model import agent_file
 from er_gym.plugins import PluginError, Registry, is_dotted
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ class ModelClientSpec:
             and ``identity``, a text that is the same for clients that reply alike.
         opens: what follows the prefix, for messages: ``"MODEL"``.
         help: a short description.
+        settings: the file with the settings of an agent that a model was tuned for, None if there
+            is none; given the text after the prefix.
         install: what to install when a package is missing.
         priced: whether a reply costs what the settings' ``prices`` state.
         keeps_ledger: whether the client checks the budget and writes the ledger itself.
@@ -40,6 +43,7 @@ class ModelClientSpec:
     make: Callable[[str, AgentSettings, Ledger, RequestSupervisor], CacheableClient]
     opens: str
     help: str
+    settings: Callable[[str], Path | None] = lambda opened: None
     install: str = "er-gym[vlm]"
     priced: bool = False
     keeps_ledger: bool = False
@@ -95,6 +99,7 @@ CLIENTS: Registry[ModelClientSpec] = Registry(
             opens="PATH",
             help="a transformers model in this process",
             make=_local,
+            settings=agent_file,
             install="er-gym[local]",
         ),
         "recorded": ModelClientSpec(
@@ -132,6 +137,20 @@ def resolve_client(name: str) -> tuple[ModelClientSpec, str]:
     if not client:
         raise PluginError(f"{name!r} is not a model agent; give {agent_name_forms()}")
     return CLIENTS.get(client), opened
+
+
+def settings_file(name: str) -> Path | None:
+    """The file with the settings that the model of an agent was tuned for; None if there is none.
+
+    Args:
+        name: the agent's, such as ``hf:DIRECTORY``.
+
+    Raises:
+        PluginError: the name belongs to no client, or the client cannot be loaded.
+        ValueError: the model cannot be used yet.
+    """
+    client, opened = resolve_client(name)
+    return client.settings(opened)
 
 
 def agent_name_forms() -> str:

@@ -37,7 +37,7 @@ _TAGGED = re.compile(rf"<({DECISION}|{'|'.join(_KIND_OF_TAG)})>(.*?)</\1>", re.D
 _PICTURE = re.compile(r"(\d+)_(.+)", re.DOTALL)
 _DIRECTION = {f"{angle}_{OBSERVE}": direction for direction, angle in ANGLES.items()}
 _STEP_LIMIT = "too many round"
-_PURPOSE: dict[str, Purpose] = {
+PURPOSE: dict[str, Purpose] = {
     verbs.NAVIGATE: "search",
     verbs.PICKUP: "take",
     verbs.PUT: "put",
@@ -209,7 +209,7 @@ def _turns(item: _Item, pictures: Sequence[_Shown], where: str) -> list[Turn]:
 def _turn(action: Action, thoughts: Sequence[ThoughtRecord]) -> dict[str, Any]:
     return {
         "pictures": [],
-        "purpose": _PURPOSE.get(action.verb, "use"),
+        "purpose": PURPOSE.get(action.verb, "use"),
         "thoughts": list(thoughts),
         "verb": action.verb,
         "object_type": action.object_type,

@@ -11,6 +11,7 @@ import pytest
 
 from agents.expert.model_places import ModelPlaces, named_places
 from agents.expert.writers.base import ThoughtRequest, WrittenThoughts
+from agents.expert.writers.grammar import Table, grammar
 from agents.expert.writers.grounded import GroundedWriter
 from agents.expert.writers.model import ModelWriter
 from agents.expert.writers.prompts import load_writer_prompts
@@ -23,6 +24,7 @@ from er_gym.data.critic import check
 from er_gym.data.knowledge import Knowledge, knowledge_at
 from er_gym.data.trajectory import Language, ThoughtKind
 from er_gym.tasks import verbs
+from er_gym.tasks.suites import config_directory
 
 Say = Callable[[Sequence[dict[str, str]]], str]
 PICTURE = Picture(b"\xff\xd8 jpeg", "image/jpeg", 160, 96)
@@ -227,6 +229,15 @@ def test_every_turn_can_be_put_into_words(language: Language) -> None:
         assert instruction in told
         assert str(knowledge.decision) in told
         assert ("。" in told) is (language == "zh")
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_the_prompts_have_words_for_every_outcome(language: Language) -> None:
+    happened = grammar(language)["happened"]
+    assert isinstance(happened, Table)
+    folder = config_directory("prompts") / "expert" / language
+    told = (folder / "outcome.jinja").read_text(encoding="utf-8")
+    assert {row for row in happened.rows if f'"{row}": ' not in told} == {"else"}
 
 
 def test_settings_for_decisions_are_refused() -> None:

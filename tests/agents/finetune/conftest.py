@@ -16,7 +16,7 @@ pytest.importorskip("transformers", reason="needs the extra finetune")
 pytest.importorskip("peft", reason="needs the extra finetune")
 pytest.importorskip("tensorboard", reason="needs the extra finetune")
 
-from exported_collection import play_collection
+from played_collection import make_collection
 from support import one_torch_thread
 from tiny_models import make_model
 
@@ -51,7 +51,10 @@ def one_thread() -> Iterator[None]:
 @pytest.fixture(scope="session")
 def played(tmp_path_factory: pytest.TempPathFactory) -> Collection:
     """Eight short episodes; some have a mistake that is not to be learnt, and feedback on it."""
-    return play_collection(tmp_path_factory.mktemp("finetune") / "played", 8)
+    folder = tmp_path_factory.mktemp("finetune") / "played"
+    made = make_collection(folder, parts=["mixed"], width=128, height=72)
+    made.write(list(made.trajectories())[:8])
+    return made
 
 
 @pytest.fixture(scope="session")
@@ -79,7 +82,7 @@ def dialect(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture(scope="session")
 def chats(played: Collection, dialect: str) -> tuple[Chat, ...]:
-    return open_samples(played.path, DataSettings(dialect=dialect)).chats
+    return open_samples([played.path], DataSettings(dialect=dialect)).chats
 
 
 @pytest.fixture(scope="session")

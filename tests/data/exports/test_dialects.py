@@ -16,6 +16,7 @@ from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
 
 FEEDBACK = "<|feedback|>"
+WITH_PICTURES = ("paper", "tags")
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +30,7 @@ def told(chat: Chat, role: str) -> list[str]:
 
 def test_every_user_turn_tells_what_came_of_the_last_action(trajectories: list[Trajectory]) -> None:
     seen = set()
-    for name in dialect_names():
+    for name in WITH_PICTURES:
         dialect = load_dialect(name)
         for trajectory in trajectories:
             chat = dialect.chat(trajectory)
@@ -150,22 +151,23 @@ def test_texts_from_outside_cannot_add_pictures_tags_or_special_tokens(
     changed = trajectory.model_copy(update={"instruction": evil, "turns": [failed, last]})
     for name in dialect_names():
         chat = load_dialect(name).chat(changed, "en")
-        assert sum(turn.text.count(IMAGE) for turn in chat.turns) == len(chat.pictures) == 1
+        pictures = sum(turn.text.count(IMAGE) for turn in chat.turns)
+        assert pictures == len(chat.pictures) == (name in WITH_PICTURES)
         texts = "".join(told(chat, "user") + told(chat, "assistant"))
         assert "<|im_end|>" not in texts
         assert "{action} 1 < 2" in texts
         assert parse(told(chat, "assistant")[0]).verb == "open"
 
 
-def test_a_verb_beyond_the_nine_is_explained_where_it_occurs(
+def test_a_verb_beyond_the_nine_is_explained_where_the_task_asks_for_it(
     trajectories: list[Trajectory],
 ) -> None:
     dialect = load_dialect("paper")
     usual = told(dialect.chat(trajectories[0]), "system")[0]
     assert usual.count("\n- ") == 9
-    cut = Turn(purpose="use", verb=verbs.SLICE, object_type="Apple", success=True)
-    changed = trajectories[0].model_copy(update={"turns": [*trajectories[0].turns, cut]})
-    assert "slice <object>: cut" in told(dialect.chat(changed), "system")[0]
+    for instruction in ("Slice the Apple for me.", "Cut up an Apple.", "把苹果切开。"):
+        changed = trajectories[0].model_copy(update={"instruction": instruction})
+        assert "slice <object>: cut" in told(dialect.chat(changed), "system")[0]
 
 
 def test_prefixes_learn_their_last_turn_alone(trajectories: list[Trajectory]) -> None:
@@ -191,7 +193,7 @@ def test_turns_that_are_not_learnt_can_be_told_by_the_user(trajectories: list[Tr
 
 
 def test_unknown_and_damaged_dialects_say_what_there_is(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"choose one of: paper, tags; or give a folder"):
+    with pytest.raises(ValueError, match=r"choose one of: paper, tags, text; or give a folder"):
         load_dialect("pirate")
     own = (Path(__file__).parents[3] / "configs/dialects/paper/en.yaml").read_text()
     (tmp_path / "en.yaml").write_text(own)

@@ -1,0 +1,59 @@
+"""The architecture of a model that is made from nothing. Imports no model library.
+
+er-gym's own files are ``configs/architectures/NAME.yaml``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from agents import configs
+
+KIND = "architectures"
+_WHAT = "architecture"
+Family: TypeAlias = Literal["llama", "qwen2", "qwen3", "qwen2_vl", "qwen2_5_vl", "qwen3_vl"]
+"""Architectures of transformers, by ``model_type``."""
+BYTES = 256
+
+
+class Architecture(BaseModel):
+    """A model's architecture, and the size of its vocabulary.
+
+    Attributes:
+        description: for people.
+        family: the architecture.
+        vocabulary: how many tokens the tokenizer learns, bytes included, special tokens not. With
+            256, each byte is a token.
+        text, vision: the fields of the language model's and the vision tower's configuration, with
+            transformers' names. ``vision`` is for the families with vision.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    description: str = ""
+    family: Family
+    vocabulary: Annotated[int, Field(ge=BYTES, le=1_000_000)] = 4096
+    text: Mapping[str, Any]
+    vision: Mapping[str, Any] = {}
+
+    @property
+    def sees(self) -> bool:
+        """Whether the model takes pictures."""
+        return self.family.endswith("_vl")
+
+
+def architecture_names() -> tuple[str, ...]:
+    """The names of er-gym's own architectures, in alphabetical order."""
+    return configs.names(KIND)
+
+
+def load_architecture(name: str, overrides: Sequence[str] = ()) -> Architecture:
+    """Read an architecture from a file of ``configs/architectures`` by name, or from any file.
+
+    Raises:
+        ValueError: the file does not exist, or the file or an override is invalid.
+    """
+    return configs.load(Architecture, configs.file_of(KIND, name, _WHAT), _WHAT, overrides)

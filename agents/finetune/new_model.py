@@ -1,0 +1,190 @@
+"""Makes a model from nothing: a tokenizer learnt from texts, random weights, and a processor.
+
+The directory is laid out as ``save_pretrained`` lays it out, so every program that loads such
+models loads it: a transformers architecture, a byte-level BPE tokenizer with Qwen's special tokens
+and chat format, and for a model with vision Qwen's image processor.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+import transformers
+from tokenizers import Regex, Tokenizer, decoders, models, pre_tokenizers, trainers
+
+from agents.finetune.architecture import BYTES, Architecture
+from agents.finetune.libraries import quiet_libraries
+
+PAD, BEGIN, END = "<|endoftext|>", "<|im_start|>", "<|im_end|>"
+FEEDBACK = "<|feedback|>"
+SPECIAL = (
+    PAD,
+    BEGIN,
+    END,
+    "<|vision_start|>",
+    "<|vision_end|>",
+    "<|image_pad|>",
+    "<|video_pad|>",
+    FEEDBACK,
+)
+"""The special tokens, in the order of their ids, after the learnt ones."""
+_ROLES = {"image": "image_pad", "video": "video_pad", "vision_start": "vision_start"}
+_ROLES |= {"vision_end": "vision_end"}
+# Words with the space before them, runs of letters, single digits, runs of signs, line ends.
+_WORDS = r" ?\p{L}+|\p{N}| ?[^\s\p{L}\p{N}]+|\s*[\r\n]|\s+(?!\S)|\s+"
+# OpenAI's CLIP, whose values Qwen's models use.
+_MEAN, _STD = [0.48145466, 0.4578275, 0.40821073], [0.26862954, 0.26130258, 0.27577711]
+_TEMPLATE = """\
+{%- for message in messages -%}
+<|im_start|>{{ message.role }}
+{% if message.content is string -%}
+{{ message.content }}
+{%- else -%}
+{%- for part in message.content -%}
+{{ '<|vision_start|><|image_pad|><|vision_end|>' if part.type == 'image' else part.text }}
+{%- endfor -%}
+{%- endif -%}
+<|im_end|>
+{% endfor -%}
+{%- if add_generation_prompt -%}
+<|im_start|>assistant
+{% endif -%}
+"""
+
+
+def make_model(
+    architecture: Architecture, texts: Iterable[str], directory: Path, seed: int = 0
+) -> Path:
+    """Write a new model, its tokenizer and its processor.
+
+    Args:
+        architecture: what is made.
+        texts: what the tokenizer is learnt from, such as the conversations of a collection. They
+            are read once, and only if the vocabulary has more than the bytes.
+        directory: must not exist; it appears when it is whole.
+        seed: of the weights.
+
+    Returns:
+        ``directory``.
+
+    Raises:
+        ValueError: the directory exists, or transformers does not accept the architecture.
+    """
+    if directory.exists():
+        raise ValueError(f"{directory} exists; give the model another directory, or remove it")
+    tokenizer = make_tokenizer(texts, architecture.vocabulary)
+    config = _config(architecture, tokenizer)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        try:
+            model = _maker(architecture).from_config(config, dtype=torch.float32)
+        except (ValueError, TypeError, RuntimeError, ZeroDivisionError) as error:
+            problem = " ".join(str(error).split())[:300]
+            raise ValueError(
+                f"transformers does not accept this {architecture.family}: {problem}"
+            ) from None
+    ends = [tokenizer.eos_token_id, tokenizer.pad_token_id]
+    model.generation_config = transformers.GenerationConfig(
+        eos_token_id=ends, pad_token_id=ends[1], do_sample=False
+    )
+    directory.parent.mkdir(parents=True, exist_ok=True)
+    with (
+        quiet_libraries(),
+        tempfile.TemporaryDirectory(dir=directory.parent, prefix=f".{directory.name}-") as folder,
+    ):
+        made = Path(folder) / "model"
+        tokenizer.save_pretrained(made)
+        model.save_pretrained(made)
+        if architecture.sees:
+            text = json.dumps(_image_processor(config), indent=2) + "\n"
+            (made / "preprocessor_config.json").write_text(text, encoding="utf-8")
+        shutil.move(made, directory)
+    return directory
+
+
+def make_tokenizer(texts: Iterable[str], vocabulary: int) -> transformers.PreTrainedTokenizerFast:
+    """A byte-level BPE tokenizer learnt from texts, with the special tokens and a chat template.
+
+    Args:
+        texts: what it is learnt from.
+        vocabulary: the number of tokens, without the special ones; with 256, each byte is a token.
+    """
+    letters = sorted(pre_tokenizers.ByteLevel.alphabet())
+    words = Tokenizer(models.BPE(vocab={each: i for i, each in enumerate(letters)}, merges=[]))
+    split = pre_tokenizers.Split(Regex(_WORDS), "isolated")
+    as_bytes = pre_tokenizers.ByteLevel(add_prefix_space=False, use_regex=False)
+    words.pre_tokenizer = pre_tokenizers.Sequence([split, as_bytes])
+    words.decoder = decoders.ByteLevel()
+    if vocabulary > BYTES:
+        trainer = trainers.BpeTrainer(
+            vocab_size=vocabulary, initial_alphabet=letters, show_progress=False
+        )
+        words.train_from_iterator(texts, trainer)
+    tokenizer = transformers.PreTrainedTokenizerFast(
+        tokenizer_object=words,
+        eos_token=END,
+        pad_token=PAD,
+        additional_special_tokens=list(SPECIAL),
+        clean_up_tokenization_spaces=False,
+    )
+    tokenizer.chat_template = _TEMPLATE
+    return tokenizer
+
+
+def _maker(architecture: Architecture) -> Any:
+    if architecture.sees:
+        return transformers.AutoModelForImageTextToText
+    return transformers.AutoModelForCausalLM
+
+
+def _config(architecture: Architecture, tokenizer: Any) -> transformers.PretrainedConfig:
+    """The model's configuration with the tokenizer's ids.
+
+    Raises:
+        ValueError: transformers does not accept the fields.
+    """
+    of_tokenizer = {
+        "vocab_size": len(tokenizer),
+        "bos_token_id": None,
+        "eos_token_id": tokenizer.eos_token_id,
+        "pad_token_id": tokenizer.pad_token_id,
+    }
+    fields: Mapping[str, Any] = {**architecture.text, **of_tokenizer}
+    if architecture.sees:
+        fields = {
+            "text_config": fields,
+            "vision_config": dict(architecture.vision),
+            "tie_word_embeddings": bool(architecture.text.get("tie_word_embeddings")),
+            **{
+                f"{role}_token_id": tokenizer.convert_tokens_to_ids(f"<|{token}|>")
+                for role, token in _ROLES.items()
+            },
+        }
+    try:
+        return transformers.AutoConfig.for_model(architecture.family, **fields)
+    except Exception as error:  # transformers checks with several libraries' exceptions
+        problem = " ".join(str(error).split())[:300]
+        raise ValueError(
+            f"transformers does not accept this {architecture.family}: {problem}"
+        ) from None
+
+
+def _image_processor(config: Any) -> dict[str, Any]:
+    """The settings of Qwen's image processor for a vision tower."""
+    vision = config.vision_config
+    return {
+        "image_processor_type": "Qwen2VLImageProcessor",
+        "patch_size": vision.patch_size,
+        "temporal_patch_size": vision.temporal_patch_size,
+        "merge_size": vision.spatial_merge_size,
+        "min_pixels": 3_136,
+        "max_pixels": 12_845_056,
+        "image_mean": _MEAN,
+        "image_std": _STD,
+    }

@@ -1,0 +1,76 @@
+"""DeepSpeed: er-gym's own trainer on several GPUs; its settings, ZeRO-3, and the data as it is."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from itertools import chain
+from pathlib import Path
+
+from agents import configs
+from agents.finetune.printing.plan import (
+    DATA,
+    OUTPUT,
+    ZERO3_FILE,
+    Printed,
+    PrintPlan,
+    Program,
+    zero3,
+)
+from agents.finetune.printing.sources import SourceJob
+from er_gym.data.collection import MANIFEST
+from er_gym.data.exports.ms_swift import MS_SWIFT as EXPORT
+
+NAME = "deepspeed"
+_SETTINGS, _MODEL = "finetune.yaml", "model"
+_LAUNCH = ("torchrun", "--nproc_per_node")
+_MODULE = ("-m", "benchmarks.cli", "finetune")
+
+
+def _write(plan: PrintPlan, folder: Path) -> Printed:
+    whole = (plan.source.path / MANIFEST).is_file()
+    if whole:
+        copy = shutil.copy2 if plan.copy else _linked
+        shutil.copytree(plan.source.path, folder / DATA, copy_function=copy)
+    else:  # messages with a flag for each turn, which er-gym reads
+        EXPORT.write(SourceJob.of(plan.source, folder / DATA, per_turn=False, copy=plan.copy))
+    training = plan.settings.training.model_copy(update={"deepspeed": ZERO3_FILE})
+    settings = plan.settings.model_copy(update={"training": training})
+    hub = plan.model.weights == plan.model.facts.hub
+    arguments = {
+        "--config": _SETTINGS,
+        "--model": _MODEL if hub else plan.model.weights,
+        "--data": DATA if whole else f"{DATA}/train.jsonl",
+        "--out": OUTPUT,
+    }
+    notes = [
+        "This is er-gym's own trainer: `pip install 'er-gym[finetune]' deepspeed` on the cluster."
+    ]
+    if hub:
+        notes.append(
+            f"It loads a model from a directory: `hf download {plan.model.weights} --local-dir "
+            f"{_MODEL}` first."
+        )
+    return Printed(
+        texts={
+            _SETTINGS: configs.dump(settings),
+            ZERO3_FILE: json.dumps(zero3(plan), indent=2) + "\n",
+        },
+        command=(*_LAUNCH, str(plan.gpus), *_MODULE, *chain(*arguments.items())),
+        environment={},
+        notes=tuple(notes),
+        made_with="DeepSpeed's ZeRO-3 through transformers",
+    )
+
+
+def _linked(source: str, to: str) -> str:
+    """A hard link, or a copy where there can be none."""
+    try:
+        os.link(source, to)
+    except OSError:
+        shutil.copy2(source, to)
+    return to
+
+
+DEEPSPEED = Program(NAME, _write)

@@ -1,0 +1,128 @@
+"""ms-swift: a YAML file for ``swift sft``, and messages with a loss flag for each turn."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from agents.finetune.printing.plan import (
+    DATA,
+    OUTPUT,
+    ZERO3_FILE,
+    Printed,
+    PrintPlan,
+    Program,
+    zero3,
+)
+from agents.finetune.printing.sources import SourceJob
+from er_gym.data.exports.ms_swift import MS_SWIFT as EXPORT
+from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
+
+NAME = "ms-swift"
+_TRAIN = "train.yaml"
+_EMBEDDINGS = ("embed_tokens", "lm_head")
+
+
+def arguments(plan: PrintPlan) -> dict[str, Any]:
+    """The arguments of a run, by ms-swift's names. ``ENV`` are variables of the environment."""
+    model, data, training = plan.settings.model, plan.settings.data, plan.settings.training
+    build = plan.model.facts.programs[NAME]
+    found: dict[str, Any] = {
+        # Pictures are looked up here; the picture bounds are those of Qwen's own processor.
+        "ENV": {
+            "ROOT_IMAGE_DIR": DATA,
+            "MIN_PIXELS": str(data.min_pixels),
+            "MAX_PIXELS": str(data.max_pixels),
+        },
+        "model": plan.model.weights,
+        "model_type": build,
+        "template": build,
+        "use_hf": True,
+        "torch_dtype": "bfloat16" if plan.half else "float32",
+        "tuner_type": "full" if model.lora is None else "lora",
+        "freeze_llm": False,
+        "freeze_vit": "vision" in model.freeze,
+        "freeze_aligner": "projector" in model.freeze,
+        "gradient_checkpointing": training.checkpointing,
+        "vit_gradient_checkpointing": training.checkpointing and "vision" not in model.freeze,
+    }
+    if model.attention:
+        found["attn_impl"] = model.attention
+    if model.lora is not None:
+        targets = model.lora.targets
+        found |= {
+            "lora_rank": model.lora.rank,
+            "lora_alpha": model.lora.alpha,
+            "lora_dropout": model.lora.dropout,
+            "target_modules": [targets] if isinstance(targets, str) else list(targets),
+        }
+    if plan.facts.feedback:
+        found["new_special_tokens"] = [FEEDBACK_TOKEN]
+        if model.lora is not None:
+            tied = plan.model.facts.numbers.tied
+            found["modules_to_save"] = list(_EMBEDDINGS[:1] if tied else _EMBEDDINGS)
+    found |= {
+        "dataset": [f"{DATA}/train.jsonl"],
+        "split_dataset_ratio": 0.0,
+        "strict": True,
+        "max_length": data.max_length,
+        "truncation_strategy": "delete",
+        "loss_scale": "default",
+        "dataset_num_proc": 1,
+        "dataloader_num_workers": 4,
+        "output_dir": OUTPUT,
+        "add_version": False,
+        "logging_steps": training.log_every,
+        "save_steps": training.save_every,
+        "save_total_limit": training.keep,
+        "report_to": ["tensorboard"],
+        "per_device_train_batch_size": training.batch,
+        "gradient_accumulation_steps": training.accumulation,
+        "learning_rate": training.learning_rate,
+        "num_train_epochs": training.epochs,
+        "weight_decay": training.weight_decay,
+        "max_grad_norm": training.max_grad_norm,
+        "lr_scheduler_type": "cosine",
+        "warmup_ratio": training.warmup,
+        "seed": training.seed,
+        "data_seed": training.seed,
+    }
+    if plan.sharded:
+        found["deepspeed"] = ZERO3_FILE
+    return found
+
+
+def _write(plan: PrintPlan, folder: Path) -> Printed:
+    EXPORT.write(SourceJob.of(plan.source, folder / DATA, per_turn=False, copy=plan.copy))
+    texts = {_TRAIN: yaml.safe_dump(arguments(plan), sort_keys=False, allow_unicode=True)}
+    notes = [
+        "`loss` in a message says whether a turn of the assistant is learnt; ms-swift heeds it."
+    ]
+    if plan.sharded:
+        texts[ZERO3_FILE] = json.dumps(zero3(plan), indent=2) + "\n"
+    if plan.facts.feedback:
+        notes.append(
+            f"`<|feedback|>` becomes the token {plan.model.facts.feedback_id}, for which the "
+            "model's embedding has a spare row."
+            + (
+                " `modules_to_save` trains the embedding as a whole, which the table of memory "
+                "counts; to save that, delete `new_special_tokens` and `modules_to_save`."
+                if plan.settings.model.lora
+                else ""
+            )
+        )
+    if plan.settings.model.lora is not None:
+        notes.append("`swift export --adapters output/CHECKPOINT --merge_lora true` merges it.")
+    return Printed(
+        texts=texts,
+        command=("swift", "sft", _TRAIN),
+        environment={"NPROC_PER_NODE": str(plan.gpus)},
+        notes=tuple(notes),
+        made_with="ms-swift 4.6.0",
+    )
+
+
+MS_SWIFT = Program(NAME, _write)

@@ -1,0 +1,102 @@
+"""TRL: a script for ``SFTTrainer`` with a collator that heeds each turn's flag, and its YAML."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from agents.finetune.printing.plan import (
+    DATA,
+    OUTPUT,
+    ZERO3_FILE,
+    Printed,
+    PrintPlan,
+    Program,
+    zero3,
+)
+from agents.finetune.printing.sources import SourceJob
+from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
+from er_gym.data.exports.trl import TRL as EXPORT
+
+NAME = "trl"
+_SCRIPT, _CONFIG = "train.py", "sft.yaml"
+_LAUNCH = ("accelerate", "launch", "--num_processes")
+_SOURCE = Path(__file__).with_name("trl_script.py")
+
+
+def arguments(plan: PrintPlan) -> dict[str, Any]:
+    """The arguments of a run: the script's own, ``SFTConfig``'s and ``ModelConfig``'s."""
+    model, data, training = plan.settings.model, plan.settings.data, plan.settings.training
+    found: dict[str, Any] = {
+        "data": DATA,
+        "min_pixels": data.min_pixels,
+        "max_pixels": data.max_pixels,
+        "freeze": list(model.freeze),
+        "special_tokens": [FEEDBACK_TOKEN] if plan.facts.feedback else [],
+        "model_name_or_path": plan.model.weights,
+        "dtype": "bfloat16" if plan.half else "float32",
+        "use_peft": model.lora is not None,
+    }
+    if model.attention:
+        found["attn_implementation"] = model.attention
+    if model.lora is not None:
+        targets = model.lora.targets
+        found |= {
+            "lora_r": model.lora.rank,
+            "lora_alpha": model.lora.alpha,
+            "lora_dropout": model.lora.dropout,
+            "lora_target_modules": [targets] if isinstance(targets, str) else list(targets),
+        }
+    found |= {
+        "output_dir": OUTPUT,
+        "max_length": None,  # to cut a conversation would cut pictures
+        "remove_unused_columns": False,  # the collator needs the column "train"
+        "dataset_kwargs": {"skip_prepare_dataset": True},
+        "logging_steps": training.log_every,
+        "save_steps": training.save_every,
+        "save_total_limit": training.keep,
+        "report_to": ["tensorboard"],
+        "per_device_train_batch_size": training.batch,
+        "gradient_accumulation_steps": training.accumulation,
+        "gradient_checkpointing": training.checkpointing,
+        "learning_rate": training.learning_rate,
+        "num_train_epochs": training.epochs,
+        "weight_decay": training.weight_decay,
+        "max_grad_norm": training.max_grad_norm,
+        "lr_scheduler_type": "cosine",
+        "warmup_steps": training.warmup,  # below 1, a share of all
+        "bf16": plan.half,
+        "seed": training.seed,
+        "data_seed": training.seed,
+        "dataloader_num_workers": 4,
+    }
+    if plan.sharded:
+        found["deepspeed"] = ZERO3_FILE
+    return found
+
+
+def _write(plan: PrintPlan, folder: Path) -> Printed:
+    EXPORT.write(SourceJob.of(plan.source, folder / DATA, per_turn=False, copy=plan.copy))
+    texts = {
+        _CONFIG: yaml.safe_dump(arguments(plan), sort_keys=False, allow_unicode=True),
+        _SCRIPT: _SOURCE.read_text(encoding="utf-8"),
+    }
+    if plan.sharded:
+        texts[ZERO3_FILE] = json.dumps(zero3(plan), indent=2) + "\n"
+    return Printed(
+        texts=texts,
+        command=(*_LAUNCH, str(plan.gpus), _SCRIPT, "--config", _CONFIG),
+        environment={},
+        notes=(
+            f"`{_SCRIPT}` is TRL's `SFTTrainer` with a collator that gives loss to the turns "
+            "marked `train`; it needs er-gym beside TRL (`pip install er-gym trl peft datasets`).",
+            "Nothing is cut off (`max_length: null`).",
+        ),
+        made_with="TRL 1.16.0 with transformers 5.23.0",
+    )
+
+
+TRL = Program(NAME, _write)

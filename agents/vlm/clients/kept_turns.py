@@ -1,0 +1,207 @@
+"""Keeps what a model has computed for the earlier turns of conversations, for their next turns.
+
+What a transformer computes for a token are a key and a value in each layer; later tokens need
+nothing else of it. A turn of a conversation repeats all turns before it, so their keys and values
+are kept, and the model processes the new turns alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import threading
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import torch
+from torch.nn import functional
+from transformers import DynamicCache
+from transformers.cache_utils import DynamicLayer
+
+from agents.vlm.chat import LEFT_OUT, Message
+
+MOST = 256
+"""The most conversations that are kept."""
+_ON_CPU = 2 << 30  # bytes
+_SHARE_OF_GPU = 0.25  # of the memory that is free once the model is loaded
+_WITH_PICTURES = ("qwen2_vl", "qwen2_5_vl", "qwen3_vl", "qwen3_vl_moe")
+"""The models with pictures whose positions :func:`positions_of` counts."""
+
+Layers = list[tuple[torch.Tensor, torch.Tensor]]
+"""Keys and values of each layer, (heads, tokens, size of a head)."""
+
+
+@dataclass(frozen=True)
+class KeptTurns:
+    """The turns of a conversation that a model has processed.
+
+    Attributes:
+        ids: their tokens; a picture takes as many as it has merged patches.
+        pictures: the digests of their pictures; ``grids``: (pictures, 3) patches in time, height
+            and width.
+        layers: keys and values of these tokens.
+    """
+
+    ids: Sequence[int]
+    pictures: Sequence[str]
+    grids: torch.Tensor | None
+    layers: Layers
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return sum(each.nbytes for layer in self.layers for each in layer)
+
+    def usable(self, ids: Sequence[int], pictures: Sequence[str], places: Sequence[int]) -> int:
+        """How many of the kept tokens a conversation begins with.
+
+        At least one token of it is left, since the model must process one to say the next.
+
+        Args:
+            ids: its tokens.
+            pictures: the digests of its pictures.
+            places: where the tokens of each picture begin.
+        """
+        length = min(len(self.ids), len(ids) - 1)
+        for place in range(length):
+            if self.ids[place] != ids[place]:
+                length = place
+                break
+        for number, (place, digest) in enumerate(zip(places, pictures, strict=True)):
+            if place >= length:
+                break
+            if number >= len(self.pictures) or self.pictures[number] != digest:
+                return place
+        # A picture is processed as a whole, and its tokens end where the next text begins.
+        for place, after in pairwise((*places, len(ids))):
+            count = next((n for n, one in enumerate(ids[place:after]) if one != ids[place]), 0)
+            if place < length < place + count:
+                return place
+        return length
+
+    def first(self, length: int) -> Layers:
+        """The keys and values of the first tokens."""
+        return [(keys[:, :length], values[:, :length]) for keys, values in self.layers]
+
+
+class KeptConversations:
+    """The kept turns of conversations, those last used; thread-safe.
+
+    Args:
+        limit: the most bytes.
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._lock = threading.Lock()
+        self._kept: OrderedDict[str, KeptTurns] = OrderedDict()
+
+    def take(self, name: str) -> KeptTurns | None:
+        """Take the turns of a conversation out; None if they are not here."""
+        with self._lock:
+            return self._kept.pop(name, None)
+
+    def keep(self, name: str, turns: KeptTurns) -> None:
+        """Keep the turns of a conversation; the conversations last used make room."""
+        with self._lock:
+            self._kept.pop(name, None)
+            self._kept[name] = turns
+            total = sum(each.size for each in self._kept.values())
+            while self._kept and (total > self._limit or len(self._kept) > MOST):
+                total -= self._kept.popitem(last=False)[1].size
+
+    def clear(self) -> None:
+        """Keep none any longer."""
+        with self._lock:
+            self._kept.clear()
+
+
+def conversation_name(messages: Sequence[Message], seed: int) -> str:
+    """The same for all turns of a conversation: its seed and the texts of its first user turn."""
+    told = hashlib.sha256(str(seed).encode())
+    for message in messages[: 1 + (messages[0].role == "system")]:
+        for part in message.parts:
+            if isinstance(part, str) and part != LEFT_OUT:  # which stands for a picture
+                told.update(part.encode(errors="surrogatepass") + b"\0")
+    return told.hexdigest()
+
+
+def memory_for(model: Any) -> int:
+    """How many bytes of keys and values may be kept beside a model; 0 if its turns cannot be.
+
+    They cannot where a layer keeps something else than all keys and values, such as the state of a
+    recurrence or a sliding window, or where positions cannot be given.
+    """
+    config = model.config
+    if hasattr(config, "vision_config"):
+        positions = config.model_type in _WITH_PICTURES
+    else:
+        positions = "position_ids" in inspect.signature(_whole(model).forward).parameters
+    layers = [] if config.is_encoder_decoder else DynamicCache(config=config).layers
+    if not positions or not layers or any(type(layer) is not DynamicLayer for layer in layers):
+        return 0
+    if model.device.type != "cuda":
+        return _ON_CPU
+    return int(torch.cuda.mem_get_info(model.device)[0] * _SHARE_OF_GPU)
+
+
+def positions_of(
+    model: Any, ids: Sequence[int], grids: torch.Tensor | None, image_token: int
+) -> torch.Tensor:
+    """The positions of a conversation's tokens as Qwen's models count them: in the text, then in
+    time, height and width; (4, tokens).
+
+    Args:
+        model: one with pictures.
+        ids: the tokens of the conversation.
+        grids: of its pictures.
+        image_token: the token of a picture.
+    """
+    tokens = torch.tensor([ids])
+    kinds = tokens.eq(image_token).int()
+    inner = _whole(model).model  # the part without an output layer
+    seen, _ = inner.get_rope_index(tokens, mm_token_type_ids=kinds, image_grid_thw=grids)
+    return torch.cat([torch.arange(len(ids))[None], seen[:, 0]])
+
+
+def joined_past(model: Any, pasts: Sequence[Layers]) -> DynamicCache:
+    """The keys and values of several conversations as one cache, padded on the left."""
+    cache = DynamicCache(config=model.config)
+    longest = max(past[0][0].shape[1] if past else 0 for past in pasts)
+    if not longest:
+        return cache
+    like = next(past for past in pasts if past)
+    for number, whole in enumerate(like):
+        keys, values = (
+            torch.stack(
+                [
+                    functional.pad(
+                        past[number][part] if past else whole[part][:, :0],
+                        (0, 0, longest - (past[number][part].shape[1] if past else 0), 0),
+                    )
+                    for past in pasts
+                ]
+            )
+            for part in (0, 1)
+        )
+        cache.update(keys, values, number)
+    return cache
+
+
+def layers_of(cache: DynamicCache, row: int, spans: Sequence[tuple[int, int]]) -> Layers:
+    """The keys and values of a row of a cache, those of some spans of tokens, one after another."""
+    spans = [span for span in spans if span[0] < span[1]]
+
+    def cut(states: torch.Tensor) -> torch.Tensor:
+        return torch.cat([states[row, :, start:end] for start, end in spans], dim=1)
+
+    layers: Any = cache.layers  # plain ones, see memory_for
+    return [(cut(layer.keys), cut(layer.values)) for layer in layers]
+
+
+def _whole(model: Any) -> Any:
+    """The model without an adapter around it."""
+    return model.get_base_model() if hasattr(model, "get_base_model") else model

@@ -1,0 +1,36 @@
+"""Sampling with a seed for each row of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+import transformers
+
+
+class SeededSampling:
+    """Samples the next token of each row with the row's own seed, independent of the batch.
+
+    ``generate`` would sample all rows with one generator, so a reply would depend on the other
+    conversations in the batch. Here each row's logits get Gumbel noise from the row's own
+    generator: the largest sum is then a sample from the distribution (the Gumbel-max trick), and
+    ``generate`` takes the largest.
+    """
+
+    def __init__(self, temperature: float, top_p: float, seeds: Sequence[int]) -> None:
+        self._temperature = temperature
+        self._likeliest = transformers.TopPLogitsWarper(top_p) if top_p < 1 else None
+        self._seeds = seeds
+        self._sources: list[torch.Generator] = []
+
+    def __call__(self, input_ids: torch.Tensor, scores: torch.Tensor) -> torch.Tensor:
+        """Scores with noise; both (rows, words)."""
+        scores = scores / self._temperature
+        if self._likeliest is not None:
+            scores = self._likeliest(input_ids, scores)
+        if not self._sources:  # the device is known only now
+            self._sources = [torch.Generator(scores.device).manual_seed(s) for s in self._seeds]
+        noise = torch.empty_like(scores)
+        for row, source in zip(noise, self._sources, strict=True):
+            row.exponential_(generator=source)
+        return scores - noise.log()

@@ -1,0 +1,98 @@
+"""Prompts that are the texts of a dialect: what training files say, a model that was tuned on them
+is told when it plays.
+
+The texts are made by the functions that make the training files (:mod:`er_gym.data.dialects`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+
+from agents.vlm.prompt_set import (
+    IMAGE_MARK,
+    Decide,
+    LastAction,
+    Sees,
+    TurnContext,
+    without_marks,
+)
+from er_gym.data.dialects import DialectTexts, LastDeed, load_dialect, system_text, user_turn
+from er_gym.data.trajectory import Language
+from er_gym.tasks import verbs
+
+_AHEAD = "ahead"
+_NOTHING = "(no action)"
+"""Stands for the action of a reply that names none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DialectPrompts:
+    """Prompts from a dialect; a :class:`~agents.vlm.prompt_set.PromptSet`.
+
+    Attributes:
+        texts: the dialect's, in one language.
+    """
+
+    name: str
+    digest: str
+    about: str
+    after_observe: int | None = field(default=3, init=False)
+    as_recorded: bool = field(default=True, init=False)
+    texts: DialectTexts = field(repr=False)
+
+    def check(self, *, decide: Decide, sees: Sees) -> None:
+        """See :class:`~agents.vlm.prompt_set.PromptSet`."""
+        if (decide, sees) != ("tags", self.texts.sees):
+            raise ValueError(
+                f"the dialect {self.name} needs decide: tags and sees: {self.texts.sees}, not "
+                f"{decide} and {sees}; change these, or leave out prompts.dialect"
+            )
+
+    def system(self, *, decide: Decide, sees: Sees, task: str = "") -> str:
+        """See :class:`~agents.vlm.prompt_set.PromptSet`."""
+        return system_text(self.texts, without_marks(task))
+
+    def first(self, turn: TurnContext) -> str:
+        """See :class:`~agents.vlm.prompt_set.PromptSet`."""
+        return self._told(turn, None, (_AHEAD,))
+
+    def next(self, turn: TurnContext, last_action: LastAction) -> str:
+        """See :class:`~agents.vlm.prompt_set.PromptSet`."""
+        last = LastDeed(
+            last_action.action, last_action.success, without_marks(last_action.feedback)
+        )
+        return self._told(turn, last, last_action.directions)
+
+    def feedback(self, *, problem: str, decide: Decide, action: str = "") -> str:
+        """See :class:`~agents.vlm.prompt_set.PromptSet`."""
+        last = LastDeed(without_marks(action) or _NOTHING, False, without_marks(problem))
+        return "".join(user_turn(self.texts, "", last, ()))
+
+    def _told(self, turn: TurnContext, last: LastDeed | None, directions: tuple[str, ...]) -> str:
+        marks = [(each, IMAGE_MARK) for each in directions if turn.sees == "pictures"]
+        task = without_marks(turn.task)
+        return "".join(user_turn(self.texts, task, last, marks, turn.now, turn.before))
+
+
+def dialect_prompts(dialect: str, language: Language) -> DialectPrompts:
+    """The prompts of a dialect.
+
+    Args:
+        dialect: its name, or a folder.
+        language: one that it has.
+
+    Raises:
+        ValueError: there is no such dialect, or it lacks the language.
+    """
+    loaded = load_dialect(dialect)
+    texts = loaded.texts_in(language)
+    digest = hashlib.sha256(texts.model_dump_json().encode())
+    if verbs.ADDED:
+        digest.update(repr(verbs.ADDED).encode())
+    return DialectPrompts(
+        name=f"{dialect}/{language}",
+        digest=digest.hexdigest(),
+        about=f"the texts of the dialect {dialect} in {language}",
+        texts=texts,
+    )

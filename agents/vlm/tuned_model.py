@@ -1,0 +1,71 @@
+"""The directory of a fine-tuned model: where its files are, and how it was taught to converse."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+RUN = "finetune.json"
+MODEL = "model"
+AGENT = "agent.yaml"
+"""In a model's directory: settings of a model agent, such as the prompts that it was tuned on."""
+
+
+_AS_DRAWN = 1 << 24
+"""Pixels; no drawn picture has more."""
+
+
+def model_directory(path: str) -> str:
+    """The directory of a model, given it or the run of ``er-gym finetune`` that made it.
+
+    Any other path, or a model's name on a hub, stays as it is.
+
+    Raises:
+        ValueError: the run is not finished.
+    """
+    run = Path(path)
+    if not (run / RUN).is_file():
+        return path
+    if not (run / MODEL).is_dir():
+        raise ValueError(
+            f"{path} is a fine-tuning run that is not finished, so it has no model yet; run its "
+            "command again until it is"
+        )
+    return str(run / MODEL)
+
+
+def agent_file(path: str) -> Path | None:
+    """The file with the settings that a model was tuned for; None if its directory has none.
+
+    Args:
+        path: as :func:`model_directory` takes it.
+
+    Raises:
+        ValueError: the run is not finished.
+    """
+    file = Path(model_directory(path)) / AGENT
+    return file if file.is_file() else None
+
+
+def recorded_pictures(
+    collection: Mapping[str, Any], min_pixels: int, max_pixels: int
+) -> dict[str, Any]:
+    """The settings with which an agent is shown pictures as training files have them.
+
+    Args:
+        collection: the settings in the collection's manifest.
+        min_pixels, max_pixels: the bounds to which the model scaled them when it was tuned.
+
+    Returns:
+        fields of :class:`agents.vlm.settings.Pictures`.
+    """
+    stated, env = collection.get("pictures", {}), collection.get("env", {})
+    return {
+        **{name: stated[name] for name in ("format", "quality") if name in stated},
+        **{name: env[name] for name in ("width", "height") if name in env},
+        "min_pixels": 1,  # a collection keeps pictures as they are drawn
+        "max_pixels": _AS_DRAWN,
+        "model_min_pixels": min_pixels,
+        "model_max_pixels": max_pixels,
+    }

@@ -1,0 +1,71 @@
+"""``er-gym data import``: a ShareGPT file as a collection of trajectories."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from benchmarks.cli.errors import bad_input, print_problem
+from benchmarks.cli.options import Place
+from benchmarks.cli.terminal import echo, terminal
+
+
+@click.command(name="import")
+@click.argument("file", metavar="FILE", type=Place(path_type=Path))
+@click.option(
+    "--out",
+    required=True,
+    type=Place(file_okay=False, path_type=Path),
+    help="The collection; new, or empty.",
+)
+@click.option(
+    "--pictures",
+    type=Place(file_okay=False, path_type=Path),
+    help="What the paths of pictures are relative to.  [default: the file's folder]",
+)
+@click.option(
+    "--dataset",
+    default="",
+    metavar="NAME",
+    help="The entry of dataset_info.json, if FILE is one that has several, or its folder.",
+)
+@click.option("--leave-out", is_flag=True, help="Leave out samples that have problems.")
+@click.option(
+    "--copy", is_flag=True, help="Copy pictures; else they are hard links where possible."
+)
+def import_(
+    file: Path, out: Path, pictures: Path | None, dataset: str, leave_out: bool, copy: bool
+) -> None:
+    """Turn a ShareGPT file with pictures, such as the paper's, into trajectories.
+
+    Thoughts are told apart by their tags, or by the phrases with which they begin; actions are read
+    from <DecisionMaking>. What the file does not tell, such as poses and key actions, stays empty:
+    er-gym data stats, show and export work on the result, verify does not.
+    """
+    from benchmarks.cli.progress import bar
+    from er_gym.data.sharegpt_files import open_sharegpt
+    from er_gym.data.sharegpt_import import import_sharegpt
+
+    with bad_input():
+        opened = open_sharegpt(
+            file, dataset=dataset, pictures=pictures, decisions=True, leave_out=leave_out
+        )
+        first, *problems = opened.report.lines()
+        for line in problems:
+            print_problem(line)
+        with bar(terminal(stderr=True)) as shown:
+            task = shown.add_task("import", total=None, status="")
+
+            def progress(done: int, total: int) -> None:
+                shown.update(task, completed=done, total=total)
+
+            summary = import_sharegpt(opened, out, copy=copy, progress=progress)
+    echo(first)
+    parts = ", ".join(f"{part} {count:,}" for part, count in summary.parts.items())
+    echo(
+        f"{out}: {summary.trajectories:,} trajectories ({parts}), {summary.turns:,} turns, of "
+        f"which {summary.trained_turns:,} are to be learnt; {summary.pictures:,} pictures"
+    )
+    if summary.without_scene:
+        echo(f"{summary.without_scene:,} trajectories do not say in which room they were played")

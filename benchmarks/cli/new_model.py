@@ -1,0 +1,92 @@
+"""``er-gym new-model``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+from benchmarks.cli.errors import BadInput, bad_input
+from benchmarks.cli.options import MOST_SEED, Place, overrides_option
+from benchmarks.cli.terminal import echo
+
+
+@click.command(name="new-model")
+@click.argument("architecture")
+@click.option(
+    "--data",
+    "collections",
+    multiple=True,
+    required=True,
+    type=Place(file_okay=False, path_type=Path),
+    help="A collection from which the tokenizer learns; may be repeated.",
+)
+@click.option(
+    "--dialect",
+    default="paper",
+    show_default=True,
+    help="How its trajectories are put into words.",
+)
+@overrides_option("vocabulary=2048")
+@click.option(
+    "--seed",
+    type=click.IntRange(0, MOST_SEED),
+    default=0,
+    show_default=True,
+    help="Of the weights.",
+)
+@click.option(
+    "--out",
+    required=True,
+    type=Place(file_okay=False, path_type=Path),
+    help="The directory of the model.",
+)
+def new_model(
+    architecture: str,
+    collections: tuple[Path, ...],
+    dialect: str,
+    overrides: tuple[str, ...],
+    seed: int,
+    out: Path,
+) -> None:
+    """Make a small model with random weights, to be taught from nothing.
+
+    ARCHITECTURE is a YAML file, or the name of one of er-gym's own. The tokenizer is learnt from
+    the conversations of collections.
+    """
+    from agents.finetune.architecture import load_architecture
+
+    with bad_input():
+        made = load_architecture(architecture, overrides)
+        texts = _texts(collections, dialect)
+    try:
+        from agents.finetune.new_model import make_model
+    except ImportError as error:
+        raise BadInput(
+            f"{error.name or error} is not installed, and a new model needs it: "
+            "pip install 'er-gym[local]'"
+        ) from error
+    with bad_input():
+        make_model(made, texts, out, seed)
+    size = sum(file.stat().st_size for file in out.glob("*.safetensors"))
+    echo(f"{out}: {made.family}, {size // 4 / 1e6:.1f} million weights")
+
+
+def _texts(collections: tuple[Path, ...], dialect: str) -> Iterator[str]:
+    """The texts of all conversations. The collections are opened at once, and read later.
+
+    Raises:
+        ValueError: there is no such dialect, or a directory holds no collection.
+    """
+    from er_gym.data.collection import Collection
+    from er_gym.data.dialects import load_dialect
+
+    words = load_dialect(dialect)
+    opened = [Collection.open(path) for path in collections]
+    return (
+        turn.text
+        for collection in opened
+        for trajectory in collection.trajectories()
+        for turn in words.chat(trajectory).turns
+    )

@@ -1,0 +1,1 @@
+"""The paper's ladder: collect, imitate, explore, reflect, and measure after each stage."""

@@ -1,0 +1,212 @@
+"""The phases of a ladder: each is a command of er-gym's with the directory that it writes."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from agents.finetune.settings import STAGES, Stage
+from benchmarks.ladder.settings import LadderSettings, StageSettings
+
+BASE = "base"
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A step of a ladder.
+
+    Attributes:
+        name: unique, such as ``2-exploration/sample``.
+        command: the arguments of ``er-gym``.
+        out: the directory that it writes, relative to the ladder's.
+    """
+
+    name: str
+    command: tuple[str, ...]
+    out: str
+
+    def __str__(self) -> str:
+        return shlex.join(("er-gym", *self.command))
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A model that is measured.
+
+    Attributes:
+        name: ``base``, or the stage that made it.
+        faults: the rate of faults.
+        run: the run directory of its evaluation, relative to the ladder's.
+    """
+
+    name: str
+    faults: float
+    run: str
+
+
+def phases(settings: LadderSettings, root: Path) -> list[Phase]:
+    """All phases in order.
+
+    Args:
+        settings: of the ladder.
+        root: its directory.
+    """
+    return list(_Plan(settings, root).phases())
+
+
+def rungs(settings: LadderSettings) -> list[Rung]:
+    """The evaluations in order."""
+    names = [name for name in (BASE, *settings.stages) if name != BASE or settings.evaluation.base]
+    found = [Rung(name, 0.0, _evaluation(name, 0.0)) for name in names]
+    for rate in settings.evaluation.faults:
+        found += [
+            Rung(name, rate, _evaluation(name, rate))
+            for name in settings.stages
+            if name != STAGES[0]
+        ]
+    return found
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Makes the commands. Every path in them begins with the ladder's directory."""
+
+    settings: LadderSettings
+    root: Path
+
+    def phases(self) -> Iterator[Phase]:
+        settings = self.settings
+        model = settings.base.model or self._at(BASE)
+        learnt_before: list[str] = []
+        before = BASE
+        for stage, row in settings.stages.items():
+            data = []
+            for phase in self._data(stage, row, model):
+                if phase.command[0] == "collect":
+                    data.append(phase.out)
+                yield phase
+            if before == BASE:
+                if settings.base.architecture:
+                    yield self._new_model(data)
+                if settings.evaluation.base:
+                    yield self._evaluate(BASE, model, 0.0)
+            yield self._finetune(stage, row, model, [*learnt_before * row.again, *data])
+            learnt_before += data
+            model, before = self._at(_stage(stage)), stage
+            yield self._evaluate(stage, model, 0.0)
+            if stage != STAGES[0]:
+                for rate in settings.evaluation.faults:
+                    yield self._evaluate(stage, model, rate)
+
+    def _data(self, stage: Stage, row: StageSettings, model: str) -> Iterator[Phase]:
+        number = _stage(stage)
+        if row.sample is not None:
+            sample, run = row.sample, f"samples/{number}"
+            faults = ("--faults", str(sample.faults)) if sample.faults else ()
+            yield self._phase(
+                f"{number}/sample",
+                run,
+                *self._bench(model, self.settings.suite, sample.tasks),
+                *("--samples", str(sample.samples)),
+                *faults,
+                *_overrides(
+                    f"sampling.temperature={sample.temperature}", f"sampling.top_p={sample.top_p}"
+                ),
+            )
+            corrects = stage == "reflection"
+            yield self._phase(
+                f"{number}/{'correct' if corrects else 'select'}",
+                f"data/{number}-{'corrected' if corrects else 'selected'}",
+                "collect",
+                *("--correct" if corrects else "--select", self._at(run)),
+                *self._collecting(sample.limit),
+            )
+        if row.collect is not None:
+            yield self._phase(
+                f"{number}/collect",
+                f"data/{number}",
+                *("collect", "--suite", self.settings.suite),
+                *("--parts", ",".join(row.collect.parts)),
+                *self._instances,
+                *self._collecting(row.collect.limit),
+            )
+
+    def _collecting(self, limit: int | None) -> tuple[str, ...]:
+        settings = self.settings
+        return (
+            *("--language", settings.language, "--seed", str(settings.seed)),
+            *("--workers", str(settings.workers)),
+            *(() if limit is None else ("--limit", str(limit))),
+        )
+
+    def _new_model(self, data: Sequence[str]) -> Phase:
+        return self._phase(
+            "base/new-model",
+            BASE,
+            *("new-model", self.settings.base.architecture),
+            *self._data_options(data),
+            *("--dialect", self.settings.dialect, "--seed", str(self.settings.seed)),
+        )
+
+    def _finetune(self, stage: Stage, row: StageSettings, model: str, data: Sequence[str]) -> Phase:
+        return self._phase(
+            f"{_stage(stage)}/finetune",
+            _stage(stage),
+            *("finetune", "--config", row.finetune, "--model", model),
+            *self._data_options(data),
+            *_overrides(
+                f"data.dialect={self.settings.dialect}",
+                f"training.seed={self.settings.seed}",
+                "data.parts=[]",
+                *row.set,
+            ),
+        )
+
+    def _evaluate(self, name: str, model: str, faults: float) -> Phase:
+        evaluation = self.settings.evaluation
+        out = _evaluation(name, faults)
+        return self._phase(
+            out,
+            out,
+            *self._bench(model, evaluation.suite, evaluation.limit),
+            *(("--faults", str(faults)) if faults else ()),
+            *_overrides(*evaluation.set),
+        )
+
+    def _bench(self, model: str, suite: str, limit: int | None) -> tuple[str, ...]:
+        settings = self.settings
+        return (
+            *("bench", "--suite", suite, "--agent", f"hf:{model}"),
+            *(() if limit is None else ("--limit", str(limit))),
+            *self._instances,
+            *("--seed", str(settings.seed), "--concurrency", str(settings.concurrency)),
+            *_overrides(*settings.play),
+        )
+
+    @property
+    def _instances(self) -> tuple[str, ...]:
+        return ("--instances", self.settings.instances) if self.settings.instances else ()
+
+    def _data_options(self, data: Sequence[str]) -> tuple[str, ...]:
+        return tuple(each for one in data for each in ("--data", self._at(one)))
+
+    def _phase(self, name: str, out: str, *command: str) -> Phase:
+        return Phase(name, (*command, "--out", self._at(out)), out)
+
+    def _at(self, out: str) -> str:
+        return str(self.root / out)
+
+
+def _overrides(*settings: str) -> tuple[str, ...]:
+    return tuple(each for one in settings for each in ("--set", one))
+
+
+def _stage(stage: Stage) -> str:
+    return f"{STAGES.index(stage) + 1}-{stage}"
+
+
+def _evaluation(name: str, faults: float) -> str:
+    number = STAGES.index(name) + 1 if name in STAGES else 0
+    return f"evaluations/{number}-{name}" + (f"-faults-{faults:g}" if faults else "")

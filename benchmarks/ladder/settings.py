@@ -1,0 +1,167 @@
+"""The settings of a ladder: one validated YAML file, ``configs/ladder/NAME.yaml``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from agents import configs
+from agents.finetune.settings import STAGES, Stage
+from er_gym.data.trajectory import Language
+
+KIND = "ladder"
+_WHAT = "ladder"
+Positive = Annotated[int, Field(gt=0)]
+
+
+class _Settings(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Base(_Settings):
+    """The model at the foot of the ladder; one of the two.
+
+    Attributes:
+        model: a directory, or a name on the Hugging Face hub.
+        architecture: a new model of this architecture (:mod:`agents.finetune.architecture`); its
+            tokenizer is learnt from the first stage's conversations.
+    """
+
+    model: str = ""
+    architecture: str = ""
+
+    @model_validator(mode="after")
+    def _one(self) -> Base:
+        if bool(self.model) == bool(self.architecture):
+            raise ValueError("give either model or architecture")
+        return self
+
+
+class Collected(_Settings):
+    """Trajectories of the data engine for a stage.
+
+    Attributes:
+        parts: of the recipe.
+        limit: how many trajectories.
+    """
+
+    parts: tuple[str, ...]
+    limit: Positive
+
+
+class Sampled(_Settings):
+    """Episodes of the last stage's model, from which the stage learns.
+
+    Attributes:
+        tasks: how many tasks of the suite.
+        samples: how many episodes of each.
+        temperature, top_p: of the model's replies.
+        faults: the rate at which actions fail (:mod:`er_gym.envs.faults`).
+        limit: the most trajectories that are taken; None for all.
+    """
+
+    tasks: Positive
+    samples: Positive = 1
+    temperature: float = Field(1.0, ge=0)
+    top_p: float = Field(1.0, gt=0, le=1)
+    faults: float = Field(0.0, ge=0, le=1)
+    limit: Positive | None = None
+
+
+class StageSettings(_Settings):
+    """One stage.
+
+    Attributes:
+        collect: what the data engine adds; None for nothing.
+        sample: what the model of the stage before adds: its successes in the second stage, its
+            corrected failures in the third; None for nothing.
+        again: whether the data of earlier stages is learnt from once more.
+        finetune: a fine-tuning configuration.
+        set: overrides of it.
+    """
+
+    collect: Collected | None = None
+    sample: Sampled | None = None
+    again: bool = False
+    finetune: str
+    set: tuple[str, ...] = ()
+
+
+class Evaluation(_Settings):
+    """How each rung is measured.
+
+    Attributes:
+        suite: whose rooms the training did not see.
+        limit: how many tasks; None for all.
+        faults: fault rates of further evaluations, after the stages from the second on.
+        base: whether the model at the foot is measured, too.
+        set: overrides of the agent's settings.
+    """
+
+    suite: str = "er-1k"
+    limit: Positive | None = None
+    faults: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
+    base: bool = True
+    set: tuple[str, ...] = ()
+
+
+class LadderSettings(_Settings):
+    """A ladder.
+
+    Attributes:
+        description: for people.
+        base: the model at its foot.
+        suite: the tasks of the training, and the arguments of ``collect`` beside.
+        instances: which object a type name means, ``target`` or ``explore``; "" for the suites' own
+            choice.
+        dialect, language: of the conversations.
+        seed: of everything that is drawn.
+        workers: processes that play.
+        concurrency: conversations at once.
+        play: overrides of the agent's settings whenever it plays.
+        stages: by name, from the first.
+        evaluation: how each rung is measured.
+    """
+
+    description: str = ""
+    base: Base
+    suite: str = "train"
+    instances: str = "explore"
+    dialect: str = "paper"
+    language: Language = "en"
+    seed: int = Field(0, ge=0, lt=2**32)
+    workers: Positive = 2
+    concurrency: Positive = 8
+    play: tuple[str, ...] = ()
+    stages: dict[Stage, StageSettings] = Field(min_length=1)
+    evaluation: Evaluation = Evaluation()
+
+    @model_validator(mode="after")
+    def _in_order(self) -> LadderSettings:
+        if tuple(self.stages) != STAGES[: len(self.stages)]:
+            raise ValueError(
+                f"the stages are {', '.join(self.stages)}; give the first ones of "
+                f"{', '.join(STAGES)}, in this order"
+            )
+        for number, (name, stage) in enumerate(self.stages.items()):
+            if not number and (stage.sample or not stage.collect):
+                raise ValueError(f"{name} has no model before it; let it collect, not sample")
+            if not (stage.collect or stage.sample):
+                raise ValueError(f"{name} learns from nothing; give it collect or sample")
+        return self
+
+
+def ladder_names() -> tuple[str, ...]:
+    """The names of er-gym's own ladders, in alphabetical order."""
+    return configs.names(KIND)
+
+
+def load_ladder(name: str, overrides: Sequence[str] = ()) -> LadderSettings:
+    """Read a ladder from a file of ``configs/ladder`` by name, or from any file by path.
+
+    Raises:
+        ValueError: the file does not exist, or the file or an override is invalid.
+    """
+    return configs.load(LadderSettings, configs.file_of(KIND, name, _WHAT), _WHAT, overrides)

@@ -1,0 +1,36 @@
+"""How much better one run is than another, over the tasks that both played."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from benchmarks.scoring.metrics import Estimate, Score, normal
+
+
+def paired_difference(
+    before: Sequence[Score], after: Sequence[Score], metric: str = "success"
+) -> Estimate:
+    """The mean difference of a metric with its 95 % interval, paired over tasks.
+
+    Pairing takes out how hard each task is, so the interval is narrower than one of two separate
+    means. A task that was played several times counts with its mean.
+
+    Args:
+        before, after: the scores of two runs of the same suite.
+        metric: a field of :class:`~benchmarks.scoring.metrics.Score`.
+
+    Raises:
+        ValueError: the runs have no task in common.
+    """
+    first, second = _by_task(before, metric), _by_task(after, metric)
+    common = [task for task in first if task in second]
+    if not common:
+        raise ValueError("the two runs have no task in common")
+    return normal([second[task] - first[task] for task in common])
+
+
+def _by_task(scores: Sequence[Score], metric: str) -> dict[str, float]:
+    found: dict[str, list[float]] = {}
+    for each in scores:
+        found.setdefault(each.task_id, []).append(float(getattr(each, metric)))
+    return {task: sum(values) / len(values) for task, values in found.items()}

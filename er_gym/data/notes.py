@@ -1,0 +1,94 @@
+"""Notes: thoughts as a short memory, made from what a trajectory records of each turn.
+
+``goal pickup Apple to Fridge; Apple unseen; looked Sink, Shelf; next CounterTop`` says what the
+agent is after, how far it is, where it has looked and where it means to look. The words are a
+dialect's (:mod:`er_gym.data.dialects`). A small model learns such notes; prose is too much for it.
+"""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict
+
+from er_gym.data.knowledge import Knowledge, knowledge_at
+from er_gym.data.trajectory import ThoughtKind, Trajectory
+from er_gym.tasks import verbs
+
+_MOST_PLACES = 4
+"""How many places a note plans to search at most."""
+
+
+class NoteWords(BaseModel):
+    """The words of notes.
+
+    Attributes:
+        goal: what the agent is after, with ``{verb}`` and ``{thing}``; ``to``: the destination,
+            ``{place}``.
+        held, near, view, seen, unseen: how far it is from the thing that it wants now, ``{thing}``:
+            in the hand, within reach, in view, seen before, never seen.
+        looked: where it has looked for it, ``{places}``; ``next``: where it means to look.
+        failed: the action that failed just before, ``{action}``.
+        separator: stands between the parts.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    goal: str
+    to: str
+    held: str
+    near: str
+    view: str
+    seen: str
+    unseen: str
+    looked: str
+    next: str
+    failed: str
+    separator: str = "; "
+
+
+def note(words: NoteWords, trajectory: Trajectory, index: int) -> tuple[ThoughtKind, str]:
+    """The note of a turn, and the kind of thought that it is: a reflection after a failure, a
+    verification before ``end``, otherwise a plan.
+
+    Args:
+        words: the dialect's.
+        trajectory: the trajectory.
+        index: of the turn.
+    """
+    known = knowledge_at(
+        trajectory.turns,
+        index,
+        instruction=trajectory.instruction,
+        language=trajectory.language,
+    )
+    parts: list[str] = []
+    kind: ThoughtKind = "verification" if known.decision.verb == verbs.END else "planning"
+    if known.last is not None and not known.last.success:
+        kind = "reflection"
+        parts.append(words.failed.replace("{action}", str(known.last.action)))
+    subgoal = known.subgoal
+    if subgoal.thing:
+        goal = words.goal.replace("{verb}", subgoal.verb).replace("{thing}", subgoal.thing)
+        if subgoal.place:
+            goal += words.to.replace("{place}", subgoal.place)
+        wanted = subgoal.thing
+        if subgoal.place and known.held == subgoal.thing:
+            wanted = subgoal.place
+        parts += [goal, getattr(words, _how_far(known, wanted)).replace("{thing}", wanted)]
+    for text, places in (
+        (words.looked, [*dict.fromkeys(visit.place for visit in known.visits)]),
+        (words.next, [*dict.fromkeys(known.plan)][:_MOST_PLACES]),
+    ):
+        if places:
+            parts.append(text.replace("{places}", ", ".join(places)))
+    return kind, words.separator.join(parts)
+
+
+def _how_far(known: Knowledge, wanted: str) -> str:
+    """The name of the words that say how far the agent is from what it wants now."""
+    if known.held == wanted:
+        return "held"
+    if wanted in known.interactable:
+        return "near"
+    if wanted in known.in_view:
+        return "view"
+    return "seen" if wanted in known.seen else "unseen"

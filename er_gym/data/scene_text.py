@@ -1,0 +1,174 @@
+"""What an agent perceives in few words, for models without pictures.
+
+``see CounterTop (Apple, Mug away), Fridge closed``: things in brackets lie in or on the thing
+before them. The words are a dialect's (:mod:`er_gym.data.dialects`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+from er_gym.data.trajectory import SeenObject, Turn
+
+
+@dataclass(frozen=True)
+class Perceived:
+    """What an agent perceives before it decides, as :class:`~er_gym.data.trajectory.Turn` has it.
+
+    Attributes:
+        view, views, held, navigable, interactable: see there.
+    """
+
+    view: Sequence[SeenObject] = ()
+    views: Mapping[str, Sequence[SeenObject]] = field(default_factory=dict)
+    held: str = ""
+    navigable: Sequence[str] = ()
+    interactable: Sequence[str] = ()
+
+    @classmethod
+    def at(cls, turn: Turn) -> Perceived:
+        """What was perceived at a turn of a trajectory."""
+        return cls(turn.view, turn.views, turn.held, turn.navigable, turn.interactable)
+
+    @classmethod
+    def of(cls, info: Mapping[str, Any]) -> Perceived:
+        """What the environment's ``info`` says, with the observation ``objects``."""
+        return cls(
+            [SeenObject.of(each) for each in info["object_views"]],
+            {
+                direction: [SeenObject.of(each) for each in views]
+                for direction, views in info.get("object_views_around", {}).items()
+            },
+            info["held"],
+            list(info["navigable"]),
+            list(info["interactable"]),
+        )
+
+
+class SceneWords(BaseModel):
+    """The words for what is perceived.
+
+    Attributes:
+        view: tells the things in view, ``{things}``; ``around``: those seen by looking around, of
+            which none is within reach;
+            ``other``: the types, not told otherwise, that one can navigate to from now on.
+        held: tells what is in the hand, ``{things}``.
+        same: told after an action that has changed nothing of this. ``nothing``: stands where no
+            thing is in view.
+        away: not within reach. ``far``: not even close enough to navigate to. Things without either
+            are within reach.
+        open, closed, on, off: states.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    view: str
+    around: str
+    other: str
+    held: str
+    same: str
+    nothing: str
+    away: str
+    far: str
+    open: str
+    closed: str
+    on: str
+    off: str
+
+
+@dataclass(frozen=True)
+class _Thing:
+    """All objects in view that are told alike."""
+
+    type: str
+    holder: str
+    states: tuple[str, ...]
+
+
+def scene_text(words: SceneWords, now: Perceived, before: Perceived | None, *, stayed: bool) -> str:
+    """What an agent perceives, in lines.
+
+    Objects that would be told alike are told once. After an action on the spot only things that are
+    new or changed are told; after any other, all that are in view, unless nothing has changed.
+
+    Args:
+        words: the dialect's.
+        now: what it perceives.
+        before: what it perceived before its last action; None at first.
+        stayed: whether its last action was done on the spot.
+
+    Returns:
+        the text; ``""`` if nothing has changed.
+    """
+    seen = _things(words, now.view, now)
+    known = [] if before is None else _things(words, before.view, before)
+    told = [each for each in seen if each not in known] if stayed else seen
+    lines: list[str] = []
+    if seen != known or before is None:
+        if told:
+            lines.append(words.view.replace("{things}", _listed(words, told)))
+        elif not seen:
+            lines.append(words.view.replace("{things}", words.nothing))
+    elsewhere = replace(now, interactable=now.navigable)  # nothing there is within reach
+    sides = (each for view in now.views.values() for each in view)
+    ahead = {(each.type, each.holder) for each in seen}
+    around = [
+        each for each in _things(words, sides, elsewhere) if (each.type, each.holder) not in ahead
+    ]
+    if around:
+        lines.append(words.around.replace("{things}", _listed(words, around)))
+    shown = {each.type for each in (*told, *around)}
+    before_known = set() if before is None else {*before.navigable}
+    others = [each for each in now.navigable if each not in before_known | shown]
+    if others:
+        lines.append(words.other.replace("{things}", ", ".join(others)))
+    if now.held and (lines or before is None or now.held != before.held):
+        lines.append(words.held.replace("{things}", now.held))
+    return "\n".join(lines)
+
+
+def _things(words: SceneWords, objects: Iterable[SeenObject], perceived: Perceived) -> list[_Thing]:
+    """The objects, nearest first, those that are told alike only once."""
+    near, walkable = {*perceived.interactable}, {*perceived.navigable}
+
+    def thing(each: SeenObject) -> _Thing:
+        states = []
+        if each.type not in near:
+            states.append(words.away if each.type in walkable else words.far)
+        if each.open is not None:
+            states.append(words.open if each.open else words.closed)
+        if each.toggled is not None:
+            states.append(words.on if each.toggled else words.off)
+        return _Thing(each.type, each.on, tuple(states))
+
+    return [*dict.fromkeys(thing(each) for each in objects)]
+
+
+def _listed(words: SceneWords, told: Sequence[_Thing]) -> str:
+    """The things, each with those in or on it in brackets behind it. A thing that holds others but
+    is not itself told is named without its states."""
+    types = {each.type for each in told}
+    holders = {each.holder: None for each in told if each.holder}
+    all_told = [*told, *(_Thing(each, "", ()) for each in holders if each not in types)]
+    holds: dict[str, _Thing] = {}  # which of the things of a type has the others in or on it
+    for each in sorted(all_told, key=lambda each: words.open not in each.states):
+        if each.type in holders:
+            holds.setdefault(each.type, each)
+    left = dict.fromkeys(all_told)
+
+    def text(one: _Thing) -> str:
+        left.pop(one)
+        said = " ".join((one.type, *one.states))
+        if holds.get(one.type) is not one:
+            return said
+        inside = [text(each) for each in all_told if each in left and each.holder == one.type]
+        return f"{said} ({', '.join(inside)})" if inside else said
+
+    said = [text(each) for each in all_told if each in left and not each.holder]
+    while left:  # types that lie on one another
+        said.append(text(next(iter(left))))
+    return ", ".join(said)

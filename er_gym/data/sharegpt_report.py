@@ -1,0 +1,194 @@
+"""What is in a ShareGPT file, and what is wrong with it."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from er_gym.data.chat import IMAGE, Role
+from er_gym.data.exports.paper import DECISION
+from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
+from er_gym.data.json_items import JsonItems
+from er_gym.envs.actions import Action, parse
+
+ProblemKind: TypeAlias = Literal[
+    "layout", "order", "empty reply", "placeholders", "missing picture", "no decision"
+]
+TOLD: Mapping[ProblemKind, str] = {
+    "layout": "are laid out otherwise",
+    "order": "do not alternate between user and assistant",
+    "empty reply": "have an empty reply",
+    "placeholders": f"have another number of {IMAGE} than of pictures",
+    "missing picture": "name a picture that is not there",
+    "no decision": f"have a reply that does not end in a known action in <{DECISION}>",
+}
+"""How each kind is told, after a number of samples."""
+HARMLESS: frozenset[ProblemKind] = frozenset({"no decision"})
+"""A conversation can be learnt from all the same, but no action can be read from it."""
+_MOST_NAMED = 3
+_DECIDED = re.compile(rf"<{DECISION}>([^<>]*)</{DECISION}>[\s.]*\Z")
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A sample, whatever its columns are called.
+
+    Attributes:
+        id: ``""`` if it has none.
+        roles, texts: of its messages, the system's included.
+        images: the paths of its pictures.
+        train: for each reply whether it is learnt; empty if that is not said.
+        wrong: why it cannot be read; then the rest is empty.
+    """
+
+    id: str = ""
+    roles: tuple[Role, ...] = ()
+    texts: tuple[str, ...] = ()
+    images: tuple[str, ...] = ()
+    train: tuple[bool, ...] = ()
+    wrong: str = ""
+
+    @property
+    def has_feedback(self) -> bool:
+        """Whether the user ever says ``<|feedback|>``: an action could not be done."""
+        said = zip(self.roles, self.texts, strict=True)
+        return any(role == "user" and FEEDBACK_TOKEN in text for role, text in said)
+
+
+@dataclass(frozen=True)
+class Report:
+    """What is in a file.
+
+    Attributes:
+        path: the file.
+        samples, replies, pictures: how many it has, those with problems included.
+        with_feedback: how many samples have ``<|feedback|>``.
+        counts: kind of problem to the number of samples that have it.
+        first: kind of problem to the places and reasons of the first.
+        unsound: how many samples have a problem that is not harmless.
+        harmless: the kinds of problems that are.
+    """
+
+    path: Path
+    samples: int
+    replies: int
+    pictures: int
+    with_feedback: int
+    counts: Mapping[ProblemKind, int]
+    first: Mapping[ProblemKind, tuple[str, ...]]
+    unsound: int
+    harmless: frozenset[ProblemKind] = HARMLESS
+
+    def lines(self) -> list[str]:
+        """The report for people: what there is, then a line for each kind of problem."""
+        lines = [
+            f"{self.path}: {self.samples:,} samples, {self.replies:,} replies, {self.pictures:,} "
+            f"pictures; samples with {FEEDBACK_TOKEN}: {self.with_feedback:,}"
+        ]
+        for kind, count in self.counts.items():
+            lines.append(f"{count:,} {TOLD[kind]}: {'; '.join(self.first[kind])}")
+        return lines
+
+    def in_one_line(self) -> str:
+        """The problems that are not harmless, with the first of each."""
+        told = "; ".join(
+            f"{count:,} {TOLD[kind]} (first: {self.first[kind][0]})"
+            for kind, count in self.counts.items()
+            if kind not in self.harmless
+        )
+        return f"{self.path}: of {self.samples:,} samples, {told or 'none has a problem'}"
+
+
+@dataclass
+class Problems:
+    """Looks at one sample after the other.
+
+    Attributes:
+        harmless: kinds of problems with which a sample is used all the same.
+    """
+
+    harmless: frozenset[ProblemKind] = HARMLESS
+    samples: int = 0
+    replies: int = 0
+    pictures: int = 0
+    with_feedback: int = 0
+    unsound: int = 0
+    counts: Counter[ProblemKind] = field(default_factory=Counter)
+    first: dict[ProblemKind, list[tuple[int, str]]] = field(default_factory=dict)
+
+    def look(self, index: int, sample: Sample, folder: Path) -> bool:
+        """Note what is wrong with a sample, and say whether it can be learnt from."""
+        self.samples += 1
+        self.replies += sample.roles.count("assistant")
+        self.pictures += len(sample.images)
+        self.with_feedback += sample.has_feedback
+        found = dict(_problems(sample, folder))
+        for kind, why in found.items():
+            self.counts[kind] += 1
+            named = self.first.setdefault(kind, [])
+            if len(named) < _MOST_NAMED:
+                named.append((index, why))
+        sound = self.harmless.issuperset(found)
+        self.unsound += not sound
+        return sound
+
+
+def report_of(items: JsonItems, problems: Problems) -> Report:
+    """The report, once all samples were looked at."""
+    return Report(
+        path=items.path,
+        samples=problems.samples,
+        replies=problems.replies,
+        pictures=problems.pictures,
+        with_feedback=problems.with_feedback,
+        counts={kind: problems.counts[kind] for kind in TOLD if problems.counts[kind]},
+        first={
+            kind: tuple(f"item {index} (line {items.line(index)}): {why}" for index, why in named)
+            for kind, named in problems.first.items()
+        },
+        unsound=problems.unsound,
+        harmless=problems.harmless,
+    )
+
+
+def decision(reply: str) -> Action | None:
+    """The action at the end of a reply, None if there is none that is known."""
+    found = _DECIDED.search(reply)
+    return parse(found[1].strip().strip(".")) if found else None
+
+
+def _problems(sample: Sample, folder: Path) -> list[tuple[ProblemKind, str]]:
+    """What is wrong with a sample: at most one of each kind."""
+    if sample.wrong:
+        return [("layout", sample.wrong)]
+    found: list[tuple[ProblemKind, str]] = []
+    first = 1 if sample.roles[0] == "system" else 0
+    for number, role in enumerate(sample.roles[first:]):
+        wanted = "assistant" if number % 2 else "user"
+        if role != wanted:
+            found.append(("order", f"message {number + first} is {role}, not {wanted}"))
+            break
+    else:
+        if sample.roles[-1] != "assistant":
+            found.append(("order", "the last message is not the assistant's"))
+    shown = 0
+    for number, (role, text) in enumerate(zip(sample.roles, sample.texts, strict=True)):
+        places = text.count(IMAGE)
+        shown += places
+        if role != "user" and places:
+            found.append(("layout", f"message {number}, of the {role}, shows a picture"))
+        if role == "assistant" and not text.strip():
+            found.append(("empty reply", f"message {number}"))
+        elif role == "assistant" and decision(text) is None:
+            found.append(("no decision", f"message {number} ends in {text[-40:]!r}"))
+    if shown != len(sample.images):
+        found.append(("placeholders", f"{shown} places, {len(sample.images)} pictures"))
+    for path in sample.images:
+        if not os.path.isfile(folder / path):
+            found.append(("missing picture", f"{folder / path}"[:200]))
+    return list(reversed(found))  # so that of each kind the first is kept

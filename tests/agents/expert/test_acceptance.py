@@ -1,0 +1,101 @@
+"""Which trajectories are taken, and where failed episodes leave the key actions."""
+
+from __future__ import annotations
+
+import pytest
+from episodes_by_hand import make_episode, make_key, make_step
+
+from agents.expert.acceptance import PlayedCourse, rejection
+from agents.expert.corrections import beginning_of
+from er_gym.envs.actions import Action
+from er_gym.rollout.records import EpisodeRecord
+
+KEYS = ("navigate to Sink", "pickup Egg", "end")
+SEARCHED = ("navigate to Bed", *KEYS)
+STUMBLED = ("navigate to Sink", "!pickup Egg", "pickup Egg", "end")
+COURSES = {
+    # kind, mode, actions ("!": not done), and the reason
+    "the key actions": ("b", "", KEYS, ""),
+    "b searched": ("b", "", SEARCHED, "more than the key actions"),
+    "a searched": ("a", "1", SEARCHED, ""),
+    "a found it at once": ("a", "1", KEYS, "nothing was searched"),
+    "c found it at once": ("c", "0", KEYS, "nothing was searched"),
+    "an explorer searched": ("explored", "search", SEARCHED, ""),
+    "an explorer found it at once": ("explored", "search", KEYS, "nothing was searched"),
+    "an explorer may": ("explored", "", KEYS, ""),
+    "refused": ("a", "1", STUMBLED, "an action was refused"),
+    "an explorer was refused": ("explored", "", STUMBLED, "an action was refused"),
+    "an anomaly": ("anomaly", "", STUMBLED, ""),
+    "a repeat": ("anomaly", "", ("navigate to Sink", *KEYS), ""),
+    "no anomaly": ("anomaly", "", KEYS, "nothing went wrong"),
+    "a correction": ("corrected", "", STUMBLED, ""),
+    "five actions": ("a", "1", ("navigate to Bed", *SEARCHED), ""),
+    "six actions": ("a", "1", ("navigate to Bed", "observe", *SEARCHED), "too long"),
+}
+
+
+def course(kind: str, mode: str, actions: tuple[str, ...], *, success: bool = True) -> PlayedCourse:
+    steps = [make_step(text) for text in actions]
+    return PlayedCourse(
+        kind,
+        mode,
+        success,
+        [make_key(text) for text in KEYS],
+        [Action(step.verb, step.object_type) for step in steps],
+        [step.success for step in steps],
+    )
+
+
+@pytest.mark.parametrize("name", COURSES)
+def test_a_course_is_taken_by_its_kind(name: str) -> None:
+    kind, mode, actions, reason = COURSES[name]
+    assert rejection(course(kind, mode, actions), 5) == reason
+
+
+def test_what_failed_is_not_taken() -> None:
+    for kind in ("a", "b", "c", "anomaly", "explored", "corrected"):
+        assert rejection(course(kind, "", KEYS, success=False), 5) == "no success"
+
+
+def failed(*steps: str, earned: int = 0, **more: object) -> EpisodeRecord:
+    """A failed episode, whose first steps earned something."""
+    episode = make_episode(KEYS, steps, **more)  # type: ignore[arg-type]
+    told = [
+        step.model_copy(update={"reward": float(0 < index <= earned)})
+        for index, step in enumerate(episode.steps)
+    ]
+    return episode.model_copy(update={"steps": told})
+
+
+def test_the_first_action_that_earned_nothing_was_wrong() -> None:
+    for steps, earned in (
+        (("pickup Bowl", "end"), 0),
+        (("navigate to Sink", "pickup Bowl", "end"), 1),
+        (("navigate to Sink", "!pickup Egg", "end"), 1),
+        (("navigate to Sink", "navigate to Sink", "pickup Egg"), 1),
+    ):
+        beginning = beginning_of(failed(*steps, earned=earned))
+        assert beginning.problem == ""
+        assert beginning.first_wrong == earned
+        wanted = [make_step(text) for text in steps[: earned + 1]]
+        assert list(beginning.actions) == [Action(one.verb, one.object_type) for one in wanted]
+
+
+def test_some_episodes_cannot_be_corrected() -> None:
+    won = failed(*KEYS, earned=3).model_copy(update={"success": True})
+    garbled = failed("navigate to Sink", "error", "pickup Egg", earned=1)
+    appended = failed("navigate to Sink", "end", earned=1)
+    last = appended.steps[-1].model_copy(update={"appended": True})
+    for episode, problem in (
+        (won, "the episode succeeded"),
+        (failed("pickup Bowl", error="boom"), "the episode crashed"),
+        (failed("end"), "it ended too early"),
+        (appended, "it ended too early"),
+        (appended.model_copy(update={"steps": [*appended.steps[:-1], last]}), "ended too early"),
+        (garbled, "its first wrong reply names no action"),
+        (failed("navigate to Sink", earned=1, end_reason="max_steps"), "nothing was wrong before"),
+        (failed(), "nothing was wrong before"),
+    ):
+        beginning = beginning_of(episode)
+        assert problem in beginning.problem
+        assert beginning.actions == ()

@@ -1,0 +1,162 @@
+"""The ladder: its phases are commands that exist, and each is run once, whatever happens."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from agents.finetune.settings import load_settings
+from benchmarks.cli.main import cli
+from benchmarks.ladder.climb import LADDER, LadderRecord, climb
+from benchmarks.ladder.phases import Phase, phases, rungs
+from benchmarks.ladder.settings import ladder_names, load_ladder
+
+for package in ("torch", "transformers", "peft", "tensorboard"):
+    pytest.importorskip(package, reason="needs the extra finetune")
+
+SMALL = {
+    "base": {"architecture": "tiny-text"},
+    "dialect": "text",
+    "suite": "mini",
+    "workers": 1,
+    "play": ["sampling.max_tokens=60"],
+    "stages": {
+        "imitation": {
+            "collect": {"parts": ["imitation"], "limit": 3},
+            "finetune": "tiny",
+            "set": ["stage=imitation", "training.epochs=1"],
+        },
+        "exploration": {
+            "collect": {"parts": ["exploration"], "limit": 2},
+            "finetune": "tiny",
+            "again": True,
+            "set": ["stage=exploration", "after=imitation", "training.epochs=1"],
+        },
+        "reflection": {
+            "collect": {"parts": ["anomalies"], "limit": 2},
+            "finetune": "tiny",
+            "set": ["stage=reflection", "after=exploration", "training.epochs=1"],
+        },
+    },
+    "evaluation": {"suite": "mini", "limit": 1, "base": False},
+}
+"""Too small for its own successes: the data engine gives what the second stage learns. What a run's
+successes and failures become is tested in tests/agents/expert/test_selecting.py."""
+
+
+def parsed(phase: Phase) -> None:
+    """Let click parse a phase's command, as far as it goes without running it."""
+    name, *arguments = phase.command
+    command = cli.commands[name]
+    command.make_context(name, [*arguments])
+
+
+@pytest.mark.parametrize("name", ladder_names())
+def test_the_phases_are_commands_that_exist(name: str, tmp_path: Path) -> None:
+    settings = load_ladder(name)
+    plan = phases(settings, tmp_path)
+    names = [phase.name for phase in plan]
+    assert len(set(names)) == len(names)
+    for phase in plan:
+        for place in (tmp_path / each for each in ("data", "samples")):
+            place.mkdir(exist_ok=True)
+        for name_of, value in pairwise(phase.command):
+            if name_of in ("--data", "--correct", "--select"):
+                Path(value).mkdir(parents=True, exist_ok=True)
+        parsed(phase)
+    assert {rung.run for rung in rungs(settings)} <= {phase.out for phase in plan}
+    for row in settings.stages.values():
+        load_settings(row.finetune, row.set)
+
+
+def test_each_stage_learns_from_the_model_before(tmp_path: Path) -> None:
+    plan = {phase.name: phase.command for phase in phases(load_ladder("tiny-text"), tmp_path)}
+    first, second, third = (
+        plan[f"{stage}/finetune"] for stage in ("1-imitation", "2-exploration", "3-reflection")
+    )
+    assert option(first, "--model") == [str(tmp_path / "base")]
+    assert option(second, "--model") == [str(tmp_path / "1-imitation")]
+    assert option(third, "--model") == [str(tmp_path / "2-exploration")]
+    sampled = plan["2-exploration/sample"]
+    assert option(sampled, "--agent") == [f"hf:{tmp_path / '1-imitation'}"]
+    corrected = plan["3-reflection/correct"]
+    assert option(corrected, "--correct") == [str(tmp_path / "samples" / "3-reflection")]
+    assert option(corrected, "--out")[0] in option(third, "--data")
+
+
+def option(command: tuple[str, ...], name: str) -> list[str]:
+    return [value for key, value in pairwise(command) if key == name]
+
+
+BAD = {
+    "both": ({"base": {"architecture": "tiny-text", "model": "x"}}, "either model or architecture"),
+    "order": ({"stages": {"exploration": SMALL["stages"]["exploration"]}}, "in this order"),  # type: ignore[index]
+    "nothing": ({"stages": {"imitation": {"finetune": "tiny"}}}, "no model before it"),
+    "unknown": ({"speed": 3}, "speed"),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), BAD.values(), ids=BAD)
+def test_bad_settings_are_told_in_one_line(
+    change: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "ladder.yaml"
+    file.write_text(yaml.safe_dump({**SMALL, **change}), encoding="utf-8")
+    result = CliRunner().invoke(
+        cli, ["ladder", "--config", str(file), "--out", str(tmp_path / "x")]
+    )
+    assert result.exit_code == 2
+    assert message in result.output
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
+    file, root = tmp_path / "ladder.yaml", tmp_path / "ladder"
+    file.write_text(yaml.safe_dump(SMALL), encoding="utf-8")
+    command = [sys.executable, "-m", "benchmarks.cli", "ladder"]
+    command += ["--config", str(file), "--out", str(root)]
+    killed_in = []
+    for phase in ("1-imitation", "evaluations/2-exploration"):
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        deadline = time.monotonic() + 300
+        while not (root / phase).exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+        killed_in.append(len(done(root)))
+    assert killed_in == sorted(set(killed_in))
+    result = CliRunner().invoke(cli, command[3:])
+    assert result.exit_code == 0, result.output
+    settings = load_ladder(str(file))
+    assert done(root) == [phase.name for phase in phases(settings, root)]
+    figures = json.loads((root / "result.json").read_text())
+    assert [rung["name"] for rung in figures["rungs"]] == ["imitation", "exploration", "reflection"]
+    assert figures["rungs"][0]["gain"] is None
+    assert figures["rungs"][2]["tokens"] > 0
+    table = (root / "result.md").read_text()
+    assert "paper: Reasoner" in table
+    before = [each.stat().st_mtime_ns for each in sorted(root.rglob("*.safetensors"))]
+    climb(settings, root, "0", lambda *phase: pytest.fail(f"{phase} runs again"))
+    assert before == [each.stat().st_mtime_ns for each in sorted(root.rglob("*.safetensors"))]
+    other = ["ladder", "--config", str(file), "--set", "seed=3", "--out", str(root)]
+    told = CliRunner().invoke(cli, other)
+    assert told.exit_code == 2
+    assert "holds another ladder: its seed is 0, this one's 3" in told.output
+
+
+def done(root: Path) -> list[str]:
+    file = root / LADDER
+    if not file.exists():
+        return []
+    return [each.name for each in LadderRecord.model_validate_json(file.read_text()).done]
