@@ -325,7 +325,7 @@ def test_bad_input_is_told_in_a_line(
         (
             "--set",
             "data.parts=[imitation]",
-            "no trajectories of the part imitation; it has: played",
+            "no trajectories of the part imitation; it has: mixed",
         ),
         ("--set", "data.dialect=pirate", "there is no dialect 'pirate'"),
         ("--set", "data.max_length=100", "data.max_length 100, and 7 others are too long; set"),
