@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from agents import configs
 from agents.finetune.settings import STAGES, Stage
@@ -138,13 +138,18 @@ class LadderSettings(_Settings):
     stages: dict[Stage, StageSettings] = Field(min_length=1)
     evaluation: Evaluation = Evaluation()
 
-    @model_validator(mode="after")
-    def _in_order(self) -> LadderSettings:
-        if tuple(self.stages) != STAGES[: len(self.stages)]:
+    @field_validator("stages")
+    @classmethod
+    def _in_order(cls, stages: dict[Stage, StageSettings]) -> dict[Stage, StageSettings]:
+        first = STAGES[: len(stages)]
+        if set(stages) != set(first):
             raise ValueError(
-                f"the stages are {', '.join(self.stages)}; give the first ones of "
-                f"{', '.join(STAGES)}, in this order"
+                f"the stages are {', '.join(stages)}; give the first ones of {', '.join(STAGES)}"
             )
+        return {name: stages[name] for name in first}
+
+    @model_validator(mode="after")
+    def _something_to_learn(self) -> LadderSettings:
         for number, (name, stage) in enumerate(self.stages.items()):
             if not number and (stage.sample or not stage.collect):
                 raise ValueError(f"{name} has no model before it; let it collect, not sample")
