@@ -13,7 +13,7 @@ import os
 import re
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -159,7 +159,14 @@ def _train(
     image_token = files.config.image_token_id if files.has_vision else None
     encoder = Encoder(tokenizer, files.template, files.image_processor, image_token, settings.data)
     chats = [encoder.encode(chat) for chat in samples.chats]
-    chats = [chat for chat in chats if chat.learnt_tokens]
+    learnt = [chat for chat in chats if chat.learnt_tokens]
+    if not learnt:  # with the mask `released`, the last reply may come before the feedback
+        raise ValueError(
+            f"{', '.join(manifest.data)}: with data.mask={settings.data.mask} no token of its "
+            f"{len(chats):,} conversations is learnt; give other data or set data.mask"
+        )
+    samples = replace(samples, left_out=samples.left_out + len(chats) - len(learnt))
+    chats = learnt
     check_lengths(chats, settings.data.max_length, ", ".join(manifest.data))
     say(_about(chats, samples))
 
@@ -182,7 +189,8 @@ def _train(
 
     # -- the model: its weights, the token <|feedback|>, and what learns --
     set_seed(settings.training.seed)
-    network = _load(files, settings, dtype)
+    # FSDP keeps weights as they are loaded; DeepSpeed keeps a copy in float32 itself.
+    network = _load(files, settings, "float32" if arguments.fsdp else dtype)
     if is_new:
         add_rows(network, tokenizer)
     _freeze(network, settings)

@@ -252,7 +252,7 @@ def collect(
             "the same command plays them again"
         )
         return CRASHED
-    return 0
+    return 0 if summary.taken else CRASHED
 
 
 def _settings(

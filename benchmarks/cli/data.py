@@ -77,9 +77,15 @@ def stats(collection: Path, layout: str, plots: Path | None, force: bool) -> Non
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="The task file that was played, if it is no bundled suite.",
 )
+@click.option("--suite", help="The suite that was played, if it is package.module:Name.")
 @workers_option
 def verify(
-    collection: Path, pictures: bool, limit: int | None, tasks_file: Path | None, workers: int
+    collection: Path,
+    pictures: bool,
+    limit: int | None,
+    tasks_file: Path | None,
+    suite: str | None,
+    workers: int,
 ) -> int:
     """Replay every trajectory, and say where anything comes out differently.
 
@@ -99,7 +105,7 @@ def verify(
 
     with bad_input():
         opened = _opened(collection)
-        tasks = _tasks(opened, tasks_file)
+        tasks = _tasks(opened, tasks_file, suite)
         number = sum(1 for _ in islice(lines_of(opened), limit))
         opened.parts()
         if not number:
@@ -198,12 +204,17 @@ def _trajectory(collection: Collection, wanted: str) -> Trajectory:
     )
 
 
-def _tasks(collection: Collection, tasks_file: Path | None) -> Sequence[Task]:
-    """The tasks of the suite that was played."""
+def _tasks(
+    collection: Collection, tasks_file: Path | None, suite_name: str | None
+) -> Sequence[Task]:
+    """The tasks of the suite that was played. No module is imported that only the collection names,
+    which may be a stranger's."""
     from er_gym.data.sharegpt_import import SOURCE
     from er_gym.tasks.suites import load_suite, suite_from_file, suite_registry
 
     told = collection.manifest
+    if tasks_file is not None and suite_name is not None:
+        raise BadInput("give --suite or --tasks-file, not both")
     if SOURCE in told.settings:
         raise BadInput(
             f"{collection.path} was imported from a file that does not tell poses and seeds, so "
@@ -211,16 +222,18 @@ def _tasks(collection: Collection, tasks_file: Path | None) -> Sequence[Task]:
         )
     if tasks_file is not None:
         suite = suite_from_file(tasks_file)
+    elif suite_name is not None:
+        suite = load_suite(suite_name)
     elif told.suite in suite_registry().names():
         suite = load_suite(told.suite)
     else:
         raise BadInput(
-            f"{collection.path} was played in tasks of a file, {told.suite!r:.100}; give it with "
-            "--tasks-file"
+            f"{collection.path} was played in tasks of a file or of another package, "
+            f"{told.suite!r:.100}; give them with --tasks-file or --suite"
         )
     if suite.digest != told.suite_digest:
         raise BadInput(
             f"the tasks of {suite.name!r:.100} are not those that {collection.path} was played in; "
-            "give the same file with --tasks-file, or the version of er-gym that collected it"
+            "give the same ones with --tasks-file or --suite, or use the er-gym that collected it"
         )
     return suite.tasks

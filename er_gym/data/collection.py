@@ -18,7 +18,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, BinaryIO, Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -27,7 +27,7 @@ from er_gym.locking import LOCK
 from er_gym.rollout.run_directory import EPISODES, RunDirectory, RunDirectoryError
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.reading import read_bytes, read_text
-from er_gym.writing import file_stem, make_folder, write_atomic
+from er_gym.writing import CannotWrite, file_stem, make_folder, write_atomic
 
 MANIFEST = "collection.json"
 TRAJECTORIES = "trajectories.jsonl"
@@ -159,6 +159,9 @@ class Collection:
         """Replace ``trajectories.jsonl`` as a whole, and return how many lines it has.
 
         Memory does not grow with their number.
+
+        Raises:
+            CannotWrite: the disk is full, for example; the old file is unchanged.
         """
         draft = self.path / f".{TRAJECTORIES}.draft"
         count = 0
@@ -170,6 +173,10 @@ class Collection:
                 file.flush()
                 os.fsync(file.fileno())
             draft.replace(self.path / TRAJECTORIES)
+        except OSError as error:
+            raise CannotWrite(
+                f"{self.path / TRAJECTORIES}: cannot be written: {error.strerror}"
+            ) from error
         finally:
             draft.unlink(missing_ok=True)
         return count
@@ -178,22 +185,49 @@ class Collection:
         """The trajectories that are taken, in order, one at a time.
 
         Raises:
-            CollectionError: the file is not there, or a line is damaged; the message names it.
+            CollectionError: the file is not there, or a line is damaged or there twice; the message
+                names it.
+        """
+        path = self.path / TRAJECTORIES
+        ids: set[int] = set()
+        with self.open_lines() as file:
+            for number, line in enumerate(file, 1):
+                try:
+                    trajectory = Trajectory.model_validate_json(line)
+                except ValidationError as error:
+                    raise damaged_line(f"{path}:{number}", error) from error
+                if hash(trajectory.id) in ids:
+                    raise CollectionError(
+                        f"{path}:{number}: the trajectory {trajectory.id!r:.300} is there twice; "
+                        f"{_ANEW}"
+                    )
+                ids.add(hash(trajectory.id))
+                yield trajectory
+
+    def open_lines(self) -> BinaryIO:
+        """``trajectories.jsonl``, opened to be read.
+
+        Raises:
+            CollectionError: it is not there, or no file.
         """
         path = self.path / TRAJECTORIES
         try:
-            file = path.open("rb")
+            if path.exists() and not path.is_file():  # reading a pipe would block
+                raise OSError(0, "not a regular file")
+            return path.open("rb")
         except OSError as error:
             raise CollectionError(
                 f"{path} cannot be read ({error.strerror}); er-gym collect writes it when it ends "
                 "or is interrupted: run the same command again"
             ) from error
-        with file:
-            for number, line in enumerate(file, 1):
-                try:
-                    yield Trajectory.model_validate_json(line)
-                except ValidationError as error:
-                    raise CollectionError(f"{path}:{number}: {_first_problem(error)}") from error
+
+
+_ANEW = "the er-gym collect that made the collection writes the file anew"
+
+
+def damaged_line(place: str, error: ValidationError) -> CollectionError:
+    """What to say of a line that is no trajectory."""
+    return CollectionError(f"{place}: {_first_problem(error)}; {_ANEW}")
 
 
 def _difference(theirs: Any, ours: Any, name: str = "") -> str:

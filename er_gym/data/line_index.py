@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from er_gym.data.collection import TRAJECTORIES, Collection, CollectionError
+from er_gym.data.collection import TRAJECTORIES, Collection, damaged_line
 from er_gym.data.trajectory import Trajectory
 
 
@@ -43,20 +43,13 @@ def lines_of(collection: Collection) -> Iterator[Line]:
         CollectionError: the file is not there, or a line is damaged; the message names it.
     """
     path = collection.path / TRAJECTORIES
-    try:
-        file = path.open("rb")
-    except OSError:
-        next(collection.trajectories(), None)  # raises what is to be said
-        return
-    with file:
+    with collection.open_lines() as file:
         offset = 0
         for number, line in enumerate(file, 1):
             try:
                 head = _Head.model_validate_json(line)
             except ValidationError as error:
-                first = error.errors(include_url=False, include_input=False)[0]
-                where = ".".join(map(str, first["loc"])) or "the line"
-                raise CollectionError(f"{path}:{number}: {where}: {first['msg']}") from error
+                raise damaged_line(f"{path}:{number}", error) from error
             yield Line(offset, head.id, head.part, head.scene, head.task_id)
             offset += len(line)
 
@@ -67,13 +60,11 @@ def trajectory_at(collection: Collection, offset: int) -> Trajectory:
     Raises:
         CollectionError: the line is damaged.
     """
-    path = collection.path / TRAJECTORIES
-    with path.open("rb") as file:
+    with collection.open_lines() as file:
         file.seek(offset)
         line = file.readline()
     try:
         return Trajectory.model_validate_json(line)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        where = ".".join(map(str, first["loc"])) or "the line"
-        raise CollectionError(f"{path}, byte {offset}: {where}: {first['msg']}") from error
+        path = collection.path / TRAJECTORIES
+        raise damaged_line(f"{path}, byte {offset}", error) from error

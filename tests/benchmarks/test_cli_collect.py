@@ -205,6 +205,18 @@ def test_failed_episodes_of_a_run_are_corrected(tmp_path: Path, er_gym: ErGym) -
         assert message in told
 
 
+def test_a_collection_of_nothing_is_no_success(tmp_path: Path, er_gym: ErGym) -> None:
+    recipe = tmp_path / "never.yaml"
+    recipe.write_text(
+        "parts: {x: {actor: expert, kinds: {a: 1}, types: {single_search: 2}, most_actions: 1}}"
+    )
+    given = ("--suite", NAME, "--recipe", recipe, "--workers", 1, "--out", tmp_path / "x")
+    code, _, told = er_gym("collect", *given)
+    assert code == 1
+    assert "0 trajectories in " in told
+    assert "x: 2 trajectories of single_search are missing; the tasks yield no more" in told
+
+
 @dataclass(frozen=True)
 class Bad:
     """Options that are refused, and what the line says."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -50,7 +51,7 @@ def test_verify(er_gym: ErGym, path: Path, tmp_path: Path) -> None:
         told["success"] = False
         for turn in told["turns"]:
             turn["feedback"] = "Yes."
-        every += [Trajectory.model_validate(told)] * 3
+        every += [Trajectory.model_validate({**told, "id": f"{one.id}-{n}"}) for n in range(3)]
     copy.write(every)
     code, out, err = er_gym("data", "verify", copy.path, "--no-pictures", "--workers", 1)
     assert code == 1
@@ -124,6 +125,16 @@ def cut(path: Path) -> None:
         file.write('{"format": "er-g')
 
 
+def twice(path: Path) -> None:
+    file = path / "trajectories.jsonl"
+    file.write_text(file.read_text() * 2)
+
+
+def pipe(path: Path) -> None:
+    unwritten(path)
+    os.mkfifo(path / "trajectories.jsonl")
+
+
 def as_it_is(path: Path) -> None:
     pass
 
@@ -149,7 +160,20 @@ BAD = {
         as_it_is,
         "there is no folder",
     ),
-    "tasks of a file": (("verify", "x"), other_suite, "give it with --tasks-file"),
+    "tasks of a file": (("verify", "x"), other_suite, "give them with --tasks-file or --suite"),
+    "both": (
+        ("verify", "x", "--suite", "mini", "--tasks-file", "x/collection.json"),
+        as_it_is,
+        "give --suite or --tasks-file, not both",
+    ),
+    "another suite": (
+        ("verify", "x", "--suite", "er-1k"),
+        as_it_is,
+        "the tasks of 'er-1k' are not those that x was played in",
+    ),
+    "twice": (("stats", "x"), twice, f"trajectories.jsonl:8: the trajectory '{SOAP}' is there tw"),
+    "a pipe": (("stats", "x"), pipe, "cannot be read (not a regular file)"),
+    "a pipe to verify": (("verify", "x"), pipe, "cannot be read (not a regular file)"),
     "other tasks": (("verify", "x"), other_digest, "are not those that x was played in"),
     "damaged part": (("verify", "x"), damaged_part, "is not a run manifest"),
     "unwritten": (("stats", "x"), unwritten, "trajectories.jsonl cannot be read"),

@@ -71,7 +71,7 @@ def test_what_models_wrote_and_cost(collection: Collection, tmp_path: Path) -> N
     cost = Cost(requests=5, prompt_tokens=70, completion_tokens=6, usd=0.25)
     changed = first.model_copy(update={"turns": [turn], "cost": cost, "language": "zh"})
     made = Collection.create(tmp_path / "y", collection.manifest)
-    made.write([changed, changed])
+    made.write([changed, changed.model_copy(update={"id": "another"})])
     found = statistics(made)
     assert found.refused == {"unseen": 2, "side": 4}
     assert found.replaced == 2
@@ -113,7 +113,7 @@ def test_memory_does_not_grow_with_the_collection(collection: Collection, tmp_pa
             )
             for index, turn in enumerate(one.turns)
         ]
-        return one.model_copy(update={"turns": turns})
+        return one.model_copy(update={"turns": turns, "id": f"{one.id}-{number}"})
 
     statistics(collection)  # what is made once, such as tables, does not count
     assert peak(10) < 1.3 * peak(2)

@@ -60,7 +60,7 @@ def test_what_turns_out_otherwise_is_left_out(collection: Collection, tmp_path: 
         [
             first.model_copy(update={"turns": [*first.turns[:-1], wrong]}),
             second.model_copy(update={"turns": [unread, *second.turns[1:]]}),
-            third.model_copy(update={"task_id": "gone"}),
+            third.model_copy(update={"id": "gone~a", "task_id": "gone"}),
             third,
         ]
     )
