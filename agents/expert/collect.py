@@ -318,7 +318,7 @@ class Collector:
         env: dict[str, Any] = dict(self._settings.env)
         if row.faults:
             env["faults"] = row.faults
-        with self._part_directory(part, {**env, "obs_mode": self._players.obs_mode}) as directory:
+        with self._part_directory(part, {**env, "obs_mode": self._obs_mode}) as directory:
             while True:
                 self._choose_enough(strata, env, row.most_actions)
                 if not any(stratum.chosen for stratum in strata):
@@ -330,6 +330,14 @@ class Collector:
                         self._take(directory, stratum, row.most_actions)
                     self.summary.taken = sum(len(one.taken) for one in self._strata.values())
                     self._tell(part, self.summary.taken)
+
+    @property
+    def _obs_mode(self) -> str:
+        """What the players need to observe, without pictures if none are recorded."""
+        modes = self._players.obs_mode.split("+")
+        if self._settings.play.pictures is None:
+            modes.remove("rgb")
+        return "+".join(modes)
 
     def _choose_enough(self, strata: Sequence[Stratum], env: Mapping[str, Any], most: int) -> None:
         """Choose candidates to be played until there are enough, or no more."""

@@ -27,12 +27,12 @@ class PlaySettings:
 
     Attributes:
         kinds: which kinds of thoughts are drawn.
-        pictures: how pictures are encoded.
+        pictures: how pictures are encoded; None to record none.
         language: of the thoughts.
     """
 
     kinds: ThoughtKinds
-    pictures: Pictures
+    pictures: Pictures | None
     language: Language
 
 

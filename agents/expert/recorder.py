@@ -73,7 +73,7 @@ class TrajectoryRecorder:
     Args:
         task: the task.
         header: what the trajectory says of itself.
-        pictures: how pictures are encoded.
+        pictures: how pictures are encoded; None to record none.
         rejects: why a trajectory will not be taken, ``""`` if it will. Only a trajectory that will
             be taken leaves its pictures.
         learn_failures: whether turns whose action was not done are to be learnt from.
@@ -87,7 +87,7 @@ class TrajectoryRecorder:
         self,
         task: Task,
         header: TrajectoryHeader,
-        pictures: Pictures,
+        pictures: Pictures | None,
         rejects: Callable[[Trajectory], str],
         *,
         learn_failures: bool = True,
@@ -217,6 +217,8 @@ class TrajectoryRecorder:
     ) -> list[tuple[str, Picture]]:
         """The pictures of a turn with their directions; none after an action that failed and left
         the view as it was."""
+        if self._pictures is None:
+            return []
         around: Mapping[str, NDArray[np.uint8]] = info.get("views", {})
         if around:
             return [(name, encode(frame, self._pictures)) for name, frame in around.items()]

@@ -37,7 +37,7 @@ class ThinkingAgent:
         header: what the trajectory says of itself.
         kinds: which kinds of thoughts are drawn.
         writer: writes them.
-        pictures: how pictures are encoded.
+        pictures: how pictures are encoded; None to record none.
         seed: of the draws.
         rejects: see :class:`~agents.expert.recorder.TrajectoryRecorder`.
         places: chooses the course's wrong places; what that costs is the trajectory's too.
@@ -54,7 +54,7 @@ class ThinkingAgent:
         header: TrajectoryHeader,
         kinds: ThoughtKinds,
         writer: ThoughtWriter,
-        pictures: Pictures,
+        pictures: Pictures | None,
         seed: int,
         rejects: Callable[[Trajectory], str] = lambda trajectory: "",
         places: PlaceChooser = DrawnPlaces(),  # noqa: B008 (has no state)

@@ -65,17 +65,21 @@ def open_samples(paths: Sequence[Path], settings: DataSettings) -> Samples:
         ValueError: there is nothing to learn from in it, a picture is missing, or the sources are
             in different words.
     """
-    sources = [_opened(path, settings) for path in paths]
+    every_source = {path: _opened(path, settings) for path in paths}
     _check_parts(paths, settings)
-    first = sources[0]
-    for path, source in zip(paths, sources, strict=True):
+    sources = {path: source for path, source in every_source.items() if source.chats}
+    if not sources:
+        names = ", ".join(map(str, paths))
+        raise ValueError(f"{names}: there are no trajectories; give other data")
+    (first_path, first), *others = sources.items()
+    for path, source in others:
         if source.prompts != first.prompts:
             raise ValueError(
-                f"{path} is in other words than {paths[0]}: {_told(source.prompts)}, not "
+                f"{path} is in other words than {first_path}: {_told(source.prompts)}, not "
                 f"{_told(first.prompts)}; set data.dialect and data.language, or train with one "
                 "after the other"
             )
-    every = [(chat, source.folder) for source in sources for chat in source.chats]
+    every = [(chat, source.folder) for source in sources.values() for chat in source.chats]
     every = every[: settings.limit]
     found = every
     if settings.mask == "turns":
@@ -113,8 +117,6 @@ def _of_collection(collection: Collection, settings: DataSettings) -> _Source:
     dialect = load_dialect(settings.dialect)
     wanted = set(settings.parts)
     trajectories = [each for each in collection.trajectories() if not wanted or each.part in wanted]
-    if not trajectories and not wanted:
-        raise ValueError(f"{collection.path} has no trajectories; give another collection")
     trajectories = trajectories[: settings.limit]
     try:
         chats = tuple(dialect.chat(each, settings.language) for each in trajectories)

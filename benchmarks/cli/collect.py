@@ -83,10 +83,20 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
     help="The language of the thoughts.",
 )
 @click.option(
+    "--no-pictures",
+    is_flag=True,
+    help="Record what is seen in words alone, for models that read: many times as fast.",
+)
+@click.option(
     "--correct",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     metavar="RUN",
     help="Correct the failed episodes of a run of er-gym bench; give no --recipe.",
+)
+@click.option(
+    "--allow-empty",
+    is_flag=True,
+    help="With --select and --correct: end well also if no episode can be taken.",
 )
 @with_select_options
 @workers_option
@@ -106,7 +116,9 @@ def collect(
     writer: str,
     thoughts: str,
     language: str,
+    no_pictures: bool,
     correct: Path | None,
+    allow_empty: bool,
     workers: int,
     seed: int,
     expert_options: ExpertOptions,
@@ -149,6 +161,8 @@ def collect(
             expert_options = replace(expert_options, strict_thoughts=False)
         model = ExpertRun.of(expert_options, language)  # type: ignore[arg-type]
         if model is not None:
+            if no_pictures:
+                raise BadInput("--no-pictures is for scripted writers; leave it or --expert out")
             _refuse_misfits(model, writer, kinds, correct)
         asked: Recipe | None = None
         if selection is not None:
@@ -177,13 +191,14 @@ def collect(
             seed=seed,
             writer=writer,
             table=thoughts,
+            has_pictures=not no_pictures,
             stated_too=selection.stated if selection else {},
         )
         if selection is not None:
-            screening, strata = selection.strata(settings.tasks, limit, seed)
+            screening, strata = selection.strata(settings.tasks, limit, seed, allow_empty)
             left_out: dict[str, int] = {}
         else:
-            strata, left_out = _strata(settings, correct, limit, model)
+            strata, left_out = _strata(settings, correct, limit, model, allow_empty)
         make_writer = _make_writer(writer)
     report_set_aside(source.name, fitted.set_aside, fitted.substitutions)
     for reason, number in left_out.items():
@@ -252,7 +267,7 @@ def collect(
             "the same command plays them again"
         )
         return CRASHED
-    return 0 if summary.taken else CRASHED
+    return 0 if summary.taken or allow_empty else CRASHED
 
 
 def _settings(
@@ -267,6 +282,7 @@ def _settings(
     seed: int,
     writer: str,
     table: str,
+    has_pictures: bool,
     stated_too: Mapping[str, Any],
 ) -> tuple[CollectSettings, CollectionManifest]:
     """What decides the trajectories, and the manifest that states it."""
@@ -282,7 +298,7 @@ def _settings(
         env = {**env, **model.env}
     EmbodiedEnv((), **env)  # so that bad arguments are found before any worker starts
     kinds = load_thought_kinds(table)
-    pictures = Pictures(quality=80, min_pixels=1, max_pixels=2**24)
+    pictures = Pictures(quality=80, min_pixels=1, max_pixels=2**24) if has_pictures else None
     stated = corrections_recipe() if recipe is None else recipe
     if model is not None and model.options.decides:
         from agents.expert.decider import model_recipe
@@ -299,7 +315,7 @@ def _settings(
             "writer": writer,
             "language": language,
             "env": dict(env),
-            "pictures": pictures.model_dump(mode="json", include={"format", "quality"}),
+            "pictures": pictures and pictures.model_dump(include={"format", "quality"}),
             **({} if correct is None else {"corrects": _name_of(correct)}),
             **({} if model is None else {"expert": model.stated}),
             **stated_too,
@@ -326,7 +342,11 @@ def _name_of(run: Path) -> str:
 
 
 def _strata(
-    settings: CollectSettings, correct: Path | None, limit: int | None, model: ExpertRun | None
+    settings: CollectSettings,
+    correct: Path | None,
+    limit: int | None,
+    model: ExpertRun | None,
+    allow_empty: bool,
 ) -> tuple[dict[tuple[str, str], Stratum], dict[str, int]]:
     """The candidates, and how many failed episodes are left out, by the reason."""
     from agents.expert.collect import correction_strata, recipe_strata
@@ -341,7 +361,7 @@ def _strata(
                 stratum.sequence = ModelCandidates(stratum.sequence, model.run.name)
         return wanted, {}
     strata, left_out = correction_strata(settings.tasks, RunDirectory.open(correct), limit)
-    if not strata:
+    if not (strata or allow_empty):
         why = "; ".join(f"{number} x {reason}" for reason, number in left_out.items())
         raise BadInput(f"{correct} has no episode that can be corrected ({why or 'it is empty'})")
     return strata, left_out

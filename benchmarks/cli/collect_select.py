@@ -239,18 +239,18 @@ class Selection:
         return {"selects": {"runs": told, **rules, **shares, **own}}
 
     def strata(
-        self, tasks: Sequence[Task], limit: int | None, seed: int
+        self, tasks: Sequence[Task], limit: int | None, seed: int, allow_empty: bool
     ) -> tuple[Screening, dict[tuple[str, str], Stratum]]:
         """What may be taken, and how many of each task type.
 
         Raises:
-            BadInput: nothing may be taken.
+            BadInput: nothing may be taken, and that is not allowed.
         """
         from agents.expert.selection import screen, selection_strata
 
         screening = screen(self.runs, tasks, self.rules, seed)
         strata = selection_strata(screening, self.rules, self.recipe, limit)
-        if not any(stratum.quota for stratum in strata.values()):
+        if not (allow_empty or any(stratum.quota for stratum in strata.values())):
             reasons: dict[str, int] = {}
             for row in screening.yields.values():
                 for reason, number in row.left_out.items():

@@ -120,14 +120,14 @@ class _Plan:
                 f"{number}/{'correct' if corrects else 'select'}",
                 f"data/{number}-{'corrected' if corrects else 'selected'}",
                 "collect",
-                *("--correct" if corrects else "--select", self._at(run)),
+                *("--correct" if corrects else "--select", self._at(run), "--allow-empty"),
                 *self._collecting(sample.limit),
             )
         if row.collect is not None:
             yield self._phase(
                 f"{number}/collect",
                 f"data/{number}",
-                *("collect", "--suite", self.settings.suite),
+                *("collect", "--suite", self.settings.suite, "--recipe", row.collect.recipe),
                 *("--parts", ",".join(row.collect.parts)),
                 *self._instances,
                 *self._collecting(row.collect.limit),
@@ -138,6 +138,7 @@ class _Plan:
         return (
             *("--language", settings.language, "--seed", str(settings.seed)),
             *("--workers", str(settings.workers)),
+            *(() if settings.pictures else ("--no-pictures",)),
             *(() if limit is None else ("--limit", str(limit))),
         )
 

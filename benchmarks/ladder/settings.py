@@ -45,10 +45,12 @@ class Collected(_Settings):
     Attributes:
         parts: of the recipe.
         limit: how many trajectories.
+        recipe: one of ``configs/collections``, or a file.
     """
 
     parts: tuple[str, ...]
     limit: Positive
+    recipe: str = "paper"
 
 
 class Sampled(_Settings):
@@ -117,6 +119,7 @@ class LadderSettings(_Settings):
         instances: which object a type name means, ``target`` or ``explore``; "" for the suites' own
             choice.
         dialect, language: of the conversations.
+        pictures: whether trajectories are recorded with pictures; a model that reads needs none.
         seed: of everything that is drawn.
         workers: processes that play.
         concurrency: conversations at once.
@@ -131,6 +134,7 @@ class LadderSettings(_Settings):
     instances: str = "explore"
     dialect: str = "paper"
     language: Language = "en"
+    pictures: bool = True
     seed: int = Field(0, ge=0, lt=2**32)
     workers: Positive = 2
     concurrency: Positive = 8

@@ -184,7 +184,8 @@ class _Worker:
         elif part not in self._parts:
             problems.append(f"the collection has no part {part!r:.80}")
         else:
-            problems += self._caught(lambda: replay(self._of(part), task, trajectory, self._folder))
+            folder = self._folder if trajectory.pictures else None
+            problems += self._caught(lambda: replay(self._of(part), task, trajectory, folder))
         problems += self._thoughts_checked(trajectory)
         thoughts = sum(len(turn.thoughts) for turn in trajectory.turns)
         return Verdict(
@@ -218,8 +219,9 @@ class _Worker:
         """The environment of a part; that of the part before is closed."""
         if self._env is None or self._part != part:
             self.close()
-            modes = ("rgb", "objects") if self._folder else ("objects",)
-            env = {**self._parts[part].manifest.env, "obs_mode": "+".join(modes)}
+            env = dict(self._parts[part].manifest.env)
+            pictured = self._folder and "rgb" in env["obs_mode"]
+            env["obs_mode"] = "rgb+objects" if pictured else "objects"
             self._part, self._env = part, EmbodiedEnv((), **env)
         return self._env
 

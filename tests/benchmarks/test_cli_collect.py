@@ -86,6 +86,23 @@ def test_what_is_collected(collected: Path) -> None:
     assert_whole(collected)
 
 
+def test_without_pictures_the_rest_is_the_same(
+    collected: Path, tmp_path: Path, er_gym: ErGym
+) -> None:
+    out = tmp_path / "x"
+    collect(out, *PLAIN, "--limit", FEW, "--workers", 1, "--no-pictures")
+    there = {each.id: each for each in trajectories(collected)}
+    for each in trajectories(out):
+        assert not each.pictures
+        before = there[each.id]
+        assert [turn.view for turn in each.turns] == [turn.view for turn in before.turns]
+        assert [turn.action for turn in each.turns] == [turn.action for turn in before.turns]
+    assert not list(out.rglob("*.jpeg"))
+    code, shown, told = er_gym("data", "verify", out, "--suite", NAME)
+    assert code == 0, told
+    assert " 0 pictures" in shown
+
+
 def test_a_collection_grows_and_two_workers_give_what_one_gives(
     collected: Path, tmp_path: Path
 ) -> None:

@@ -30,6 +30,7 @@ SMALL: dict[str, Any] = {
     "dialect": "text",
     "suite": "mini",
     "workers": 1,
+    "pictures": False,
     "play": ["sampling.max_tokens=60"],
     "stages": {
         "imitation": {
@@ -38,12 +39,14 @@ SMALL: dict[str, Any] = {
             "set": ["stage=imitation", "training.epochs=1"],
         },
         "exploration": {
+            "sample": {"tasks": 1, "samples": 2},
             "collect": {"parts": ["exploration"], "limit": 2},
             "finetune": "tiny",
             "again": True,
             "set": ["stage=exploration", "after=imitation", "training.epochs=1"],
         },
         "reflection": {
+            "sample": {"tasks": 1, "faults": 0.2},
             "collect": {"parts": ["anomalies"], "limit": 2},
             "finetune": "tiny",
             "set": ["stage=reflection", "after=exploration", "training.epochs=1"],
@@ -51,8 +54,8 @@ SMALL: dict[str, Any] = {
     },
     "evaluation": {"suite": "mini", "limit": 1, "base": False},
 }
-"""Too small for its own successes: the data engine gives what the second stage learns. What a run's
-successes and failures become is tested in tests/agents/expert/test_selecting.py."""
+"""Every phase is run, but so small a model has no success to learn from: tests/agents/expert/
+test_selecting.py tests what successes become."""
 
 
 def parsed(phase: Phase) -> None:

@@ -403,6 +403,10 @@ def test_bad_input_is_told_in_a_line(run: Path, collected: Path, tmp_path: Path)
     assert "was played with instances 'explore'" in select("--select", run, "--select", explore)
     strange = other("strange", suite="er-1k", suite_digest="1" * 64)
     assert "was played with the tasks of er-1k" in select("--select", run, "--select", strange)
+    nothing = tmp_path / "nothing"
+    table = done("collect", "--select", other("bare"), "--out", nothing, "--allow-empty")
+    assert "What became of the samples" in table
+    assert (nothing / "trajectories.jsonl").read_bytes() == b""
     assert "is given twice" in select("--select", run, "--select", run)
     assert "--correct does not go with --select" in select("--select", run, "--correct", run)
     assert "--kinds does not go with --select" in select("--select", run, "--kinds", "a")
