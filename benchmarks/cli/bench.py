@@ -66,6 +66,11 @@ _directory = Place(file_okay=False, path_type=Path)
 )
 @click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
 @click.option(
+    "--spread",
+    is_flag=True,
+    help="With --limit: take tasks of all types and rooms, not the first ones.",
+)
+@click.option(
     "--samples",
     type=click.IntRange(1, MOST_SAMPLES),
     default=1,
@@ -94,6 +99,7 @@ def bench(
     out: Path | None,
     workers: int,
     limit: int | None,
+    spread: bool,
     samples: int,
     task_ids: tuple[str, ...],
     shard: str | None,
@@ -150,7 +156,12 @@ def bench(
         if aside and not fitted.tasks:
             raise BadInput(f"{asked.name}: no task can be played: {summarise_set_aside(aside)}")
         chosen = select(
-            fitted.tasks, task_ids=split(*task_ids), shard=part, limit=limit, set_aside=aside
+            fitted.tasks,
+            task_ids=split(*task_ids),
+            shard=part,
+            limit=limit,
+            spread=spread,
+            set_aside=aside,
         )
         episodes = episodes_of(chosen, samples)
         out = out or Path("runs") / f"{file_stem(asked.name)}-{file_stem(agent)}"

@@ -180,7 +180,7 @@ class _Plan:
         settings = self.settings
         return (
             *("bench", "--suite", suite, "--agent", f"hf:{model}"),
-            *(() if limit is None else ("--limit", str(limit))),
+            *(() if limit is None else ("--limit", str(limit), "--spread")),
             *self._instances,
             *("--seed", str(settings.seed), "--concurrency", str(settings.concurrency)),
             *_overrides(*settings.play),

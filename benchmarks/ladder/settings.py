@@ -57,7 +57,7 @@ class Sampled(_Settings):
     """Episodes of the last stage's model, from which the stage learns.
 
     Attributes:
-        tasks: how many tasks of the suite.
+        tasks: how many tasks, spread over the suite.
         samples: how many episodes of each.
         temperature, top_p: of the model's replies.
         faults: the rate at which actions fail (:mod:`er_gym.envs.faults`).
@@ -96,7 +96,7 @@ class Evaluation(_Settings):
 
     Attributes:
         suite: whose rooms the training did not see.
-        limit: how many tasks; None for all.
+        limit: how many tasks, spread over the suite; None for all.
         faults: fault rates of further evaluations, after the stages from the second on.
         base: whether the model at the foot is measured, too.
         set: overrides of the agent's settings.

@@ -31,8 +31,7 @@ class Shard:
 
     def __contains__(self, task_id: str) -> bool:
         """Whether a task is in the shard. A hash of its id decides, the same on every machine."""
-        digest = hashlib.sha256(task_id.encode()).digest()
-        return int.from_bytes(digest[:8], "big") % self.count == self.index - 1
+        return _number(task_id) % self.count == self.index - 1
 
 
 def select(
@@ -41,12 +40,15 @@ def select(
     task_ids: Iterable[str] = (),
     shard: Shard | None = None,
     limit: int | None = None,
+    spread: bool = False,
     set_aside: Iterable[SetAsideTask] = (),
 ) -> list[Task]:
     """The tasks to play, in the suite's order.
 
     The selection starts from the named tasks (all tasks if none is named). It keeps those in the
-    shard, and of these the first ``limit``. Tasks that were set aside are never played.
+    shard, and of these the first ``limit``; with ``spread``, the ``limit`` tasks whose ids have the
+    lowest hashes, which are of all types and rooms. A larger limit adds tasks. Tasks that were set
+    aside are never played.
 
     Raises:
         ValueError: the suite has no task of a given id, or all that were named are set aside.
@@ -64,4 +66,12 @@ def select(
         for task in tasks
         if (not wanted or task.id in wanted) and (shard is None or task.id in shard)
     ]
+    if spread and limit is not None:
+        kept = {task.id for task in sorted(chosen, key=lambda task: _number(task.id))[:limit]}
+        return [task for task in chosen if task.id in kept]
     return chosen[:limit]
+
+
+def _number(task_id: str) -> int:
+    """A number that looks random, the same on every machine."""
+    return int.from_bytes(hashlib.sha256(task_id.encode()).digest()[:8], "big")

@@ -121,6 +121,11 @@ def test_the_limit_is_on_what_the_shard_has(tasks):
     whole = [task.id for task in tasks if task.id in shard]
     assert [task.id for task in select(tasks, shard=shard, limit=2)] == whole[:2]
     assert select(tasks, limit=100) == tasks
+    few, more = (select(tasks, limit=limit, spread=True) for limit in (2, 4))
+    assert len(few) == 2
+    assert few != tasks[:2]
+    assert [task for task in more if task in few] == few
+    assert [task for task in tasks if task in more] == more
 
 
 def test_an_unknown_task_is_named(tasks):
