@@ -235,9 +235,25 @@ def write_agent_files(
         for source in (processor_of.path, processor_of.base):
             if (source / name).is_file() and not (folder / name).exists():
                 shutil.copyfile(source / name, folder / name)
+    _write_bounds(folder, agent.get("pictures", {}))
     words = yaml.safe_dump(dict(agent), sort_keys=False, allow_unicode=True)
     write_atomic(folder / AGENT, YAML_MARK + words)
     write_atomic(folder / HISTORY, history.model_dump_json(indent=2) + "\n")
+
+
+def _write_bounds(folder: Path, pictures: Mapping[str, Any]) -> None:
+    """Let the image processor scale pictures as in the training, whatever program loads it."""
+    least, most = pictures.get("model_min_pixels"), pictures.get("model_max_pixels")
+    for name in ("preprocessor_config.json", "processor_config.json"):
+        if least is None or most is None or not (folder / name).is_file():
+            continue
+        told = json.loads(read_bytes(folder / name))
+        found = told.get("image_processor") if name == "processor_config.json" else told
+        if isinstance(found, dict):
+            found.pop("min_pixels", None)
+            found.pop("max_pixels", None)
+            found["size"] = {"shortest_edge": least, "longest_edge": most}
+            write_atomic(folder / name, json.dumps(told, indent=2) + "\n")
 
 
 def settings_as_json(settings: BaseModel) -> dict[str, Any]:

@@ -60,7 +60,7 @@ def recorded_pictures(
     Returns:
         fields of :class:`agents.vlm.settings.Pictures`.
     """
-    stated, env = collection.get("pictures", {}), collection.get("env", {})
+    stated, env = collection.get("pictures") or {}, collection.get("env", {})
     return {
         **{name: stated[name] for name in ("format", "quality") if name in stated},
         **{name: env[name] for name in ("width", "height") if name in env},

@@ -168,12 +168,16 @@ class _Plan:
     def _evaluate(self, name: str, model: str, faults: float) -> Phase:
         evaluation = self.settings.evaluation
         out = _evaluation(name, faults)
+        play = list(evaluation.set)
+        if name == BASE and self.settings.base.architecture:  # no stage has told it how to converse
+            sees = () if self.settings.pictures else ("sees=text",)
+            play = [f"prompts.dialect={self.settings.dialect}", *sees, *play]
         return self._phase(
             out,
             out,
             *self._bench(model, evaluation.suite, evaluation.limit),
             *(("--faults", str(faults)) if faults else ()),
-            *_overrides(*evaluation.set),
+            *_overrides(*play),
         )
 
     def _bench(self, model: str, suite: str, limit: int | None) -> tuple[str, ...]:

@@ -52,7 +52,7 @@ SMALL: dict[str, Any] = {
             "set": ["stage=reflection", "after=exploration", "training.epochs=1"],
         },
     },
-    "evaluation": {"suite": "mini", "limit": 1, "base": False},
+    "evaluation": {"suite": "mini", "limit": 1},
 }
 """Every phase is run, but so small a model has no success to learn from: tests/agents/expert/
 test_selecting.py tests what successes become."""
@@ -147,9 +147,9 @@ def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
     settings = load_ladder(str(file))
     assert done(root) == [phase.name for phase in phases(settings, root)]
     figures = json.loads((root / "result.json").read_text())
-    assert [rung["name"] for rung in figures["rungs"]] == ["imitation", "exploration", "reflection"]
+    assert [rung["name"] for rung in figures["rungs"]] == ["base", *settings.stages]
     assert figures["rungs"][0]["gain"] is None
-    assert figures["rungs"][2]["tokens"] > 0
+    assert figures["rungs"][3]["tokens"] > 0
     table = (root / "result.md").read_text()
     assert "paper: Reasoner" in table
     before = [each.stat().st_mtime_ns for each in sorted(root.rglob("*.safetensors"))]

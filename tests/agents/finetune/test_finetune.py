@@ -134,6 +134,8 @@ def test_eight_trajectories_are_learnt_by_heart(
             name for name in before if torch.equal(before[name], after[name][: len(before[name])])
         }
         assert same == {name for name in before if "visual" in name}
+        eyes = transformers.AutoImageProcessor.from_pretrained(result.path / "model", backend="pil")
+        assert (eyes.size["shortest_edge"], eyes.size["longest_edge"]) == (784, 4704)
     else:
         assert {name.split(".")[-2] for name in after if "lora" in name} == {"lora_A", "lora_B"}
 
