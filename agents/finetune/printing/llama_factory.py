@@ -19,6 +19,7 @@ from agents.finetune.printing.plan import (
     Printed,
     PrintPlan,
     Program,
+    of_transformers,
     zero3,
 )
 from agents.finetune.printing.sources import SourceJob
@@ -65,28 +66,14 @@ def arguments(plan: PrintPlan) -> dict[str, Any]:
         "cutoff_len": data.max_length,
         "mask_history": plan.facts.partly,
         "preprocessing_num_workers": 8,
-        "dataloader_num_workers": 4,
-        "output_dir": OUTPUT,
-        "logging_steps": training.log_every,
-        "save_steps": training.save_every,
-        "save_total_limit": training.keep,
+        **of_transformers(plan),
         "report_to": "tensorboard",
-        "per_device_train_batch_size": training.batch,
-        "gradient_accumulation_steps": training.accumulation,
-        "learning_rate": training.learning_rate,
-        "num_train_epochs": training.epochs,
-        "weight_decay": training.weight_decay,
-        "max_grad_norm": training.max_grad_norm,
-        "lr_scheduler_type": "cosine",
         "warmup_ratio": training.warmup,
         "bf16": plan.half,
-        "seed": training.seed,
         "ddp_timeout": 180_000_000,
     }
     if training.buckets and training.batch > 1:
         found["train_sampling_strategy"] = "group_by_length"
-    if plan.sharded:
-        found["deepspeed"] = ZERO3_FILE
     return found
 
 

@@ -10,11 +10,11 @@ import yaml
 
 from agents.finetune.printing.plan import (
     DATA,
-    OUTPUT,
     ZERO3_FILE,
     Printed,
     PrintPlan,
     Program,
+    of_transformers,
     zero3,
 )
 from agents.finetune.printing.sources import SourceJob
@@ -72,26 +72,12 @@ def arguments(plan: PrintPlan) -> dict[str, Any]:
         "truncation_strategy": "delete",
         "loss_scale": "default",
         "dataset_num_proc": 1,
-        "dataloader_num_workers": 4,
-        "output_dir": OUTPUT,
+        **of_transformers(plan),
         "add_version": False,
-        "logging_steps": training.log_every,
-        "save_steps": training.save_every,
-        "save_total_limit": training.keep,
         "report_to": ["tensorboard"],
-        "per_device_train_batch_size": training.batch,
-        "gradient_accumulation_steps": training.accumulation,
-        "learning_rate": training.learning_rate,
-        "num_train_epochs": training.epochs,
-        "weight_decay": training.weight_decay,
-        "max_grad_norm": training.max_grad_norm,
-        "lr_scheduler_type": "cosine",
         "warmup_ratio": training.warmup,
-        "seed": training.seed,
         "data_seed": training.seed,
     }
-    if plan.sharded:
-        found["deepspeed"] = ZERO3_FILE
     return found
 
 

@@ -83,6 +83,27 @@ class Program:
     write: Callable[[PrintPlan, Path], Printed]
 
 
+def of_transformers(plan: PrintPlan) -> dict[str, Any]:
+    """Arguments of transformers' ``TrainingArguments``, which these programs take by its names."""
+    training = plan.settings.training
+    return {
+        "output_dir": OUTPUT,
+        "logging_steps": training.log_every,
+        "save_steps": training.save_every,
+        "save_total_limit": training.keep,
+        "per_device_train_batch_size": training.batch,
+        "gradient_accumulation_steps": training.accumulation,
+        "learning_rate": training.learning_rate,
+        "num_train_epochs": training.epochs,
+        "weight_decay": training.weight_decay,
+        "max_grad_norm": training.max_grad_norm,
+        "lr_scheduler_type": "cosine",
+        "seed": training.seed,
+        "dataloader_num_workers": 4,
+        **({"deepspeed": ZERO3_FILE} if plan.sharded else {}),
+    }
+
+
 def zero3(plan: PrintPlan) -> dict[str, Any]:
     """DeepSpeed's configuration for ZeRO-3. Transformers fills in what is ``auto``."""
     return {

@@ -10,11 +10,11 @@ import yaml
 
 from agents.finetune.printing.plan import (
     DATA,
-    OUTPUT,
     ZERO3_FILE,
     Printed,
     PrintPlan,
     Program,
+    of_transformers,
     zero3,
 )
 from agents.finetune.printing.sources import SourceJob
@@ -51,30 +51,16 @@ def arguments(plan: PrintPlan) -> dict[str, Any]:
             "lora_target_modules": [targets] if isinstance(targets, str) else list(targets),
         }
     found |= {
-        "output_dir": OUTPUT,
         "max_length": None,  # to cut a conversation would cut pictures
         "remove_unused_columns": False,  # the collator needs the column "train"
         "dataset_kwargs": {"skip_prepare_dataset": True},
-        "logging_steps": training.log_every,
-        "save_steps": training.save_every,
-        "save_total_limit": training.keep,
+        **of_transformers(plan),
         "report_to": ["tensorboard"],
-        "per_device_train_batch_size": training.batch,
-        "gradient_accumulation_steps": training.accumulation,
         "gradient_checkpointing": training.checkpointing,
-        "learning_rate": training.learning_rate,
-        "num_train_epochs": training.epochs,
-        "weight_decay": training.weight_decay,
-        "max_grad_norm": training.max_grad_norm,
-        "lr_scheduler_type": "cosine",
         "warmup_steps": training.warmup,  # below 1, a share of all
         "bf16": plan.half,
-        "seed": training.seed,
         "data_seed": training.seed,
-        "dataloader_num_workers": 4,
     }
-    if plan.sharded:
-        found["deepspeed"] = ZERO3_FILE
     return found
 
 
