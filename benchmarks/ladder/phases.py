@@ -102,13 +102,27 @@ class _Plan:
 
     def _data(self, stage: Stage, row: StageSettings, model: str) -> Iterator[Phase]:
         number = _stage(stage)
+        if row.teacher is not None:
+            teacher, run = row.teacher, f"samples/{number}-teacher"
+            yield self._phase(
+                f"{number}/teacher",
+                run,
+                *self._bench(teacher.agent, self.settings.suite, teacher.tasks),
+                *("--samples", str(teacher.samples), "--workers", str(self.settings.workers)),
+            )
+            yield self._phase(
+                f"{number}/taught",
+                f"data/{number}-taught",
+                *("collect", "--select", self._at(run), "--balance", "none"),
+                *self._collecting(teacher.limit),
+            )
         if row.sample is not None:
             sample, run = row.sample, f"samples/{number}"
             faults = ("--faults", str(sample.faults)) if sample.faults else ()
             yield self._phase(
                 f"{number}/sample",
                 run,
-                *self._bench(model, self.settings.suite, sample.tasks),
+                *self._bench_model(model, self.settings.suite, sample.tasks),
                 *("--samples", str(sample.samples)),
                 *faults,
                 *_overrides(
@@ -175,19 +189,24 @@ class _Plan:
         return self._phase(
             out,
             out,
-            *self._bench(model, evaluation.suite, evaluation.limit),
+            *self._bench_model(model, evaluation.suite, evaluation.limit),
             *(("--faults", str(faults)) if faults else ()),
             *_overrides(*play),
         )
 
-    def _bench(self, model: str, suite: str, limit: int | None) -> tuple[str, ...]:
-        settings = self.settings
+    def _bench(self, agent: str, suite: str, limit: int | None) -> tuple[str, ...]:
         return (
-            *("bench", "--suite", suite, "--agent", f"hf:{model}"),
+            *("bench", "--suite", suite, "--agent", agent),
             *(() if limit is None else ("--limit", str(limit), "--spread")),
             *self._instances,
-            *("--seed", str(settings.seed), "--concurrency", str(settings.concurrency)),
-            *_overrides(*settings.play),
+            *("--seed", str(self.settings.seed)),
+        )
+
+    def _bench_model(self, model: str, suite: str, limit: int | None) -> tuple[str, ...]:
+        return (
+            *self._bench(f"hf:{model}", suite, limit),
+            *("--concurrency", str(self.settings.concurrency)),
+            *_overrides(*self.settings.play),
         )
 
     @property

@@ -72,11 +72,28 @@ class Sampled(_Settings):
     limit: Positive | None = None
 
 
+class Taught(_Settings):
+    """Successful episodes of another agent, from which the stage learns.
+
+    Attributes:
+        agent: as ``er-gym bench`` takes it, such as ``searcher``.
+        tasks: how many tasks, spread over the suite.
+        samples: how many episodes of each.
+        limit: the most trajectories that are taken; None for all.
+    """
+
+    agent: str
+    tasks: Positive
+    samples: Positive = 1
+    limit: Positive | None = None
+
+
 class StageSettings(_Settings):
     """One stage.
 
     Attributes:
         collect: what the data engine adds; None for nothing.
+        teacher: what another agent adds; None for nothing.
         sample: what the model of the stage before adds: its successes in the second stage, its
             corrected failures in the third; None for nothing.
         again: whether the data of earlier stages is learnt from once more.
@@ -85,6 +102,7 @@ class StageSettings(_Settings):
     """
 
     collect: Collected | None = None
+    teacher: Taught | None = None
     sample: Sampled | None = None
     again: bool = False
     finetune: str
@@ -155,10 +173,10 @@ class LadderSettings(_Settings):
     @model_validator(mode="after")
     def _something_to_learn(self) -> LadderSettings:
         for number, (name, stage) in enumerate(self.stages.items()):
-            if not number and (stage.sample or not stage.collect):
+            if not number and stage.sample:
                 raise ValueError(f"{name} has no model before it; let it collect, not sample")
-            if not (stage.collect or stage.sample):
-                raise ValueError(f"{name} learns from nothing; give it collect or sample")
+            if not (stage.collect or stage.teacher or stage.sample):
+                raise ValueError(f"{name} learns from nothing; give it collect, teacher or sample")
         return self
 
 

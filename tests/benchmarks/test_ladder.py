@@ -35,6 +35,7 @@ SMALL: dict[str, Any] = {
     "stages": {
         "imitation": {
             "collect": {"parts": ["imitation"], "limit": 3},
+            "teacher": {"agent": "searcher", "tasks": 2},
             "finetune": "tiny",
             "set": ["stage=imitation", "training.epochs=1"],
         },
@@ -108,7 +109,7 @@ BAD = {
         {"stages": {"exploration": SMALL["stages"]["exploration"]}},
         "give the first ones of",
     ),
-    "nothing": ({"stages": {"imitation": {"finetune": "tiny"}}}, "no model before it"),
+    "nothing": ({"stages": {"imitation": {"finetune": "tiny"}}}, "learns from nothing"),
     "unknown": ({"speed": 3}, "speed"),
 }
 
