@@ -26,7 +26,7 @@ from agents.vlm.pictures import encode
 from agents.vlm.settings import AgentSettings
 from benchmarks.cli.options import agent_config_option, overrides_option
 
-_WORDS = "see CounterTop (Apple, Mug away, Bread far), Fridge closed, Cabinet open (Plate). "
+_WORDS = "see CounterTop ( Apple, Mug away, Bread far ), Fridge closed, Cabinet open ( Plate ). "
 
 
 @click.command()

@@ -1,6 +1,6 @@
 """What an agent perceives in few words, for models without pictures.
 
-``see CounterTop (Apple, Mug away), Fridge closed``: things in brackets lie in or on the thing
+``see CounterTop ( Apple, Mug away ), Fridge closed``: things in brackets lie in or on the thing
 before them. The words are a dialect's (:mod:`er_gym.data.dialects`).
 """
 
@@ -166,7 +166,8 @@ def _listed(words: SceneWords, told: Sequence[_Thing]) -> str:
         if holds.get(one.type) is not one:
             return said
         inside = [text(each) for each in all_told if each in left and each.holder == one.type]
-        return f"{said} ({', '.join(inside)})" if inside else said
+        # With a space before each name it is the same token everywhere.
+        return f"{said} ( {', '.join(inside)} )" if inside else said
 
     said = [text(each) for each in all_told if each in left and not each.holder]
     while left:  # types that lie on one another

@@ -26,7 +26,7 @@ KITCHEN = Perceived(
     interactable=["Cabinet", "CounterTop", "Egg", "Mug", "Plate"],
 )
 ALL = (
-    "see CounterTop (Mug, Toaster far off), Cabinet closed, Cabinet open (Plate (Egg)), "
+    "see CounterTop ( Mug, Toaster far off ), Cabinet closed, Cabinet open ( Plate ( Egg ) ), "
     "Fridge away closed\nalso Sink"
 )
 
@@ -47,9 +47,9 @@ def test_after_an_action_on_the_spot_only_changes_are_told() -> None:
     ]
     milk = SeenObject(type="Bowl", side="left", distance=5, on="Fridge")
     now = replace(KITCHEN, view=[*opened, milk], held="Apple")
-    assert told(now, KITCHEN, stayed=True) == "see Fridge away open (Bowl far)\nhold Apple"
+    assert told(now, KITCHEN, stayed=True) == "see Fridge away open ( Bowl far )\nhold Apple"
     again = replace(now, view=[*now.view, milk.model_copy(update={"type": "Cup"})])
-    assert told(again, now, stayed=True) == "see Fridge (Cup far)\nhold Apple"
+    assert told(again, now, stayed=True) == "see Fridge ( Cup far )\nhold Apple"
     assert told(KITCHEN, KITCHEN, stayed=True) == ""
 
 
@@ -65,7 +65,7 @@ def test_looking_around_tells_what_is_not_ahead() -> None:
     pillow = SeenObject(type="Pillow", side="ahead", distance=3, on="Sofa")
     views = {"right": [sofa, pillow], "behind": [KITCHEN.view[0]], "left": [sofa]}
     now = replace(KITCHEN, views=views, navigable=[*KITCHEN.navigable, "Sofa", "Bed"])
-    assert told(now, KITCHEN) == "around Sofa (Pillow far)\nalso Bed"
+    assert told(now, KITCHEN) == "around Sofa ( Pillow far )\nalso Bed"
 
 
 def test_things_that_lie_on_one_another_are_all_told() -> None:
@@ -75,7 +75,7 @@ def test_things_that_lie_on_one_another_are_all_told() -> None:
         SeenObject(type="Book", side="ahead", distance=1, on="Book"),
     ]
     now = Perceived(view=view, interactable=["Bowl", "Plate", "Book"])
-    assert told(now) == "see Bowl (Plate), Book"
+    assert told(now) == "see Bowl ( Plate ), Book"
 
 
 def episode(*turns: Turn, actor: str = "expert") -> Trajectory:
