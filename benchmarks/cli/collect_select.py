@@ -325,7 +325,8 @@ def yield_table(yields: Mapping[str, TypeYield]) -> Table:
         ]
         for _, row in lines
     ]
-    sums = [sum(column) for column in zip(*numbers, strict=True)]
+    nothing = [0] * (5 + len(reasons))
+    sums = [sum(column) for column in zip(nothing, *numbers, strict=True)]
     return Table(
         title="What became of the samples",
         head=("", "Tasks", "Solved", "Samples", "Successes", "Kept", *map(_column, reasons)),

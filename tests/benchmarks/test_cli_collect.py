@@ -248,7 +248,7 @@ BAD = {
     "limit": Bad({"limit": 0}, "'--limit': 0 is not in the range x>=1"),
     "no number": Bad({"limit": "all"}, "'--limit': 'all' is not a valid"),
     "workers": Bad({"workers": 0}, "'--workers': 0 is not in the range"),
-    "recipe": Bad({"recipe": "mine"}, "there is no recipe 'mine'; give a YAML file, or one of: p"),
+    "recipe": Bad({"recipe": "mine"}, "there is no recipe 'mine'; give a YAML file, or one of: b"),
     "part": Bad({"parts": "all"}, "unknown part 'all'; the recipe has: imitation, exploration, "),
     "parts": Bad({"parts": ","}, "--parts ',' names nothing"),
     "kind": Bad({"kinds": "d"}, "unknown kind 'd'; the recipe has: a, b, c"),

@@ -159,7 +159,7 @@ def test_a_bad_recipe_is_told_in_one_line(
 
 def test_an_unknown_recipe_is_told_with_the_known_ones(tmp_path: Path) -> None:
     for name in ("nobodys", str(tmp_path), "/dev/null", "/dev/zero"):
-        with pytest.raises(ValueError, match=r"there is no recipe .*one of: paper"):
+        with pytest.raises(ValueError, match=r"there is no recipe .*one of: balanced, paper"):
             load_recipe(name)
 
 
