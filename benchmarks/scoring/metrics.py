@@ -183,8 +183,8 @@ def _wilson(rate: float, n: float) -> Estimate:
     scale = 1 + _Z**2 / n
     centre = (rate + _Z**2 / (2 * n)) / scale
     half = _Z / scale * math.sqrt(rate * (1 - rate) / n + _Z**2 / (4 * n**2))
-    # At the ends the interval touches 0 or 1, but for rounding.
-    return Estimate(rate, max(centre - half, 0.0), min(centre + half, 1.0))
+    # At the ends the interval touches 0 or 1, and so the rate, but for rounding.
+    return Estimate(rate, max(min(centre - half, rate), 0.0), min(max(centre + half, rate), 1.0))
 
 
 def normal(values: Sequence[float]) -> Estimate:

@@ -326,6 +326,9 @@ def test_wilson_at_the_ends():
     full, none = wilson(100, 100), wilson(0, 100)
     assert (full.low, full.high) == pytest.approx((100 / (100 + 1.959964**2), 1.0))
     assert (none.low, none.high) == pytest.approx((0.0, 1 - 100 / (100 + 1.959964**2)))
+    for n in range(1, 400):  # whatever the rounding
+        for estimate in (wilson(0, n), wilson(n, n)):
+            assert estimate.low <= estimate.mean <= estimate.high
 
 
 def test_normal():
