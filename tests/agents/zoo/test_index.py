@@ -53,7 +53,7 @@ def test_an_unknown_name_lists_the_known(name: str) -> None:
 
 
 def test_a_similar_name_is_suggested() -> None:
-    with pytest.raises(ValueError, match=r"did you mean walker\?"):
+    with pytest.raises(ValueError, match=r"did you mean walker or talker\?"):
         make_agent("zoo:walk")
 
 
