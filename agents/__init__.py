@@ -18,6 +18,8 @@ from agents.vlm.factory import (
     load_settings,
     settings_file,
 )
+from agents.zoo.index import PREFIX as ZOO_PREFIX
+from agents.zoo.index import resolved
 from er_gym.plugins import PluginError, Registry, reason
 from er_gym.rollout.agent import Agent, Decision
 from er_gym.tasks.task import Task
@@ -41,7 +43,8 @@ AGENTS: Registry[Callable[..., Agent]] = Registry(
     own={"oracle": OracleAgent, "random": RandomAgent, "searcher": SearcherAgent},
     expected="an agent's class (er_gym.rollout.agent.Agent), or a function that makes an agent",
     fits=callable,
-    others=f"{RL_PREFIX}RUN with a run directory of er-gym train-rl; {agent_name_forms()}",
+    others=f"{RL_PREFIX}RUN with a run directory of er-gym train-rl; {ZOO_PREFIX}NAME with a model "
+    f"that er-gym zoo lists; {agent_name_forms()}",
 )
 """The factories of agents by name. A factory is called with ``seed=`` if it takes a seed, else
 without arguments."""
@@ -49,7 +52,8 @@ without arguments."""
 
 def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
     """Make an agent by name: one of :data:`AGENTS`, ``package.module:Class``, ``rl:RUN`` for a
-    trained policy, or a model agent with default settings (:mod:`agents.vlm.factory`).
+    trained policy, ``zoo:NAME`` for a model of the zoo, or a model agent with default settings
+    (:mod:`agents.vlm.factory`).
 
     Args:
         name: the agent's name.
@@ -60,8 +64,9 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
     Raises:
         ValueError: no agent has this name, or it cannot be made; the message lists the agents.
     """
-    if name.startswith(RL_PREFIX):
-        return _rl_agent(name.removeprefix(RL_PREFIX), trust)
+    behind = resolved(name)
+    if behind.startswith(RL_PREFIX):
+        return _rl_agent(name, behind.removeprefix(RL_PREFIX), trust)
     if is_model_agent(name):
         return _model_agents(name).agent(seed)
     make = AGENTS.get(name)
@@ -112,12 +117,11 @@ def _model_agents(name: str) -> AgentFactory:
     return AgentFactory(name, load_settings(None, (), settings_file(name)))
 
 
-def _rl_agent(path: str, trust: bool) -> Agent:
+def _rl_agent(name: str, path: str, trust: bool) -> Agent:
     try:
         from agents.rl.agent import RLAgent  # late: torch
     except ImportError as error:
         raise ValueError(
-            f"agent {RL_PREFIX}{path} needs {error.name}, which is not installed: "
-            "pip install 'er-gym[rl]'"
+            f"agent {name} needs {error.name}, which is not installed: pip install 'er-gym[rl]'"
         ) from error
     return RLAgent(path, trust)

@@ -37,6 +37,7 @@ MAY_USE = {
     "agents/vlm/clients/padded_batch.py": ("local",),
     "agents/vlm/clients/seeded_sampling.py": ("local",),
     "agents/vlm/merging.py": ("local",),
+    "agents/zoo/packing.py": ("rl",),
     "benchmarks": (),
     "benchmarks/ladder/chart.py": ("charts",),
     "benchmarks/scoring/charts.py": ("charts",),

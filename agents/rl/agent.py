@@ -10,9 +10,9 @@ from typing import Any
 import torch
 
 from agents.rl.config import load_config
-from agents.rl.model_file import MODEL, SB3_MODEL, untrusted_model
+from agents.rl.greedy import GreedyPolicy
+from agents.rl.policy_file import CONFIG, policy_file, untrusted_model
 from agents.rl.policy_observation import PolicyObservation
-from agents.rl.train import ALGORITHMS, CONFIG, load_model
 from er_gym.envs.actions import ACTIONS
 from er_gym.rollout.agent import Decision
 from er_gym.tasks.task import Task
@@ -25,8 +25,8 @@ class RLAgent:
     encoding. From ``info`` it reads the action mask.
 
     Args:
-        path: the run directory, or a model file with its ``config.yaml`` beside it: ``model.npz``
-            or, with ``trust``, a file of Stable-Baselines3.
+        path: the run directory, or a model file with its ``config.yaml`` beside it: ``model.npz``,
+            ``policy.safetensors`` or, with ``trust``, a file of Stable-Baselines3.
         trust: whether a file of Stable-Baselines3, which can run code, may be loaded.
 
     Raises:
@@ -35,14 +35,12 @@ class RLAgent:
     """
 
     def __init__(self, path: str | Path, trust: bool = False) -> None:
-        file = _model_file(Path(path))
+        file = policy_file(Path(path))
         if file.suffix == ".zip" and not trust:
             raise untrusted_model(file)
         config = load_config(file.parent / CONFIG)
-        spec = ALGORITHMS[config.algorithm.name]
-        self._model = _loaded(file, file.stat().st_mtime_ns, trust)
-        self._masks = not spec.needs_mask
-        self._policy_observation = PolicyObservation(config.env, spec.needs_mask)
+        self._policy = _loaded(file, file.stat().st_mtime_ns, trust)
+        self._policy_observation = PolicyObservation(config.env)
         self.obs_mode: str = config.env.obs_mode
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
@@ -56,23 +54,11 @@ class RLAgent:
             self._instruction = None
         else:
             seen = self._policy_observation.observe(obs, info)
-        masks = {"action_masks": info["action_mask"]} if self._masks else {}
-        action, _ = self._model.predict(seen, deterministic=True, **masks)
-        return Decision(ACTIONS[int(action)])
-
-
-def _model_file(path: Path) -> Path:
-    for file in (path, path / MODEL, path / SB3_MODEL):
-        if file.is_file() and (file.name == MODEL or file.suffix == ".zip"):
-            return file
-    raise ValueError(
-        f"there is no trained model {path / MODEL}; give rl: and a directory that er-gym train-rl "
-        "has made"
-    )
+        return Decision(ACTIONS[self._policy.best(seen, info["action_mask"])])
 
 
 @lru_cache(maxsize=4)
-def _loaded(file: Path, changed: int, trust: bool) -> Any:
-    """Load the model of a file; the cache serves many episodes while the file is unchanged."""
+def _loaded(file: Path, changed: int, trust: bool) -> GreedyPolicy:
+    """Load the policy of a file; the cache serves many episodes while the file is unchanged."""
     torch.set_num_threads(1)  # observations come one at a time, and several workers may run
-    return load_model(file, trust, learns=False)
+    return GreedyPolicy.load(file, trust)

@@ -199,10 +199,9 @@ class LegalQRDQN(_Legal, QRDQN):
     """QR-DQN, which learns the distribution of returns, over the legal actions."""
 
 
-def make(config: TrainConfig, settings: DQNSettings, env: VecEnv, **policy: Any) -> BaseAlgorithm:
-    """Make an untrained learner: DQN or QR-DQN, by ``settings.name``; ``policy`` holds more
-    parameters of its policy."""
-    policy_kwargs = {**config.network.model_dump(), **policy}
+def make(config: TrainConfig, settings: DQNSettings, env: VecEnv) -> BaseAlgorithm:
+    """Make an untrained learner: DQN or QR-DQN, by ``settings.name``."""
+    policy_kwargs = config.network.model_dump()
     if settings.name == "qrdqn":
         policy_kwargs["n_quantiles"] = settings.quantiles
     given: dict[str, Any] = {

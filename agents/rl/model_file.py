@@ -15,7 +15,6 @@ import io
 import json
 import zipfile
 from collections import deque
-from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -23,38 +22,25 @@ import gymnasium
 import numpy as np
 import torch
 from gymnasium import spaces
-from numpy.lib import format as npy
 from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
+from agents.rl.policy_file import (
+    ABOUT,
+    FORMAT,
+    MODEL,
+    check_about,
+    read_about,
+    read_tensor,
+    unreadable,
+)
 from er_gym.writing import write_atomic
 
-MODEL = "model.npz"
-SB3_MODEL = "model.zip"
-"""The model file of Stable-Baselines3, which runs of er-gym 0.1.0 hold."""
-_FORMAT = 1
-_ABOUT = "about"
 _COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_n_calls", "exploration_rate")
 """The progress counters of a learner; not every algorithm has all of them."""
-_HEADER = 4096
-"""The largest header of an array in the archive, in bytes."""
-_LONGEST_ABOUT = 1_000_000
 
 Arrays = dict[str, NDArray[Any]]
-
-
-class UntrustedModel(ValueError):
-    """Reading the file can run code; the message says how to allow it."""
-
-
-def untrusted_model(file: Path) -> UntrustedModel:
-    """The error for a file of Stable-Baselines3 without ``trust``."""
-    return UntrustedModel(
-        f"{file} is a file of Stable-Baselines3, and reading it runs whatever code is in it: "
-        "if you know who made it, give --trust (in Python: trust=True); "
-        f"er-gym's own runs hold {MODEL}, which needs no trust"
-    )
 
 
 # -- writing -------------------------------------------------------------------------------------
@@ -64,7 +50,7 @@ def save(model: BaseAlgorithm, run: Path) -> None:
     """Write the model; the file is replaced as a whole."""
     about = np.frombuffer(json.dumps(_about(model)).encode(), np.uint8)
     archive = io.BytesIO()
-    arrays: dict[str, Any] = {_ABOUT: about, **_arrays(model)}
+    arrays: dict[str, Any] = {ABOUT: about, **_arrays(model)}
     np.savez(archive, **arrays)
     write_atomic(run / MODEL, archive.getvalue())
 
@@ -79,7 +65,7 @@ def _arrays(model: BaseAlgorithm) -> Arrays:
 
 def _about(model: BaseAlgorithm) -> dict[str, Any]:
     return {
-        "format": _FORMAT,
+        "format": FORMAT,
         "algorithm": type(model).__name__,
         "sees": _shapes(model.observation_space),
         "actions": int(cast(spaces.Discrete, model.action_space).n),
@@ -109,11 +95,12 @@ def restore(file: Path, model: BaseAlgorithm) -> None:
     """
     try:
         with zipfile.ZipFile(file) as archive:
-            about = json.loads(_array(archive, _ABOUT, _LONGEST_ABOUT).tobytes().decode())
-            _check(about, model)
+            about = read_about(archive)
+            check_about(about, _about(model))
             weights = model.policy.state_dict()
             policy = {
-                name: _tensor(archive, f"policy/{name}", value) for name, value in weights.items()
+                name: read_tensor(archive, f"policy/{name}", value)
+                for name, value in weights.items()
             }
             optimizer = _optimizer(archive, model)
         found: dict[str, Any] = {"policy": policy, "policy.optimizer": optimizer}
@@ -129,37 +116,7 @@ def restore(file: Path, model: BaseAlgorithm) -> None:
         zipfile.BadZipFile, OSError, KeyError, TypeError, ValueError, RuntimeError, MemoryError,
         NotImplementedError, EOFError,
     ) as error:  # fmt: skip
-        why = " ".join(str(error).split()) or type(error).__name__
-        raise ValueError(f"{file} cannot be read as a model: {why}") from error
-
-
-def _check(about: Mapping[str, Any], model: BaseAlgorithm) -> None:
-    wanted = _about(model)
-    for name in ("format", "algorithm", "sees", "actions"):
-        if about[name] != wanted[name]:
-            raise ValueError(
-                f"its {name} is {about[name]}, and {wanted[name]} is needed here; use the er-gym "
-                "that it was trained with, or train again"
-            )
-
-
-def _array(archive: zipfile.ZipFile, name: str, most: int) -> NDArray[Any]:
-    """Read an array of at most ``most`` bytes."""
-    entry = archive.getinfo(f"{name}.npy")
-    if entry.file_size > most + _HEADER:
-        raise ValueError(f"{name} is larger than its weight")
-    with archive.open(entry) as stream:
-        return npy.read_array(stream, allow_pickle=False)
-
-
-def _tensor(archive: zipfile.ZipFile, name: str, like: torch.Tensor) -> torch.Tensor:
-    array = _array(archive, name, like.numel() * like.element_size())
-    wanted = like.detach().cpu().numpy()
-    if array.shape != wanted.shape or array.dtype != wanted.dtype:
-        raise ValueError(
-            f"{name} is {array.dtype} {array.shape}, and {wanted.dtype} {wanted.shape} is needed"
-        )
-    return torch.from_numpy(array)
+        raise unreadable(file, error) from error
 
 
 def _optimizer(archive: zipfile.ZipFile, model: BaseAlgorithm) -> dict[str, Any]:
@@ -174,7 +131,7 @@ def _optimizer(archive: zipfile.ZipFile, model: BaseAlgorithm) -> dict[str, Any]
         if not place.isdecimal() or int(place) >= len(weights):
             raise ValueError(f"{entry} does not belong to a weight")
         like = number if name == "step" else weights[int(place)]
-        state.setdefault(int(place), {})[name] = _tensor(archive, entry[:-4], like)
+        state.setdefault(int(place), {})[name] = read_tensor(archive, entry[:-4], like)
     return {"state": state, "param_groups": model.policy.optimizer.state_dict()["param_groups"]}
 
 
@@ -191,20 +148,3 @@ class _UnplayableEnv(gymnasium.Env[Any, Any]):
 def placeholder_env(sees: spaces.Space[Any], actions: int, count: int) -> VecEnv:
     """Placeholder environments for a learner that only plays, or gets its environments later."""
     return DummyVecEnv([lambda: _UnplayableEnv(sees, spaces.Discrete(actions))] * count)
-
-
-class NoOptimizer:
-    """Stands where a policy has its optimizer, and does nothing: for a policy that only plays.
-
-    torch's optimizers import torch's compiler, which takes longer than all that playing imports.
-    """
-
-    def __init__(self, weights: Iterable[torch.nn.Parameter], **settings: Any) -> None:
-        self.param_groups = [{"params": list(weights)}]
-
-    def state_dict(self) -> dict[str, Any]:
-        """Of nothing."""
-        return {"state": {}, "param_groups": []}
-
-    def load_state_dict(self, state: Mapping[str, Any], strict: bool = True) -> None:
-        """Leave what it says: nothing here would use it."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from sb3_contrib import MaskablePPO
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv
@@ -12,15 +10,15 @@ from agents.rl.config import PPO, TrainConfig
 from agents.rl.policy import TypePolicy
 
 
-def make(config: TrainConfig, settings: PPO, env: VecEnv, **policy: Any) -> MaskablePPO:
-    """Make an untrained learner; ``policy`` holds more parameters of its policy."""
+def make(config: TrainConfig, settings: PPO, env: VecEnv) -> MaskablePPO:
+    """Make an untrained learner."""
     rate = settings.learning_rate
     return MaskablePPO(
         TypePolicy,
         env,
         learning_rate=LinearSchedule(rate, rate * settings.final_learning_rate, 1.0),
         **settings.model_dump(exclude={"name", "learning_rate", "final_learning_rate"}),
-        policy_kwargs={**config.network.model_dump(), **policy},
+        policy_kwargs=config.network.model_dump(),
         seed=config.seed,
         device="cpu",
     )

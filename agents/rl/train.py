@@ -41,22 +41,14 @@ from agents.rl.callbacks import (
 from agents.rl.cloning import clone_behaviour, collect_demonstrations
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, WarmStart, load_config
 from agents.rl.envs import evaluation_config, make_env
-from agents.rl.model_file import (
-    MODEL,
-    SB3_MODEL,
-    NoOptimizer,
-    placeholder_env,
-    restore,
-    save,
-    untrusted_model,
-)
+from agents.rl.model_file import placeholder_env, restore, save
+from agents.rl.policy_file import CONFIG, LEARNERS, MODEL, SB3_MODEL, untrusted_model
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.vec_env import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS
 from er_gym.locking import exclusive_use
 from er_gym.writing import YAML_MARK, is_ours, make_folder, write_atomic
 
-CONFIG = "config.yaml"
 WARM_START = "warm_start.json"
 TENSORBOARD = "tensorboard"
 _OF_A_RUN = (MODEL, SB3_MODEL, CURVE, WARM_START, TENSORBOARD)
@@ -68,18 +60,15 @@ class AlgorithmSpec(NamedTuple):
     """How the learners of an algorithm are made and loaded."""
 
     make: Callable[..., BaseAlgorithm]
-    """Called with the configuration, that of the algorithm and the environments; by keyword, with
-    more parameters of the policy."""
+    """Called with the configuration, that of the algorithm and the environments."""
     model_class: type[BaseAlgorithm]
     """The class that loads a file of Stable-Baselines3, which may run code in it."""
-    needs_mask: bool
-    """Whether the observation must hold the action mask."""
 
 
 ALGORITHMS = {
-    "ppo": AlgorithmSpec(ppo.make, MaskablePPO, needs_mask=False),
-    "dqn": AlgorithmSpec(dqn.make, dqn.LegalDQN, needs_mask=True),
-    "qrdqn": AlgorithmSpec(dqn.make, dqn.LegalQRDQN, needs_mask=True),
+    "ppo": AlgorithmSpec(ppo.make, MaskablePPO),
+    "dqn": AlgorithmSpec(dqn.make, dqn.LegalDQN),
+    "qrdqn": AlgorithmSpec(dqn.make, dqn.LegalQRDQN),
 }
 
 
@@ -278,13 +267,12 @@ def load_last_checkpoint(run: Path, trust: bool = False) -> BaseAlgorithm | None
     return None if file is None else load_model(file, trust)
 
 
-def load_model(file: Path, trust: bool = False, *, learns: bool = True) -> BaseAlgorithm:
+def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
     """Load the learner of a file, with the ``config.yaml`` beside it.
 
     Args:
         file: ``model.npz``; or, with ``trust``, a file of Stable-Baselines3.
         trust: whether a file of Stable-Baselines3, which can run code, may be loaded.
-        learns: False for a learner that only plays; it is loaded faster, and cannot be trained.
 
     Raises:
         UntrustedModel: ``trust`` is False, and the file can run code. (It is a ValueError.)
@@ -295,10 +283,9 @@ def load_model(file: Path, trust: bool = False, *, learns: bool = True) -> BaseA
         raise untrusted_model(file)
     config = load_config(file.parent / CONFIG)
     spec = ALGORITHMS[config.algorithm.name]
-    space = PolicyObservation(config.env, spec.needs_mask).space
+    space = PolicyObservation(config.env, LEARNERS[config.algorithm.name].needs_mask).space
     env = placeholder_env(space, len(ACTIONS), config.vec.envs)
-    policy = {} if learns else {"optimizer_class": NoOptimizer}
-    model = spec.make(config, config.algorithm, env, **policy)
+    model = spec.make(config, config.algorithm, env)
     if not foreign:
         restore(file, model)
         return model
@@ -318,8 +305,8 @@ def load_model(file: Path, trust: bool = False, *, learns: bool = True) -> BaseA
 def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int) -> VecEnv:
     """Make ``config.vec.envs`` environments in worker processes with consecutive seeds; each
     process plays in its share of the rooms."""
-    spec = ALGORITHMS[config.algorithm.name]
-    make = partial(make_env, options, config.algorithm.gamma, spec.needs_mask)
+    needs_mask = LEARNERS[config.algorithm.name].needs_mask
+    make = partial(make_env, options, config.algorithm.gamma, needs_mask)
     env = VecMonitor(WorkerVecEnv([make] * config.vec.envs, config.vec.workers))
     env.seed(seed)
     return env

@@ -11,7 +11,8 @@ from typing import Any
 from agents.vlm.tuned_model import MODEL, RUN
 from er_gym.writing import write_atomic
 
-_STAMP = "merged_from.json"
+STAMP = "merged_from.json"
+"""The file that says what a model was merged from."""
 _COPIED = {".json", ".jinja", ".txt", ".model", ".yaml"}
 _NOT_COPIED = ("adapter", "config.json", "model.safetensors", "pytorch_model")
 """The beginnings of the names of files that are an adapter's own or that come with the weights."""
@@ -51,7 +52,7 @@ def merge(directory: Path) -> Path:
         return directory
     base, adapters = adapter_chain(directory)
     stamp = json.dumps([_files(each) for each in (base, *adapters)])
-    if (target / _STAMP).is_file() and (target / _STAMP).read_text(encoding="utf-8") == stamp:
+    if (target / STAMP).is_file() and (target / STAMP).read_text(encoding="utf-8") == stamp:
         return target
     draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}.draft")
     try:
@@ -61,7 +62,7 @@ def merge(directory: Path) -> Path:
                 if file.suffix in _COPIED and not file.name.startswith(_NOT_COPIED):
                     shutil.copyfile(file, draft / file.name)
         _merged(base, adapters).save_pretrained(draft)
-        write_atomic(draft / _STAMP, stamp)
+        write_atomic(draft / STAMP, stamp)
         old = target.with_name(f"{draft.name}.old")
         if target.exists():
             target.rename(old)

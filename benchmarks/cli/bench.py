@@ -25,6 +25,7 @@ from benchmarks.cli.options import (
     Place,
     Words,
     faults_option,
+    named,
     protocol_option,
     scorer_option,
     seed_option,
@@ -58,7 +59,8 @@ _directory = Place(file_okay=False, path_type=Path)
     "--agent",
     type=Words(),
     required=True,
-    help="The agent: oracle, random, searcher, rl:RUN, openai:MODEL, package.module:Class …",
+    help="The agent: oracle, random, searcher, zoo:NAME, rl:RUN, openai:MODEL, "
+    "package.module:Class …",
 )
 @click.option("--out", type=_directory, help="The run directory.  [default: runs/SUITE-AGENT]")
 @click.option(
@@ -80,6 +82,7 @@ _directory = Place(file_okay=False, path_type=Path)
 @click.option(
     "--task-ids", multiple=True, metavar="ID,…", help="Play these tasks; may be repeated."
 )
+@click.option("--types", metavar="TYPE,…", help="Play only tasks of these types.")
 @click.option("--shard", metavar="I/N", help="Play the I-th of N parts, such as 2/8.")
 @seed_option
 @click.option("--backend", help="The engine: embedded or unity.  [default: the suite's]")
@@ -102,6 +105,7 @@ def bench(
     spread: bool,
     samples: int,
     task_ids: tuple[str, ...],
+    types: str | None,
     shard: str | None,
     seed: int,
     backend: str | None,
@@ -158,6 +162,7 @@ def bench(
         chosen = select(
             fitted.tasks,
             task_ids=split(*task_ids),
+            types=named("--types", types),
             shard=part,
             limit=limit,
             spread=spread,

@@ -26,7 +26,7 @@ from rich.console import Console
 from agents import NamedAgent, make_agent
 from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig, load_config
-from agents.rl.model_file import MODEL, SB3_MODEL
+from agents.rl.policy_file import MODEL, SB3_MODEL
 from agents.rl.policy_observation import IMAGES
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option, trust_option

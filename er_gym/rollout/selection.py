@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from er_gym.tasks.errors import SetAsideTask, summarise_set_aside
 from er_gym.tasks.task import Task
+from er_gym.tasks.types import task_type
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,7 @@ def select(
     tasks: Sequence[Task],
     *,
     task_ids: Iterable[str] = (),
+    types: Iterable[str] = (),
     shard: Shard | None = None,
     limit: int | None = None,
     spread: bool = False,
@@ -45,15 +47,16 @@ def select(
 ) -> list[Task]:
     """The tasks to play, in the suite's order.
 
-    The selection starts from the named tasks (all tasks if none is named). It keeps those in the
-    shard, and of these the first ``limit``; with ``spread``, the ``limit`` tasks whose ids have the
-    lowest hashes, which are of all types and rooms. A larger limit adds tasks. Tasks that were set
-    aside are never played.
+    The selection starts from the named tasks (all tasks if none is named) of the named types (all
+    types if none is named). It keeps those in the shard, and of these the first ``limit``; with
+    ``spread``, the ``limit`` tasks whose ids have the lowest hashes, which are of all types and
+    rooms. A larger limit adds tasks. Tasks that were set aside are never played.
 
     Raises:
-        ValueError: the suite has no task of a given id, or all that were named are set aside.
+        ValueError: the suite has no task of a given id, or all that were named are set aside; or a
+            type is unknown, or no task is of the types.
     """
-    wanted = set(task_ids)
+    wanted, kinds = set(task_ids), {task_type(name).name for name in types}
     aside = [one for one in set_aside if one.task in wanted]
     unknown = wanted.difference((task.id for task in tasks), (one.task for one in aside))
     if aside and len(aside) == len(wanted):
@@ -64,8 +67,15 @@ def select(
     chosen = [
         task
         for task in tasks
-        if (not wanted or task.id in wanted) and (shard is None or task.id in shard)
+        if (not wanted or task.id in wanted)
+        and (not kinds or task.type.name in kinds)
+        and (shard is None or task.id in shard)
     ]
+    if kinds and shard is None and not chosen:
+        there = ", ".join(dict.fromkeys(task.type.name for task in tasks))
+        raise ValueError(
+            f"no task to play is of the types {', '.join(sorted(kinds))}; there are {there}"
+        )
     if spread and limit is not None:
         kept = {task.id for task in sorted(chosen, key=lambda task: _number(task.id))[:limit]}
         return [task for task in chosen if task.id in kept]

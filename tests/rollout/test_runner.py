@@ -25,6 +25,7 @@ from er_gym.rollout.runner import RunSummary
 from er_gym.rollout.selection import Shard, select
 from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.paper_format import read_tasks
+from er_gym.tasks.types import task_type
 
 
 @pytest.fixture
@@ -114,6 +115,17 @@ def test_what_is_no_shard(text):
 def test_select_keeps_the_suites_order(tasks):
     chosen = select(tasks, task_ids=["paper-5", "paper-2"])
     assert [task.id for task in chosen] == ["paper-2", "paper-5"]
+
+
+def test_types_are_chosen(tasks):
+    other = replace(tasks[0], id="other", type=task_type("single_search"))
+    mixed = [*tasks[:3], other]
+    assert select(mixed, types=["single_search"]) == [other]
+    assert select(mixed, types=["ER-SinglePickup-v0"], limit=2) == tasks[:2]
+    with pytest.raises(ValueError, match="unknown task type 'single'; choose one of"):
+        select(mixed, types=["single"])
+    with pytest.raises(ValueError, match=r"long-range .*; there are single_pickup, single_search"):
+        select(mixed, types=["ER-LongRange-v0"])
 
 
 def test_the_limit_is_on_what_the_shard_has(tasks):

@@ -1,6 +1,7 @@
 """The registry of model clients, by the prefix of an agent's name.
 
-An agent ``openai:MODEL`` is the VLM agent with the client ``openai``. A client is a row of
+An agent ``openai:MODEL`` is the VLM agent with the client ``openai``; a language model of the zoo,
+``zoo:NAME``, is one with the client ``hf``. A client is a row of
 :data:`CLIENTS`; other packages add rows with an entry point in the group ``er_gym.model_clients``,
 or name one as ``package.module:ROW:MODEL``.
 """
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from agents.vlm.tuned_model import agent_file
+from agents.zoo.index import resolved
 from er_gym.plugins import PluginError, Registry, is_dotted
 
 if TYPE_CHECKING:
@@ -114,7 +116,7 @@ CLIENTS: Registry[ModelClientSpec] = Registry(
 
 def _split(name: str) -> tuple[str, str]:
     """The client's name and what it opens; ("", "") if the name belongs to no client."""
-    client, colon, opened = name.partition(":")
+    client, colon, opened = resolved(name).partition(":")
     if colon and client not in CLIENTS.names() and is_dotted(client + ":" + opened.split(":")[0]):
         attribute, colon, opened = opened.partition(":")
         client = f"{client}:{attribute}"
@@ -123,7 +125,11 @@ def _split(name: str) -> tuple[str, str]:
 
 
 def is_model_agent(name: str) -> bool:
-    """Whether an agent of this name gets its replies from a model client: ``openai:MODEL``."""
+    """Whether an agent of this name gets its replies from a model client: ``openai:MODEL``.
+
+    Raises:
+        ValueError: the zoo has no model of the name ``zoo:NAME``.
+    """
     return bool(_split(name)[0])
 
 

@@ -19,7 +19,7 @@ from click.testing import CliRunner
 from agents import make_agent
 from agents.rl.agent import RLAgent
 from agents.rl.config import TrainConfig
-from agents.rl.model_file import MODEL, SB3_MODEL, UntrustedModel
+from agents.rl.policy_file import MODEL, SB3_MODEL, UntrustedModel
 from agents.rl.train import CONFIG, load_last_checkpoint, train
 from benchmarks.cli.main import cli
 

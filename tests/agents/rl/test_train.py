@@ -18,7 +18,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from agents.configs import dump
 from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig
-from agents.rl.model_file import MODEL
+from agents.rl.policy_file import MODEL
 from agents.rl.train import RunConflict, load_last_checkpoint, train
 from er_gym.locking import Locked, exclusive_use
 

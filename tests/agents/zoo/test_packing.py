@@ -1,0 +1,192 @@
+"""Folders of models are made from training runs, and take nothing that could run code."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("sb3_contrib", reason="needs the extra rl")
+pytest.importorskip("transformers", reason="needs the extra finetune")
+
+import torch
+from safetensors.torch import load_file, save_file
+from untrained_policy import write_untrained_run
+
+from agents.finetune.architecture import load_architecture
+from agents.finetune.new_model import make_model
+from agents.rl.config import TrainConfig, config_file, load_config
+from agents.zoo import packing
+from agents.zoo.packing import HISTORY, WEIGHTS, new_folder, pack, same_files
+
+SMALL = ("hidden_size=32", "intermediate_size=32", "num_hidden_layers=1")
+STAGE = {
+    "stage": "imitation", "run": "/scratch/me/runs/one", "data": ["/scratch/me/data/x"],
+    "data_digest": "abc", "settings": {}, "conversations": 1200, "updates": 3, "loss": 0.5,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def policy_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("policy") / "run"
+    write_untrained_run(load_config(config_file("single_search"), (), {"seed": 3}), path)
+    return path
+
+
+@pytest.fixture
+def language_run(tmp_path: Path) -> Path:
+    """A finished fine-tuning run of a tiny model, that has learnt nothing."""
+    run = tmp_path / "language"
+    changes = [f"text.{each}" for each in SMALL]
+    made = load_architecture("tiny-text", ["vocabulary=256", *changes])
+    make_model(made, (), run / "model")
+    (run / "finetune.json").write_text("{}")
+    (run / "model" / "agent.yaml").write_text("sees: text\n")
+    told = {"format": "er-gym/finetune-history/1", "runs": [STAGE, {**STAGE, "stage": None}]}
+    (run / "model" / HISTORY).write_text(json.dumps(told))
+    return run
+
+
+def test_a_policy_tells_how_it_was_made(policy_run: Path, tmp_path: Path) -> None:
+    packed = pack(policy_run, tmp_path, "float16")
+    assert packed.kind == "policy"
+    assert packed.made_by == ("er-gym train-rl --config single_search --seed 3",)
+    assert packed.trained_on.startswith("200,000 steps of MaskablePPO on state, seed 3")
+    weights = load_file(tmp_path / "policy.safetensors")
+    assert packed.parameters == sum(each.numel() for each in weights.values()) > 10_000
+
+
+def test_a_policy_of_another_configuration_names_no_command(tmp_path: Path) -> None:
+    config = TrainConfig.model_validate({"total_steps": 8, "network": {"width": 8, "kind": 2}})
+    write_untrained_run(config, tmp_path / "run")
+    (tmp_path / "to").mkdir()
+    assert pack(tmp_path / "run", tmp_path / "to", "float16").made_by == ()
+
+
+def test_a_language_model_is_stored_small_and_played_as_it_was_trained(
+    language_run: Path, tmp_path: Path
+) -> None:
+    from agents.vlm.clients.checkpoint import load
+    from agents.vlm.factory import load_settings
+
+    folder = tmp_path / "to"
+    folder.mkdir()
+    packed = pack(language_run, folder, "float16")
+    assert packed.kind == "language model"
+    assert packed.trained_on == (
+        "imitation: 3 updates on 1,200 conversations; then 3 updates on 1,200 conversations"
+    )
+    whole, half = (load_file(each / WEIGHTS) for each in (language_run / "model", folder))
+    assert {each.dtype for each in half.values()} == {torch.float16}
+    assert packed.parameters == sum(each.numel() for each in half.values())
+    history = (folder / HISTORY).read_text()
+    assert (
+        json.loads(history)["runs"][0] | {"run": "one", "data": ["x"]}
+        == json.loads(history)["runs"][0]
+    )
+    assert "scratch" not in history
+    settings = load_settings(None, ("local.device_map=cpu",), folder / "agent.yaml")
+    played = load(str(folder), settings).model.state_dict()
+    for name, value in half.items():
+        assert played[name].dtype == torch.float32
+        assert torch.equal(played[name], value.float())
+        torch.testing.assert_close(played[name], whole[name], rtol=1e-3, atol=1e-6)
+
+
+def without_weights(run: Path) -> None:
+    (run / "model" / WEIGHTS).unlink()
+
+
+def pickled(run: Path) -> None:
+    torch.save({}, run / "model" / "pytorch_model.bin")
+
+
+def too_large_for_half(run: Path) -> None:
+    weights = load_file(run / "model" / WEIGHTS)
+    save_file({**weights, "more": torch.tensor([1e6])}, run / "model" / WEIGHTS)
+
+
+def unfinished(run: Path) -> None:
+    (run / "model").rename(run / ".model.draft")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (without_weights, "has no model.safetensors"),
+        (pickled, "holds pytorch_model.bin, which may run code"),
+        (too_large_for_half, "float16 does not hold the weights more; give --dtype bfloat16"),
+        (unfinished, "is not finished"),
+    ],
+)
+def test_a_language_model_that_is_not_taken(
+    language_run: Path, tmp_path: Path, change: Callable[[Path], Any], message: str
+) -> None:
+    change(language_run)
+    (tmp_path / "to").mkdir()
+    with pytest.raises(ValueError, match=message):
+        pack(language_run, tmp_path / "to", "float16")
+
+
+def test_a_policy_that_is_not_taken(tmp_path: Path) -> None:
+    config = load_config(config_file("single_search"))
+    write_untrained_run(config, tmp_path / "early", steps=5)
+    with pytest.raises(ValueError, match=r"has 5 of 200,000 steps; run er-gym train-rl again"):
+        pack(tmp_path / "early", tmp_path, "float16")
+    (tmp_path / "early" / "model.npz").rename(tmp_path / "early" / "model.zip")
+    with pytest.raises(ValueError, match="holds pickled objects, which the zoo does not take"):
+        pack(tmp_path / "early", tmp_path, "float16")
+    with pytest.raises(ValueError, match="holds no trained model; give a run directory"):
+        pack(tmp_path, tmp_path, "float16")
+
+
+def test_a_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
+    with new_folder(tmp_path, "one") as draft:
+        (draft / "a.json").write_text("1")
+    with (
+        pytest.raises(FileNotFoundError, match="nowhere"),
+        new_folder(tmp_path, "one") as draft,
+    ):
+        (draft / "nowhere" / "a.json").write_text("2")
+    assert (tmp_path / "one" / "a.json").read_text() == "1"
+    with new_folder(tmp_path, "one") as draft:
+        (draft / "b.json").write_text("2")
+        assert not same_files(draft, tmp_path / "one")
+    assert [each.name for each in tmp_path.rglob("*")] == ["one", "b.json"]
+
+
+@pytest.mark.parametrize("name", ["model.bin", "weights.pkl", "code.py", "notes", "x.json.gz"])
+def test_other_files_are_refused(tmp_path: Path, name: str) -> None:
+    with (
+        pytest.raises(ValueError, match=f"{name} is no file for the zoo"),
+        new_folder(tmp_path, "one") as draft,
+    ):
+        (draft / name).touch()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_link_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "secret.json").touch()
+    with (
+        pytest.raises(ValueError, match=r"a\.json is no file for the zoo"),
+        new_folder(tmp_path, "one") as draft,
+    ):
+        (draft / "a.json").symlink_to(tmp_path / "secret.json")
+
+
+def test_all_models_together_must_stay_small(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(packing, "MOST_BYTES", 100)
+    for _ in range(2):  # a model takes its own place
+        with new_folder(tmp_path, "one") as draft:
+            (draft / "a.txt").write_text("x" * 60)
+    with (
+        pytest.raises(ValueError, match=r"110 bytes together, and 100 are allowed: one 60, two 50"),
+        new_folder(tmp_path, "two") as draft,
+    ):
+        (draft / "a.txt").write_text("x" * 50)
+    assert [each.name for each in tmp_path.iterdir()] == ["one"]
