@@ -6,6 +6,7 @@ policy in the first updates.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -53,9 +54,20 @@ def collect_demonstrations(config: TrainConfig, warm_start: WarmStart, seed: int
 
 
 def clone_behaviour(
-    model: MaskablePPO, demonstrations: Demonstrations, warm_start: WarmStart, seed: int
+    model: MaskablePPO,
+    demonstrations: Demonstrations,
+    warm_start: WarmStart,
+    seed: int,
+    rates: Sequence[float] | None = None,
 ) -> float:
     """Fit policy and value network to demonstrations.
+
+    Args:
+        model: the learner.
+        demonstrations: what it learns.
+        warm_start: the settings.
+        seed: of the order of the steps.
+        rates: the learning rate of each epoch; None for ``warm_start.epochs`` at the first rate.
 
     Returns:
         The share of the teacher's actions in the last epoch that were the policy's best action.
@@ -65,8 +77,9 @@ def clone_behaviour(
     random = np.random.default_rng(seed)
     policy.set_training_mode(True)
     agreed = 0
-    for _ in range(warm_start.epochs):
+    for rate in rates or [warm_start.learning_rate] * warm_start.epochs:
         agreed = 0
+        optimizer.param_groups[0]["lr"] = rate
         for rows in np.array_split(
             random.permutation(len(demonstrations)),
             max(1, len(demonstrations) // warm_start.batch_size),
@@ -76,7 +89,8 @@ def clone_behaviour(
                 {key: all_[rows] for key, all_ in demonstrations.obs.items()}
             )[0]
             actions = torch.as_tensor(demonstrations.actions[rows])
-            masks = torch.as_tensor(demonstrations.masks[rows])
+            legal = demonstrations.masks[rows]
+            masks = torch.as_tensor(legal)
             values, log_prob, _ = policy.evaluate_actions(obs, actions, action_masks=masks)
             worth = torch.as_tensor(demonstrations.returns[rows])
             loss = 0.5 * functional.mse_loss(values.flatten(), worth) - log_prob.mean()
@@ -85,6 +99,6 @@ def clone_behaviour(
             torch.nn.utils.clip_grad_norm_(policy.parameters(), model.max_grad_norm)
             optimizer.step()
             with torch.no_grad():
-                best = policy.get_distribution(obs, demonstrations.masks[rows]).mode()
+                best = policy.get_distribution(obs, legal).mode()
             agreed += int((best == actions).sum())
     return agreed / len(demonstrations)

@@ -42,6 +42,8 @@ class EnvConfig(_Model):
         types: the task types, drawn with equal probability; all types if empty.
         obs_mode: ``state``, with ``rgb`` or ``depth`` or both before it. (``instance`` is not
             offered: its numbers only name objects, so a network cannot calculate with them.)
+        subtasks: whether the policy also observes which subtask of the instruction is at hand, and
+            where it has looked for it (:mod:`agents.rl.subtask_memory`).
         instruction: the encoder of the instruction, as
             :func:`er_gym.envs.wrappers.make_encoder` has it; "" for none, since ``state`` says
             which types it names.
@@ -59,6 +61,7 @@ class EnvConfig(_Model):
     episodes: str = "train"
     types: tuple[str, ...] = ()
     obs_mode: Literal["state", "rgb+state", "depth+state", "rgb+depth+state"] = "state"
+    subtasks: bool = False
     instruction: str = ""
     width: Annotated[int, Field(gt=0, le=2048)] = 128
     height: Annotated[int, Field(gt=0, le=2048)] = 72
@@ -103,6 +106,21 @@ class Phase(_Model):
     _types = field_validator("types")(_known_types)
 
 
+class Practice(_Model):
+    """Rounds of DAgger after cloning: the policy plays, the searcher says what it would have done,
+    and the policy is fitted to all that has been gathered (:mod:`agents.rl.practice`).
+
+    Attributes:
+        rounds: how many.
+        steps: environment steps in a round.
+        epochs: passes over all that has been gathered, after each round.
+    """
+
+    rounds: Positive = 4
+    steps: Positive = 20_000
+    epochs: Positive = 2
+
+
 class WarmStart(_Model):
     """Behaviour cloning before reinforcement learning.
 
@@ -111,6 +129,9 @@ class WarmStart(_Model):
         episodes: the number of its episodes.
         successes_only: whether failed episodes are left out.
         epochs, batch_size, learning_rate: of the supervised training.
+        final_learning_rate: the share of the learning rate that remains at its end.
+        practice: rounds of DAgger that follow; None for none. They need ``env.subtasks``, and
+            ``searcher`` as the teacher.
     """
 
     teacher: Literal["searcher", "oracle"] = "searcher"
@@ -119,6 +140,8 @@ class WarmStart(_Model):
     epochs: Positive = 5
     batch_size: Positive = 512
     learning_rate: Rate = 1e-3
+    final_learning_rate: Fraction = 1.0
+    practice: Practice | None = None
 
 
 class Network(_Model):
@@ -221,6 +244,18 @@ class TrainConfig(_Model):
         if self.warm_start is not None and self.algorithm.name != "ppo":
             raise ValueError(
                 f"warm_start goes with ppo, not with {self.algorithm.name}: leave one out"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _practice_needs_the_searcher(self) -> TrainConfig:
+        if self.warm_start is None or self.warm_start.practice is None:
+            return self
+        if self.warm_start.teacher != "searcher" or not self.env.subtasks:
+            raise ValueError(
+                "warm_start.practice goes with the teacher searcher and env.subtasks=true, not "
+                f"with {self.warm_start.teacher} and {str(self.env.subtasks).lower()}: change "
+                "these, or leave it out"
             )
         return self
 

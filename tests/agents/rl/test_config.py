@@ -81,3 +81,7 @@ def test_what_needs_the_warm_start(file: Path) -> None:
     overrides: list[Any] = ["warm_start.teacher=searcher", "algorithm.name=dqn"]
     with pytest.raises(ValueError, match="warm_start goes with ppo"):
         load_config(file, overrides)
+    overrides = ["warm_start.practice.rounds=1"]
+    with pytest.raises(ValueError, match="practice goes with the teacher searcher"):
+        load_config(file, overrides)
+    load_config(file, [*overrides, "env.subtasks=true"])
