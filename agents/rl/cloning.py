@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import torch
 from sb3_contrib import MaskablePPO
+from sb3_contrib.common.maskable.distributions import MaskableDistribution
 from torch.nn import functional
 
 from agents.rl.config import TrainConfig, WarmStart
@@ -89,16 +90,23 @@ def clone_behaviour(
                 {key: all_[rows] for key, all_ in demonstrations.obs.items()}
             )[0]
             actions = torch.as_tensor(demonstrations.actions[rows])
-            legal = demonstrations.masks[rows]
-            masks = torch.as_tensor(legal)
-            values, log_prob, _ = policy.evaluate_actions(obs, actions, action_masks=masks)
+            distribution, values = _outputs(policy, obs, demonstrations.masks[rows])
             worth = torch.as_tensor(demonstrations.returns[rows])
+            log_prob = distribution.log_prob(actions)
             loss = 0.5 * functional.mse_loss(values.flatten(), worth) - log_prob.mean()
             optimizer.zero_grad()
             loss.backward()
             torch.nn.utils.clip_grad_norm_(policy.parameters(), model.max_grad_norm)
             optimizer.step()
-            with torch.no_grad():
-                best = policy.get_distribution(obs, legal).mode()
-            agreed += int((best == actions).sum())
+            agreed += int((distribution.mode() == actions).sum())
     return agreed / len(demonstrations)
+
+
+def _outputs(policy: Any, obs: Any, legal: Any) -> tuple[MaskableDistribution, torch.Tensor]:
+    """The distribution over actions, and the values (B, 1), in one pass through the network; the
+    policy's own methods would need two."""
+    features = policy.extract_features(obs)
+    actor, critic = policy.mlp_extractor(features)
+    distribution: MaskableDistribution = policy._get_action_dist_from_latent(actor)
+    distribution.apply_masking(legal)
+    return distribution, policy.value_net(critic)

@@ -152,8 +152,11 @@ def _split(vector: Tensor, scalars: int, features: int) -> tuple[Tensor, Tensor]
 def _pooled(rows: Tensor, at: Tensor, weights: Tensor, size: int) -> Tensor:
     """(B, (1 + R) W) of the rows (M, W) that belong to each of B: their sum, scaled to be about 1,
     and for each role their sum by their weights (M, R) in it."""
-    parts = [rows / _MANY, *(rows * weight[:, None] for weight in weights.unbind(1))]
-    return rows.new_zeros(size, len(parts) * rows.shape[1]).index_add(0, at, torch.cat(parts, 1))
+    parts, width = 1 + weights.shape[1], rows.shape[1]
+    pooled = rows.new_zeros(size * parts, width).index_add(0, at * parts, rows / _MANY)
+    row, role = weights.nonzero(as_tuple=True)  # most rows have no role
+    in_role = rows.index_select(0, row) * weights[row, role][:, None]
+    return pooled.index_add(0, at[row] * parts + 1 + role, in_role).view(size, parts * width)
 
 
 def _eye(width: int, channels: int) -> nn.Module:
