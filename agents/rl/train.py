@@ -147,6 +147,7 @@ def _train(
             callbacks.append(curriculum)
         if show_progress:
             callbacks.append(ProgressBarCallback())
+        logger = _logger(config, run, steps)  # its clock runs during the warm start, too
         if model is None:
             model = spec.make(config, config.algorithm, env)
             if config.warm_start is not None:
@@ -158,7 +159,7 @@ def _train(
         else:
             model.set_env(env)
             set_random_seed(seed)
-        model.set_logger(_logger(config, run, steps))
+        model.set_logger(logger)
         try:
             with fast_arithmetic():
                 model.learn(
