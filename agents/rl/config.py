@@ -198,7 +198,8 @@ class TrainConfig(_Model):
 
     Attributes:
         algorithm: the algorithm and its parameters.
-        total_steps: environment steps in all; a run completes its last rollout.
+        total_steps: environment steps of reinforcement learning in all; a run completes its last
+            rollout. 0 for the warm start alone.
         seed: of all random choices. The same seed gives the same policy on the same machine with
             the same ``vec`` and ``threads``, if the run is not interrupted.
         env, vec, evaluation, network: see their classes.
@@ -212,7 +213,7 @@ class TrainConfig(_Model):
     """
 
     algorithm: Algorithm = PPO()
-    total_steps: Positive
+    total_steps: int = Field(ge=0)
     seed: int = Field(0, ge=0, lt=2**32)
     env: EnvConfig = EnvConfig()
     vec: VecEnvConfig = VecEnvConfig()
@@ -245,6 +246,12 @@ class TrainConfig(_Model):
             raise ValueError(
                 f"warm_start goes with ppo, not with {self.algorithm.name}: leave one out"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _no_steps_need_the_warm_start(self) -> TrainConfig:
+        if not self.total_steps and self.warm_start is None:
+            raise ValueError("total_steps is 0 and there is no warm_start: give one of them")
         return self
 
     @model_validator(mode="after")

@@ -69,7 +69,8 @@ SUBTASK_LAYOUT = (
 :data:`~er_gym.envs.observations.STATE_LAYOUT` does for ``state``."""
 _ROW = {feature: row for row, feature in enumerate(SUBTASK_FEATURES)}
 _PLACE = {name: place for place, name in enumerate(SUBTASK_SCALARS)}
-_LOG_MOST = log1p(20)
+_MOST = 20
+"""Counts are the same from here on."""
 _LONGEST = 36
 _INDICES = np.stack([INDICES[verb] for verb in verbs.OBJECT_VERBS])  # (V, T)
 _FITS = {
@@ -78,11 +79,16 @@ _FITS = {
 }
 
 
-def _logarithm(count: float) -> float:
-    return min(1.0, log1p(count) / _LOG_MOST)
+def _logarithm(count: int) -> float:
+    return min(1.0, log1p(count) / log1p(_MOST))
 
 
-_LOGARITHMS = np.array([_logarithm(count) for count in range(64)], np.float32)
+_LOGARITHMS = np.array([_logarithm(count) for count in range(_MOST + 1)], np.float32)
+
+
+def _logarithms(counts: NDArray[np.intp]) -> NDArray[np.float32]:
+    """(T,) from 0 to 1."""
+    return np.asarray(_LOGARITHMS[np.minimum(counts, _MOST)])
 
 
 class SubtaskMemory:
@@ -181,9 +187,9 @@ class SubtaskMemory:
         ):
             vector[_PLACE[name]] = value
         table = vector[len(SUBTASK_SCALARS) :].reshape(len(SUBTASK_FEATURES), len(TYPES))
-        table[_ROW["tried"]] = _LOGARITHMS[self.tried]
-        table[_ROW["visits"]] = _LOGARITHMS[self._visits]
-        table[_ROW["opens"]] = _LOGARITHMS[self._opens]
+        table[_ROW["tried"]] = _logarithms(self.tried)
+        table[_ROW["visits"]] = _logarithms(self._visits)
+        table[_ROW["opens"]] = _logarithms(self._opens)
         table[_ROW["opened now"]] = self._opened_now
         table[_ROW["opened before"]] = self._opened_before
         table[_ROW["same sight"]] = self._same_sight
@@ -204,19 +210,16 @@ class SubtaskMemory:
         if now.thing in _FITS:
             table[_ROW["fits"], _FITS[now.thing]] = 1.0
         marked = {thing, place}
-        role = "next "
+        roles = ("next thing", "next place")
         for ahead in range(1, _AHEAD):
             subtask = self.progress.at(ahead)
-            if subtask is None:
-                break
-            thing, place = _roles(subtask)
-            if {thing, place} <= marked:
+            if subtask is None or set(_roles(subtask)) <= marked:
                 continue
-            for name, kind in (("thing", thing), ("place", place)):
+            for role, kind in zip(roles, _roles(subtask), strict=True):
                 if kind is not None:
-                    table[_ROW[f"next {name}" if role else "later"], kind] = 1.0
-            marked |= {thing, place}
-            role = ""
+                    table[_ROW[role], kind] = 1.0
+            marked.update(_roles(subtask))
+            roles = ("later", "later")
 
 
 def _roles(subtask: Subtask) -> tuple[int | None, int | None]:

@@ -155,6 +155,7 @@ def _train(
                 with fast_arithmetic():
                     warm_start(model, config, config.warm_start, run, seed, show_progress)
                 save(model, run)
+                logger.dump(0)  # a line with its duration
             env.seed(seed)
         else:
             model.set_env(env)

@@ -78,7 +78,7 @@ def test_a_run_begins_warm(make_config: Make, tmp_path: Path) -> None:
 
 def test_a_policy_practises_under_advice(make_config: Make, tmp_path: Path) -> None:
     config = make_config(
-        total_steps=256,
+        total_steps=0,
         env={"episodes": "mini", "types": ["single_pickup"], "subtasks": True},
         warm_start={
             "episodes": 16,
