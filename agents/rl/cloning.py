@@ -6,12 +6,14 @@ policy in the first updates.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 import torch
 from sb3_contrib import MaskablePPO
+from sb3_contrib.common.maskable.distributions import MaskableDistribution
 from torch.nn import functional
 
 from agents.rl.config import TrainConfig, WarmStart
@@ -53,9 +55,20 @@ def collect_demonstrations(config: TrainConfig, warm_start: WarmStart, seed: int
 
 
 def clone_behaviour(
-    model: MaskablePPO, demonstrations: Demonstrations, warm_start: WarmStart, seed: int
+    model: MaskablePPO,
+    demonstrations: Demonstrations,
+    warm_start: WarmStart,
+    seed: int,
+    rates: Sequence[float] | None = None,
 ) -> float:
     """Fit policy and value network to demonstrations.
+
+    Args:
+        model: the learner.
+        demonstrations: what it learns.
+        warm_start: the settings.
+        seed: of the order of the steps.
+        rates: the learning rate of each epoch; None for ``warm_start.epochs`` at the first rate.
 
     Returns:
         The share of the teacher's actions in the last epoch that were the policy's best action.
@@ -65,8 +78,9 @@ def clone_behaviour(
     random = np.random.default_rng(seed)
     policy.set_training_mode(True)
     agreed = 0
-    for _ in range(warm_start.epochs):
+    for rate in rates or [warm_start.learning_rate] * warm_start.epochs:
         agreed = 0
+        optimizer.param_groups[0]["lr"] = rate
         for rows in np.array_split(
             random.permutation(len(demonstrations)),
             max(1, len(demonstrations) // warm_start.batch_size),
@@ -76,15 +90,23 @@ def clone_behaviour(
                 {key: all_[rows] for key, all_ in demonstrations.obs.items()}
             )[0]
             actions = torch.as_tensor(demonstrations.actions[rows])
-            masks = torch.as_tensor(demonstrations.masks[rows])
-            values, log_prob, _ = policy.evaluate_actions(obs, actions, action_masks=masks)
+            distribution, values = _outputs(policy, obs, demonstrations.masks[rows])
             worth = torch.as_tensor(demonstrations.returns[rows])
+            log_prob = distribution.log_prob(actions)
             loss = 0.5 * functional.mse_loss(values.flatten(), worth) - log_prob.mean()
             optimizer.zero_grad()
             loss.backward()
             torch.nn.utils.clip_grad_norm_(policy.parameters(), model.max_grad_norm)
             optimizer.step()
-            with torch.no_grad():
-                best = policy.get_distribution(obs, demonstrations.masks[rows]).mode()
-            agreed += int((best == actions).sum())
+            agreed += int((distribution.mode() == actions).sum())
     return agreed / len(demonstrations)
+
+
+def _outputs(policy: Any, obs: Any, legal: Any) -> tuple[MaskableDistribution, torch.Tensor]:
+    """The distribution over actions, and the values (B, 1), in one pass through the network; the
+    policy's own methods would need two."""
+    features = policy.extract_features(obs)
+    actor, critic = policy.mlp_extractor(features)
+    distribution: MaskableDistribution = policy._get_action_dist_from_latent(actor)
+    distribution.apply_masking(legal)
+    return distribution, policy.value_net(critic)

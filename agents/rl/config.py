@@ -42,6 +42,8 @@ class EnvConfig(_Model):
         types: the task types, drawn with equal probability; all types if empty.
         obs_mode: ``state``, with ``rgb`` or ``depth`` or both before it. (``instance`` is not
             offered: its numbers only name objects, so a network cannot calculate with them.)
+        subtasks: whether the policy also observes which subtask of the instruction is at hand, and
+            where it has looked for it (:mod:`agents.rl.subtask_memory`).
         instruction: the encoder of the instruction, as
             :func:`er_gym.envs.wrappers.make_encoder` has it; "" for none, since ``state`` says
             which types it names.
@@ -59,6 +61,7 @@ class EnvConfig(_Model):
     episodes: str = "train"
     types: tuple[str, ...] = ()
     obs_mode: Literal["state", "rgb+state", "depth+state", "rgb+depth+state"] = "state"
+    subtasks: bool = False
     instruction: str = ""
     width: Annotated[int, Field(gt=0, le=2048)] = 128
     height: Annotated[int, Field(gt=0, le=2048)] = 72
@@ -103,6 +106,21 @@ class Phase(_Model):
     _types = field_validator("types")(_known_types)
 
 
+class Practice(_Model):
+    """Rounds of DAgger after cloning: the policy plays, the searcher says what it would have done,
+    and the policy is fitted to all that has been gathered (:mod:`agents.rl.practice`).
+
+    Attributes:
+        rounds: how many.
+        steps: environment steps in a round.
+        epochs: passes over all that has been gathered, after each round.
+    """
+
+    rounds: Positive = 4
+    steps: Positive = 20_000
+    epochs: Positive = 2
+
+
 class WarmStart(_Model):
     """Behaviour cloning before reinforcement learning.
 
@@ -111,6 +129,9 @@ class WarmStart(_Model):
         episodes: the number of its episodes.
         successes_only: whether failed episodes are left out.
         epochs, batch_size, learning_rate: of the supervised training.
+        final_learning_rate: the share of the learning rate that remains at its end.
+        practice: rounds of DAgger that follow; None for none. They need ``env.subtasks``, and
+            ``searcher`` as the teacher.
     """
 
     teacher: Literal["searcher", "oracle"] = "searcher"
@@ -119,6 +140,8 @@ class WarmStart(_Model):
     epochs: Positive = 5
     batch_size: Positive = 512
     learning_rate: Rate = 1e-3
+    final_learning_rate: Fraction = 1.0
+    practice: Practice | None = None
 
 
 class Network(_Model):
@@ -175,7 +198,8 @@ class TrainConfig(_Model):
 
     Attributes:
         algorithm: the algorithm and its parameters.
-        total_steps: environment steps in all; a run completes its last rollout.
+        total_steps: environment steps of reinforcement learning in all; a run completes its last
+            rollout. 0 for the warm start alone.
         seed: of all random choices. The same seed gives the same policy on the same machine with
             the same ``vec`` and ``threads``, if the run is not interrupted.
         env, vec, evaluation, network: see their classes.
@@ -189,7 +213,7 @@ class TrainConfig(_Model):
     """
 
     algorithm: Algorithm = PPO()
-    total_steps: Positive
+    total_steps: int = Field(ge=0)
     seed: int = Field(0, ge=0, lt=2**32)
     env: EnvConfig = EnvConfig()
     vec: VecEnvConfig = VecEnvConfig()
@@ -221,6 +245,24 @@ class TrainConfig(_Model):
         if self.warm_start is not None and self.algorithm.name != "ppo":
             raise ValueError(
                 f"warm_start goes with ppo, not with {self.algorithm.name}: leave one out"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _no_steps_need_the_warm_start(self) -> TrainConfig:
+        if not self.total_steps and self.warm_start is None:
+            raise ValueError("total_steps is 0 and there is no warm_start: give one of them")
+        return self
+
+    @model_validator(mode="after")
+    def _practice_needs_the_searcher(self) -> TrainConfig:
+        if self.warm_start is None or self.warm_start.practice is None:
+            return self
+        if self.warm_start.teacher != "searcher" or not self.env.subtasks:
+            raise ValueError(
+                "warm_start.practice goes with the teacher searcher and env.subtasks=true, not "
+                f"with {self.warm_start.teacher} and {str(self.env.subtasks).lower()}: change "
+                "these, or leave it out"
             )
         return self
 

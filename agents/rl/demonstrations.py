@@ -12,6 +12,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from agents import make_agent
+from agents.rl.packed import Column, PackedRows, concatenated, packed
 from agents.rl.policy_observation import Obs
 from er_gym.envs.actions import ACTIONS, INDEX, Action, understand
 from er_gym.rollout.loop import transitions
@@ -22,8 +23,8 @@ class Demonstrations:
     """N steps from episodes of a teacher: those with a legal action.
 
     Attributes:
-        obs: by the observation's keys, (N, …).
-        masks: (N, A) int8, the legal actions.
+        obs: by the observation's keys, (N, …); vectors are packed.
+        masks: (N, A), the legal actions, packed: 1 for each.
         actions: (N,) the teacher's actions.
         returns: (N,) float32, the discounted return from each step on.
         episodes, successes: the numbers of episodes played and of successes.
@@ -31,8 +32,8 @@ class Demonstrations:
             that names no action.
     """
 
-    obs: Obs
-    masks: NDArray[np.int8]
+    obs: dict[str, Column]
+    masks: PackedRows
     actions: NDArray[np.intp]
     returns: NDArray[np.float32]
     episodes: int
@@ -77,8 +78,8 @@ def demonstrate(
 def concatenate(parts: Sequence[Demonstrations]) -> Demonstrations:
     """Concatenate demonstrations along the steps."""
     return Demonstrations(
-        obs={key: np.concatenate([part.obs[key] for part in parts]) for key in parts[0].obs},
-        masks=np.concatenate([part.masks for part in parts]),
+        obs={key: concatenated([part.obs[key] for part in parts]) for key in parts[0].obs},
+        masks=PackedRows.concatenate([part.masks for part in parts]),
         actions=np.concatenate([part.actions for part in parts]),
         returns=np.concatenate([part.returns for part in parts]),
         episodes=sum(part.episodes for part in parts),
@@ -114,10 +115,14 @@ def _of(env: gymnasium.Env[Obs, Any], steps: Sequence[_Step], gamma: float) -> D
     boxes: dict[str, Any] = dict(cast(spaces.Dict, env.observation_space).spaces)
     return Demonstrations(
         obs={
-            key: np.array([steps[n].obs[key] for n in rows], box.dtype).reshape((-1, *box.shape))
+            key: packed(
+                np.array([steps[n].obs[key] for n in rows], box.dtype).reshape((-1, *box.shape))
+            )
             for key, box in boxes.items()
         },
-        masks=np.array([steps[n].mask for n in rows], np.int8).reshape(-1, len(ACTIONS)),
+        masks=PackedRows.of(
+            np.array([steps[n].mask for n in rows], np.float32).reshape(-1, len(ACTIONS))
+        ),
         actions=np.array([steps[n].action_index for n in rows], np.intp),
         returns=returns[rows] if rows else returns[:0],
         episodes=0,

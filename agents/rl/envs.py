@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
+from agents.rl.adviser import Adviser
 from agents.rl.config import EnvConfig
 from agents.rl.demonstrations import Demonstrations, demonstrate
 from agents.rl.policy_observation import Obs, PolicyObservation
+from er_gym.envs.actions import ACTIONS, INDEX
 from er_gym.envs.embodied_env import EmbodiedEnv, verification_env
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.envs.wrappers import KeyActionShaping
@@ -20,6 +23,8 @@ from er_gym.tasks.types import TaskType, task_type
 
 _TRAINING_ONLY = ("step_penalty", "illegal_penalty", "success_bonus", "shaping")
 """The fields that change the reward."""
+ADVICE = "advice"
+"""The key of an advised environment's observation."""
 
 
 class TrainingRules(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -58,7 +63,7 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         policy_observation: PolicyObservation,
     ) -> None:
         super().__init__(env)
-        self._source, self._policy_observation = source, policy_observation
+        self._source, self.policy_observation = source, policy_observation
         self.set_types(types)
         self._rng = np.random.default_rng()
         self.observation_space = policy_observation.space
@@ -79,13 +84,13 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
             self._rng = np.random.default_rng(seed)
         obs, info = self.env.reset(seed=seed, options=options or {"task": self._draw()})
         info["seen"] = obs
-        return self._policy_observation.reset(obs, info, info["task"].instruction), info
+        return self.policy_observation.reset(obs, info, info["task"].instruction), info
 
     def step(self, action: Any) -> tuple[Obs, Any, bool, bool, dict[str, Any]]:
         """Do an action."""
         obs, reward, terminated, truncated, info = self.env.step(action)
         info["seen"] = obs
-        return self._policy_observation.observe(obs, info), reward, terminated, truncated, info
+        return self.policy_observation.observe(obs, info), reward, terminated, truncated, info
 
     def action_masks(self) -> NDArray[np.int8]:
         """(A,) int8, the actions that are legal now."""
@@ -106,11 +111,45 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         return self._source.draw(self._rng, kind, None)
 
 
+class AdvisedEnv(gymnasium.Wrapper[Obs, Any, Obs, Any]):
+    """Adds to the observation of a :class:`LearningEnv` with subtasks what the searcher would do:
+    ``advice``, () int64, the index of its action."""
+
+    env: LearningEnv
+
+    def __init__(self, env: LearningEnv) -> None:
+        super().__init__(env)
+        self._adviser = Adviser()
+        entries = cast(spaces.Dict, env.observation_space).spaces
+        advice = spaces.Box(0, len(ACTIONS) - 1, (), np.int64)
+        space: Any = spaces.Dict({**entries, ADVICE: advice})
+        self.observation_space = space
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Obs, dict[str, Any]]:
+        """Begin an episode."""
+        obs, info = self.env.reset(seed=seed, options=options)
+        memory = self.env.policy_observation.subtasks
+        assert memory is not None  # make_env sees to it
+        self._adviser.begin(info["task"], info, memory)
+        return self._advised(obs, info), info
+
+    def step(self, action: Any) -> tuple[Obs, Any, bool, bool, dict[str, Any]]:
+        """Do an action."""
+        obs, reward, terminated, truncated, info = self.env.step(action)
+        return self._advised(obs, info), reward, terminated, truncated, info
+
+    def _advised(self, obs: Obs, info: dict[str, Any]) -> Obs:
+        return {**obs, ADVICE: np.array(INDEX[self._adviser.advise(info)])}
+
+
 def make_env(
     options: EnvConfig,
     gamma: float = 1.0,
     with_mask: bool = False,
     with_text: bool = False,
+    advised: bool = False,
     share: tuple[int, int] = (0, 1),
 ) -> gymnasium.Env[Obs, Any]:
     """Make a training environment.
@@ -121,6 +160,7 @@ def make_env(
         with_mask: whether the observation holds the action mask.
         with_text: whether ``info["seen"]``, the environment's own observation, holds text, which
             scripted agents need.
+        advised: whether the observation holds the searcher's advice; for options with subtasks.
         share: ``(index, count)`` of the worker process; each plays in its own rooms.
 
     Raises:
@@ -145,7 +185,8 @@ def make_env(
     source = make_source(options.episodes, verification_env)
     if isinstance(source, TaskList):
         source = source.share(*share)
-    return LearningEnv(env, source, options.types, PolicyObservation(options, with_mask))
+    learning = LearningEnv(env, source, options.types, PolicyObservation(options, with_mask))
+    return AdvisedEnv(learning) if advised else learning
 
 
 def evaluation_config(options: EnvConfig, episodes: str) -> EnvConfig:

@@ -5,6 +5,9 @@ processes only the types that are navigable, interactable, held or named by the 
 20 of 124, since no other type can be acted on. Each type's row passes through the same layers,
 with the type's embedding and AI2-THOR properties, its fit to the types that the instruction names,
 and a summary of all other types. The output is one number for each verb with that type.
+
+The observation ``subtask`` adds features to the rows and to the summary, and types that matter in
+more roles: those of the subtask at hand and of the next.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from agents.rl.policy_observation import IMAGES
+from agents.rl.subtask_memory import ROLES, SUBTASK_FEATURES, SUBTASK_SCALARS
 from er_gym.envs.actions import ACTIONS, INDEX, INDICES, Action
 from er_gym.envs.observations import FEATURES, SCALARS
 from er_gym.tasks import verbs
@@ -29,6 +33,9 @@ _PROPERTIES = tuple(
 """Trained policies lack the excluded property; adding it would change layer sizes."""
 _MATTERS = [FEATURES.index(name) for name in ("navigable", "interactable", "held", "goal")]
 _GOAL = FEATURES.index("goal")
+_ROLES = [SUBTASK_FEATURES.index(name) for name in ROLES]
+_TABLES = ("state", "subtask")
+"""The observations that are scalars and a table of types."""
 _MANY = 8
 """The approximate number of processed types, for scaling sums."""
 _NOWHERE = len(ACTIONS)
@@ -39,8 +46,9 @@ class TypeNetwork(nn.Module):
     """Outputs numbers for every action, and a summary for a value head.
 
     Args:
-        space: with a key ``state``; optionally ``instruction`` (E,), and ``rgb`` and ``depth``
-            (channels, H, W), as Stable-Baselines3 turns pictures; a ``mask`` is not looked at.
+        space: with a key ``state``; optionally ``subtask``, ``instruction`` (E,), and ``rgb`` and
+            ``depth`` (channels, H, W), as Stable-Baselines3 turns pictures; a ``mask`` is not
+            looked at.
         width: of the layers.
         kind: length of the learnt vector of a type.
         outputs: numbers per action: 1 for a logit or a value, more for quantiles.
@@ -70,8 +78,12 @@ class TypeNetwork(nn.Module):
         extras = {
             key: box
             for key, box in space.spaces.items()
-            if key not in ("state", "mask") and isinstance(box, spaces.Box)
+            if key not in (*_TABLES, "mask") and isinstance(box, spaces.Box)
         }
+        self._subtasks = "subtask" in space.spaces
+        roles = 2 + len(ROLES) * self._subtasks
+        features = len(FEATURES) + len(SUBTASK_FEATURES) * self._subtasks
+        scalars = len(SCALARS) + len(SUBTASK_SCALARS) * self._subtasks
         self._images = [key for key in extras if key in IMAGES]
         self._told = [key for key in extras if key not in IMAGES]
         channels = sum(int(extras[key].shape[0]) for key in self._images)
@@ -79,30 +91,36 @@ class TypeNetwork(nn.Module):
         told = sum(int(extras[key].shape[0]) for key in self._told) + width * bool(channels)
         self.is_a = nn.Linear(known, width, bias=False)
         self.offers = nn.Linear(known, kind)
-        self.asks = nn.Linear(2 * known, kind)
-        self.row = nn.Linear(len(FEATURES) + kind, width, bias=False)
-        self.room = nn.Linear(len(SCALARS) + told + 2 * known, width)
-        self.gather = nn.Linear(4 * width, width)
+        self.asks = nn.Linear(roles * known, kind)
+        self.row = nn.Linear(features + kind, width, bias=False)
+        self.room = nn.Linear(scalars + told + roles * known, width)
+        self.gather = nn.Linear((2 + roles) * width, width)
         self.row2 = nn.Linear(width, width, bias=False)
         self.room2 = nn.Linear(width, width)
         self.each = nn.Linear(width, len(verbs.OBJECT_VERBS) * outputs)
-        self.bare = nn.Linear(4 * width, len(verbs.BARE_VERBS) * outputs)
-        self.summary_width = 4 * width
+        self.summary_width = (2 + roles) * width
+        self.bare = nn.Linear(self.summary_width, len(verbs.BARE_VERBS) * outputs)
         bare = [INDEX[Action(verb)] for verb in verbs.BARE_VERBS]
         self.register_buffer("bare_index", torch.tensor(bare), persistent=False)
 
     def forward(self, obs: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
-        """(B, A, outputs) for the actions, 0 for those that cannot be legal; (B, 4 width)."""
+        """(B, A, outputs) for the actions, 0 for those that cannot be legal; (B, summary_width)."""
         state = obs["state"]
         size = len(state)
-        scalars = state[:, : len(SCALARS)]
-        table = state[:, len(SCALARS) :].view(size, len(FEATURES), len(TYPES))
-        at, which = (table[:, _MATTERS] > 0).any(dim=1).nonzero(as_tuple=True)  # (M,), (M,)
-        kinds = torch.cat([self.kinds, self.properties], dim=1)  # (T, K)
+        scalars, table = _split(state, len(SCALARS), len(FEATURES))
         goal = table[:, _GOAL]
-        first = (goal == 1).float() @ kinds  # (B, K)
-        later = (goal * (goal < 1)) @ kinds
-        wanted = torch.cat([first, later], dim=1)
+        matters = (table[:, _MATTERS] > 0).any(dim=1)  # (B, T)
+        # By its roles, a type's weight: named first, named later, and in the subtasks.
+        weights = torch.stack([(goal == 1).to(state), goal * (goal < 1)], dim=2)  # (B, T, R)
+        if self._subtasks:
+            more, rows = _split(obs["subtask"], len(SUBTASK_SCALARS), len(SUBTASK_FEATURES))
+            in_role = rows[:, _ROLES]
+            matters = matters | (in_role > 0).any(dim=1)
+            weights = torch.cat([weights, in_role.transpose(1, 2)], dim=2)
+            scalars, table = torch.cat([scalars, more], dim=1), torch.cat([table, rows], dim=1)
+        at, which = matters.nonzero(as_tuple=True)  # (M,), (M,)
+        kinds = torch.cat([self.kinds, self.properties], dim=1)  # (T, K)
+        wanted = (weights.transpose(1, 2) @ kinds).flatten(1)  # (B, R K)
         # How well a type fits the instruction's types: a fridge is a good place for an apple.
         fit = functional.embedding(which, self.offers(kinds)) * self.asks(wanted).index_select(
             0, at
@@ -114,10 +132,10 @@ class TypeNetwork(nn.Module):
         row = self.row(torch.cat([table[at, :, which], fit], dim=1))  # (M, W)
         row = row + functional.embedding(which, self.is_a(kinds))
         hidden = torch.relu(row + room.index_select(0, at))
-        named = goal[at, which]  # (M,)
+        named = weights[at, which]  # (M, R)
         room = torch.relu(self.gather(torch.cat([room, _pooled(hidden, at, named, size)], dim=1)))
         hidden = torch.relu(self.row2(hidden) + self.room2(room).index_select(0, at))
-        summary = torch.cat([room, _pooled(hidden, at, named, size)], dim=1)  # (B, 4 W)
+        summary = torch.cat([room, _pooled(hidden, at, named, size)], dim=1)
         each = self.each(hidden).view(len(at), len(verbs.OBJECT_VERBS), self.outputs)
         numbers = state.new_zeros(size, len(ACTIONS) + 1, self.outputs)
         numbers = numbers.index_put((at[:, None], self.index[which]), each)
@@ -126,12 +144,19 @@ class TypeNetwork(nn.Module):
         return numbers[:, :-1], summary
 
 
-def _pooled(rows: Tensor, at: Tensor, goal: Tensor, size: int) -> Tensor:
-    """(B, 3 W) of the rows (M, W) that belong to each of B: their sum, scaled to be about 1; that
-    of the type that the instruction names first; those of the others that it names."""
-    first, later = (goal == 1).to(rows), goal * (goal < 1)  # (M,)
-    parts = torch.cat([rows / _MANY, rows * first[:, None], rows * later[:, None]], dim=1)
-    return rows.new_zeros(size, parts.shape[1]).index_add(0, at, parts)
+def _split(vector: Tensor, scalars: int, features: int) -> tuple[Tensor, Tensor]:
+    """(B, scalars) and (B, features, T): the parts of an observation of types."""
+    return vector[:, :scalars], vector[:, scalars:].view(len(vector), features, len(TYPES))
+
+
+def _pooled(rows: Tensor, at: Tensor, weights: Tensor, size: int) -> Tensor:
+    """(B, (1 + R) W) of the rows (M, W) that belong to each of B: their sum, scaled to be about 1,
+    and for each role their sum by their weights (M, R) in it."""
+    parts, width = 1 + weights.shape[1], rows.shape[1]
+    pooled = rows.new_zeros(size * parts, width).index_add(0, at * parts, rows / _MANY)
+    row, role = weights.nonzero(as_tuple=True)  # most rows have no role
+    in_role = rows.index_select(0, row) * weights[row, role][:, None]
+    return pooled.index_add(0, at[row] * parts + 1 + role, in_role).view(size, parts * width)
 
 
 def _eye(width: int, channels: int) -> nn.Module:

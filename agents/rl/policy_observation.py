@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from agents.rl.config import EnvConfig
+from agents.rl.subtask_memory import SUBTASK_LAYOUT, SubtaskMemory
 from er_gym.envs.actions import ACTIONS
 from er_gym.envs.observations import STATE_LAYOUT
 from er_gym.envs.wrappers import make_encoder
@@ -27,6 +28,7 @@ class PolicyObservation:
     """Makes the learner's observation from the environment's.
 
     - ``state``: as in the environment's observation.
+    - ``subtask``: (S,) float32 in [0, 1], see :mod:`agents.rl.subtask_memory`.
     - ``instruction``: (E,) float32 in [-1, 1], with an encoder.
     - ``rgb``: (height, width, 3 × frames) uint8, the last pictures, the newest last; at the
       beginning the first is repeated.
@@ -42,6 +44,10 @@ class PolicyObservation:
         entries: dict[str, spaces.Space[Any]] = {
             "state": spaces.Box(-1.0, 1.0, (len(STATE_LAYOUT),), np.float32)
         }
+        self._with_subtasks = options.subtasks
+        self.subtasks: SubtaskMemory | None = None
+        if options.subtasks:
+            entries["subtask"] = spaces.Box(0.0, 1.0, (len(SUBTASK_LAYOUT),), np.float32)
         if self._encode is not None:
             entries["instruction"] = spaces.Box(-1.0, 1.0, (self._encode.dimension,), np.float32)
         self._images: dict[str, deque[NDArray[np.uint8]]] = {
@@ -60,12 +66,15 @@ class PolicyObservation:
         """The first observation of an episode."""
         for images in self._images.values():
             images.clear()
+        self.subtasks = SubtaskMemory(instruction) if self._with_subtasks else None
         self._told = self._encode(instruction) if self._encode is not None else None
         return self.observe(obs, info)
 
     def observe(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Obs:
         """The next one."""
         made: Obs = {"state": obs["state"]}
+        if self.subtasks is not None:
+            made["subtask"] = self.subtasks.update(info)
         if self._told is not None:
             made["instruction"] = self._told
         for name, images in self._images.items():

@@ -8,9 +8,7 @@ done, it does nothing.
 
 from __future__ import annotations
 
-import json
 import shutil
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -38,18 +36,17 @@ from agents.rl.callbacks import (
     SuccessByType,
     TorchThreads,
 )
-from agents.rl.cloning import clone_behaviour, collect_demonstrations
-from agents.rl.config import EnvConfig, Evaluation, TrainConfig, WarmStart, load_config
+from agents.rl.config import EnvConfig, Evaluation, TrainConfig, load_config
 from agents.rl.envs import evaluation_config, make_env
 from agents.rl.model_file import placeholder_env, restore, save
 from agents.rl.policy_file import CONFIG, LEARNERS, MODEL, SB3_MODEL, untrusted_model
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.vec_env import WorkerVecEnv
+from agents.rl.warm_start import WARM_START, warm_start
 from er_gym.envs.actions import ACTIONS
 from er_gym.locking import exclusive_use
 from er_gym.writing import YAML_MARK, is_ours, make_folder, write_atomic
 
-WARM_START = "warm_start.json"
 TENSORBOARD = "tensorboard"
 _OF_A_RUN = (MODEL, SB3_MODEL, CURVE, WARM_START, TENSORBOARD)
 _EVALUATION_SEED = 10_000
@@ -139,15 +136,20 @@ def _train(
             callbacks.append(curriculum)
         if show_progress:
             callbacks.append(ProgressBarCallback())
+        logger = _logger(config, run, steps)  # its clock runs during the warm start, too
         if model is None:
             model = spec.make(config, config.algorithm, env)
             if config.warm_start is not None:
-                _warm_start(model, config, config.warm_start, run, seed)
+                assert isinstance(model, MaskablePPO)  # as the configuration has checked
+                with fast_arithmetic():
+                    warm_start(model, config, config.warm_start, run, seed, show_progress)
+                save(model, run)
+                logger.dump(0)  # a line with its duration
             env.seed(seed)
         else:
             model.set_env(env)
             set_random_seed(seed)
-        model.set_logger(_logger(config, run, steps))
+        model.set_logger(logger)
         try:
             with fast_arithmetic():
                 model.learn(
@@ -180,30 +182,6 @@ def fast_arithmetic() -> Iterator[None]:
     finally:
         torch.set_flush_denormal(False)
         Distribution.set_default_validate_args(__debug__)
-
-
-def _warm_start(
-    model: BaseAlgorithm, config: TrainConfig, warm_start: WarmStart, run: Path, seed: int
-) -> None:
-    assert isinstance(model, MaskablePPO)  # a configuration of another learner has no warm start
-    demonstrations = collect_demonstrations(config, warm_start, seed)
-    agreement = clone_behaviour(model, demonstrations, warm_start, seed)
-    rate = demonstrations.successes / demonstrations.episodes
-    told = {
-        "teacher_success": rate,
-        "steps": len(demonstrations),
-        "refused": demonstrations.refused,
-        "unread": demonstrations.unread,
-        "agreement": agreement,
-    }
-    write_atomic(run / WARM_START, json.dumps(told))
-    if demonstrations.refused or demonstrations.unread:
-        played = len(demonstrations) + demonstrations.refused + demonstrations.unread
-        warnings.warn(
-            f"cloning {warm_start.teacher}: of {played:,} steps, {demonstrations.refused:,} "
-            f"illegal ones and {demonstrations.unread:,} whose text names no action are left out",
-            stacklevel=2,
-        )
 
 
 def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOutEvaluation:

@@ -266,7 +266,7 @@ def _section(name: str, members: Sequence[TrainedRun], results: Results) -> str:
     lines = [
         f"## {name}",
         "",
-        f"{_algorithm(config)} on `{config.env.obs_mode}`, {members[0].steps:,} steps, "
+        f"{_algorithm(config)} on {_observed(config)}, {members[0].steps:,} steps, "
         f"{_span(minutes)} minutes; seeds {', '.join(str(each.config.seed) for each in members)}. "
         f"Types: {', '.join(config.env.types) or 'all'}.",
         "",
@@ -304,7 +304,14 @@ def _algorithm(config: TrainConfig) -> str:
     }
     warm = config.warm_start
     after = f", after cloning {warm.episodes:,} episodes of the {warm.teacher}" if warm else ""
+    if warm and warm.practice:
+        after += f" and {warm.practice.rounds} rounds of DAgger"
     return names[config.algorithm.name] + after
+
+
+def _observed(config: TrainConfig) -> str:
+    parts = [config.env.obs_mode, *(["subtask"] if config.env.subtasks else [])]
+    return " and ".join(f"`{part}`" for part in parts)
 
 
 def _span(values: Sequence[float]) -> str:

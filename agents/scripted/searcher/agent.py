@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Container, Generator, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from agents.scripted.searcher import instruction, search_priors
 from agents.scripted.searcher.instruction import Goal, understand
@@ -105,6 +105,7 @@ class SearcherAgent:
         ]
         self._thought = ""
         self._water_runs = False  # whether it has turned on the faucet
+        self._tried_before: Counter[str] = Counter()  # in the search that comes next
         self._last: Action | None = None
         self._repeats = 0
         self._steps = self._episode()
@@ -179,8 +180,8 @@ class SearcherAgent:
     def _reach(self, thing: str, verb: str = "", source: str = "") -> Steps:
         """Search until an object is within reach and the action is legal."""
         memory = self._memory
-        tried: Counter[str] = Counter()
-        observed = bool(memory.visits)
+        tried, self._tried_before = self._tried_before, Counter()
+        observed = bool(memory.visits) or bool(tried["observe"])
         if source:
             while (
                 tried[source] < search_priors.usual_number(source)
@@ -216,8 +217,12 @@ class SearcherAgent:
         there = yield from self._step(
             verbs.NAVIGATE, target, f"The {thing} may be at the {target}."
         )
-        if not there or self._ready(thing, verb):
-            return there
+        if there and not self._ready(thing, verb):
+            yield from self._look_inside(target, thing, verb)
+        return there
+
+    def _look_inside(self, target: str, thing: str, verb: str) -> Steps:
+        """Look into closed containers at the place where it is."""
         shut = (
             [target]
             if search_priors.opens(target) and search_priors.has(thing, "pickupable")
@@ -378,12 +383,10 @@ class SearcherAgent:
     def _process(self, goal: Goal, later: Iterable[Goal] = ()) -> Steps:
         """Put an object into an appliance, run it, and pick the object up again."""
         thing = goal.object_type
-        place, switch, times = _PROCESSES[goal.kind]
+        place, switch, times, closed = PROCESSES[goal.kind]
         yield from self._take(goal)
         yield from self._put_into(thing, place)
-        if goal.kind in (instruction.HEAT, instruction.CHILL) and self._is_legal(
-            verbs.CLOSE, place
-        ):
+        if closed and self._is_legal(verbs.CLOSE, place):
             yield from self._step(verbs.CLOSE, place, "It runs only when it is closed.")
         if switch and not (switch == "Faucet" and self._water_runs):
             for _ in range(times):
@@ -403,12 +406,27 @@ class SearcherAgent:
         return True
 
 
-_PROCESSES = {
-    instruction.WASH: ("SinkBasin", "Faucet", 1),
-    instruction.BREW: ("CoffeeMachine", "CoffeeMachine", 1),
-    instruction.HEAT: ("Microwave", "Microwave", 2),
-    instruction.CHILL: ("Fridge", "", 0),
-    instruction.TOAST: ("Toaster", "Toaster", 1),
+class Process(NamedTuple):
+    """What happens to an object in an appliance.
+
+    Attributes:
+        place: the receptacle type of the appliance.
+        switch: the type that is switched, "" for none; and ``times``, how often.
+        closed: whether it works only when closed.
+    """
+
+    place: str
+    switch: str
+    times: int
+    closed: bool = False
+
+
+PROCESSES = {
+    instruction.WASH: Process("SinkBasin", "Faucet", 1),
+    instruction.BREW: Process("CoffeeMachine", "CoffeeMachine", 1),
+    instruction.HEAT: Process("Microwave", "Microwave", 2, closed=True),
+    instruction.CHILL: Process("Fridge", "", 0, closed=True),
+    instruction.TOAST: Process("Toaster", "Toaster", 1),
 }
 _DO = {
     instruction.FIND: SearcherAgent._find,
@@ -418,5 +436,5 @@ _DO = {
     instruction.OPEN: SearcherAgent._open,
     instruction.CLOSE: SearcherAgent._open,
     instruction.SLICE: SearcherAgent._slice,
-    **dict.fromkeys(_PROCESSES, SearcherAgent._process),
+    **dict.fromkeys(PROCESSES, SearcherAgent._process),
 }

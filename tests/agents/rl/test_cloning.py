@@ -10,13 +10,17 @@ import numpy as np
 import pytest
 
 import agents.rl.demonstrations
+from agents import make_agent
 from agents.rl.cloning import clone_behaviour, collect_demonstrations
 from agents.rl.config import TrainConfig, WarmStart
 from agents.rl.demonstrations import Demonstrations, demonstrate
 from agents.rl.envs import make_env
 from agents.rl.train import ALGORITHMS, make_vec_env, train
 from er_gym.envs.actions import INDEX, Action
+from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.agent import Decision
+from er_gym.rollout.play import play_episode
+from er_gym.tasks.suites import load_suite
 
 Make = Callable[..., TrainConfig]
 Recited = Callable[..., Demonstrations]
@@ -42,7 +46,7 @@ def test_demonstrations_are_what_the_learner_would_have_seen(
         len(seen),
         *make_env(config.env).observation_space["state"].shape,
     )
-    assert seen.masks[np.arange(len(seen)), seen.actions].all()
+    assert seen.masks[np.arange(len(seen))][np.arange(len(seen)), seen.actions].all()
     ends = np.flatnonzero(seen.actions == 2)
     assert len(ends) == seen.successes
     assert (seen.returns[ends] == 1.5).all()  # "end" is worth 1 and the bonus; nothing follows
@@ -70,6 +74,28 @@ def test_a_run_begins_warm(make_config: Make, tmp_path: Path) -> None:
     noted = json.loads((tmp_path / "run" / "warm_start.json").read_text())
     assert 0 < noted["agreement"] <= 1
     assert 0 < noted["teacher_success"] <= 1
+
+
+def test_a_policy_practises_under_advice(make_config: Make, tmp_path: Path) -> None:
+    config = make_config(
+        total_steps=0,
+        env={"episodes": "mini", "types": ["single_pickup"], "subtasks": True},
+        warm_start={
+            "episodes": 16,
+            "epochs": 6,
+            "final_learning_rate": 0.5,
+            "practice": {"rounds": 2, "steps": 160, "epochs": 2},
+        },
+    )
+    train(config, tmp_path / "run")
+    noted = json.loads((tmp_path / "run" / "warm_start.json").read_text())
+    first, second = noted["rounds"]
+    assert noted["steps"] < first["steps"] < second["steps"] <= noted["steps"] + 320
+    assert first["episodes"] > 0
+    agent = make_agent(f"rl:{tmp_path / 'run'}")
+    tasks = [task for task in load_suite("mini").tasks if task.type.name == "single_pickup"]
+    record = play_episode(EmbodiedEnv((), obs_mode=agent.obs_mode), agent, tasks[0], 0)
+    assert not record.error
 
 
 class Reciter:

@@ -43,7 +43,7 @@ def test_what_is_written_out_is_read_the_same(file: Path, tmp_path: Path) -> Non
     ("overrides", "message"),
     [
         (["total_steps"], r"'total_steps' is not an override; give NAME=VALUE"),
-        (["total_steps=0"], r"'total_steps': input should be greater than 0, not 0"),
+        (["total_steps=-1"], r"'total_steps': input should be greater than or equal to 0, not -1"),
         (["steps=5"], r"'steps': extra inputs are not permitted"),
         (["env.types=[fly]"], r"unknown type 'fly'; choose of: single_search,"),
         (["env.obs_mode=text"], r"'env.obs_mode': input should be 'state', 'rgb\+state'"),
@@ -81,3 +81,9 @@ def test_what_needs_the_warm_start(file: Path) -> None:
     overrides: list[Any] = ["warm_start.teacher=searcher", "algorithm.name=dqn"]
     with pytest.raises(ValueError, match="warm_start goes with ppo"):
         load_config(file, overrides)
+    with pytest.raises(ValueError, match="total_steps is 0 and there is no warm_start"):
+        load_config(file, ["total_steps=0"])
+    overrides = ["warm_start.practice.rounds=1", "total_steps=0"]
+    with pytest.raises(ValueError, match="practice goes with the teacher searcher"):
+        load_config(file, overrides)
+    load_config(file, [*overrides, "env.subtasks=true"])

@@ -7,6 +7,7 @@ import torch
 from gymnasium import spaces
 
 from agents.rl.network import TypeNetwork
+from agents.rl.subtask_memory import SUBTASK_LAYOUT
 from er_gym.envs.actions import ACTIONS, INDEX, Action
 from er_gym.envs.observations import SCALARS, STATE_LAYOUT
 
@@ -53,7 +54,21 @@ def test_the_same_weights_serve_every_type() -> None:
         network.kinds.zero_()
     numbers, _ = network({"state": torch.stack([state("navigable:Apple", "navigable:Tomato")])})
     apple, tomato = (INDEX[Action("navigate to", name)] for name in ("Apple", "Tomato"))
-    assert numbers[0, apple] == numbers[0, tomato] != 0
+    assert numbers[0, apple] != 0
+    assert torch.allclose(numbers[0, apple], numbers[0, tomato], atol=1e-6)
+
+
+def test_the_subtask_at_hand_counts() -> None:
+    subtask = spaces.Box(0, 1, (len(SUBTASK_LAYOUT),), np.float32)
+    network = TypeNetwork(spaces.Dict({**SPACE.spaces, "subtask": subtask}), width=16, kind=4)
+    at_hand = torch.zeros(2, len(SUBTASK_LAYOUT))
+    at_hand[0, SUBTASK_LAYOUT.index("thing:Egg")] = 1.0
+    states = torch.stack([state("navigable:Fridge")] * 2)
+    numbers, summary = network({"state": states, "subtask": at_hand})
+    assert summary.shape == (2, network.summary_width)
+    fridge, egg = INDEX[Action("open", "Fridge")], INDEX[Action("pickup", "Egg")]
+    assert numbers[0, fridge] != numbers[1, fridge]
+    assert numbers[0, egg] != 0 == numbers[1, egg]
 
 
 def test_every_weight_learns() -> None:
