@@ -135,6 +135,7 @@ class _Plan:
                 f"data/{number}-{'corrected' if corrects else 'selected'}",
                 "collect",
                 *("--correct" if corrects else "--select", self._at(run), "--allow-empty"),
+                *(("--rewrite-thoughts",) * sample.rewrite_thoughts),
                 *self._collecting(sample.limit),
             )
         if row.collect is not None:

@@ -62,6 +62,8 @@ class Sampled(_Settings):
         temperature, top_p: of the model's replies.
         faults: the rate at which actions fail (:mod:`er_gym.envs.faults`).
         limit: the most trajectories that are taken; None for all.
+        rewrite_thoughts: whether the thoughts of its successes are written anew, since those of a
+            weak model are often wrong.
     """
 
     tasks: Positive
@@ -70,6 +72,7 @@ class Sampled(_Settings):
     top_p: float = Field(1.0, gt=0, le=1)
     faults: float = Field(0.0, ge=0, le=1)
     limit: Positive | None = None
+    rewrite_thoughts: bool = False
 
 
 class Taught(_Settings):
@@ -175,6 +178,8 @@ class LadderSettings(_Settings):
         for number, (name, stage) in enumerate(self.stages.items()):
             if not number and stage.sample:
                 raise ValueError(f"{name} has no model before it; let it collect, not sample")
+            if name == STAGES[2] and stage.sample and stage.sample.rewrite_thoughts:
+                raise ValueError(f"{name} puts failures right; leave out rewrite_thoughts")
             if not (stage.collect or stage.teacher or stage.sample):
                 raise ValueError(f"{name} learns from nothing; give it collect, teacher or sample")
         return self

@@ -1,11 +1,14 @@
 """Notes: thoughts as a short memory, made from what a trajectory records of each turn.
 
-``goal pickup Apple to Fridge; Apple unseen; looked Sink, Shelf; next CounterTop`` says what the
-agent is after, how far it is, where it has looked and where it means to look. The words are a
-dialect's (:mod:`er_gym.data.dialects`). A small model learns such notes; prose is too much for it.
+``goal pickup Apple to Fridge; Apple unseen; looked Sink, Drawer 2; next CounterTop`` says what the
+agent is after, how far it is, where it has looked (in drawers twice) and where it means to look.
+The words are a dialect's (:mod:`er_gym.data.dialects`). A small model learns such notes; prose is
+too much for it.
 """
 
 from __future__ import annotations
+
+from collections import Counter
 
 from pydantic import BaseModel, ConfigDict
 
@@ -25,7 +28,9 @@ class NoteWords(BaseModel):
             ``{place}``.
         held, near, view, seen, unseen: how far it is from the thing that it wants now, ``{thing}``:
             in the hand, within reach, in view, seen before, never seen.
-        looked: where it has looked for it, ``{places}``; ``next``: where it means to look.
+        looked: where it has looked for it, ``{places}``; ``times``: how a place is named where it
+            has looked more than once, with ``{place}`` and ``{count}``.
+        next: where it means to look, ``{places}``.
         failed: the action that failed just before, ``{action}``.
         separator: stands between the parts.
     """
@@ -40,6 +45,7 @@ class NoteWords(BaseModel):
     seen: str
     unseen: str
     looked: str
+    times: str
     next: str
     failed: str
     separator: str = "; "
@@ -74,10 +80,14 @@ def note(words: NoteWords, trajectory: Trajectory, index: int) -> tuple[ThoughtK
         if subgoal.place and known.held == subgoal.thing:
             wanted = subgoal.place
         parts += [goal, getattr(words, _how_far(known, wanted)).replace("{thing}", wanted)]
-    for text, places in (
-        (words.looked, [*dict.fromkeys(visit.place for visit in known.visits)]),
-        (words.next, [*dict.fromkeys(known.plan)][:_MOST_PLACES]),
-    ):
+    looked = [
+        place
+        if count == 1
+        else words.times.replace("{place}", place).replace("{count}", str(count))
+        for place, count in Counter(visit.place for visit in known.visits).items()
+    ]
+    plan = [*dict.fromkeys(known.plan)][:_MOST_PLACES]
+    for text, places in ((words.looked, looked), (words.next, plan)):
         if places:
             parts.append(text.replace("{places}", ", ".join(places)))
     return kind, words.separator.join(parts)

@@ -113,6 +113,13 @@ def test_a_note_remembers_the_goal_and_where_one_has_looked() -> None:
     ]
 
 
+def test_a_note_counts_how_often_one_has_looked_in_a_place() -> None:
+    assert TEXTS.notes is not None
+    other = FAR.model_copy(update={"object_type": "Cabinet"})
+    whole = episode(FAR, other, FAR, NEAR)
+    assert note(TEXTS.notes, whole, 3)[1].endswith("; Egg near; looked Shelf 2, Cabinet")
+
+
 def test_a_model_that_decided_itself_keeps_its_own_notes() -> None:
     own = [ThoughtRecord(kind="planning", text="mine", writer="hf:x")]
     thinking = FAR.model_copy(update={"thoughts": own})
