@@ -39,6 +39,7 @@ MAY_USE = {
     "agents/vlm/merging.py": ("local",),
     "agents/zoo/packing.py": ("rl",),
     "benchmarks": (),
+    "benchmarks/ablation/chart.py": ("charts",),
     "benchmarks/ladder/chart.py": ("charts",),
     "benchmarks/scoring/charts.py": ("charts",),
     "benchmarks/scoring/curves.py": ("charts",),

@@ -6,10 +6,10 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from agents.finetune.drawing import drawn
 from agents.finetune.settings import DataSettings
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import MANIFEST, Collection
@@ -66,7 +66,7 @@ def open_samples(paths: Sequence[Path], settings: DataSettings) -> Samples:
             in different words.
     """
     every_source = {path: _opened(path, settings) for path in paths}
-    _check_parts(paths, settings)
+    _check_choice(paths, settings)
     sources = {path: source for path, source in every_source.items() if source.chats}
     if not sources:
         names = ", ".join(map(str, paths))
@@ -80,7 +80,7 @@ def open_samples(paths: Sequence[Path], settings: DataSettings) -> Samples:
                 "after the other"
             )
     every = [(chat, source.folder) for source in sources.values() for chat in source.chats]
-    every = every[: settings.limit]
+    every = [*drawn(every, settings.limit)]
     found = every
     if settings.mask == "turns":
         found = [(chat, folder) for chat, folder in every if any(chat.train)]
@@ -109,15 +109,15 @@ def _opened(path: Path, settings: DataSettings) -> _Source:
             "er-gym collect wrote, or a ShareGPT file"
         )
     file = open_sharegpt(path)
-    chats = tuple(islice(file, settings.limit))
+    chats = tuple(file)
     return _Source(chats, file.folder, {"dataset": str(file.path.resolve())})
 
 
 def _of_collection(collection: Collection, settings: DataSettings) -> _Source:
     dialect = load_dialect(settings.dialect)
-    wanted = set(settings.parts)
-    trajectories = [each for each in collection.trajectories() if not wanted or each.part in wanted]
-    trajectories = trajectories[: settings.limit]
+    trajectories = [
+        each for each in collection.trajectories() if settings.takes(each.part, each.kind)
+    ]
     try:
         chats = tuple(dialect.chat(each, settings.language) for each in trajectories)
     except ValueError as error:
@@ -128,19 +128,12 @@ def _of_collection(collection: Collection, settings: DataSettings) -> _Source:
     return _Source(chats, collection.path, prompts, collection.manifest.settings)
 
 
-def _check_parts(paths: Sequence[Path], settings: DataSettings) -> None:
-    """Refuse parts that none of the collections has. A ShareGPT file has no parts."""
+def _check_choice(paths: Sequence[Path], settings: DataSettings) -> None:
+    """Refuse parts and kinds that none of the collections has. A ShareGPT file has neither."""
     collections = [Collection.open(path) for path in paths if (path / MANIFEST).is_file()]
-    if not (settings.parts and collections):
-        return
-    there = {each.part for collection in collections for each in collection.trajectories()}
-    missing = sorted(set(settings.parts) - there)
-    if missing:
-        names, parts = ", ".join(str(each.path) for each in collections), ", ".join(sorted(there))
-        raise ValueError(
-            f"{names} has no trajectories of the part {', '.join(missing)}; it has: "
-            f"{parts or 'none'}; set data.parts, such as --set 'data.parts=[{parts}]'"
-        )
+    if collections and (settings.parts or settings.kinds):
+        there = {(one.part, one.kind) for each in collections for one in each.trajectories()}
+        settings.check_choice(", ".join(str(each.path) for each in collections), there)
 
 
 def _told(prompts: Mapping[str, str]) -> str:

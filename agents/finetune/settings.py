@@ -6,7 +6,7 @@ er-gym's own files are ``configs/finetune/NAME.yaml``. Every field has a default
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -68,6 +68,7 @@ class DataSettings(_Settings):
 
     Attributes:
         parts: of a collection; all if empty.
+        kinds: of its trajectories, such as ``a`` (:mod:`er_gym.data.trajectory`); all if empty.
         dialect: how trajectories are put into words (:mod:`er_gym.data.dialects`); its words are
             also the prompts with which the tuned model plays.
         language: of the dialect's texts; None for that of the thoughts.
@@ -78,10 +79,11 @@ class DataSettings(_Settings):
         max_length: the most tokens of a conversation. A longer one is an error: to cut it would cut
             pictures.
         min_pixels, max_pixels: a picture with fewer or more is scaled.
-        limit: the most conversations; None for all.
+        limit: the most conversations, drawn at random, always the same; None for all.
     """
 
     parts: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
     dialect: str = "paper"
     language: Language | None = None
     mask: Mask = "turns"
@@ -97,6 +99,30 @@ class DataSettings(_Settings):
                 f"min_pixels {self.min_pixels} is more than max_pixels {self.max_pixels}"
             )
         return self
+
+    def takes(self, part: str, kind: str) -> bool:
+        """Whether a trajectory of this part and kind is learnt from."""
+        return (not self.parts or part in self.parts) and (not self.kinds or kind in self.kinds)
+
+    def check_choice(self, where: str, there: Collection[tuple[str, str]]) -> None:
+        """Refuse a part or a kind that no trajectory has.
+
+        Args:
+            where: the name of what holds the trajectories.
+            there: the part and the kind of each.
+
+        Raises:
+            ValueError: see above.
+        """
+        for name, wanted, place in (("part", self.parts, 0), ("kind", self.kinds, 1)):
+            found = sorted({each[place] for each in there})
+            missing = sorted(set(wanted) - set(found))
+            if missing:
+                raise ValueError(
+                    f"{where} has no trajectories of the {name} {', '.join(missing)}; it has: "
+                    f"{', '.join(found) or 'none'}; set data.{name}s, such as "
+                    f"--set 'data.{name}s=[{', '.join(found)}]'"
+                )
 
 
 class TrainingSettings(_Settings):

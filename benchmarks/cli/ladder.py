@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from benchmarks.cli.errors import INTERRUPTED, bad_input, print_problem
+from benchmarks.cli.errors import bad_input, print_problem
 from benchmarks.cli.options import Place, overrides_option
-from benchmarks.cli.terminal import echo, stdout, terminal
+from benchmarks.cli.plan import carry_out
+from benchmarks.cli.terminal import echo, stdout
 
 if TYPE_CHECKING:
-    from benchmarks.ladder.phases import Phase
     from benchmarks.ladder.result import RungResult
     from benchmarks.ladder.settings import LadderSettings
 
@@ -41,36 +41,16 @@ def ladder(
     phase is a command of er-gym, which --print shows. The same command continues a ladder. It ends
     with a table and a picture, beside the paper's.
     """
-    from benchmarks.ladder.climb import LadderError, PhaseFailed, climb
-    from benchmarks.ladder.phases import phases
+    from benchmarks.ladder.phases import plan_of
     from benchmarks.ladder.result import read_results
     from benchmarks.ladder.settings import load_ladder
-    from er_gym import __version__
-    from er_gym.locking import Locked
-    from er_gym.writing import ForeignFile
 
-    console = terminal(stderr=True)
     with bad_input():
         settings = load_ladder(config, overrides)
     out = out or Path("runs") / "ladder" / Path(config).stem
-    if only_print:
-        for phase in phases(settings, out):
-            echo(str(phase))
-        return 0
-
-    def tell(phase: Phase, number: int, total: int) -> None:
-        console.print(f"[{number}/{total}] {phase.name}", style="bold", markup=False)
-        console.print(str(phase), style="dim", soft_wrap=True, markup=False)
-
-    try:
-        with bad_input(LadderError, Locked, ForeignFile):
-            climb(settings, out, __version__, tell, until)
-    except PhaseFailed as error:
-        print_problem(f"{error}; the same command continues {out}")
-        return error.code
-    except KeyboardInterrupt:
-        print_problem(f"interrupted; the same command continues {out}")
-        return INTERRUPTED
+    code = carry_out(plan_of(settings, out), out, until, only_print)
+    if code or only_print:
+        return code
     with bad_input():
         results = read_results(settings, out)
     _show(settings, out, results)

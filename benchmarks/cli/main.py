@@ -13,6 +13,7 @@ from typing import NoReturn
 
 import click
 
+from benchmarks.cli.ablate import ablate
 from benchmarks.cli.bench import bench
 from benchmarks.cli.collect import collect
 from benchmarks.cli.data import data
@@ -101,6 +102,7 @@ cli.add_command(match_server)
 cli.add_command(inspect)
 cli.add_command(data)
 cli.add_command(ladder)
+cli.add_command(ablate)
 cli.add_command(new_model)
 cli.add_command(zoo)
 

@@ -2,33 +2,17 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from agents.finetune.settings import STAGES, Stage
 from benchmarks.ladder.settings import LadderSettings, StageSettings
+from benchmarks.plan.commands import Commands
+from benchmarks.plan.phase import Phase
+from benchmarks.plan.run import Plan
 
 BASE = "base"
-
-
-@dataclass(frozen=True)
-class Phase:
-    """A step of a ladder.
-
-    Attributes:
-        name: unique, such as ``2-exploration/sample``.
-        command: the arguments of ``er-gym``.
-        out: the directory that it writes, relative to the ladder's.
-    """
-
-    name: str
-    command: tuple[str, ...]
-    out: str
-
-    def __str__(self) -> str:
-        return shlex.join(("er-gym", *self.command))
 
 
 @dataclass(frozen=True)
@@ -46,14 +30,14 @@ class Rung:
     run: str
 
 
-def phases(settings: LadderSettings, root: Path) -> list[Phase]:
-    """All phases in order.
+def plan_of(settings: LadderSettings, root: Path) -> Plan:
+    """All phases of a ladder in order.
 
     Args:
         settings: of the ladder.
         root: its directory.
     """
-    return list(_Plan(settings, root).phases())
+    return Plan("ladder", settings, tuple(_Ladder(settings, Commands(settings, root)).phases()))
 
 
 def rungs(settings: LadderSettings) -> list[Rung]:
@@ -70,15 +54,15 @@ def rungs(settings: LadderSettings) -> list[Rung]:
 
 
 @dataclass(frozen=True)
-class _Plan:
-    """Makes the commands. Every path in them begins with the ladder's directory."""
+class _Ladder:
+    """Puts the commands together."""
 
     settings: LadderSettings
-    root: Path
+    make: Commands
 
     def phases(self) -> Iterator[Phase]:
-        settings = self.settings
-        model = settings.base.model or self._at(BASE)
+        settings, make = self.settings, self.make
+        model = settings.base.model or make.at(BASE)
         learnt_before: list[str] = []
         before = BASE
         for stage, row in settings.stages.items():
@@ -88,97 +72,60 @@ class _Plan:
                     data.append(phase.out)
                 yield phase
             if before == BASE:
-                if settings.base.architecture:
-                    yield self._new_model(data)
+                if architecture := settings.base.architecture:
+                    yield make.new_model(
+                        "base/new-model", BASE, architecture, data, settings.dialect, settings.seed
+                    )
                 if settings.evaluation.base:
                     yield self._evaluate(BASE, model, 0.0)
-            yield self._finetune(stage, row, model, [*learnt_before * row.again, *data])
+            yield make.finetune(
+                f"{_stage(stage)}/finetune",
+                _stage(stage),
+                row.finetune,
+                model,
+                [*learnt_before * row.again, *data],
+                f"data.dialect={settings.dialect}",
+                f"training.seed={settings.seed}",
+                "data.parts=[]",
+                *row.set,
+            )
             learnt_before += data
-            model, before = self._at(_stage(stage)), stage
+            model, before = make.at(_stage(stage)), stage
             yield self._evaluate(stage, model, 0.0)
             if stage != STAGES[0]:
                 for rate in settings.evaluation.faults:
                     yield self._evaluate(stage, model, rate)
 
     def _data(self, stage: Stage, row: StageSettings, model: str) -> Iterator[Phase]:
-        number = _stage(stage)
+        make, number = self.make, _stage(stage)
         if row.teacher is not None:
-            teacher, run = row.teacher, f"samples/{number}-teacher"
-            yield self._phase(
-                f"{number}/teacher",
-                run,
-                *self._bench(teacher.agent, self.settings.suite, teacher.tasks),
-                *("--samples", str(teacher.samples), "--workers", str(self.settings.workers)),
-            )
-            yield self._phase(
-                f"{number}/taught",
-                f"data/{number}-taught",
-                *("collect", "--select", self._at(run), "--balance", "none"),
-                *self._collecting(teacher.limit),
-            )
+            names = (f"{number}/teacher", f"{number}/taught")
+            run, out = f"samples/{number}-teacher", f"data/{number}-taught"
+            yield from make.teach(names, run, out, row.teacher)
         if row.sample is not None:
             sample, run = row.sample, f"samples/{number}"
-            faults = ("--faults", str(sample.faults)) if sample.faults else ()
-            yield self._phase(
+            yield make.bench_model(
                 f"{number}/sample",
                 run,
-                *self._bench_model(model, self.settings.suite, sample.tasks),
-                *("--samples", str(sample.samples)),
-                *faults,
-                *_overrides(
-                    f"sampling.temperature={sample.temperature}", f"sampling.top_p={sample.top_p}"
-                ),
+                model,
+                self.settings.suite,
+                sample.tasks,
+                f"sampling.temperature={sample.temperature}",
+                f"sampling.top_p={sample.top_p}",
+                faults=sample.faults,
+                samples=sample.samples,
             )
-            corrects = stage == "reflection"
-            yield self._phase(
+            corrects = stage == STAGES[2]
+            yield make.phase(
                 f"{number}/{'correct' if corrects else 'select'}",
                 f"data/{number}-{'corrected' if corrects else 'selected'}",
                 "collect",
-                *("--correct" if corrects else "--select", self._at(run), "--allow-empty"),
+                *("--correct" if corrects else "--select", make.at(run), "--allow-empty"),
                 *(("--rewrite-thoughts",) * sample.rewrite_thoughts),
-                *self._collecting(sample.limit),
+                *make.collecting(sample.limit),
             )
         if row.collect is not None:
-            yield self._phase(
-                f"{number}/collect",
-                f"data/{number}",
-                *("collect", "--suite", self.settings.suite, "--recipe", row.collect.recipe),
-                *("--parts", ",".join(row.collect.parts)),
-                *self._instances,
-                *self._collecting(row.collect.limit),
-            )
-
-    def _collecting(self, limit: int | None) -> tuple[str, ...]:
-        settings = self.settings
-        return (
-            *("--language", settings.language, "--seed", str(settings.seed)),
-            *("--workers", str(settings.workers)),
-            *(() if settings.pictures else ("--no-pictures",)),
-            *(() if limit is None else ("--limit", str(limit))),
-        )
-
-    def _new_model(self, data: Sequence[str]) -> Phase:
-        return self._phase(
-            "base/new-model",
-            BASE,
-            *("new-model", self.settings.base.architecture),
-            *self._data_options(data),
-            *("--dialect", self.settings.dialect, "--seed", str(self.settings.seed)),
-        )
-
-    def _finetune(self, stage: Stage, row: StageSettings, model: str, data: Sequence[str]) -> Phase:
-        return self._phase(
-            f"{_stage(stage)}/finetune",
-            _stage(stage),
-            *("finetune", "--config", row.finetune, "--model", model),
-            *self._data_options(data),
-            *_overrides(
-                f"data.dialect={self.settings.dialect}",
-                f"training.seed={self.settings.seed}",
-                "data.parts=[]",
-                *row.set,
-            ),
-        )
+            yield make.collect(f"{number}/collect", f"data/{number}", row.collect)
 
     def _evaluate(self, name: str, model: str, faults: float) -> Phase:
         evaluation = self.settings.evaluation
@@ -187,45 +134,9 @@ class _Plan:
         if name == BASE and self.settings.base.architecture:  # no stage has told it how to converse
             sees = () if self.settings.pictures else ("sees=text",)
             play = [f"prompts.dialect={self.settings.dialect}", *sees, *play]
-        return self._phase(
-            out,
-            out,
-            *self._bench_model(model, evaluation.suite, evaluation.limit),
-            *(("--faults", str(faults)) if faults else ()),
-            *_overrides(*play),
+        return self.make.bench_model(
+            out, out, model, evaluation.suite, evaluation.limit, *play, faults=faults
         )
-
-    def _bench(self, agent: str, suite: str, limit: int | None) -> tuple[str, ...]:
-        return (
-            *("bench", "--suite", suite, "--agent", agent),
-            *(() if limit is None else ("--limit", str(limit), "--spread")),
-            *self._instances,
-            *("--seed", str(self.settings.seed)),
-        )
-
-    def _bench_model(self, model: str, suite: str, limit: int | None) -> tuple[str, ...]:
-        return (
-            *self._bench(f"hf:{model}", suite, limit),
-            *("--concurrency", str(self.settings.concurrency)),
-            *_overrides(*self.settings.play),
-        )
-
-    @property
-    def _instances(self) -> tuple[str, ...]:
-        return ("--instances", self.settings.instances) if self.settings.instances else ()
-
-    def _data_options(self, data: Sequence[str]) -> tuple[str, ...]:
-        return tuple(each for one in data for each in ("--data", self._at(one)))
-
-    def _phase(self, name: str, out: str, *command: str) -> Phase:
-        return Phase(name, (*command, "--out", self._at(out)), out)
-
-    def _at(self, out: str) -> str:
-        return str(self.root / out)
-
-
-def _overrides(*settings: str) -> tuple[str, ...]:
-    return tuple(each for one in settings for each in ("--set", one))
 
 
 def _stage(stage: Stage) -> str:

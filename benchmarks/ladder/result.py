@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,10 @@ from benchmarks.ladder.paper_rungs import PAPER
 from benchmarks.ladder.phases import Rung, rungs
 from benchmarks.ladder.settings import LadderSettings
 from benchmarks.scoring.metrics import Estimate, Score, Summary, summarise, summarise_by
-from benchmarks.scoring.paired import paired_difference
+from benchmarks.scoring.paired import paired_change, paired_difference
 from benchmarks.scoring.report import by_group, load_run
 from benchmarks.scoring.scorers import CORRECTED
-from benchmarks.scoring.tables import Table
+from benchmarks.scoring.tables import Table, interval, percent, signed
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import CONVERSATIONS, MANIFEST
 from er_gym.tasks.types import GROUPS
@@ -37,6 +37,9 @@ class RungResult:
         by_key_actions: success by the number of key actions.
         tokens: tokens of the model's replies in an episode; None if there are no conversations.
         gain: the difference in success to the rung before, paired over tasks; None for the first.
+        change: with faults, the difference in success to the same rung without them, paired over
+            tasks; None without.
+        spared: how much smaller a loss that is than the rung's before; None for the first.
     """
 
     rung: Rung
@@ -45,6 +48,8 @@ class RungResult:
     by_key_actions: dict[int, Summary]
     tokens: float | None
     gain: Estimate | None
+    change: Estimate | None
+    spared: Estimate | None
 
 
 def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
@@ -55,6 +60,8 @@ def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
     """
     found: list[RungResult] = []
     before: dict[float, Sequence[Score]] = {}
+    plain: dict[str, Sequence[Score]] = {}
+    pairs: dict[float, tuple[Sequence[Score], Sequence[Score]]] = {}
     for rung in rungs(settings):
         path = root / rung.run
         if not (path / MANIFEST).exists():
@@ -64,6 +71,15 @@ def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
         if not scores:
             continue
         last = before.get(rung.faults)
+        change = spared = None
+        if not rung.faults:
+            plain[rung.name] = scores
+        elif rung.name in plain:
+            pair = plain[rung.name], scores
+            change = paired_difference(*pair)
+            if rung.faults in pairs:
+                spared = paired_change(pairs[rung.faults], pair)
+            pairs[rung.faults] = pair
         found.append(
             RungResult(
                 rung=rung,
@@ -72,6 +88,8 @@ def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
                 by_key_actions=_by_key_actions(scores, run.episodes),
                 tokens=_tokens(path, run.episodes),
                 gain=None if last is None else paired_difference(last, scores),
+                change=change,
+                spared=spared,
             )
         )
         before[rung.faults] = scores
@@ -115,6 +133,16 @@ def result_tables(results: Sequence[RungResult]) -> list[Table]:
         rows=tuple(_length_row(each) for each in results),
         text_columns=1,
     )
+    with_faults = Table(
+        title="What faults cost, in %",
+        head=("rung", "faults", "success", "change", "95 %", "spared", "95 %", "repeated"),
+        rows=tuple(_faults_row(each) for each in results if each.change is not None),
+        text_columns=1,
+        notes=(
+            "change: in success by the faults, paired over tasks",
+            "spared: how much smaller the loss is than that of the rung before",
+        ),
+    )
     return [
         Table(
             title="The ladder, in %",
@@ -129,26 +157,36 @@ def result_tables(results: Sequence[RungResult]) -> list[Table]:
             ),
             may_turn=True,
         ),
+        *([with_faults] if with_faults.rows else []),
         by_length,
     ]
 
 
 def _row(result: RungResult) -> tuple[str, ...]:
-    summary, gain = result.summary, result.gain
-    groups = result.groups
+    summary, groups = result.summary, result.groups
     return (
         result.rung.name,
         f"{100 * result.rung.faults:g}",
         str(summary.n),
-        _percent(summary["success"].mean),
-        _interval(summary["success"]),
-        _NONE if gain is None else f"{100 * gain.mean:+.1f}",
-        _NONE if gain is None else _interval(gain),
-        _percent(summary["search_efficiency"].mean),
-        _percent(summary["completeness"].mean),
-        *(_percent(groups[each]["success"].mean) if each in groups else _NONE for each in GROUPS),
-        _percent(summary["repeat_rate"].mean),
+        percent(summary["success"].mean, 1),
+        interval(summary["success"]),
+        *signed(result.gain),
+        percent(summary["search_efficiency"].mean, 1),
+        percent(summary["completeness"].mean, 1),
+        *(percent(groups[each]["success"].mean, 1) if each in groups else _NONE for each in GROUPS),
+        percent(summary["repeat_rate"].mean, 1),
         _NONE if result.tokens is None else f"{result.tokens:,.0f}",
+    )
+
+
+def _faults_row(result: RungResult) -> tuple[str, ...]:
+    return (
+        result.rung.name,
+        f"{100 * result.rung.faults:g}",
+        percent(result.summary["success"].mean, 1),
+        *signed(result.change),
+        *signed(result.spared),
+        percent(result.summary["repeat_rate"].mean, 1),
     )
 
 
@@ -172,7 +210,7 @@ def _length_row(result: RungResult) -> tuple[str, ...]:
         result.rung.name,
         f"{100 * result.rung.faults:g}",
         *(
-            _percent(result.by_key_actions[each]["success"].mean)
+            percent(result.by_key_actions[each]["success"].mean, 1)
             if each in result.by_key_actions
             else _NONE
             for each in lengths
@@ -191,7 +229,14 @@ def _json(result: RungResult) -> dict[str, Any]:
     return {
         **asdict(result.rung),
         **_figures(result.summary),
-        "gain": None if result.gain is None else asdict(result.gain),
+        **{
+            name: None if one is None else asdict(one)
+            for name, one in (
+                ("gain", result.gain),
+                ("change", result.change),
+                ("spared", result.spared),
+            )
+        },
         "tokens": result.tokens,
         "groups": {name: _figures(each) for name, each in result.groups.items()},
         "by_key_actions": {str(n): _figures(each) for n, each in result.by_key_actions.items()},
@@ -200,18 +245,3 @@ def _json(result: RungResult) -> dict[str, Any]:
 
 def _figures(summary: Summary) -> dict[str, Any]:
     return {"n": summary.n, **{name: asdict(each) for name, each in summary.metrics.items()}}
-
-
-def _percent(rate: float) -> str:
-    return f"{100 * rate:.1f}"
-
-
-def _interval(estimate: Estimate) -> str:
-    if estimate.low is None or estimate.high is None:
-        return _NONE
-    return f"{100 * estimate.low:.1f} to {100 * estimate.high:.1f}"
-
-
-def without_faults(results: Sequence[RungResult]) -> Iterator[RungResult]:
-    """The rungs of the ladder itself."""
-    return (each for each in results if not each.rung.faults)

@@ -5,22 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from agents import configs
 from agents.finetune.settings import STAGES, Stage
-from er_gym.data.trajectory import Language
+from benchmarks.plan.settings import Collected, PlaySettings, Positive, StrictSettings, Taught
 
 KIND = "ladder"
 _WHAT = "ladder"
-Positive = Annotated[int, Field(gt=0)]
 
 
-class _Settings(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Base(_Settings):
+class Base(StrictSettings):
     """The model at the foot of the ladder; one of the two.
 
     Attributes:
@@ -39,21 +34,7 @@ class Base(_Settings):
         return self
 
 
-class Collected(_Settings):
-    """Trajectories of the data engine for a stage.
-
-    Attributes:
-        parts: of the recipe.
-        limit: how many trajectories.
-        recipe: one of ``configs/collections``, or a file.
-    """
-
-    parts: tuple[str, ...]
-    limit: Positive
-    recipe: str = "paper"
-
-
-class Sampled(_Settings):
+class Sampled(StrictSettings):
     """Episodes of the last stage's model, from which the stage learns.
 
     Attributes:
@@ -75,23 +56,7 @@ class Sampled(_Settings):
     rewrite_thoughts: bool = False
 
 
-class Taught(_Settings):
-    """Successful episodes of another agent, from which the stage learns.
-
-    Attributes:
-        agent: as ``er-gym bench`` takes it, such as ``searcher``.
-        tasks: how many tasks, spread over the suite.
-        samples: how many episodes of each.
-        limit: the most trajectories that are taken; None for all.
-    """
-
-    agent: str
-    tasks: Positive
-    samples: Positive = 1
-    limit: Positive | None = None
-
-
-class StageSettings(_Settings):
+class StageSettings(StrictSettings):
     """One stage.
 
     Attributes:
@@ -112,7 +77,7 @@ class StageSettings(_Settings):
     set: tuple[str, ...] = ()
 
 
-class Evaluation(_Settings):
+class Evaluation(StrictSettings):
     """How each rung is measured.
 
     Attributes:
@@ -130,36 +95,16 @@ class Evaluation(_Settings):
     set: tuple[str, ...] = ()
 
 
-class LadderSettings(_Settings):
+class LadderSettings(PlaySettings):
     """A ladder.
 
     Attributes:
-        description: for people.
         base: the model at its foot.
-        suite: the tasks of the training, and the arguments of ``collect`` beside.
-        instances: which object a type name means, ``target`` or ``explore``; "" for the suites' own
-            choice.
-        dialect, language: of the conversations.
-        pictures: whether trajectories are recorded with pictures; a model that reads needs none.
-        seed: of everything that is drawn.
-        workers: processes that play.
-        concurrency: conversations at once.
-        play: overrides of the agent's settings whenever it plays.
         stages: by name, from the first.
         evaluation: how each rung is measured.
     """
 
-    description: str = ""
     base: Base
-    suite: str = "train"
-    instances: str = "explore"
-    dialect: str = "paper"
-    language: Language = "en"
-    pictures: bool = True
-    seed: int = Field(0, ge=0, lt=2**32)
-    workers: Positive = 2
-    concurrency: Positive = 8
-    play: tuple[str, ...] = ()
     stages: dict[Stage, StageSettings] = Field(min_length=1)
     evaluation: Evaluation = Evaluation()
 

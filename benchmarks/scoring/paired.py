@@ -29,6 +29,29 @@ def paired_difference(
     return normal([second[task] - first[task] for task in common])
 
 
+def paired_change(
+    first: tuple[Sequence[Score], Sequence[Score]],
+    second: tuple[Sequence[Score], Sequence[Score]],
+    metric: str = "success",
+) -> Estimate:
+    """How much more a metric changes for one agent than for another, with its 95 % interval.
+
+    Args:
+        first, second: of each agent, the scores of a run before and of one after the change; all
+            runs are of the same suite.
+        metric: as for :func:`paired_difference`.
+
+    Raises:
+        ValueError: the runs have no task in common.
+    """
+    runs = [_by_task(each, metric) for each in (*first, *second)]
+    common = [task for task in runs[0] if all(task in run for run in runs)]
+    if not common:
+        raise ValueError("the runs have no task in common")
+    before, after, other_before, other_after = runs
+    return normal([(other_after[t] - other_before[t]) - (after[t] - before[t]) for t in common])
+
+
 def _by_task(scores: Sequence[Score], metric: str) -> dict[str, float]:
     found: dict[str, list[float]] = {}
     for each in scores:

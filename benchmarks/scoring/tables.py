@@ -129,11 +129,11 @@ def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple
     overall = slices(scores)[0][2]
     return (
         *head,
-        _percent(overall["success"].mean),
-        _interval(overall["success"]),
-        _percent(overall["search_efficiency"].mean),
-        _percent(overall["completeness"].mean),
-        *(_percent(groups[name]["success"].mean) if name in groups else _NONE for name in GROUPS),
+        percent(overall["success"].mean),
+        interval(overall["success"]),
+        percent(overall["search_efficiency"].mean),
+        percent(overall["completeness"].mean),
+        *(percent(groups[name]["success"].mean) if name in groups else _NONE for name in GROUPS),
     )
 
 
@@ -154,8 +154,8 @@ def _samples(run: RunReport, scorer: str, scores: Sequence[Score], with_types: b
             (
                 name,
                 str(counted.tasks),
-                *(_percent(rate) for rate in counted.pass_at.values()),
-                _percent(counted.always),
+                *(percent(rate) for rate in counted.pass_at.values()),
+                percent(counted.always),
             )
             for name, counted in lines
         ),
@@ -197,9 +197,9 @@ def _types(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
         (
             name,
             str(summary.n),
-            _percent(summary["success"].mean),
-            _interval(summary["success"]),
-            *(_percent(summary[metric].mean) for metric in METRICS[1:]),
+            percent(summary["success"].mean),
+            interval(summary["success"]),
+            *(percent(summary[metric].mean) for metric in METRICS[1:]),
         )
         for name, summary in lines
     ]
@@ -234,14 +234,23 @@ def _misses(run: RunReport) -> Table:
     )
 
 
-def _percent(rate: float) -> str:
-    return f"{100 * rate:.2f}"
+def percent(rate: float, digits: int = 2) -> str:
+    """A rate in %."""
+    return f"{100 * rate:.{digits}f}"
 
 
-def _interval(estimate: Estimate) -> str:
+def interval(estimate: Estimate) -> str:
+    """The 95 % interval of a rate in %, ``-`` if it has none."""
     if estimate.low is None or estimate.high is None:
         return _NONE
     return f"{100 * estimate.low:.1f} to {100 * estimate.high:.1f}"
+
+
+def signed(estimate: Estimate | None) -> tuple[str, str]:
+    """A difference in % and its interval; ``-`` for None."""
+    if estimate is None:
+        return _NONE, _NONE
+    return f"{100 * estimate.mean:+.1f}", interval(estimate)
 
 
 def as_markdown(found: Sequence[Table]) -> str:

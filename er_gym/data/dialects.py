@@ -200,17 +200,28 @@ def load_dialect(name: str) -> Dialect:
     own = dialect_names()
     folder = config_directory("dialects") / name if name in own else Path(name)
     files = [(language, folder / f"{language}.yaml") for language in get_args(Language)]
-    texts = {
-        language: validated(DialectTexts, read_yaml(file), f"{file}:")
-        for language, file in files
-        if file.is_file()
-    }
+    texts = {language: _read_texts(file) for language, file in files if file.is_file()}
     if not texts:
         raise ValueError(
             f"there is no dialect {name!r:.80}; choose one of: {', '.join(own)}; or give a folder "
             "that has en.yaml or zh.yaml"
         )
     return Dialect(name, texts)
+
+
+def _read_texts(file: Path) -> DialectTexts:
+    """Read a file of a dialect. ``like: NAME`` takes all entries that it lacks from NAME."""
+    data = read_yaml(file)
+    if isinstance(data, dict) and "like" in data:
+        name = data.pop("like")
+        other = config_directory("dialects") / str(name) / file.name
+        if name not in dialect_names() or not other.is_file():
+            raise ValueError(
+                f"{file}: there is no {file.stem} dialect {name!r:.80} to be like; choose one of: "
+                f"{', '.join(dialect_names())}"
+            )
+        data = {**_read_texts(other).model_dump(exclude_unset=True), **data}
+    return validated(DialectTexts, data, f"{file}:")
 
 
 # -- the system's and the user's turns -------------------------------------------------------------

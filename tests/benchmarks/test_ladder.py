@@ -18,9 +18,10 @@ from click.testing import CliRunner
 
 from agents.finetune.settings import load_settings
 from benchmarks.cli.main import cli
-from benchmarks.ladder.climb import LADDER, LadderRecord, climb
-from benchmarks.ladder.phases import Phase, phases, rungs
+from benchmarks.ladder.phases import plan_of, rungs
 from benchmarks.ladder.settings import ladder_names, load_ladder
+from benchmarks.plan.phase import Phase
+from benchmarks.plan.run import PlanRecord, run_plan
 
 for package in ("torch", "transformers", "peft", "tensorboard"):
     pytest.importorskip(package, reason="needs the extra finetune")
@@ -69,12 +70,10 @@ def parsed(phase: Phase) -> None:
 @pytest.mark.parametrize("name", ladder_names())
 def test_the_phases_are_commands_that_exist(name: str, tmp_path: Path) -> None:
     settings = load_ladder(name)
-    plan = phases(settings, tmp_path)
+    plan = plan_of(settings, tmp_path).phases
     names = [phase.name for phase in plan]
     assert len(set(names)) == len(names)
     for phase in plan:
-        for place in (tmp_path / each for each in ("data", "samples")):
-            place.mkdir(exist_ok=True)
         for name_of, value in pairwise(phase.command):
             if name_of in ("--data", "--correct", "--select"):
                 Path(value).mkdir(parents=True, exist_ok=True)
@@ -85,7 +84,9 @@ def test_the_phases_are_commands_that_exist(name: str, tmp_path: Path) -> None:
 
 
 def test_each_stage_learns_from_the_model_before(tmp_path: Path) -> None:
-    plan = {phase.name: phase.command for phase in phases(load_ladder("tiny-text"), tmp_path)}
+    plan = {
+        phase.name: phase.command for phase in plan_of(load_ladder("tiny-text"), tmp_path).phases
+    }
     first, second, third = (
         plan[f"{stage}/finetune"] for stage in ("1-imitation", "2-exploration", "3-reflection")
     )
@@ -146,7 +147,7 @@ def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
     result = CliRunner().invoke(cli, command[3:])
     assert result.exit_code == 0, result.output
     settings = load_ladder(str(file))
-    assert done(root) == [phase.name for phase in phases(settings, root)]
+    assert done(root) == [phase.name for phase in plan_of(settings, root).phases]
     figures = json.loads((root / "result.json").read_text())
     assert [rung["name"] for rung in figures["rungs"]] == ["base", *settings.stages]
     assert figures["rungs"][0]["gain"] is None
@@ -154,7 +155,7 @@ def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
     table = (root / "result.md").read_text()
     assert "paper: Reasoner" in table
     before = [each.stat().st_mtime_ns for each in sorted(root.rglob("*.safetensors"))]
-    climb(settings, root, "0", lambda *phase: pytest.fail(f"{phase} runs again"))
+    run_plan(plan_of(settings, root), root, lambda *phase: pytest.fail(f"{phase} runs again"))
     assert before == [each.stat().st_mtime_ns for each in sorted(root.rglob("*.safetensors"))]
     other = ["ladder", "--config", str(file), "--set", "seed=3", "--out", str(root)]
     told = CliRunner().invoke(cli, other)
@@ -163,7 +164,7 @@ def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
 
 
 def done(root: Path) -> list[str]:
-    file = root / LADDER
+    file = root / "ladder.json"
     if not file.exists():
         return []
-    return [each.name for each in LadderRecord.model_validate_json(file.read_text()).done]
+    return [each.name for each in PlanRecord.model_validate_json(file.read_text()).done]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
 
 import er_gym
+from agents.finetune.drawing import drawn
 from agents.finetune.settings import DataSettings, Mask
 from er_gym.data.chat import Chat
 from er_gym.data.collection import MANIFEST, Collection, CollectionManifest
@@ -80,7 +80,9 @@ def open_source(path: Path, settings: DataSettings) -> Source:
     dialect = load_dialect(settings.dialect)
     if (path / MANIFEST).is_file():
         collection = Collection.open(path)
-        _check_parts(collection, settings)
+        settings.check_choice(
+            str(collection.path), {(each.part, each.kind) for each in collection.trajectories()}
+        )
         return Source(path, collection, dialect, lambda: _of_collection(collection, settings))
     if path.is_dir() and not (path / "dataset_info.json").is_file():
         raise ValueError(
@@ -95,7 +97,7 @@ def open_source(path: Path, settings: DataSettings) -> Source:
         path,
         Collection(file.folder, manifest),
         dialect,
-        lambda: _masked(islice(file, settings.limit), settings.mask),
+        lambda: _masked(iter(drawn(file, settings.limit)), settings.mask),
     )
 
 
@@ -183,28 +185,17 @@ def released(chat: Chat) -> Chat:
 
 def _of_collection(collection: Collection, settings: DataSettings) -> Iterator[Chat]:
     dialect = load_dialect(settings.dialect)
-    wanted = set(settings.parts)
     taken = (
         each
         for each in collection.trajectories()
-        if each.turns and (not wanted or each.part in wanted)
+        if each.turns and settings.takes(each.part, each.kind)
     )
-    chats = (dialect.chat(each, settings.language) for each in islice(taken, settings.limit))
+    chats = (dialect.chat(each, settings.language) for each in drawn(taken, settings.limit))
     return _masked(chats, settings.mask)
 
 
 def _masked(chats: Iterator[Chat], mask: Mask) -> Iterator[Chat]:
     return map(released, chats) if mask == "released" else chats
-
-
-def _check_parts(collection: Collection, settings: DataSettings) -> None:
-    there = {each.part for each in collection.trajectories()}
-    missing = [part for part in settings.parts if part not in there]
-    if missing:
-        raise ValueError(
-            f"{collection.path} has no trajectories of the part {', '.join(missing)}; it has: "
-            f"{', '.join(sorted(there)) or 'none'}; choose with --set data.parts=[…]"
-        )
 
 
 def _about(text: str) -> int:

@@ -1,30 +1,54 @@
-"""Runs the phases of a ladder, one after another, each once."""
+"""Runs the phases of a plan, one after another, each once."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from benchmarks.ladder.phases import Phase, phases
-from benchmarks.ladder.settings import LadderSettings
+from benchmarks.plan.phase import Phase
+from benchmarks.plan.settings import FREE, PlaySettings
+from er_gym import __version__
 from er_gym.locking import Locked, exclusive_use
 from er_gym.rollout.processes import CONTEXT, GRACE_SECONDS, end_with_parent
 from er_gym.tasks.reading import read_text
 from er_gym.writing import make_folder, write_atomic
 
-LADDER = "ladder.json"
 _RUNNING = "running"
-_FREE = {"workers", "concurrency", "description"}
-"""Settings that may change while a ladder is climbed: they do not change what comes out."""
 _PATIENCE = 3 * GRACE_SECONDS
 
 
-class LadderError(ValueError):
-    """A ladder cannot be climbed; the message is one line."""
+class PlanError(ValueError):
+    """A plan cannot be run; the message is one line."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be run.
+
+    Attributes:
+        kind: what a person calls it, such as ``ladder``; its record is the file ``KIND.json``.
+        settings: what it was made from.
+        phases: in order.
+    """
+
+    kind: str
+    settings: PlaySettings
+    phases: Sequence[Phase]
+
+    @property
+    def file(self) -> str:
+        """The name of its record."""
+        return f"{self.kind}.json"
+
+    @property
+    def format(self) -> str:
+        """The version of the record's layout."""
+        return f"er-gym/{self.kind}/1"
 
 
 class DonePhase(BaseModel):
@@ -42,20 +66,20 @@ class DonePhase(BaseModel):
     seconds: float
 
 
-class LadderRecord(BaseModel):
-    """The file ``ladder.json``: what is climbed, and how far it has come.
+class PlanRecord(BaseModel):
+    """The record of a plan: what is run, and how far it has come.
 
     Attributes:
-        format: the version of this layout.
-        settings: of the ladder.
+        format: see :attr:`Plan.format`.
+        settings: of the plan, as JSON has them.
         er_gym: the version that began it.
         done: the phases that have ended well, in order.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    format: Literal["er-gym/ladder/1"] = "er-gym/ladder/1"
-    settings: LadderSettings
+    format: str
+    settings: dict[str, Any]
     er_gym: str
     done: list[DonePhase] = []
 
@@ -73,56 +97,54 @@ class PhaseFailed(Exception):
         self.phase, self.code = phase, code
 
 
-def read_record(root: Path) -> LadderRecord | None:
-    """What a ladder's directory says; None if there is no ladder yet.
+def read_record(plan: Plan, root: Path) -> PlanRecord | None:
+    """What a plan's directory says; None if it has not begun.
 
     Raises:
-        LadderError: the file is damaged, or the directory holds something else.
+        PlanError: the file is damaged, or the directory holds something else.
     """
-    file = root / LADDER
+    file = root / plan.file
     if not file.exists():
         if root.is_dir() and any(each.name != "run.lock" for each in root.iterdir()):
-            raise LadderError(f"{root} is not empty and holds no {LADDER}; choose another --out")
+            raise PlanError(f"{root} is not empty and holds no {file.name}; choose another --out")
         return None
     try:
-        return LadderRecord.model_validate_json(read_text(file))
+        record = PlanRecord.model_validate_json(read_text(file))
     except ValidationError as error:
         problem = error.errors()[0]
         place = ".".join(map(str, problem["loc"]))
-        raise LadderError(f"{file} is damaged: {place}: {problem['msg']}") from None
+        raise PlanError(f"{file} is damaged: {place}: {problem['msg']}") from None
+    if record.format != plan.format:
+        raise PlanError(f"{file} has the format {record.format!r:.80}, not {plan.format!r}")
+    return record
 
 
-def check_same(settings: LadderSettings, record: LadderRecord, root: Path) -> None:
-    """Refuse to climb another ladder in the same directory.
+def check_same(plan: Plan, record: PlanRecord, root: Path) -> None:
+    """Refuse to run another plan in the same directory.
 
     Raises:
-        LadderError: a setting differs that changes what comes out.
+        PlanError: a setting differs that changes what comes out.
     """
-    here, there = settings.model_dump(mode="json"), record.settings.model_dump(mode="json")
-    for name, value in here.items():
-        if name not in _FREE and value != there[name]:
-            raise LadderError(
-                f"{root} holds another ladder: its {name} is {there[name]!r:.300}, this one's "
+    for name, value in plan.settings.model_dump(mode="json").items():
+        there = record.settings.get(name)
+        if name not in FREE and value != there:
+            raise PlanError(
+                f"{root} holds another {plan.kind}: its {name} is {there!r:.300}, this one's "
                 f"{value!r:.300}; choose another --out, or give the same settings"
             )
 
 
-def climb(
-    settings: LadderSettings,
-    root: Path,
-    version: str,
-    tell: Callable[[Phase, int, int], None],
-    until: str | None = None,
-) -> LadderRecord:
+def run_plan(
+    plan: Plan, root: Path, tell: Callable[[Phase, int, int], None], until: str | None = None
+) -> PlanRecord:
     """Run the phases that are not done yet.
 
     Each runs in a process of its own, which ends when this one ends. An interrupted phase is begun
     again by the same command, and goes on where it was.
 
     Args:
-        settings: of the ladder.
+        plan: the phases.
         root: its directory.
-        version: er-gym's.
         tell: is called with each phase before it runs, its number from 1, and how many there are.
         until: the name of the last phase to run; None for all.
 
@@ -130,41 +152,45 @@ def climb(
         What the directory says in the end.
 
     Raises:
-        LadderError: the directory holds another ladder, or there is no phase ``until``.
-        Locked: another process climbs it.
+        PlanError: the directory holds another plan, or there is no phase ``until``.
+        Locked: another process runs it.
         PhaseFailed: a phase ended with an error.
         KeyboardInterrupt: after the running phase has ended.
         OSError: the directory cannot be written to.
     """
-    record = read_record(root)
+    record = read_record(plan, root)
     if record is not None:
-        check_same(settings, record, root)
-    plan = phases(settings, root)
-    names = [phase.name for phase in plan]
+        check_same(plan, record, root)
+    names = [phase.name for phase in plan.phases]
     if until is not None and until not in names:
-        raise LadderError(f"there is no phase {until!r}; there are: {', '.join(names)}")
+        raise PlanError(f"there is no phase {until!r}; there are: {', '.join(names)}")
     with exclusive_use(root):
         _wait_for_running(root)
-        record = LadderRecord(settings=settings, er_gym=version, done=record.done if record else [])
-        _write(root, record)
+        record = PlanRecord(
+            format=plan.format,
+            settings=plan.settings.model_dump(mode="json"),
+            er_gym=__version__,
+            done=record.done if record else [],
+        )
+        _write(root / plan.file, record)
         done = {each.name for each in record.done}
-        for number, phase in enumerate(plan, 1):
+        for number, phase in enumerate(plan.phases, 1):
             if phase.name not in done:
-                tell(phase, number, len(plan))
+                tell(phase, number, len(plan.phases))
                 begin = time.monotonic()
                 _run(phase, root)
                 seconds = round(time.monotonic() - begin, 1)
                 ended = DonePhase(name=phase.name, command=list(phase.command), seconds=seconds)
                 record = record.model_copy(update={"done": [*record.done, ended]})
-                _write(root, record)
+                _write(root / plan.file, record)
             if phase.name == until:
                 break
     return record
 
 
-def _write(root: Path, record: LadderRecord) -> None:
-    make_folder(root)
-    write_atomic(root / LADDER, record.model_dump_json(indent=1) + "\n")
+def _write(file: Path, record: PlanRecord) -> None:
+    make_folder(file.parent)
+    write_atomic(file, record.model_dump_json(indent=1) + "\n")
 
 
 def _run(phase: Phase, root: Path) -> None:

@@ -1,0 +1,54 @@
+"""Runs a plan for a command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.cli.errors import INTERRUPTED, bad_input, print_problem
+from benchmarks.cli.terminal import echo, terminal
+
+if TYPE_CHECKING:
+    from benchmarks.plan.phase import Phase
+    from benchmarks.plan.run import Plan
+
+
+def carry_out(plan: Plan, out: Path, until: str | None, only_print: bool) -> int:
+    """Run the phases of a plan that are not done yet, and tell of each.
+
+    Args:
+        plan: the phases.
+        out: its directory.
+        until: the name of the last phase to run; None for all.
+        only_print: print the phases and run none.
+
+    Returns:
+        The exit code, 0 if all went well.
+
+    Raises:
+        BadInput: the directory holds another plan, or another process runs it.
+    """
+    from benchmarks.plan.run import PhaseFailed, PlanError, run_plan
+    from er_gym.locking import Locked
+    from er_gym.writing import ForeignFile
+
+    if only_print:
+        for phase in plan.phases:
+            echo(str(phase))
+        return 0
+    console = terminal(stderr=True)
+
+    def tell(phase: Phase, number: int, total: int) -> None:
+        console.print(f"[{number}/{total}] {phase.name}", style="bold", markup=False)
+        console.print(str(phase), style="dim", soft_wrap=True, markup=False)
+
+    try:
+        with bad_input(PlanError, Locked, ForeignFile):
+            run_plan(plan, out, tell, until)
+    except PhaseFailed as error:
+        print_problem(f"{error}; the same command continues {out}")
+        return error.code
+    except KeyboardInterrupt:
+        print_problem(f"interrupted; the same command continues {out}")
+        return INTERRUPTED
+    return 0

@@ -1,0 +1,143 @@
+"""The commands of which plans consist."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.plan.phase import Phase
+from benchmarks.plan.settings import Collected, PlaySettings, Taught
+
+
+@dataclass(frozen=True)
+class Commands:
+    """Makes the phases of a plan. Every path in them begins with the plan's directory.
+
+    Attributes:
+        settings: of the plan.
+        root: its directory.
+    """
+
+    settings: PlaySettings
+    root: Path
+
+    def at(self, out: str) -> str:
+        """The path of a directory in the plan's."""
+        return str(self.root / out)
+
+    def phase(self, name: str, out: str, *command: str) -> Phase:
+        """A phase whose command writes ``out``."""
+        return Phase(name, (*command, "--out", self.at(out)), out)
+
+    def collect(self, name: str, out: str, collected: Collected) -> Phase:
+        """Collects trajectories of the data engine."""
+        return self.phase(
+            name,
+            out,
+            *("collect", "--suite", self.settings.suite, "--recipe", collected.recipe),
+            *("--parts", ",".join(collected.parts)),
+            *self._instances,
+            *self.collecting(collected.limit),
+        )
+
+    def teach(self, names: tuple[str, str], run: str, out: str, taught: Taught) -> list[Phase]:
+        """Lets another agent play, and takes its successes.
+
+        Args:
+            names: of the two phases.
+            run: its run directory.
+            out: the collection's.
+            taught: who plays what.
+        """
+        return [
+            self.phase(
+                names[0],
+                run,
+                *self._bench(taught.agent, self.settings.suite, taught.tasks),
+                *("--samples", str(taught.samples), "--workers", str(self.settings.workers)),
+            ),
+            self.phase(
+                names[1],
+                out,
+                *("collect", "--select", self.at(run), "--balance", "none"),
+                *self.collecting(taught.limit),
+            ),
+        ]
+
+    def collecting(self, limit: int | None) -> tuple[str, ...]:
+        """The options that every collection has."""
+        settings = self.settings
+        return (
+            *("--language", settings.language, "--seed", str(settings.seed)),
+            *("--workers", str(settings.workers)),
+            *(() if settings.pictures else ("--no-pictures",)),
+            *(() if limit is None else ("--limit", str(limit))),
+        )
+
+    def new_model(
+        self, name: str, out: str, architecture: str, data: Iterable[str], dialect: str, seed: int
+    ) -> Phase:
+        """Makes a model with random weights and a tokenizer that is learnt from data."""
+        return self.phase(
+            name,
+            out,
+            *("new-model", architecture),
+            *self._data(data),
+            *("--dialect", dialect, "--seed", str(seed)),
+        )
+
+    def finetune(
+        self, name: str, out: str, config: str, model: str, data: Iterable[str], *changes: str
+    ) -> Phase:
+        """Tunes a model; ``changes`` are overrides of the configuration."""
+        return self.phase(
+            name,
+            out,
+            *("finetune", "--config", config, "--model", model),
+            *self._data(data),
+            *_overrides(*changes),
+        )
+
+    def bench_model(
+        self,
+        name: str,
+        out: str,
+        model: str,
+        suite: str,
+        limit: int | None,
+        *changes: str,
+        faults: float = 0.0,
+        samples: int | None = None,
+    ) -> Phase:
+        """Lets a model play; ``changes`` are overrides of the agent's settings."""
+        return self.phase(
+            name,
+            out,
+            *self._bench(f"hf:{model}", suite, limit),
+            *("--concurrency", str(self.settings.concurrency)),
+            *_overrides(*self.settings.play),
+            *(() if samples is None else ("--samples", str(samples))),
+            *(("--faults", str(faults)) if faults else ()),
+            *_overrides(*changes),
+        )
+
+    def _bench(self, agent: str, suite: str, limit: int | None) -> tuple[str, ...]:
+        return (
+            *("bench", "--suite", suite, "--agent", agent),
+            *(() if limit is None else ("--limit", str(limit), "--spread")),
+            *self._instances,
+            *("--seed", str(self.settings.seed)),
+        )
+
+    @property
+    def _instances(self) -> tuple[str, ...]:
+        return ("--instances", self.settings.instances) if self.settings.instances else ()
+
+    def _data(self, directories: Iterable[str]) -> tuple[str, ...]:
+        return tuple(each for one in directories for each in ("--data", self.at(one)))
+
+
+def _overrides(*settings: str) -> tuple[str, ...]:
+    """The options that override settings, each ``NAME=VALUE``."""
+    return tuple(each for one in settings for each in ("--set", one))

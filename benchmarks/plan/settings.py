@@ -1,0 +1,79 @@
+"""What the settings of all plans have in common."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from er_gym.data.trajectory import Language
+
+Positive = Annotated[int, Field(gt=0)]
+
+
+class StrictSettings(BaseModel):
+    """Settings that refuse unknown names."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Collected(StrictSettings):
+    """Trajectories of the data engine.
+
+    Attributes:
+        parts: of the recipe.
+        limit: how many trajectories.
+        recipe: one of ``configs/collections``, or a file.
+    """
+
+    parts: tuple[str, ...]
+    limit: Positive
+    recipe: str = "paper"
+
+
+class Taught(StrictSettings):
+    """Successful episodes of another agent.
+
+    Attributes:
+        agent: as ``er-gym bench`` takes it, such as ``searcher``.
+        tasks: how many tasks, spread over the suite.
+        samples: how many episodes of each.
+        limit: the most trajectories that are taken; None for all.
+    """
+
+    agent: str
+    tasks: Positive
+    samples: Positive = 1
+    limit: Positive | None = None
+
+
+class PlaySettings(StrictSettings):
+    """How trajectories are played and put into words, and how models play.
+
+    Attributes:
+        description: for people.
+        suite: the tasks of the training, and the arguments of ``collect`` beside.
+        instances: which object a type name means, ``target`` or ``explore``; "" for the suites' own
+            choice.
+        dialect, language: of the conversations.
+        pictures: whether trajectories are recorded with pictures; a model that reads needs none.
+        seed: of everything that is drawn.
+        workers: processes that play.
+        concurrency: conversations at once.
+        play: overrides of the agent's settings whenever it plays.
+    """
+
+    description: str = ""
+    suite: str = "train"
+    instances: str = "explore"
+    dialect: str = "paper"
+    language: Language = "en"
+    pictures: bool = True
+    seed: int = Field(0, ge=0, lt=2**32)
+    workers: Positive = 2
+    concurrency: Positive = 8
+    play: tuple[str, ...] = ()
+
+
+FREE = frozenset({"workers", "concurrency", "description"})
+"""Settings that may change while a plan runs: they do not change what comes out."""
