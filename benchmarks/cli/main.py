@@ -36,6 +36,7 @@ from benchmarks.cli.serve import match_server, serve
 from benchmarks.cli.tasks import tasks
 from benchmarks.cli.terminal import echo, stdout, use_any_encoding
 from benchmarks.cli.train import train_rl
+from benchmarks.cli.ui import ui
 from benchmarks.cli.zoo import zoo
 
 FORMATS = ("table", "md", "csv", "json")
@@ -103,6 +104,7 @@ cli.add_command(inspect)
 cli.add_command(data)
 cli.add_command(ladder)
 cli.add_command(ablate)
+cli.add_command(ui)
 cli.add_command(new_model)
 cli.add_command(zoo)
 

@@ -37,7 +37,7 @@ an episode (:func:`replay`). Only the paper's scorer has other rules. The judge'
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -196,6 +196,17 @@ def replay(criteria: Criteria, steps: Iterable[RecordedStep], *, goal_holds: boo
         steps: all steps, in order.
         goal_holds: whether the task's goal held when the agent said ``end``.
     """
+    *_, last = (
+        Progress.start(criteria),
+        *progress_by_step(criteria, steps, goal_holds=goal_holds),
+    )
+    return last
+
+
+def progress_by_step(
+    criteria: Criteria, steps: Iterable[RecordedStep], *, goal_holds: bool
+) -> Iterator[Progress]:
+    """The progress after each recorded step; the arguments are those of :func:`replay`."""
     progress = Progress.start(criteria)
     for step in steps:
         if step.success:
@@ -206,4 +217,4 @@ def replay(criteria: Criteria, steps: Iterable[RecordedStep], *, goal_holds: boo
                 in_reach=step.interactable,
                 goal_holds=goal_holds,
             )
-    return progress
+        yield progress

@@ -1,0 +1,76 @@
+"""``er-gym ui``."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+from pathlib import Path
+
+import click
+
+from benchmarks.cli.errors import BadInput
+from benchmarks.cli.options import Place
+from benchmarks.cli.terminal import echo
+
+_LOOPBACK = "127.0.0.1"
+
+
+@click.command()
+@click.argument(
+    "folders",
+    nargs=-1,
+    type=Place(exists=True, file_okay=False, path_type=Path),
+    metavar="[FOLDER]...",
+)
+@click.option(
+    "--host",
+    default=_LOOPBACK,
+    show_default=True,
+    help="The address to listen on. Any other than this machine's own needs a token, which is "
+    "printed.",
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=8010,
+    show_default=True,
+    help="The port; 0 for a free one.",
+)
+@click.option("--token", help="The token for another --host.  [default: a random one]")
+@click.option("--no-browser", is_flag=True, help="Do not open a browser.")
+def ui(folders: tuple[Path, ...], host: str, port: int, token: str | None, no_browser: bool) -> int:
+    """Show runs in the browser, while they grow or after.
+
+    FOLDERs hold run directories, at any depth; without one, ./runs. Nothing in them is changed.
+    """
+    try:
+        import uvicorn
+
+        from benchmarks.monitor.app import make_app
+    except ImportError as error:
+        raise BadInput(
+            f"{error.name} is not installed, and er-gym ui needs it: pip install 'er-gym[ui]'"
+        ) from error
+    roots = folders or (Path("runs"),)
+    missing = next((root for root in roots if not root.is_dir()), None)
+    if missing is not None:
+        raise BadInput(f"{missing} does not exist; give the folder that holds your runs")
+    local = host in (_LOOPBACK, "localhost", "::1")
+    secret = "" if local and token is None else (token or secrets.token_urlsafe(18))
+    try:
+        listener = socket.create_server(
+            (host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET
+        )
+    except OSError as error:
+        raise BadInput(
+            f"cannot listen on {host}:{port}: {error.strerror or error}; choose another --port"
+        ) from None
+    shown = f"[{host}]" if ":" in host else host
+    address = f"http://{shown}:{listener.getsockname()[1]}/"
+    address += f"?token={secret}" if secret else ""
+    echo(address)
+    if not no_browser:
+        click.launch(address)
+    config = uvicorn.Config(make_app(roots, secret), log_level="warning", access_log=False)
+    uvicorn.Server(config).run(sockets=[listener])
+    return 0

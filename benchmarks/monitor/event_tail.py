@@ -1,0 +1,183 @@
+"""Follows a run's event stream while it grows."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from er_gym.rollout.events import EVENTS
+
+_CHUNK = 4 * 2**20
+_LONGEST = 8 * 2**20
+"""A longer line is skipped: a model may say anything."""
+
+
+@dataclass(slots=True)
+class EpisodeRow:
+    """What the stream tells of one episode.
+
+    Attributes:
+        key: the name of the episode in its run.
+        task_type, scene, instruction, max_steps: of the task.
+        begun: when it began, seconds since the epoch.
+        ended: when it ended; None if it has not.
+        success: the environment's verdict.
+        end_reason, error: as :class:`~er_gym.rollout.events.EpisodeEnded` has them.
+        steps, reward, seconds: so far.
+        tokens, cost: of the model's replies that were not cached, cost in US dollars.
+        last: the last action.
+    """
+
+    key: str
+    task_type: str = ""
+    scene: str = ""
+    instruction: str = ""
+    max_steps: int = 0
+    begun: float = 0.0
+    ended: float | None = None
+    success: bool = False
+    end_reason: str = ""
+    error: str = ""
+    steps: int = 0
+    reward: float = 0.0
+    seconds: float = 0.0
+    tokens: int = 0
+    cost: float = 0.0
+    last: str = ""
+
+    @property
+    def outcome(self) -> str:
+        """``playing``, ``crashed``, ``success`` or ``failure``."""
+        if self.ended is None:
+            return "playing"
+        if self.error:
+            return "crashed"
+        return "success" if self.success else "failure"
+
+
+@dataclass
+class EventTail:
+    """The state of a run as its event stream tells it.
+
+    Attributes:
+        folder: the run directory.
+        rows: by episode, in the order in which they began first.
+        wanted: how many episodes the run is to have; None if it does not say.
+        begun: when it was started last, seconds since the epoch; 0 if unknown.
+        done_before: how many episodes earlier starts had finished.
+        stopped: whether it has ended, and ``why`` it did so early.
+        time: of the last event.
+        version: changes with every event that was read.
+    """
+
+    folder: Path
+    rows: dict[str, EpisodeRow] = field(default_factory=dict)
+    wanted: int | None = None
+    begun: float = 0.0
+    done_before: int = 0
+    stopped: bool = False
+    why: str = ""
+    time: float = 0.0
+    version: int = 0
+    _offset: int = 0
+    _inode: int = 0
+    _rest: bytes = b""
+    _skipping: bool = False
+
+    def read(self) -> None:
+        """Read what has been added. A stream that was replaced is read from its beginning."""
+        try:
+            with (self.folder / EVENTS).open("rb") as file:
+                status = os.fstat(file.fileno())
+                if status.st_ino != self._inode or status.st_size < self._offset:
+                    self._forget(status.st_ino)
+                file.seek(self._offset)
+                while chunk := file.read(_CHUNK):
+                    self._offset += len(chunk)
+                    self._take(chunk)
+        except OSError:  # there is none (yet)
+            return
+
+    def _forget(self, inode: int) -> None:
+        fresh = EventTail(self.folder, version=self.version + 1, _inode=inode)
+        self.__dict__.update(fresh.__dict__)
+
+    def _take(self, chunk: bytes) -> None:
+        *lines, rest = (self._rest + chunk).split(b"\n")
+        self._rest = rest
+        for line in lines:
+            if self._skipping:
+                self._skipping = False
+            elif line:
+                self._line(line)
+        if len(self._rest) > _LONGEST:
+            self._rest, self._skipping = b"", True
+
+    def _line(self, line: bytes) -> None:
+        try:
+            event = json.loads(line)
+            told = _HANDLERS[event["kind"]]
+            told(self, event)
+            self.time = max(self.time, float(event["time"]))
+        except (ValueError, KeyError, TypeError, RecursionError):
+            return  # half a line of a killed process, or an event of a later version
+        self.version += 1
+
+    def _row(self, event: dict[str, Any]) -> EpisodeRow:
+        key = str(event["task_id"])
+        return self.rows.setdefault(key, EpisodeRow(key))
+
+    def _run_begun(self, event: dict[str, Any]) -> None:
+        self.wanted, self.done_before = int(event["tasks"]), int(event["done"])
+        self.begun, self.stopped, self.why = float(event["time"]), False, ""
+        for key in [key for key, row in self.rows.items() if row.ended is None or row.error]:
+            del self.rows[key]  # the start before was killed, or it is played again
+
+    def _episode_begun(self, event: dict[str, Any]) -> None:
+        key = str(event["task_id"])
+        self.rows.pop(key, None)
+        self.rows[key] = EpisodeRow(
+            key,
+            task_type=str(event["task_type"]),
+            scene=str(event["scene"]),
+            instruction=str(event["instruction"]),
+            max_steps=int(event["max_steps"]),
+            begun=float(event["time"]),
+        )
+
+    def _reply(self, event: dict[str, Any]) -> None:
+        row = self._row(event)
+        if not event.get("cached"):
+            row.tokens += int(event["prompt_tokens"]) + int(event["completion_tokens"])
+            row.cost += float(event["cost"])
+
+    def _step(self, event: dict[str, Any]) -> None:
+        row = self._row(event)
+        row.steps = max(row.steps, int(event["step"]))
+        row.reward += float(event["reward"])
+        row.last = f"{event['verb']} {event.get('object_type', '')}".strip()
+
+    def _ended(self, event: dict[str, Any]) -> None:
+        row = self._row(event)
+        row.task_type = str(event["task_type"])
+        row.ended, row.success = float(event["time"]), bool(event["success"])
+        row.end_reason, row.error = str(event["end_reason"]), str(event.get("error", ""))
+        row.steps, row.seconds = int(event["steps"]), float(event["seconds"])
+        row.reward = float(event["total_reward"])
+
+    def _run_ended(self, event: dict[str, Any]) -> None:
+        self.stopped, self.why = True, str(event.get("stopped", ""))
+
+
+_HANDLERS = {
+    "run_begun": EventTail._run_begun,
+    "episode_begun": EventTail._episode_begun,
+    "reply": EventTail._reply,
+    "step": EventTail._step,
+    "episode_ended": EventTail._ended,
+    "cost": lambda tail, event: None,
+    "run_ended": EventTail._run_ended,
+}

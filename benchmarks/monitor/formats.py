@@ -1,0 +1,59 @@
+"""How the pages write figures."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+
+def percent(rate: float | None) -> str:
+    """A fraction in %, with one decimal place."""
+    return "–" if rate is None else f"{100 * rate:.1f} %"
+
+
+def duration(seconds: float | None) -> str:
+    """``1:02:03``."""
+    if seconds is None:
+        return "–"
+    whole = max(0, round(seconds))
+    return f"{whole // 3600}:{whole // 60 % 60:02}:{whole % 60:02}"
+
+
+def moment(seconds: float | None) -> str:
+    """A time since the epoch, as this machine's clock shows it."""
+    return "–" if not seconds else time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(seconds))
+
+
+def count(number: float) -> str:
+    """A whole number with commas."""
+    return f"{number:,.0f}"
+
+
+def money(dollars: float) -> str:
+    """US dollars."""
+    return f"${dollars:,.2f}" if dollars else "–"
+
+
+def visible(text: str) -> str:
+    """A text in which characters that turn or hide text can be seen.
+
+    A model can say them, and could so make a page look like another: bidirectional controls, and
+    other characters without a shape, are written as their code points.
+    """
+    return "".join(char if _is_plain(char) else f"⟨U+{ord(char):04X}⟩" for char in text)
+
+
+def _is_plain(char: str) -> bool:
+    return char.isprintable() or char in "\n\t"
+
+
+FILTERS: Mapping[str, Callable[..., Any]] = {
+    "percent": percent,
+    "duration": duration,
+    "moment": moment,
+    "count": count,
+    "money": money,
+    "visible": visible,
+}
+"""The functions by their names in templates."""

@@ -1,0 +1,349 @@
+"""What the pages say of a run: progress, counts, and rows that can be filtered and sorted."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from benchmarks.monitor.event_tail import EpisodeRow, EventTail
+from benchmarks.monitor.places import Place
+from benchmarks.scoring.metrics import wilson
+from er_gym.rollout.run_directory import Manifest, RunDirectory, RunDirectoryError
+from er_gym.tasks.types import task_type
+
+PAGE_ROWS = 100
+_SILENT_SECONDS = 120.0
+"""A run without an event for so long is not counted as playing."""
+_RECENT_SECONDS = 60.0
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Which rows are shown; every field is a parameter of the address.
+
+    Attributes:
+        type, scene, outcome, reason: exact values; "" for any.
+        steps: ``5``, ``5-10``, ``-10`` or ``5-``; "" for any.
+        text: part of the name or the instruction, whatever the case.
+        sort: a column of :data:`SORTS`; with ``-`` before it, descending.
+        page: from 1.
+    """
+
+    type: str = ""
+    scene: str = ""
+    outcome: str = ""
+    reason: str = ""
+    steps: str = ""
+    text: str = ""
+    sort: str = "-ended"
+    page: int = 1
+
+    @staticmethod
+    def of(parameters: Mapping[str, str]) -> Filter:
+        """From an address; what makes no sense there is passed over."""
+        given: dict[str, Any] = {}
+        for each in fields(Filter):
+            value = parameters.get(each.name, "")[:200]
+            if value and each.name != "page":
+                given[each.name] = value
+        page = parameters.get("page", "")
+        if page.isascii() and page.isdigit():
+            given["page"] = max(1, min(int(page[:7]), 10**6))
+        if str(given.get("sort", "-ended")).removeprefix("-") not in SORTS:
+            given.pop("sort", None)
+        return Filter(**given)
+
+    def takes(self, row: EpisodeRow) -> bool:
+        """Whether a row is shown."""
+        return (
+            self.type in ("", row.task_type)
+            and self.scene in ("", row.scene)
+            and self.outcome in ("", row.outcome)
+            and self.reason in ("", row.end_reason)
+            and _within(row.steps, self.steps)
+            and (not self.text or self.text.casefold() in f"{row.key} {row.instruction}".casefold())
+        )
+
+    def parameters(self, **changes: Any) -> dict[str, str]:
+        """The parameters of an address with some changed; the page begins again."""
+        told = {each.name: getattr(self, each.name) for each in fields(self)}
+        told["page"] = 1
+        told.update(changes)
+        defaults = {each.name: each.default for each in fields(self)}
+        return {name: str(value) for name, value in told.items() if value != defaults[name]}
+
+
+def _within(number: int, bounds: str) -> bool:
+    low, dash, high = bounds.partition("-")
+    if not all(part.isascii() and (part.isdigit() or not part) for part in (low, high)):
+        return True
+    if not dash:
+        return not low or number == int(low)
+    return (not low or number >= int(low)) and (not high or number <= int(high))
+
+
+SORTS: Mapping[str, Callable[[EpisodeRow], Any]] = {
+    "ended": lambda row: row.ended or float("inf"),
+    "task": lambda row: row.key,
+    "type": lambda row: row.task_type,
+    "scene": lambda row: _room_number(row.scene),
+    "outcome": lambda row: row.outcome,
+    "reason": lambda row: row.end_reason,
+    "steps": lambda row: row.steps,
+    "reward": lambda row: row.reward,
+    "tokens": lambda row: row.tokens,
+    "cost": lambda row: row.cost,
+    "seconds": lambda row: row.seconds,
+}
+"""What rows can be sorted by."""
+
+
+def _room_number(scene: str) -> tuple[int, str]:
+    digits = "".join(char for char in scene if char.isascii() and char.isdigit())
+    return (int(digits[:9]) if digits else -1, scene)
+
+
+@dataclass(frozen=True)
+class Page:
+    """Some of the rows.
+
+    Attributes:
+        rows: of this page.
+        total: how many rows the filter takes.
+        number, last: of this page and of the last one, from 1.
+    """
+
+    rows: Sequence[EpisodeRow]
+    total: int
+    number: int
+    last: int
+
+
+@dataclass(frozen=True)
+class Tally:
+    """A count of successes.
+
+    Attributes:
+        name: of what was counted.
+        n, successes: finished episodes that did not crash.
+        rate, low, high: success with Wilson's 95 % interval, as fractions; None without episodes.
+    """
+
+    name: str
+    n: int
+    successes: int
+    rate: float | None
+    low: float | None
+    high: float | None
+
+    @staticmethod
+    def of(name: str, rows: Iterable[EpisodeRow]) -> Tally:
+        """Count."""
+        told = [row.success for row in rows if row.outcome in ("success", "failure")]
+        if not told:
+            return Tally(name, 0, 0, None, None, None)
+        estimate = wilson(sum(told), len(told))
+        return Tally(name, len(told), sum(told), estimate.mean, estimate.low, estimate.high)
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """A run at a moment.
+
+    Attributes:
+        place: its directory.
+        manifest: what is played; None if that cannot be read, and ``problem`` says why.
+        state: ``playing``, ``finished``, ``stopped`` or ``waiting``.
+        wanted: how many episodes it is to have.
+        counts: episodes by outcome.
+        success: over all.
+        tokens, cost: so far.
+        decisions_per_second: in the last minute of play.
+        seconds_left: by the speed of this start; None if unknown.
+        version: changes when anything does.
+    """
+
+    place: Place
+    manifest: Manifest | None
+    problem: str
+    state: str
+    wanted: int
+    counts: Mapping[str, int]
+    success: Tally
+    tokens: int
+    cost: float
+    decisions_per_second: float
+    seconds_left: float | None
+    version: int
+
+    @property
+    def finished(self) -> int:
+        """How many episodes have ended."""
+        return sum(number for name, number in self.counts.items() if name != "playing")
+
+
+@dataclass
+class RunView:
+    """A run, followed while it grows. One thread at a time may use it.
+
+    Attributes:
+        place: its directory.
+    """
+
+    place: Place
+    _tail: EventTail = field(init=False)
+    _manifest: Manifest | None = None
+    _problem: str = ""
+
+    def __post_init__(self) -> None:
+        self._tail = EventTail(self.place.path)
+
+    def refresh(self) -> None:
+        """Read what is new."""
+        if self._manifest is None:
+            try:
+                self._manifest = RunDirectory.open(self.place.path).manifest
+                self._problem = ""
+            except (RunDirectoryError, OSError) as error:
+                self._problem = str(error)
+        self._tail.read()
+
+    @property
+    def rows(self) -> Mapping[str, EpisodeRow]:
+        """The episodes by key."""
+        return self._tail.rows
+
+    def summary(self, now: float | None = None) -> RunSummary:
+        """The run at this moment."""
+        now = time.time() if now is None else now
+        tail, rows = self._tail, list(self._tail.rows.values())
+        counts = Counter(row.outcome for row in rows)
+        finished = sum(counts.values()) - counts["playing"]
+        wanted = max(tail.wanted or 0, finished)
+        if tail.stopped:
+            state = "finished" if finished >= wanted else "stopped"
+        elif not tail.version:
+            state = "waiting"
+        else:
+            state = "playing" if now - tail.time < _SILENT_SECONDS else "stopped"
+        since = [row for row in rows if row.ended is not None and row.ended >= tail.begun]
+        spent = tail.time - tail.begun
+        left = None
+        if state == "playing" and since and spent > 0:
+            left = (wanted - finished) * spent / len(since)
+        return RunSummary(
+            place=self.place,
+            manifest=self._manifest,
+            problem=self._problem,
+            state=state,
+            wanted=wanted,
+            counts=counts,
+            success=Tally.of("", rows),
+            tokens=sum(row.tokens for row in rows),
+            cost=sum(row.cost for row in rows),
+            decisions_per_second=_speed(rows, tail.time),
+            seconds_left=left,
+            version=tail.version,
+        )
+
+    def page(self, chosen: Filter) -> Page:
+        """The rows that a filter takes, sorted."""
+        rows = [row for row in self._tail.rows.values() if chosen.takes(row)]
+        rows.sort(key=SORTS[chosen.sort.removeprefix("-")], reverse=chosen.sort.startswith("-"))
+        last = max(1, -(-len(rows) // PAGE_ROWS))
+        number = min(chosen.page, last)
+        return Page(rows[(number - 1) * PAGE_ROWS : number * PAGE_ROWS], len(rows), number, last)
+
+    def neighbours(self, chosen: Filter, key: str) -> tuple[str, str]:
+        """The episodes before and after one in a filter's order; "" for none."""
+        rows = [row for row in self._tail.rows.values() if chosen.takes(row)]
+        rows.sort(key=SORTS[chosen.sort.removeprefix("-")], reverse=chosen.sort.startswith("-"))
+        keys = [row.key for row in rows]
+        if key not in keys:
+            return "", ""
+        at = keys.index(key)
+        return (keys[at - 1] if at else ""), (keys[at + 1] if at + 1 < len(keys) else "")
+
+    def tallies(self) -> tuple[list[Tally], list[Tally]]:
+        """Success by group and by task type, in the order of the paper's table."""
+        by_type: dict[str, list[EpisodeRow]] = {}
+        for row in self._tail.rows.values():
+            by_type.setdefault(row.task_type, []).append(row)
+        by_group: dict[str, list[EpisodeRow]] = {}
+        for name, rows in by_type.items():
+            by_group.setdefault(_group(name), []).extend(rows)
+        return (
+            [Tally.of(name, rows) for name, rows in by_group.items()],
+            [Tally.of(name, rows) for name, rows in sorted(by_type.items())],
+        )
+
+    def choices(self) -> dict[str, list[str]]:
+        """The values by which rows can be filtered."""
+        rows = self._tail.rows.values()
+        return {
+            "type": sorted({row.task_type for row in rows}),
+            "scene": sorted({row.scene for row in rows}, key=_room_number),
+            "outcome": sorted({row.outcome for row in rows}),
+            "reason": sorted({row.end_reason for row in rows} - {""}),
+        }
+
+
+def _group(name: str) -> str:
+    try:
+        return task_type(name).group
+    except (KeyError, ValueError):
+        return "-"
+
+
+def _speed(rows: Sequence[EpisodeRow], until: float) -> float:
+    """Decisions per second over the last minute before a time, from the episodes in it."""
+    recent = [row for row in rows if (row.ended or until) > until - _RECENT_SECONDS]
+    begun = min((row.begun for row in recent if row.begun), default=until)
+    spent = until - max(begun, until - _RECENT_SECONDS)
+    steps = sum(row.steps * _share(row, until) for row in recent)
+    return steps / spent if spent > 0 else 0.0
+
+
+def _share(row: EpisodeRow, until: float) -> float:
+    """Which part of an episode lies in the last minute."""
+    end, begin = row.ended or until, row.begun
+    if end <= begin:
+        return 1.0
+    return (end - max(begin, until - _RECENT_SECONDS)) / (end - begin)
+
+
+class RunViews:
+    """All runs that have been looked at; safe for threads."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._views: dict[str, tuple[RunView, threading.Lock]] = {}
+
+    def use(self, place: Place) -> _InUse:
+        """A run for a ``with`` block, up to date."""
+        with self._lock:
+            if place.id not in self._views:
+                self._views[place.id] = RunView(place), threading.Lock()
+            return _InUse(*self._views[place.id])
+
+
+@dataclass(frozen=True)
+class _InUse:
+    view: RunView
+    lock: threading.Lock
+
+    def __enter__(self) -> RunView:
+        self.lock.acquire()
+        try:
+            self.view.refresh()
+        except BaseException:
+            self.lock.release()
+            raise
+        return self.view
+
+    def __exit__(self, *_: object) -> None:
+        self.lock.release()

@@ -1,0 +1,93 @@
+// News: a page names what it shows; when that changes, its parts are fetched again and replaced.
+"use strict";
+
+const live = document.body.dataset.live;
+if (live) {
+  let busy = false, again = false;
+  const renew = async () => {
+    if (busy) { again = true; return; }
+    busy = true;
+    try {
+      const answer = await fetch(location.href, { headers: { Accept: "text/html" } });
+      if (answer.ok) {
+        const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+        for (const fresh of page.querySelectorAll("[data-part]")) {
+          const old = document.getElementById(fresh.id);
+          if (old && old.innerHTML !== fresh.innerHTML) {
+            const focused = old.contains(document.activeElement) ? document.activeElement : null;
+            const address = focused && focused.getAttribute("href");
+            old.innerHTML = fresh.innerHTML;
+            if (address) {
+              for (const link of old.querySelectorAll("a"))
+                if (link.getAttribute("href") === address) { link.focus({ preventScroll: true }); break; }
+            }
+          }
+        }
+      }
+    } catch (error) {
+      // The server is away; the stream below says when it is back.
+    } finally {
+      busy = false;
+      if (again) { again = false; setTimeout(renew, 300); }
+    }
+  };
+  let lost = false;
+  const listen = () => {
+    const source = new EventSource("/live?of=" + encodeURIComponent(live));
+    source.addEventListener("change", renew);
+    source.onopen = () => { if (lost) { lost = false; renew(); } };
+    source.onerror = () => {
+      lost = true;
+      if (source.readyState === EventSource.CLOSED) { source.close(); setTimeout(listen, 1000); }
+    };
+  };
+  listen();
+}
+
+// An episode: slider, buttons and keys choose a step; pictures are loaded when they are shown.
+const player = document.querySelector("[data-player]");
+if (player) {
+  const last = Number(player.dataset.last);
+  const slider = player.querySelector("[data-slider]");
+  const output = player.querySelector("[data-number]");
+  const steps = [...player.querySelectorAll("[data-step]")];
+  const pictures = [...player.querySelectorAll("[data-picture]")];
+  const keyActions = [...player.querySelectorAll("[data-key-action]")];
+  const numbers = (text) => (text ? text.split(",").map(Number) : []);
+  const show = (number, scroll) => {
+    const now = Math.max(0, Math.min(last, number));
+    slider.value = now;
+    output.textContent = output.dataset.words.replace("#", now);
+    const done = new Set(), seen = [];
+    steps.forEach((step, place) => {
+      step.classList.toggle("now", place === now);
+      if (place <= now) numbers(step.dataset.done).forEach((one) => done.add(one));
+      // The pictures that the agent has before it decides: those of the step after this one.
+      if (place <= Math.min(last, now + 1)) {
+        const own = numbers(step.dataset.pictures);
+        if (own.length) { seen.length = 0; seen.push(...own); }
+      }
+    });
+    for (const picture of pictures) {
+      const shown = seen.includes(Number(picture.dataset.picture));
+      if (shown && !picture.src) picture.src = picture.dataset.src;
+      picture.hidden = !shown;
+    }
+    keyActions.forEach((one, place) => one.classList.toggle("done", done.has(place)));
+    if (scroll && steps[now]) steps[now].scrollIntoView({ block: "nearest" });
+    history.replaceState(null, "", "#step-" + now);
+  };
+  slider.addEventListener("input", () => show(Number(slider.value), true));
+  for (const button of player.querySelectorAll("[data-move]"))
+    button.addEventListener("click", () => show(Number(slider.value) + Number(button.dataset.move), true));
+  for (const step of steps) step.addEventListener("click", () => show(Number(step.dataset.step), false));
+  document.addEventListener("keydown", (event) => {
+    if (event.altKey || event.ctrlKey || event.metaKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName) && event.target !== slider) return;
+    const to = { ArrowLeft: Number(slider.value) - 1, ArrowRight: Number(slider.value) + 1, Home: 0, End: last }[event.key];
+    if (to !== undefined) { event.preventDefault(); show(to, true); }
+    const link = document.querySelector(`a[data-key="${event.key === "j" || event.key === "k" ? event.key : "-"}"]`);
+    if (link) location.href = link.href;
+  });
+  const asked = /^#step-(\d+)$/.exec(location.hash);
+  show(asked ? Number(asked[1]) : 0, Boolean(asked));
+}
