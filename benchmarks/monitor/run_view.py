@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
+from urllib.parse import urlencode
 
 from benchmarks.monitor.event_tail import EpisodeRow, EventTail
 from benchmarks.monitor.places import Place
@@ -68,13 +69,12 @@ class Filter:
             and (not self.text or self.text.casefold() in f"{row.key} {row.instruction}".casefold())
         )
 
-    def parameters(self, **changes: Any) -> dict[str, str]:
-        """The parameters of an address with some changed; the page begins again."""
+    def query(self, **changes: Any) -> str:
+        """The parameters of an address, with some changed or added; the page begins again."""
         told = {each.name: getattr(self, each.name) for each in fields(self)}
-        told["page"] = 1
-        told.update(changes)
+        told |= {"page": 1, **changes}
         defaults = {each.name: each.default for each in fields(self)}
-        return {name: str(value) for name, value in told.items() if value != defaults[name]}
+        return urlencode({k: str(value) for k, value in told.items() if value != defaults.get(k)})
 
 
 def _within(number: int, bounds: str) -> bool:
