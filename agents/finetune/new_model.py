@@ -36,8 +36,8 @@ SPECIAL = (
 """The special tokens, in the order of their ids, after the learnt ones."""
 _ROLES = {"image": "image_pad", "video": "video_pad", "vision_start": "vision_start"}
 _ROLES |= {"vision_end": "vision_end"}
-# Words with the space before them, runs of letters, single digits, runs of signs, line ends.
-_WORDS = r" ?\p{L}+|\p{N}| ?[^\s\p{L}\p{N}]+|\s*[\r\n]|\s+(?!\S)|\s+"
+# Tags, words with the space before them, single digits, runs of signs, line ends.
+_WORDS = r"</?\p{L}+>| ?\p{L}+|\p{N}| ?[^\s\p{L}\p{N}]+|\s*[\r\n]|\s+(?!\S)|\s+"
 # OpenAI's CLIP, whose values Qwen's models use.
 _MEAN, _STD = [0.48145466, 0.4578275, 0.40821073], [0.26862954, 0.26130258, 0.27577711]
 _TEMPLATE = """\

@@ -281,6 +281,32 @@ def config_file(name: str) -> Path:
     return configs.file_of("rl", name, _WHAT)
 
 
+ALGORITHM_NAMES = {
+    "ppo": "MaskablePPO",
+    "dqn": "DQN over legal actions",
+    "qrdqn": "QR-DQN over legal actions",
+}
+"""How people call the algorithms."""
+
+
+def how_learnt(config: TrainConfig, steps: int) -> str:
+    """How a policy was trained, in words.
+
+    Args:
+        config: of its training.
+        steps: of the algorithm, which may be 0 after a warm start.
+    """
+    parts = []
+    if warm := config.warm_start:
+        parts.append(f"{warm.episodes:,} cloned episodes of the {warm.teacher}")
+        if practice := warm.practice:
+            parts.append(f"{practice.rounds} rounds of DAgger of {practice.steps:,} steps")
+    if steps or not parts:
+        parts.append(f"{steps:,} steps of {ALGORITHM_NAMES[config.algorithm.name]}")
+    observed = f"{config.env.obs_mode}{' and subtask' * config.env.subtasks}"
+    return f"{', then '.join(parts)} on {observed}"
+
+
 def load_config(
     file: Path, overrides: Sequence[str] = (), more: Mapping[str, Any] | None = None
 ) -> TrainConfig:

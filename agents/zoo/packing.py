@@ -16,10 +16,9 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import load_file, save
 
-from agents.rl.config import TrainConfig, config_file, config_names, load_config
+from agents.rl.config import TrainConfig, config_file, config_names, how_learnt, load_config
 from agents.rl.policy_file import (
     CONFIG,
-    LEARNERS,
     MODEL,
     POLICY,
     SB3_MODEL,
@@ -167,12 +166,9 @@ def _pack_policy(run: Path, folder: Path, dtype: str) -> tuple[str, tuple[str, .
         )
     write_policy(run, folder, DTYPES[dtype])
     types = ", ".join(config.env.types) or "all types"
-    warm = config.warm_start
-    cloned = f", after cloning {warm.episodes:,} episodes of the {warm.teacher}" if warm else ""
-    learner = LEARNERS[config.algorithm.name].name
     trained_on = (
-        f"{steps:,} steps of {learner} on {config.env.obs_mode}, seed {config.seed}, tasks of the "
-        f"suite {config.env.episodes} ({types}){cloned}"
+        f"{how_learnt(config, steps)}, seed {config.seed}, tasks of the suite "
+        f"{config.env.episodes} ({types})"
     )
     return trained_on, _train_command(config)
 

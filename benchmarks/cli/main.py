@@ -114,20 +114,29 @@ cli.add_command(zoo)
 @click.option("--format", "layout", type=click.Choice(FORMATS), default="table", show_default=True)
 @scorer_option
 @click.option("--by-type", is_flag=True, help="Add every metric for each group and task type.")
+@click.option(
+    "--by-split",
+    is_flag=True,
+    help="Add success by whether the tasks' rooms and objects are those of the training tasks.",
+)
 @click.option("--misses", is_flag=True, help="Add the episodes without success, and why.")
-def report(runs: tuple[Path, ...], layout: str, scorer: str, by_type: bool, misses: bool) -> None:
+def report(
+    runs: tuple[Path, ...], layout: str, scorer: str, by_type: bool, by_split: bool, misses: bool
+) -> None:
     """Show the results in one or several run directories.
 
     Rates have Wilson's 95 % interval. The json format carries every metric, slice, score and miss,
     whatever the other options.
     """
     from benchmarks.scoring import report as reports
+    from benchmarks.scoring.splits import split_results, split_table
     from benchmarks.scoring.tables import as_markdown, print_tables, tables
 
-    if misses and layout == "csv":
-        raise BadInput(
-            "--misses does not go with --format csv, which holds means; choose json, md or table"
-        )
+    for name, given in (("--misses", misses), ("--by-split", by_split)):
+        if given and layout == "csv":
+            raise BadInput(
+                f"{name} does not go with --format csv, which holds means; choose md or table"
+            )
     with bad_input():
         loaded = [reports.load_run(path) for path in runs]
     if layout == "json":
@@ -136,6 +145,8 @@ def report(runs: tuple[Path, ...], layout: str, scorer: str, by_type: bool, miss
         echo(reports.as_csv(loaded, scorer, by_type), nl=False)
     else:
         found = tables(loaded, scorer=scorer, with_types=by_type, with_misses=misses)
+        if by_split:
+            found.append(split_table(split_results(loaded)))
         if layout == "md":
             echo(as_markdown(found), nl=False)
         else:

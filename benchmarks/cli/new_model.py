@@ -74,7 +74,8 @@ def new_model(
 
 
 def _texts(collections: tuple[Path, ...], dialect: str) -> Iterator[str]:
-    """The texts of all conversations. The collections are opened at once, and read later.
+    """The texts of all conversations, each turn after its role, as the model's chat format has it.
+    The collections are opened at once, and read later.
 
     Raises:
         ValueError: there is no such dialect, or a directory holds no collection.
@@ -85,7 +86,7 @@ def _texts(collections: tuple[Path, ...], dialect: str) -> Iterator[str]:
     words = load_dialect(dialect)
     opened = [Collection.open(path) for path in collections]
     return (
-        turn.text
+        f"{turn.role}\n{turn.text}"
         for collection in opened
         for trajectory in collection.trajectories()
         for turn in words.chat(trajectory).turns

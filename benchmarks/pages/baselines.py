@@ -25,7 +25,7 @@ from rich.console import Console
 
 from agents import NamedAgent, make_agent
 from agents.rl.callbacks import read_curve
-from agents.rl.config import TrainConfig, load_config
+from agents.rl.config import TrainConfig, how_learnt, load_config
 from agents.rl.policy_file import MODEL, SB3_MODEL
 from agents.rl.policy_observation import IMAGES
 from benchmarks.cli.errors import bad_input
@@ -266,7 +266,7 @@ def _section(name: str, members: Sequence[TrainedRun], results: Results) -> str:
     lines = [
         f"## {name}",
         "",
-        f"{_algorithm(config)} on {_observed(config)}, {members[0].steps:,} steps, "
+        f"{how_learnt(config, members[0].steps)}; "
         f"{_span(minutes)} minutes; seeds {', '.join(str(each.config.seed) for each in members)}. "
         f"Types: {', '.join(config.env.types) or 'all'}.",
         "",
@@ -294,24 +294,6 @@ def _section(name: str, members: Sequence[TrainedRun], results: Results) -> str:
         "",
     ]
     return "\n".join(lines)
-
-
-def _algorithm(config: TrainConfig) -> str:
-    names = {
-        "ppo": "MaskablePPO",
-        "dqn": "DQN over legal actions",
-        "qrdqn": "QR-DQN over legal actions",
-    }
-    warm = config.warm_start
-    after = f", after cloning {warm.episodes:,} episodes of the {warm.teacher}" if warm else ""
-    if warm and warm.practice:
-        after += f" and {warm.practice.rounds} rounds of DAgger"
-    return names[config.algorithm.name] + after
-
-
-def _observed(config: TrainConfig) -> str:
-    parts = [config.env.obs_mode, *(["subtask"] if config.env.subtasks else [])]
-    return " and ".join(f"`{part}`" for part in parts)
 
 
 def _span(values: Sequence[float]) -> str:

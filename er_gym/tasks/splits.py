@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task, type_of_id
@@ -41,12 +41,13 @@ _ABOUT_PLACES = frozenset({verbs.PUT, verbs.OPEN, verbs.CLOSE})
 
 def subject_types(task: Task) -> frozenset[str]:
     """The types that a task searches for, picks up, switches, slices and so on."""
-    acted_on = {
-        action.actual_type
-        for action in task.key_actions
-        if action.verb in verbs.INTERACTIONS and action.verb not in _ABOUT_PLACES
-    }
+    acted_on = {action.actual_type for action in task.key_actions if is_about(action.verb)}
     return frozenset(acted_on or {type_of_id(object_id) for object_id in task.related_objects})
+
+
+def is_about(verb: str) -> bool:
+    """Whether the object of a key action with this verb is a subject of the task."""
+    return verb in verbs.INTERACTIONS and verb not in _ABOUT_PLACES
 
 
 def split(task: Task) -> str:
@@ -55,7 +56,12 @@ def split(task: Task) -> str:
     Returns:
         ``seen``, ``unseen room``, ``unseen object`` or ``unseen room and object``.
     """
-    new_room = task.scene.removesuffix("_physics") not in TRAINING_SCENES
-    new_object = not UNSEEN_TYPES.isdisjoint(subject_types(task))
+    return split_of(task.scene, subject_types(task))
+
+
+def split_of(scene: str, subjects: Collection[str]) -> str:
+    """The same for a task in a scene, given its subjects (:func:`subject_types`)."""
+    new_room = scene.removesuffix("_physics") not in TRAINING_SCENES
+    new_object = not UNSEEN_TYPES.isdisjoint(subjects)
     new = [name for name, is_new in (("room", new_room), ("object", new_object)) if is_new]
     return f"unseen {' and '.join(new)}" if new else "seen"

@@ -25,6 +25,7 @@ from agents.vlm.chat import LEFT_OUT, Message
 
 MOST = 256
 """The most conversations that are kept."""
+_ROOM = 64  # tokens by which a full layer grows
 _ON_CPU = 2 << 30  # bytes
 _SHARE_OF_GPU = 0.25  # of the memory that is free once the model is loaded
 _WITH_PICTURES = ("qwen2_vl", "qwen2_5_vl", "qwen3_vl", "qwen3_vl_moe")
@@ -170,6 +171,7 @@ def positions_of(
 def joined_past(model: Any, pasts: Sequence[Layers]) -> DynamicCache:
     """The keys and values of several conversations as one cache, padded on the left."""
     cache = DynamicCache(config=model.config)
+    cache.layers = [_RoomyLayer() for _ in cache.layers]
     longest = max(past[0][0].shape[1] if past else 0 for past in pasts)
     if not longest:
         return cache
@@ -191,6 +193,37 @@ def joined_past(model: Any, pasts: Sequence[Layers]) -> DynamicCache:
     return cache
 
 
+class _RoomyLayer(DynamicLayer):
+    """A layer with room for tokens to come. The library's copies all keys and values of all
+    conversations for each token, which takes a quarter of the time of a small model."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._rooms: list[torch.Tensor] = []
+        self._length = 0
+
+    def update(
+        self, key_states: torch.Tensor, value_states: torch.Tensor, *args: Any, **kwargs: Any
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Add keys and values of new tokens; returns all."""
+        if not self.is_initialized:
+            self.lazy_initialization(key_states, value_states)
+        states = (key_states, value_states)
+        before, after = self._length, self._length + key_states.shape[-2]
+        if not self._rooms or after > self._rooms[0].shape[-2]:
+            larger = [
+                new.new_empty((*new.shape[:-2], after + _ROOM, new.shape[-1])) for new in states
+            ]
+            for old, room in zip(self._rooms, larger, strict=False):
+                room[..., :before, :] = old[..., :before, :]
+            self._rooms = larger
+        for room, new in zip(self._rooms, states, strict=True):
+            room[..., before:after, :] = new
+        self._length = after
+        self.keys, self.values = (room[..., :after, :] for room in self._rooms)
+        return self.keys, self.values
+
+
 def layers_of(cache: DynamicCache, row: int, spans: Sequence[tuple[int, int]]) -> Layers:
     """The keys and values of a row of a cache, those of some spans of tokens, one after another."""
     spans = [span for span in spans if span[0] < span[1]]
@@ -198,7 +231,7 @@ def layers_of(cache: DynamicCache, row: int, spans: Sequence[tuple[int, int]]) -
     def cut(states: torch.Tensor) -> torch.Tensor:
         return torch.cat([states[row, :, start:end] for start, end in spans], dim=1)
 
-    layers: Any = cache.layers  # plain ones, see memory_for
+    layers: Any = cache.layers
     return [(cut(layer.keys), cut(layer.values)) for layer in layers]
 
 
