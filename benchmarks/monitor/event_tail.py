@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,13 @@ from typing import Any
 from er_gym.rollout.events import EVENTS
 
 _CHUNK = 4 * 2**20
+_STEP = re.compile(
+    rb'\{"time":(?P<time>[0-9.e+-]+),"kind":"step","task_id":"(?P<key>[^"\\]*)",'
+    rb'"step":(?P<step>[0-9]+),"verb":"(?P<verb>[^"\\]*)","object_type":"(?P<type>[^"\\]*)",'
+    rb'"success":(?:true|false),"reward":(?P<reward>[0-9.e+-]+)[,}]'
+)
+"""How er-gym writes a step. Most lines are steps; to parse their thoughts, which are not shown
+here, would take most of the time."""
 _LONGEST = 8 * 2**20
 """A longer line is skipped: a model may say anything."""
 
@@ -118,6 +126,16 @@ class EventTail:
 
     def _line(self, line: bytes) -> None:
         try:
+            if match := _STEP.match(line):
+                self._step(
+                    match["key"].decode(),
+                    int(match["step"]),
+                    float(match["reward"]),
+                    b" ".join((match["verb"], match["type"])).strip().decode(),
+                )
+                self.time = max(self.time, float(match["time"]))
+                self.version += 1
+                return
             event = json.loads(line)
             told = _HANDLERS[event["kind"]]
             told(self, event)
@@ -126,9 +144,10 @@ class EventTail:
             return  # half a line of a killed process, or an event of a later version
         self.version += 1
 
-    def _row(self, event: dict[str, Any]) -> EpisodeRow:
-        key = str(event["task_id"])
-        return self.rows.setdefault(key, EpisodeRow(key))
+    def _row(self, key: str) -> EpisodeRow:
+        if key not in self.rows:
+            self.rows[key] = EpisodeRow(key)
+        return self.rows[key]
 
     def _run_begun(self, event: dict[str, Any]) -> None:
         self.wanted, self.done_before = int(event["tasks"]), int(event["done"])
@@ -149,19 +168,23 @@ class EventTail:
         )
 
     def _reply(self, event: dict[str, Any]) -> None:
-        row = self._row(event)
+        row = self._row(str(event["task_id"]))
         if not event.get("cached"):
             row.tokens += int(event["prompt_tokens"]) + int(event["completion_tokens"])
             row.cost += float(event["cost"])
 
-    def _step(self, event: dict[str, Any]) -> None:
-        row = self._row(event)
-        row.steps = max(row.steps, int(event["step"]))
-        row.reward += float(event["reward"])
-        row.last = f"{event['verb']} {event.get('object_type', '')}".strip()
+    def _step(self, key: str, number: int, reward: float, action: str) -> None:
+        row = self._row(key)
+        row.steps = max(row.steps, number)
+        row.reward += reward
+        row.last = action
+
+    def _other_step(self, event: dict[str, Any]) -> None:
+        action = f"{event['verb']} {event.get('object_type', '')}".strip()
+        self._step(str(event["task_id"]), int(event["step"]), float(event["reward"]), action)
 
     def _ended(self, event: dict[str, Any]) -> None:
-        row = self._row(event)
+        row = self._row(str(event["task_id"]))
         row.task_type = str(event["task_type"])
         row.ended, row.success = float(event["time"]), bool(event["success"])
         row.end_reason, row.error = str(event["end_reason"]), str(event.get("error", ""))
@@ -176,7 +199,7 @@ _HANDLERS = {
     "run_begun": EventTail._run_begun,
     "episode_begun": EventTail._episode_begun,
     "reply": EventTail._reply,
-    "step": EventTail._step,
+    "step": EventTail._other_step,
     "episode_ended": EventTail._ended,
     "cost": lambda tail, event: None,
     "run_ended": EventTail._run_ended,
