@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import hmac
+import io
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -13,6 +14,8 @@ from urllib.parse import urlencode
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse, StreamingResponse
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from PIL import Image
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware.base import RequestResponseEndpoint
 
@@ -20,8 +23,11 @@ from benchmarks.monitor import formats, svg
 from benchmarks.monitor.episode_view import MOST_TEXT, picture_file, view_of
 from benchmarks.monitor.language import LANGUAGES, Translator, chosen_language
 from benchmarks.monitor.places import Kind, Place, Places
+from benchmarks.monitor.room_map import room_map
 from benchmarks.monitor.run_view import Filter, RunSummary, RunViews
-from er_gym.rollout.run_directory import RunDirectory
+from benchmarks.monitor.world import CannotReplay, Worlds
+from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.run_directory import Manifest, RunDirectory
 
 _STATIC = {
     "monitor.css": "text/css; charset=utf-8",
@@ -108,6 +114,7 @@ class _Pages:
     def __init__(self, places: Places) -> None:
         self._places = places
         self._runs = RunViews()
+        self._worlds = Worlds()
         self._templates = Environment(
             loader=PackageLoader("benchmarks.monitor", "templates"),
             autoescape=True,
@@ -127,6 +134,8 @@ class _Pages:
             "/runs/{id}": self.run,
             "/runs/{id}/episode": self.episode,
             "/runs/{id}/picture": self.picture,
+            "/runs/{id}/map": self.map,
+            "/runs/{id}/frame": self.frame,
             "/language/{name}": self.language,
             "/live": self.live,
             "/static/{name}": self.static,
@@ -201,6 +210,42 @@ class _Pages:
         except (ValueError, OSError):
             raise NothingThere from None
 
+    def map(self, request: Request, id: str, key: str = "") -> Response:
+        """The room of an episode from above, as SVG, or why it cannot be drawn."""
+        record, manifest = self._record(id, key)
+        words = self._translator(request)
+        try:
+            world = self._worlds.world(manifest, record)
+        except CannotReplay as error:
+            text = words("no_replay", why=formats.visible(str(error)))
+            return HTMLResponse(Markup("<p class=empty>{}</p>").format(text))
+        wanted = {key_action.object_id for key_action in record.key_actions}
+        return HTMLResponse(room_map(world, wanted, words("map")))
+
+    def frame(self, id: str, key: str = "", n: int = 0) -> Response:
+        """What the agent could see after a step, drawn now."""
+        record, manifest = self._record(id, key)
+        if not 0 <= n < len(record.steps):
+            raise NothingThere
+        try:
+            picture = self._worlds.frame(manifest, record, n)
+        except CannotReplay:
+            raise NothingThere from None
+        data = io.BytesIO()
+        Image.fromarray(picture).save(data, "JPEG", quality=85)
+        return Response(
+            data.getvalue(),
+            media_type="image/jpeg",
+            headers={"Cache-Control": "private, max-age=3600"},
+        )
+
+    def _record(self, id: str, key: str) -> tuple[EpisodeRecord, Manifest]:
+        try:
+            run = RunDirectory.open(self._place(id, "run").path)
+            return run.episode(key), run.manifest
+        except (ValueError, OSError):
+            raise NothingThere from None
+
     # -- beside the pages ------------------------------------------------------------------------
 
     def language(self, request: Request, name: str) -> Response:
@@ -256,14 +301,15 @@ class _Pages:
         self, request: Request, template: str, status: int, told: Mapping[str, Any]
     ) -> Response:
         """A page in the reader's language."""
-        language = chosen_language(
-            request.cookies.get(_LANGUAGE, ""), request.headers.get("accept-language", "")
-        )
         here = request.url.path + (f"?{request.url.query}" if request.url.query else "")
         text = self._templates.get_template(template).render(
-            {"live": "", **told, "t": Translator(language), "here": here}
+            {"live": "", **told, "t": self._translator(request), "here": here}
         )
         return HTMLResponse(text, status)
+
+    def _translator(self, request: Request) -> Translator:
+        accepted = request.headers.get("accept-language", "")
+        return Translator(chosen_language(request.cookies.get(_LANGUAGE, ""), accepted))
 
     def _place(self, id: str, kind: Kind) -> Place:
         place = self._places.get(id)

@@ -53,6 +53,9 @@ if (player) {
   const steps = [...player.querySelectorAll("[data-step]")];
   const pictures = [...player.querySelectorAll("[data-picture]")];
   const keyActions = [...player.querySelectorAll("[data-key-action]")];
+  const map = player.querySelector("[data-map]");
+  const frame = player.querySelector("[data-frame]");
+  let drawn = false;
   const numbers = (text) => (text ? text.split(",").map(Number) : []);
   const show = (number, scroll) => {
     const now = Math.max(0, Math.min(last, number));
@@ -74,6 +77,9 @@ if (player) {
       picture.hidden = !shown;
     }
     keyActions.forEach((one, place) => one.classList.toggle("done", done.has(place)));
+    for (const stand of map.querySelectorAll("[data-map-step]"))
+      stand.classList.toggle("now", Number(stand.dataset.mapStep) === now);
+    if (frame && drawn) { frame.src = frame.dataset.frame + "&n=" + now; frame.hidden = false; }
     if (scroll && steps[now]) steps[now].scrollIntoView({ block: "nearest" });
     history.replaceState(null, "", "#step-" + now);
   };
@@ -88,6 +94,13 @@ if (player) {
     const link = document.querySelector(`a[data-key="${event.key === "j" || event.key === "k" ? event.key : "-"}"]`);
     if (link) location.href = link.href;
   });
+  fetch(map.dataset.map).then((answer) => (answer.ok ? answer.text() : "")).then((text) => {
+    map.innerHTML = text;
+    show(Number(slider.value), false);
+  }).catch(() => {});
+  player.querySelector("[data-hidden]").addEventListener("change", (event) => map.classList.toggle("with-hidden", event.target.checked));
+  const draw = player.querySelector("[data-draw]");
+  if (draw) draw.addEventListener("click", () => { drawn = true; draw.hidden = true; show(Number(slider.value), false); });
   const asked = /^#step-(\d+)$/.exec(location.hash);
   show(asked ? Number(asked[1]) : 0, Boolean(asked));
 }
