@@ -193,7 +193,7 @@ def test_turns_that_are_not_learnt_can_be_told_by_the_user(trajectories: list[Tr
 
 
 def test_unknown_and_damaged_dialects_say_what_there_is(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"choose one of: paper, tags, text; or give a folder"):
+    with pytest.raises(ValueError, match=r"one of: paper, tags, text, text-actions; or give"):
         load_dialect("pirate")
     own = (Path(__file__).parents[3] / "configs/dialects/paper/en.yaml").read_text()
     (tmp_path / "en.yaml").write_text(own)
