@@ -6,13 +6,13 @@ er-gym's own files are ``configs/finetune/NAME.yaml``. Every field has a default
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from agents import configs
-from er_gym.data.trajectory import Language
+from er_gym.data.trajectory import Language, Trajectory
 
 KIND = "finetune"
 _WHAT = "fine-tuning run"
@@ -104,16 +104,19 @@ class DataSettings(_Settings):
         """Whether a trajectory of this part and kind is learnt from."""
         return (not self.parts or part in self.parts) and (not self.kinds or kind in self.kinds)
 
-    def check_choice(self, where: str, there: Collection[tuple[str, str]]) -> None:
+    def check_choice(self, where: str, trajectories: Iterable[Trajectory]) -> None:
         """Refuse a part or a kind that no trajectory has.
 
         Args:
             where: the name of what holds the trajectories.
-            there: the part and the kind of each.
+            trajectories: read only if something is chosen.
 
         Raises:
             ValueError: see above.
         """
+        if not (self.parts or self.kinds):
+            return
+        there = {(each.part, each.kind) for each in trajectories}
         for name, wanted, place in (("part", self.parts, 0), ("kind", self.kinds, 1)):
             found = sorted({each[place] for each in there})
             missing = sorted(set(wanted) - set(found))

@@ -329,6 +329,7 @@ def test_bad_input_is_told_in_a_line(
             "data.parts=[imitation]",
             "no trajectories of the part imitation; it has: mixed",
         ),
+        ("--set", "data.kinds=[z]", "no trajectories of the kind z; it has: "),
         ("--set", "data.dialect=pirate", "there is no dialect 'pirate'"),
         ("--set", "data.max_length=100", "data.max_length 100, and 7 others are too long; set"),
         ("--set", "model.lora.targets=[elbow]", "model.lora does not fit the model"),

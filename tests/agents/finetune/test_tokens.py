@@ -13,6 +13,7 @@ import torch
 from agents.finetune.batches import Collator, Order
 from agents.finetune.feedback import add_feedback
 from agents.finetune.model_files import open_model
+from agents.finetune.new_model import make_tokenizer
 from agents.finetune.settings import DataSettings
 from agents.finetune.tokens import FEEDBACK, EncodedChat, Encoder, check_lengths, expanded
 from agents.vlm.chat import Message, Picture
@@ -199,3 +200,11 @@ def test_a_picture_of_another_size_than_its_record_is_refused(
         collate(
             [EncodedChat("x", encoded.ids, encoded.learnt, tuple(wrong), encoded.picture_tokens)]
         )
+
+
+def test_in_a_new_models_tokenizer_a_tag_and_a_role_are_a_token_each() -> None:
+    words = ["assistant\n<Planning>goal</Planning>\n<DecisionMaking>end</DecisionMaking>"] * 9
+    tokenizer = make_tokenizer([*words, "user\nsee Mug"], 400)
+    told = tokenizer.tokenize(words[0])
+    assert {"assistant", "<Planning>", "</Planning>", "<DecisionMaking>"} <= set(told)
+    assert tokenizer.decode(tokenizer(words[0])["input_ids"]) == words[0]
