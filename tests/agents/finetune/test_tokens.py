@@ -82,6 +82,24 @@ def test_the_released_mask_learns_all_that_is_said_after_the_first_feedback(
     assert 0 < told < len(chats)
 
 
+def test_the_mask_all_learns_all_but_pictures_and_turns_that_are_not_marked(
+    models: Any, chats: tuple[Chat, ...]
+) -> None:
+    made = encoder(models(), mask="all")
+    pictures = 0
+    for chat in chats:
+        ids, refused = by_hand(made, chat, [not each for each in chat.train])
+        pictures += len(chat.pictures)
+        wanted = [
+            not each and one != made.tokenizer.convert_tokens_to_ids("<|image_pad|>")
+            for each, one in zip(refused, ids, strict=True)
+        ]
+        found = made.encode(chat)
+        assert (found.ids.tolist(), found.learnt.tolist()) == (ids, wanted)
+    assert pictures
+    assert not all(all(chat.train) for chat in chats)
+
+
 def test_what_is_learnt_is_what_is_read_at_play(
     models: Any, played: Collection, chats: tuple[Chat, ...]
 ) -> None:
