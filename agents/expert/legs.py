@@ -147,9 +147,7 @@ def _chief(index: int, key: KeyAction, chiefs: Sequence[int]) -> int:
     return after[0] if after else before[-1]
 
 
-def _subgoal(
-    verb: str, thing: str, put: KeyAction | None, carried: str, several: bool
-) -> Subgoal:
+def _subgoal(verb: str, thing: str, put: KeyAction | None, carried: str, several: bool) -> Subgoal:
     """What an agent is after that is about to do an action.
 
     Args:

@@ -88,9 +88,7 @@ class TaskCourse:
         if leg.actions and not left:
             return True
         there = (
-            bool(left)
-            and self._legal(leg.actions[left[0]])
-            and leg.navigate not in self.view.left
+            bool(left) and self._legal(leg.actions[left[0]]) and leg.navigate not in self.view.left
         )
         if not there and (leg.actions or not self._within_reach(leg.thing)):
             yield from self._find(leg)

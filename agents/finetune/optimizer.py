@@ -28,8 +28,12 @@ class MuonAdamW(torch.optim.Optimizer):
         for name, weight in network.named_parameters():
             if not weight.requires_grad:
                 continue
-            inside = "layers." in name or "blocks." in name
-            kind = vectors if weight.ndim < 2 else matrices if inside and weight.ndim == 2 else others
+            if weight.ndim < 2:
+                kind = vectors
+            elif weight.ndim == 2 and ("layers." in name or "blocks." in name):
+                kind = matrices
+            else:
+                kind = others
             kind.append(weight)
         self._both: list[torch.optim.Optimizer] = []
         super().__init__([*matrices, *others, *vectors], {"lr": learning_rate})

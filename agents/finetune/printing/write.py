@@ -53,7 +53,8 @@ def write_files(
 
     Raises:
         ValueError: no such program, model or data; a conversation is longer than
-            ``data.max_length``; the program knows neither ``data.mask`` nor the optimizer; or ``out`` is not empty.
+            ``data.max_length``; the program does not know the mask or the optimizer; or ``out`` is
+            not empty.
         OSError: something cannot be written.
     """
     if program not in PROGRAMS:
