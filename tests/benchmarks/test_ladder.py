@@ -112,6 +112,18 @@ BAD = {
     ),
     "nothing": ({"stages": {"imitation": {"finetune": "tiny"}}}, "learns from nothing"),
     "unknown": ({"speed": 3}, "speed"),
+    "rewritten": (
+        {
+            "stages": {
+                **SMALL["stages"],
+                "reflection": {
+                    "sample": {"tasks": 1, "rewrite_thoughts": True},
+                    "finetune": "tiny",
+                },
+            }
+        },
+        "leave out rewrite_thoughts",
+    ),
 }
 
 

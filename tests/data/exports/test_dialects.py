@@ -193,7 +193,7 @@ def test_turns_that_are_not_learnt_can_be_told_by_the_user(trajectories: list[Tr
 
 
 def test_unknown_and_damaged_dialects_say_what_there_is(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"choose one of: paper, tags, text; or give a folder"):
+    with pytest.raises(ValueError, match=r"one of: paper, tags, text, text-actions; or give"):
         load_dialect("pirate")
     own = (Path(__file__).parents[3] / "configs/dialects/paper/en.yaml").read_text()
     (tmp_path / "en.yaml").write_text(own)
@@ -208,6 +208,18 @@ def test_unknown_and_damaged_dialects_say_what_there_is(tmp_path: Path) -> None:
         (tmp_path / "en.yaml").write_text(edit(own))
         with pytest.raises(ValueError, match=problem):
             load_dialect(str(tmp_path))
+
+
+def test_a_dialect_may_state_only_how_it_differs_from_another(tmp_path: Path) -> None:
+    file = tmp_path / "en.yaml"
+    file.write_text("like: text\nthoughts: none\n")
+    whole, own = load_dialect("text").texts["en"], load_dialect(str(tmp_path)).texts["en"]
+    assert whole.thoughts == "notes"
+    assert own == whole.model_copy(update={"thoughts": "none"})
+    assert own == load_dialect("text-actions").texts["en"]
+    file.write_text("like: pirate\n")
+    with pytest.raises(ValueError, match=r"no en dialect 'pirate' to be like; choose one of: pap"):
+        load_dialect(str(tmp_path))
 
 
 def test_languages_of_a_dialect_have_the_same_entries() -> None:
