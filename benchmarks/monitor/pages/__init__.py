@@ -1,0 +1,1 @@
+"""The pages of the monitor. Each file answers at some addresses."""

@@ -1,0 +1,109 @@
+"""What all pages of the monitor share: the directories that they show, templates and words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+from urllib.parse import urlencode
+
+from fastapi import Request, Response
+from fastapi.responses import HTMLResponse
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from benchmarks.monitor import formats, svg
+from benchmarks.monitor.episode_view import MOST_TEXT
+from benchmarks.monitor.language import Translator, chosen_language
+from benchmarks.monitor.places import Kind, Place, Places
+from benchmarks.monitor.run_view import RunSummary, RunViews
+from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.run_directory import Manifest, RunDirectory
+
+Routes: TypeAlias = Mapping[str, Callable[..., Any]]
+"""The function that answers at each address."""
+LANGUAGE = "er-gym-language"
+"""The cookie with the reader's choice."""
+AN_HOUR = {"Cache-Control": "private, max-age=3600"}
+"""For what does not change: pictures."""
+
+
+class NothingThere(Exception):
+    """There is nothing at this address."""
+
+
+class Site:
+    """The directories, read while they grow, and pages made from templates.
+
+    Attributes:
+        places: the directories.
+        runs: what was read of those that are runs.
+    """
+
+    def __init__(self, places: Places) -> None:
+        self.places = places
+        self.runs = RunViews()
+        self._templates = Environment(
+            loader=PackageLoader("benchmarks.monitor", "templates"),
+            autoescape=True,
+            undefined=StrictUndefined,
+            trim_blocks=True,
+            lstrip_blocks=True,
+        )
+        self._templates.globals.update(svg=svg, query=urlencode, most_text=MOST_TEXT)
+        self._templates.filters.update(formats.FILTERS)
+
+    def show(
+        self, request: Request, template: str, told: Mapping[str, Any], status: int = 200
+    ) -> Response:
+        """A page in the reader's language.
+
+        Args:
+            request: asks for it.
+            template: its file.
+            told: the template's variables; ``live`` is what the page wants news of.
+            status: of the answer.
+        """
+        here = request.url.path + (f"?{request.url.query}" if request.url.query else "")
+        text = self._templates.get_template(template).render(
+            {"live": "", "scripts": (), **told, "t": self.translator(request), "here": here}
+        )
+        return HTMLResponse(text, status)
+
+    def translator(self, request: Request) -> Translator:
+        """The words in the reader's language."""
+        accepted = request.headers.get("accept-language", "")
+        return Translator(chosen_language(request.cookies.get(LANGUAGE, ""), accepted))
+
+    def place(self, id: str, kind: Kind) -> Place:
+        """The directory with an id.
+
+        Raises:
+            NothingThere: there is none of this kind.
+        """
+        place = self.places.get(id)
+        if place is None or place.kind != kind:
+            raise NothingThere
+        return place
+
+    def summary(self, place: Place) -> RunSummary:
+        """A run at this moment."""
+        with self.runs.use(place) as view:
+            return view.summary()
+
+    def version(self, place: Place) -> object:
+        """What changes whenever a directory does."""
+        if place.kind != "run":
+            return None
+        summary = self.summary(place)
+        return summary.version, summary.state
+
+    def record(self, id: str, key: str) -> tuple[EpisodeRecord, Manifest]:
+        """An episode's record, and its run's manifest.
+
+        Raises:
+            NothingThere: there is none.
+        """
+        try:
+            run = RunDirectory.open(self.place(id, "run").path)
+            return run.episode(key), run.manifest
+        except (ValueError, OSError):
+            raise NothingThere from None

@@ -1,0 +1,62 @@
+// An episode: slider, buttons and keys choose a step; pictures are loaded when they are shown.
+"use strict";
+
+const player = document.querySelector("[data-player]");
+if (player) {
+  const last = Number(player.dataset.last);
+  const slider = player.querySelector("[data-slider]");
+  const output = player.querySelector("[data-number]");
+  const steps = [...player.querySelectorAll("[data-step]")];
+  const pictures = [...player.querySelectorAll("[data-picture]")];
+  const keyActions = [...player.querySelectorAll("[data-key-action]")];
+  const map = player.querySelector("[data-map]");
+  const frame = player.querySelector("[data-frame]");
+  let drawn = false;
+  const numbers = (text) => (text ? text.split(",").map(Number) : []);
+  const show = (number, scroll) => {
+    const now = Math.max(0, Math.min(last, number));
+    slider.value = now;
+    output.textContent = output.dataset.words.replace("#", now);
+    const done = new Set(), seen = [];
+    steps.forEach((step, place) => {
+      step.classList.toggle("now", place === now);
+      if (place <= now) numbers(step.dataset.done).forEach((one) => done.add(one));
+      // The pictures that the agent has before it decides: those of the step after this one.
+      if (place <= Math.min(last, now + 1)) {
+        const own = numbers(step.dataset.pictures);
+        if (own.length) { seen.length = 0; seen.push(...own); }
+      }
+    });
+    for (const picture of pictures) {
+      const shown = seen.includes(Number(picture.dataset.picture));
+      if (shown && !picture.src) picture.src = picture.dataset.src;
+      picture.hidden = !shown;
+    }
+    keyActions.forEach((one, place) => one.classList.toggle("done", done.has(place)));
+    for (const stand of map.querySelectorAll("[data-map-step]"))
+      stand.classList.toggle("now", Number(stand.dataset.mapStep) === now);
+    if (frame && drawn) { frame.src = frame.dataset.frame + "&n=" + now; frame.hidden = false; }
+    if (scroll && steps[now]) steps[now].scrollIntoView({ block: "nearest" });
+    history.replaceState(null, "", "#step-" + now);
+  };
+  slider.addEventListener("input", () => show(Number(slider.value), true));
+  for (const button of player.querySelectorAll("[data-move]"))
+    button.addEventListener("click", () => show(Number(slider.value) + Number(button.dataset.move), true));
+  for (const step of steps) step.addEventListener("click", () => show(Number(step.dataset.step), false));
+  document.addEventListener("keydown", (event) => {
+    if (event.altKey || event.ctrlKey || event.metaKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName) && event.target !== slider) return;
+    const to = { ArrowLeft: Number(slider.value) - 1, ArrowRight: Number(slider.value) + 1, Home: 0, End: last }[event.key];
+    if (to !== undefined) { event.preventDefault(); show(to, true); }
+    const link = document.querySelector(`a[data-key="${event.key === "j" || event.key === "k" ? event.key : "-"}"]`);
+    if (link) location.href = link.href;
+  });
+  fetch(map.dataset.map).then((answer) => (answer.ok ? answer.text() : "")).then((text) => {
+    map.innerHTML = text;
+    show(Number(slider.value), false);
+  }).catch(() => {});
+  player.querySelector("[data-hidden]").addEventListener("change", (event) => map.classList.toggle("with-hidden", event.target.checked));
+  const draw = player.querySelector("[data-draw]");
+  if (draw) draw.addEventListener("click", () => { drawn = true; draw.hidden = true; show(Number(slider.value), false); });
+  const asked = /^#step-(\d+)$/.exec(location.hash);
+  show(asked ? Number(asked[1]) : 0, Boolean(asked));
+}
