@@ -16,6 +16,7 @@ from benchmarks.monitor.pages.episodes import EpisodePages
 from benchmarks.monitor.pages.live import LivePages
 from benchmarks.monitor.pages.runs import RunPages
 from benchmarks.monitor.pages.static import StaticPages
+from benchmarks.monitor.pages.training import TrainingPages
 from benchmarks.monitor.places import Places
 from benchmarks.monitor.site import NothingThere, Site
 
@@ -55,7 +56,14 @@ def make_app(roots: Sequence[Path], token: str = "") -> FastAPI:
     async def gone(request: Request, error: Exception) -> Response:
         return await run_in_threadpool(site.show, request, "gone.html", {}, 404)
 
-    for pages in (RunPages(site), EpisodePages(site), LivePages(site), StaticPages()):
+    every = (
+        RunPages(site),
+        EpisodePages(site),
+        TrainingPages(site),
+        LivePages(site),
+        StaticPages(),
+    )
+    for pages in every:
         for path, page in pages.routes().items():
             app.add_api_route(path, page, methods=["GET"], response_class=HTMLResponse)
     return app

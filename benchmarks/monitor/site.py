@@ -12,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from benchmarks.monitor import formats, svg
 from benchmarks.monitor.episode_view import MOST_TEXT
+from benchmarks.monitor.growth import growth
 from benchmarks.monitor.language import Translator, chosen_language
 from benchmarks.monitor.places import Kind, Place, Places
 from benchmarks.monitor.run_view import RunSummary, RunViews
@@ -64,7 +65,7 @@ class Site:
         """
         here = request.url.path + (f"?{request.url.query}" if request.url.query else "")
         text = self._templates.get_template(template).render(
-            {"live": "", "scripts": (), **told, "t": self.translator(request), "here": here}
+            {"live": "", "scripts": (), "at": "", **told, "t": self.translator(request), "here": here}
         )
         return HTMLResponse(text, status)
 
@@ -92,7 +93,7 @@ class Site:
     def version(self, place: Place) -> object:
         """What changes whenever a directory does."""
         if place.kind != "run":
-            return None
+            return growth(place)
         summary = self.summary(place)
         return summary.version, summary.state
 

@@ -1,0 +1,63 @@
+"""Whether a directory is in use, and what changes when it grows: from its files' names and sizes
+alone, so that it can be asked often."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from benchmarks.monitor.places import Kind, Place
+from er_gym.locking import LOCK
+
+_GROWING: Mapping[Kind, Sequence[str]] = {
+    "policy": ("curve.jsonl", LOCK, "model.npz"),
+    "finetuning": ("metrics.jsonl", "finetune.json", "model", LOCK),
+    "ladder": ("ladder.json", "result.json", LOCK),
+    "ablation": ("ablation.json", "result.json", LOCK),
+    "collection": ("collection.json", "trajectories.jsonl", "parts", LOCK),
+}
+"""The files whose growth is a directory's."""
+
+
+def growth(place: Place) -> object:
+    """What changes whenever a directory does that is no run."""
+    return tuple(_state(place.path / name) for name in _GROWING.get(place.kind, ()))
+
+
+def changed(place: Place) -> float:
+    """When it changed last, seconds since the epoch; 0 if unknown."""
+    told = [_state(place.path / name) for name in _GROWING.get(place.kind, ())]
+    return max((each[0] for each in told if each), default=0) / 1e9
+
+
+def in_use(folder: Path) -> bool:
+    """Whether a process holds the folder's lock, as far as it can be seen without touching it.
+
+    A killed process leaves its lock's file; that the file names no living process tells so. A
+    process of another machine is taken to live.
+    """
+    try:
+        told = (folder / LOCK).read_bytes()[:300].decode("ascii").split()
+    except (OSError, ValueError):
+        return False
+    if len(told) != 2 or not told[0].isdigit() or len(told[0]) > 18:
+        return False
+    if told[1] != socket.gethostname():
+        return True
+    try:
+        os.kill(int(told[0]), 0)  # asks whether it is there
+    except PermissionError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return True
+
+
+def _state(file: Path) -> tuple[int, int] | None:
+    try:
+        status = file.stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size

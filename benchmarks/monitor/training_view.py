@@ -1,0 +1,213 @@
+"""What the pages say of a training run: its curves, its settings and how far it has come."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from benchmarks.monitor.charts import Axis, Series, chart
+from benchmarks.monitor.curve_tail import CurveTail, last_line
+from benchmarks.monitor.growth import changed, in_use
+from benchmarks.monitor.language import Translator
+from benchmarks.monitor.places import Place
+from er_gym.tasks.errors import TaskFileError
+from er_gym.tasks.reading import parse_json, read_text, read_yaml
+
+_FRESH_SECONDS = 120.0
+"""A log that grew so lately is taken to be growing, whoever writes it."""
+_MOST_KEPT = 32
+"""The curves of no more runs are kept."""
+_OVER = {"policy": "steps", "finetuning": "update"}
+_LOG = {"policy": "curve.jsonl", "finetuning": "metrics.jsonl"}
+_TYPES = "success/"
+"""What the names of figures by task type begin with."""
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A training run at a moment.
+
+    Attributes:
+        place: its directory.
+        state: ``running``, ``finished``, ``stopped`` or ``waiting``.
+        done, wanted: steps or updates; ``wanted`` is None where it cannot be known.
+        last: of each figure the last value.
+        settings: as the run was given them; "" if they cannot be read.
+        problem: why they cannot be.
+        about: facts of its settings that a list shows, such as the algorithm.
+        changed: when it changed last, seconds since the epoch.
+    """
+
+    place: Place
+    state: str
+    done: int
+    wanted: int | None
+    last: Mapping[str, Any]
+    settings: str
+    problem: str
+    about: str
+    changed: float
+
+    @property
+    def share(self) -> float | None:
+        """How much of it is done, as a fraction; None if unknown."""
+        return min(1.0, self.done / self.wanted) if self.wanted else None
+
+    @property
+    def types(self) -> Sequence[tuple[str, float]]:
+        """The last success for each task type, as a fraction."""
+        return [(k.removeprefix(_TYPES), v) for k, v in self.last.items() if k.startswith(_TYPES)]
+
+
+def trained(place: Place, last: Mapping[str, Any] | None = None) -> Trained:
+    """A training run of the kind ``policy`` or ``finetuning``.
+
+    Args:
+        place: its directory.
+        last: of each figure the last value; None to look them up in the last line of the log.
+    """
+    last = last_line(place.path / _LOG[place.kind]) if last is None else last
+    done = last.get(_OVER[place.kind], 0)
+    done = int(done) if isinstance(done, (int, float)) else 0
+    settings, problem = _settings(place)
+    wanted, about = _told(place, settings, done, last)
+    finished = (
+        done >= wanted if place.kind == "policy" and wanted else (place.path / "model").is_dir()
+    )
+    state = _state(place, done, bool(finished))
+    return Trained(
+        place=place,
+        state=state,
+        done=done,
+        wanted=done if state == "finished" and place.kind == "finetuning" else wanted,
+        last=last,
+        settings=yaml.safe_dump(settings, allow_unicode=True, sort_keys=False) if settings else "",
+        problem=problem,
+        about=about,
+        changed=changed(place),
+    )
+
+
+def _state(place: Place, done: int, finished: bool) -> str:
+    if in_use(place.path):
+        return "running"
+    if finished:
+        return "finished"
+    if done and time.time() - _written(place.path / _LOG[place.kind]) < _FRESH_SECONDS:
+        return "running"
+    return "stopped" if done else "waiting"
+
+
+def _written(file: Path) -> float:
+    try:
+        return file.stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def _settings(place: Place) -> tuple[dict[str, Any], str]:
+    """The settings, and why they cannot be read."""
+    try:
+        if place.kind == "policy":
+            told = read_yaml(place.path / "config.yaml")
+        else:
+            file = place.path / "finetune.json"
+            told = parse_json(read_text(file), file)
+            if isinstance(told, dict):
+                told = {key: told.get(key) for key in ("model", "data", "settings")}
+    except (TaskFileError, ValueError, OSError) as error:
+        return {}, str(error).splitlines()[0]
+    return (told, "") if isinstance(told, dict) else ({}, "its settings are no mapping")
+
+
+def _told(
+    place: Place, settings: Mapping[str, Any], done: int, last: Mapping[str, Any]
+) -> tuple[int | None, str]:
+    """How many steps or updates are wanted, and what a list says of the run."""
+    try:
+        if place.kind == "policy":
+            name = str(settings["algorithm"]["name"])
+            types = ", ".join(map(str, settings["env"]["types"]))
+            return int(settings["total_steps"]), " · ".join(filter(None, (name, types)))
+        epochs = float(settings["settings"]["training"]["epochs"])
+        stage = str(settings["settings"]["stage"] or "")
+        epoch = float(last.get("epoch") or 0.0)
+        return (round(done * max(epochs / epoch, 1.0)) if epoch else None), stage
+    except (KeyError, TypeError, ValueError, OverflowError):
+        return None, ""
+
+
+def policy_charts(tail: CurveTail, t: Translator) -> list[tuple[str, Any]]:
+    """The charts of a policy, each with its title."""
+    steps = Axis(t("environment_steps"), low=0.0)
+    success = [
+        Series(t("while_training"), tail.points("rollout/success_rate", 100)),
+        Series(t("evaluation"), tail.points("eval/success_rate", 100)),
+    ]
+    returns = [
+        Series(t("while_training"), tail.points("rollout/ep_rew_mean")),
+        Series(t("evaluation"), tail.points("eval/mean_reward")),
+    ]
+    wanted = (
+        ("success", t("success"), Axis("%", 0.0, 100.0), success),
+        ("return", t("return"), Axis(""), returns),
+        ("length", t("episode_length"), Axis(t("steps"), low=0.0),
+         [Series(t("while_training"), tail.points("rollout/ep_len_mean")),
+          Series(t("evaluation"), tail.points("eval/mean_ep_length"))]),
+        ("loss", t("value_loss"), Axis(""), [Series(t("value_loss"), tail.points("train/value_loss")
+                                                    or tail.points("train/loss"))]),
+        ("entropy", t("entropy"), Axis(""),
+         [Series(t("entropy"), [point._replace(y=-point.y, low=-point.high, high=-point.low)
+                                for point in tail.points("train/entropy_loss")])]),
+        ("speed", t("steps_per_second"), Axis("", low=0.0),
+         [Series(t("steps_per_second"), tail.points("time/fps"))]),
+    )  # fmt: skip
+    drawn = [(title, chart(name, title, steps, y, lines)) for name, title, y, lines in wanted]
+    return [(title, picture) for title, picture in drawn if picture]
+
+
+def finetuning_charts(tail: CurveTail, t: Translator) -> list[tuple[str, Any]]:
+    """The charts of a fine-tuning, each with its title."""
+    updates = Axis(t("updates"), low=0.0)
+    wanted = (
+        ("loss", Axis("", log=True)),
+        ("learning_rate", Axis("", low=0.0)),
+        ("tokens_per_second", Axis("", low=0.0)),
+        ("gradient_norm", Axis("", low=0.0)),
+    )
+    drawn = [
+        (t(name), chart(name, t(name), updates, y, [Series(t(name), tail.points(name))]))
+        for name, y in wanted
+    ]
+    return [(title, picture) for title, picture in drawn if picture]
+
+
+class Curves:
+    """The curves of the runs that were looked at last; safe for threads."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._kept: OrderedDict[str, tuple[CurveTail, threading.Lock]] = OrderedDict()
+
+    @contextmanager
+    def use(self, place: Place) -> Iterator[CurveTail]:
+        """A run's curves for a ``with`` block, up to date."""
+        with self._lock:
+            if place.id not in self._kept:
+                tail = CurveTail(place.path / _LOG[place.kind], _OVER[place.kind])
+                self._kept[place.id] = tail, threading.Lock()
+            self._kept.move_to_end(place.id)
+            while len(self._kept) > _MOST_KEPT:
+                self._kept.popitem(last=False)
+            tail, lock = self._kept[place.id]
+        with lock:
+            tail.read()
+            yield tail
