@@ -12,6 +12,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware.base import RequestResponseEndpoint
 
+from benchmarks.monitor.pages.compare import ComparePages
 from benchmarks.monitor.pages.episodes import EpisodePages
 from benchmarks.monitor.pages.live import LivePages
 from benchmarks.monitor.pages.runs import RunPages
@@ -55,7 +56,10 @@ def make_app(roots: Sequence[Path], token: str = "") -> FastAPI:
     async def gone(request: Request, error: Exception) -> Response:
         return await run_in_threadpool(site.show, request, "gone.html", {}, 404)
 
-    for pages in (RunPages(site), EpisodePages(site), LivePages(site), StaticPages()):
+    every = (
+        RunPages(site), EpisodePages(site), ComparePages(site), LivePages(site), StaticPages(),
+    )  # fmt: skip
+    for pages in every:
         for path, page in pages.routes().items():
             app.add_api_route(path, page, methods=["GET"], response_class=HTMLResponse)
     return app

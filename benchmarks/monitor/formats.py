@@ -12,6 +12,16 @@ def percent(rate: float | None) -> str:
     return "–" if rate is None else f"{100 * rate:.1f} %"
 
 
+def signed(rate: float) -> str:
+    """A difference of fractions in percentage points, with its sign."""
+    return f"{100 * rate:+.1f}"
+
+
+def chance(p: float) -> str:
+    """A p value, with two digits that say something."""
+    return "< 0.0001" if p < 1e-4 else f"{p:.2g}"
+
+
 def duration(seconds: float | None) -> str:
     """``1:02:03``."""
     if seconds is None:
@@ -50,6 +60,8 @@ def _is_plain(char: str) -> bool:
 
 FILTERS: Mapping[str, Callable[..., Any]] = {
     "percent": percent,
+    "signed": signed,
+    "chance": chance,
     "duration": duration,
     "moment": moment,
     "count": count,

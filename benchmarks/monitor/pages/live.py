@@ -52,4 +52,6 @@ class LivePages:
     def _version(self, of: frozenset[str]) -> object:
         """What changes whenever one of the directories does."""
         places = [each for each in self._site.places.all() if "*" in of or each.id in of]
-        return tuple((place.id, self._site.version(place)) for place in places)
+        return tuple(
+            (place.id, self._site.version(place, closely=place.id in of)) for place in places
+        )
