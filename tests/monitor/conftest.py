@@ -22,13 +22,10 @@ LOCAL = "http://127.0.0.1:8010"
 Visit = Callable[[Path], TestClient]
 
 
-def play(out: Path, agent: str, *options: str) -> None:
+def play(out: Path, agent: str) -> None:
     """``er-gym bench`` over some tasks of ``mini``."""
     with pytest.raises(SystemExit) as left:
-        cli.main(
-            ["bench", "--suite", "mini", "--agent", agent, "--limit", "8", "--out", str(out)]
-            + list(options)
-        )
+        cli.main(["bench", "--suite", "mini", "--agent", agent, "--limit", "8", "--out", str(out)])
     assert left.value.code == 0
 
 
@@ -62,7 +59,9 @@ class Server:
     def __init__(self, folder: Path, port: int = 0) -> None:
         listener = socket.create_server(("127.0.0.1", port))
         self.port: int = listener.getsockname()[1]
-        config = uvicorn.Config(make_app([folder]), log_level="error", access_log=False)
+        self._closing = threading.Event()
+        app = make_app([folder], closing=self._closing)
+        config = uvicorn.Config(app, log_level="error", access_log=False)
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._server.run, args=([listener],))
         self._thread.start()
@@ -84,7 +83,8 @@ class Server:
             connection.close()
 
     def stop(self) -> None:
-        self._server.should_exit = self._server.force_exit = True
+        self._closing.set()
+        self._server.should_exit = True
         self._thread.join(20)
 
 
