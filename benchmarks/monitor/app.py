@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hmac
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import urlencode
@@ -12,6 +13,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware.base import RequestResponseEndpoint
 
+from benchmarks.monitor.pages.compare import ComparePages
 from benchmarks.monitor.pages.episodes import EpisodePages
 from benchmarks.monitor.pages.live import LivePages
 from benchmarks.monitor.pages.runs import RunPages
@@ -32,7 +34,9 @@ _HEADERS = {
 _TOKEN = "er-gym-token"
 
 
-def make_app(roots: Sequence[Path], token: str = "") -> FastAPI:
+def make_app(
+    roots: Sequence[Path], token: str = "", closing: threading.Event | None = None
+) -> FastAPI:
     """The application.
 
     Args:
@@ -40,6 +44,7 @@ def make_app(roots: Sequence[Path], token: str = "") -> FastAPI:
         token: must be given once as ``?token=``; "" where only this machine can connect. Then
             requests must name this machine as their host, so that no foreign page can read along
             through a name that it made point here.
+        closing: set when the server is to end, so that pages that wait for news let go.
     """
     app = FastAPI(title="er-gym", docs_url=None, redoc_url=None, openapi_url=None)
     site = Site(Places(roots))
@@ -56,13 +61,11 @@ def make_app(roots: Sequence[Path], token: str = "") -> FastAPI:
     async def gone(request: Request, error: Exception) -> Response:
         return await run_in_threadpool(site.show, request, "gone.html", {}, 404)
 
+    live = LivePages(site, closing or threading.Event())
     every = (
-        RunPages(site),
-        EpisodePages(site),
-        TrainingPages(site),
-        LivePages(site),
-        StaticPages(),
-    )
+        RunPages(site), EpisodePages(site), ComparePages(site), TrainingPages(site),
+        live, StaticPages(),
+    )  # fmt: skip
     for pages in every:
         for path, page in pages.routes().items():
             app.add_api_route(path, page, methods=["GET"], response_class=HTMLResponse)
