@@ -14,6 +14,7 @@ import click
 from benchmarks.cli.errors import BadInput
 from benchmarks.cli.options import Place
 from benchmarks.cli.terminal import echo
+from benchmarks.cli.ui_export import FileOptions, file_options, write_files
 
 _LOOPBACK = "127.0.0.1"
 
@@ -41,15 +42,28 @@ _LOOPBACK = "127.0.0.1"
 )
 @click.option("--token", help="The token for another --host.  [default: a random one]")
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
-def ui(folders: tuple[Path, ...], host: str, port: int, token: str | None, no_browser: bool) -> int:
+@file_options
+def ui(
+    folders: tuple[Path, ...],
+    host: str,
+    port: int,
+    token: str | None,
+    no_browser: bool,
+    files: FileOptions,
+) -> int:
     """Show runs in the browser, while they grow or after.
 
     FOLDERs hold run directories, at any depth; without one, ./runs. Nothing in them is changed.
+
+    With --export or --video nothing is shown: a run's pages, or an episode's video, are written.
     """
     try:
         import uvicorn
 
         from benchmarks.monitor.app import make_app
+
+        if write_files(files):
+            return 0
     except ImportError as error:
         raise BadInput(
             f"{error.name} is not installed, and er-gym ui needs it: pip install 'er-gym[ui]'"

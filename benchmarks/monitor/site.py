@@ -68,10 +68,14 @@ class Site:
             status: of the answer.
         """
         here = request.url.path + (f"?{request.url.query}" if request.url.query else "")
-        text = self._templates.get_template(template).render(
-            {"live": "", "scripts": (), "at": "", **told, "t": self.translator(request), "here": here}
+        return HTMLResponse(self.page(template, told, self.translator(request), here), status)
+
+    def page(self, template: str, told: Mapping[str, Any], t: Translator, here: str = "") -> str:
+        """A page in a language, as HTML; ``here`` is its address."""
+        shared = {"live": "", "scripts": (), "at": "", "exported": None}
+        return self._templates.get_template(template).render(
+            {**shared, **told, "t": t, "here": here}
         )
-        return HTMLResponse(text, status)
 
     def translator(self, request: Request) -> Translator:
         """The words in the reader's language."""

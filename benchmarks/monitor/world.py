@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -136,6 +136,29 @@ class Worlds:
             if picture is None:
                 raise CannotReplay("nothing is drawn")
             return picture
+
+    def frames(self, manifest: Manifest, record: EpisodeRecord) -> Iterator[NDArray[np.uint8]]:
+        """(height, width, 3) uint8: what the agent could see after each step, from the first.
+
+        The episode is played once; meanwhile nothing else is. It ends early where the episode
+        comes out differently.
+
+        Raises:
+            CannotReplay: as above.
+        """
+        with self._lock:
+            env = self._environment(manifest)
+            env.reset(seed=record.seed, options={"task": _task(manifest, record)})
+            for number, step in enumerate(record.steps):
+                if number and not step.appended:
+                    try:
+                        env.step(_action(step.verb, step.object_type))
+                    except ValueError:
+                        return
+                picture = env.render()
+                if picture is None:
+                    raise CannotReplay("nothing is drawn")
+                yield np.asarray(picture)
 
     def _environment(self, manifest: Manifest) -> EmbodiedEnv:
         if manifest.env.get("backend", "embedded") != "embedded":

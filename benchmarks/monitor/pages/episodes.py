@@ -17,7 +17,7 @@ from benchmarks.monitor.site import AN_HOUR, NothingThere, Routes, Site
 from benchmarks.monitor.world import CannotReplay, Worlds
 from er_gym.rollout.run_directory import RunDirectory
 
-_PICTURES = {
+PICTURE_KINDS = {
     ".jpg": "image/jpeg",
     ".jpeg": "image/jpeg",
     ".png": "image/png",
@@ -69,7 +69,7 @@ class EpisodePages:
         try:
             pictures = view_of(RunDirectory.open(place.path), key).pictures
             file = picture_file(place.path, pictures[n]) if 0 <= n < len(pictures) else None
-            kind = _PICTURES.get(file.suffix.lower()) if file else None
+            kind = PICTURE_KINDS.get(file.suffix.lower()) if file else None
             if file is None or kind is None:
                 raise NothingThere
             return Response(file.read_bytes(), media_type=kind, headers=AN_HOUR)

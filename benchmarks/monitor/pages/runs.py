@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from fastapi import Request, Response
 
 from benchmarks.ladder.paper_rungs import PAPER
-from benchmarks.monitor.run_view import Filter
+from benchmarks.monitor.run_view import Filter, RunView
 from benchmarks.monitor.site import Routes, Site
 from er_gym.tasks.types import COMPOSITE, MANIPULATE, SEARCH, TRANSPORT
 
@@ -23,6 +24,21 @@ def _paper_rows() -> list[tuple[str, Mapping[str, float], float]]:
         (rung.name, dict(zip(_PAPER_GROUPS, rung.groups, strict=True)), rung.success)
         for rung in PAPER.values()
     ]
+
+
+def run_told(view: RunView, chosen: Filter) -> dict[str, Any]:
+    """What the page of a run says."""
+    groups, types = view.tallies()
+    return {
+        "run": view.summary(),
+        "filter": chosen,
+        "page": view.page(chosen),
+        "groups": groups,
+        "types": types,
+        "choices": view.choices(),
+        "failures": view.failures,
+        "paper": _paper_rows(),
+    }
 
 
 class RunPages:
@@ -48,16 +64,5 @@ class RunPages:
         chosen = Filter.of(request.query_params)
         with self._site.runs.use(place) as view:
             view.count_failures(_COUNT_SECONDS)
-            groups, types = view.tallies()
-            told = {
-                "run": view.summary(),
-                "filter": chosen,
-                "page": view.page(chosen),
-                "groups": groups,
-                "types": types,
-                "choices": view.choices(),
-                "failures": view.failures,
-                "paper": _paper_rows(),
-                "live": id,
-            }
-        return self._site.show(request, "run.html", told)
+            told = run_told(view, chosen)
+        return self._site.show(request, "run.html", {**told, "live": id})

@@ -47,7 +47,7 @@ const setUp = (player, moved) => {
   for (const button of player.querySelectorAll("[data-move]"))
     button.addEventListener("click", () => moved(Number(slider.value) + Number(button.dataset.move), true));
   for (const step of steps) step.addEventListener("click", () => moved(Number(step.dataset.step), false));
-  fetch(map.dataset.map).then((answer) => (answer.ok ? answer.text() : "")).then((text) => {
+  if (map.dataset.map) fetch(map.dataset.map).then((answer) => (answer.ok ? answer.text() : "")).then((text) => {
     map.innerHTML = text;
     show(Number(slider.value), false);
   }).catch(() => {});

@@ -1,0 +1,194 @@
+"""Pages of training: a policy, a fine-tuning, a ladder and an ablation, while they grow."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+import re
+import shutil
+import socket
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from benchmarks.ablation.phases import plan_of as plan_of_ablation
+from benchmarks.ablation.settings import ablation_names, load_ablation
+from benchmarks.ladder.phases import plan_of as plan_of_ladder
+from benchmarks.ladder.settings import load_ladder
+from benchmarks.monitor.growth import growth, in_use
+from benchmarks.monitor.places import Places
+from benchmarks.plan.run import DonePhase, Plan, PlanRecord
+from er_gym import __version__
+from er_gym.locking import LOCK, exclusive_use
+
+FINETUNING = {
+    "format": "er-gym/finetune/1",
+    "model": "base",
+    "data": ["data/x"],
+    "settings": {"stage": "imitation", "training": {"epochs": 4.0}},
+}
+
+
+def said(text: str) -> str:
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
+
+
+def metric(update: int, loss: float) -> str:
+    line = {"update": update, "epoch": update / 100, "loss": loss, "learning_rate": 1e-3,
+            "gradient_norm": 0.5, "tokens_per_second": 900.0, "memory": 2**30}  # fmt: skip
+    return json.dumps(line) + "\n"
+
+
+def make_finetuning(folder: Path) -> Path:
+    folder.mkdir(parents=True)
+    (folder / "finetune.json").write_text(json.dumps(FINETUNING))
+    (folder / "metrics.jsonl").write_text(metric(10, 5.0) + metric(100, 0.5))
+    return folder
+
+
+def make_policy(folder: Path) -> Path:
+    folder.mkdir()
+    (folder / "config.yaml").write_text(
+        "algorithm:\n  name: ppo\ntotal_steps: 4000\nenv:\n  types: [single_search]\n"
+    )
+    lines: list[dict[str, Any]] = [
+        {"steps": 1000, "seconds": 3.0, "rollout/success_rate": 0.25, "rollout/ep_rew_mean": 1.5,
+         "success/single_search": 0.25},
+        {"steps": 2000, "seconds": 6.0, "eval/success_rate": 0.5, "eval/mean_reward": 2.0},
+    ]  # fmt: skip
+    (folder / "curve.jsonl").write_text("".join(json.dumps(each) + "\n" for each in lines))
+    return folder
+
+
+def make_plan(plan: Plan, folder: Path, done: int) -> None:
+    """The record that a plan leaves after some of its phases."""
+    phases = [
+        DonePhase(name=phase.name, command=list(phase.command), seconds=61.0)
+        for phase in plan.phases[:done]
+    ]
+    record = PlanRecord(
+        format=plan.format,
+        settings=plan.settings.model_dump(mode="json"),
+        er_gym=__version__,
+        done=phases,
+    )
+    (folder / plan.file).write_text(record.model_dump_json())
+
+
+def page(client: TestClient, root: Path, name: str) -> str:
+    (id,) = (each.id for each in Places([root]).all() if each.path == root / name)
+    answer = client.get(f"/training/{id}")
+    assert answer.status_code == 200
+    return answer.text
+
+
+def test_a_fine_tuning_grows_while_it_is_looked_at(tmp_path, visit):
+    folder = make_finetuning(tmp_path / "tuning")
+    client = visit(tmp_path)
+    first = page(client, tmp_path, "tuning")
+    assert "100 / 400" in said(first)  # one of four epochs
+    assert len(re.findall(r'<svg class="chart"', first)) == 4
+    (place,) = Places([tmp_path]).all()
+    before = growth(place)
+    with (folder / "metrics.jsonl").open("a") as log:
+        log.write(metric(200, 0.25))
+    assert growth(place) != before
+    second = page(client, tmp_path, "tuning")
+    assert "200 / 400" in said(second)
+    assert "0.25" in said(second)
+    assert "running" in said(second)
+    (folder / "model").mkdir()
+    assert "finished" in said(page(client, tmp_path, "tuning"))
+
+
+def test_a_policy_shows_training_and_evaluation(tmp_path, visit):
+    make_policy(tmp_path / "policy")
+    text = page(visit(tmp_path), tmp_path, "policy")
+    assert "2,000 / 4,000" in said(text)
+    assert "Success, evaluation 50.0 %" in said(text)
+    assert "Success, while it trains 25.0 %" in said(text)
+    assert "while it trains: 1, 25" in text  # the chart's description
+    assert "evaluation: 1, 50" in text
+    assert "single_search 25.0 %" in said(text)
+
+
+def test_a_ladder_shows_its_phases_and_the_success_of_each_rung(tmp_path, visit, runs):
+    root = tmp_path / "ladder"
+    root.mkdir()
+    settings = load_ladder("tiny-text")
+    plan = plan_of_ladder(settings, root)
+    names = [phase.name for phase in plan.phases]
+    measured = names.index("evaluations/1-imitation")
+    shutil.copytree(runs / "random", root / "evaluations" / "0-base")
+    shutil.copytree(runs / "oracle", root / "evaluations" / "1-imitation")
+    make_finetuning(root / "1-imitation")
+    make_plan(plan, root, measured)
+    with exclusive_use(root):
+        text = page(visit(tmp_path), tmp_path, "ladder")
+    assert f"{measured} / {len(names)}" in said(text)
+    states = re.findall(r'<span class="state (\w+)">', text[text.index('id="phases"') :])
+    assert states == ["finished"] * measured + ["running"] + ["waiting"] * (
+        len(names) - measured - 1
+    )
+    ids = {each.path: each.id for each in Places([tmp_path]).all()}
+    for name, kind in (("evaluations/0-base", "runs"), ("1-imitation", "training")):
+        assert f'href="/{kind}/{ids[root / name]}"' in text
+    results = text[text.index('id="results"') : text.index('id="phases"')]
+    assert "imitation 0 % 8 100.0 % 95 % interval 67.6 to 100.0 %" in said(results)
+    assert "this ladder: 2, 0 … 100" in text
+    assert "the paper&#39;s models" in text
+    listed = said(visit(tmp_path).get("/training").text)
+    assert f"{measured} of {len(names)} phases" in listed
+    assert "ladder/1-imitation Fine-tuning imitation" in listed
+
+
+def test_an_ablation_shows_its_studies(tmp_path, visit, runs):
+    root = tmp_path / "ablation"
+    root.mkdir()
+    settings = load_ablation(ablation_names()[0])
+    make_plan(plan_of_ablation(settings, root), root, 1)
+    study = next(iter(settings.studies.values()))
+    for name, run in zip(study.rows, ("oracle", "random"), strict=False):
+        shutil.copytree(runs / run, root / "evaluations" / name / str(settings.seeds[0]))
+    text = page(visit(tmp_path), tmp_path, "ablation")
+    assert study.title in html.unescape(text)
+    assert f"{study.rows[0]} 8 100.0 %" in said(text)
+    assert '<svg class="chart"' in text
+
+
+def test_damaged_settings_are_told_in_a_line(tmp_path, visit):
+    root = tmp_path / "ladder"
+    root.mkdir()
+    done = [{"name": "<b>1</b>", "command": ["collect"], "seconds": 1.0}]
+    (root / "ladder.json").write_text(
+        json.dumps({"format": "er-gym/ladder/1", "settings": {}, "er_gym": "0", "done": done})
+    )
+    make_finetuning(tmp_path / "tuning")
+    (tmp_path / "tuning" / "finetune.json").write_text("{")
+    client = visit(tmp_path)
+    text = page(client, tmp_path, "ladder")
+    assert 'class="problem">ladder.json: base' in text
+    assert "&lt;b&gt;1&lt;/b&gt;" in text
+    assert 'class="problem"' in page(client, tmp_path, "tuning")
+    assert client.get("/training").status_code == 200
+    assert client.get("/training/000000000000").status_code == 404
+
+
+def test_who_holds_the_lock_is_seen_without_touching_it(tmp_path):
+    assert not in_use(tmp_path)
+    with exclusive_use(tmp_path):
+        assert in_use(tmp_path)
+        with pytest.raises(BlockingIOError):  # the lock is still held
+            import fcntl
+
+            with (tmp_path / LOCK).open() as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    ended = os.fork()
+    if not ended:
+        os._exit(0)
+    os.waitpid(ended, 0)
+    (tmp_path / LOCK).write_text(f"{ended} {socket.gethostname()}\n")
+    assert not in_use(tmp_path)
