@@ -78,5 +78,6 @@ if (players.length) {
   for (const link of document.querySelectorAll("[data-go]"))
     link.addEventListener("click", (event) => { event.preventDefault(); moveTo(Number(link.dataset.go), true); });
   const asked = /^#(?:[a-z]+-)?step-(\d+)$/.exec(location.hash);
-  moveTo(asked ? Number(asked[1]) : 0, Boolean(asked));
+  if (asked) moveTo(Number(asked[1]), true);
+  else players.forEach((each) => each.show(0, false));
 }
