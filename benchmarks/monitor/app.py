@@ -14,6 +14,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.middleware.base import RequestResponseEndpoint
 
 from benchmarks.monitor.pages.compare import ComparePages
+from benchmarks.monitor.pages.data import DataPages
 from benchmarks.monitor.pages.episodes import EpisodePages
 from benchmarks.monitor.pages.live import LivePages
 from benchmarks.monitor.pages.runs import RunPages
@@ -64,7 +65,7 @@ def make_app(
     live = LivePages(site, closing or threading.Event())
     every = (
         RunPages(site), EpisodePages(site), ComparePages(site), TrainingPages(site),
-        live, StaticPages(),
+        DataPages(site), live, StaticPages(),
     )  # fmt: skip
     for pages in every:
         for path, page in pages.routes().items():

@@ -109,14 +109,22 @@ def view_of(run: RunDirectory, key: str) -> EpisodeView:
 
 
 def picture_file(run: Path, picture: PictureRecord) -> Path | None:
-    """The file of a picture; None unless it is a regular file in the run's folder of pictures.
+    """The file of a picture; None unless it is a regular file in the run's folder of pictures."""
+    return file_inside(run, PICTURES, picture.path)
 
-    The path comes from a file that anyone may have written.
+
+def file_inside(root: Path, folder: str, path: str) -> Path | None:
+    """A file; None unless it is a regular one in a folder of ``root``.
+
+    Args:
+        root: a directory.
+        folder: relative to it.
+        path: relative to ``root``; it comes from a file that anyone may have written.
     """
-    folder = os.path.realpath(run / PICTURES)
-    path = os.path.realpath(run / picture.path)
-    inside = path.startswith(folder + os.sep) and folder.startswith(os.path.realpath(run) + os.sep)
-    return Path(path) if inside and os.path.isfile(path) else None
+    top = os.path.realpath(root)
+    within, found = os.path.realpath(root / folder), os.path.realpath(root / path)
+    inside = found.startswith(within + os.sep) and within.startswith(top + os.sep)
+    return Path(found) if inside and os.path.isfile(found) else None
 
 
 def _conversation(run: Path, key: str) -> tuple[ConversationRecord | None, str]:

@@ -19,11 +19,25 @@ _GROWING: Mapping[Kind, Sequence[str]] = {
     "collection": ("collection.json", "trajectories.jsonl", "parts", LOCK),
 }
 """The files whose growth is a directory's."""
+_MOST_PARTS = 50
 
 
 def growth(place: Place) -> object:
     """What changes whenever a directory does that is no run."""
-    return tuple(_state(place.path / name) for name in _GROWING.get(place.kind, ()))
+    names = list(_GROWING.get(place.kind, ()))
+    if place.kind == "collection":
+        names += [f"parts/{part}/events.jsonl" for part in parts_of(place.path)]
+    return tuple(_state(place.path / name) for name in names)
+
+
+def parts_of(collection: Path) -> list[str]:
+    """The names of a collection's parts that have begun."""
+    try:
+        with os.scandir(collection / "parts") as entries:
+            found = [each.name for each in entries if each.is_dir(follow_symlinks=False)]
+    except OSError:
+        return []
+    return sorted(found)[:_MOST_PARTS]
 
 
 def changed(place: Place) -> float:

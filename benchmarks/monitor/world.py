@@ -106,7 +106,8 @@ class Worlds:
         Raises:
             CannotReplay: its task is not at hand, or it was not played on the embedded engine.
         """
-        name = (manifest.digest, record.key)
+        did = hash(tuple((step.verb, step.object_type) for step in record.steps))
+        name = (manifest.digest, f"{record.key} {record.seed} {did}")
         with self._lock:
             if name in self._kept:
                 self._kept.move_to_end(name)

@@ -14,6 +14,8 @@ const setUp = (player, moved) => {
   const map = player.querySelector("[data-map]");
   const frame = player.querySelector("[data-frame]");
   let drawn = false;
+  // Of a trajectory, the pictures before a turn's decision belong to the turn itself.
+  const ahead = player.dataset.shown === "before" ? 0 : 1;
   const show = (number, scroll) => {
     const now = Math.max(0, Math.min(last, number));
     slider.value = now;
@@ -23,7 +25,7 @@ const setUp = (player, moved) => {
       step.classList.toggle("now", place === now);
       if (place <= now) numbers(step.dataset.done).forEach((one) => done.add(one));
       // The pictures that the agent has before it decides: those of the step after this one.
-      if (place <= Math.min(last, now + 1)) {
+      if (place <= Math.min(last, now + ahead)) {
         const own = numbers(step.dataset.pictures);
         if (own.length) { seen.length = 0; seen.push(...own); }
       }

@@ -1,0 +1,192 @@
+"""What the pages say of a collection, and of one of its trajectories."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+from urllib.parse import urlencode
+
+from benchmarks.monitor.charts import Axis, Series, chart, points
+from benchmarks.monitor.collection_index import CollectionIndex, Head
+from benchmarks.monitor.flow import flow
+from benchmarks.monitor.language import Translator
+from er_gym.data import paper_figures as paper
+from er_gym.data.statistics import STATES, mean_and_most
+from er_gym.data.trajectory import TAG_OF_KIND, THOUGHT_KINDS, PictureRecord, Trajectory, Turn
+
+PAGE_ROWS = 100
+_SORTS = ("order", "turns", "thoughts", "refused")
+
+
+@dataclass(frozen=True)
+class DataFilter:
+    """Which trajectories are shown; every field is a parameter of the address.
+
+    Attributes:
+        part, kind, type, language, outcome: exact values; "" for any.
+        refused: a code of the critic's; "" for any.
+        text: part of the id or the instruction, whatever the case.
+        sort: ``order``, ``turns``, ``thoughts`` or ``refused``; with ``-`` before it, descending.
+        page: from 1.
+    """
+
+    part: str = ""
+    kind: str = ""
+    type: str = ""
+    language: str = ""
+    outcome: str = ""
+    refused: str = ""
+    text: str = ""
+    sort: str = "order"
+    page: int = 1
+
+    @staticmethod
+    def of(parameters: Mapping[str, str]) -> DataFilter:
+        """From an address; what makes no sense there is passed over."""
+        given: dict[str, Any] = {}
+        for each in fields(DataFilter):
+            value = parameters.get(each.name, "")[:300]
+            if value and each.name != "page":
+                given[each.name] = value
+        page = parameters.get("page", "")
+        if page.isascii() and page.isdigit():
+            given["page"] = max(1, min(int(page[:7]), 10**6))
+        if str(given.get("sort", "order")).removeprefix("-") not in _SORTS:
+            given.pop("sort")
+        return DataFilter(**given)
+
+    def takes(self, head: Head) -> bool:
+        """Whether a trajectory is shown."""
+        return (
+            self.part in ("", head.part)
+            and self.kind in ("", head.kind)
+            and self.type in ("", head.task_type)
+            and self.language in ("", head.language)
+            and self.outcome in ("", outcome_of(head))
+            and (not self.refused or self.refused in head.refused)
+            and (not self.text or self.text.casefold() in f"{head.id} {head.instruction}".casefold())
+        )
+
+    def query(self, **changes: Any) -> str:
+        """The parameters of an address, with some changed or added; the page begins again."""
+        told = {each.name: getattr(self, each.name) for each in fields(self)}
+        told |= {"page": 1, **changes}
+        defaults = {each.name: each.default for each in fields(self)}
+        return urlencode({k: str(value) for k, value in told.items() if value != defaults.get(k)})
+
+
+def outcome_of(head: Head) -> str:
+    """``success`` or ``failure``."""
+    return "success" if head.success else "failure"
+
+
+def chosen(index: CollectionIndex, filter: DataFilter) -> list[Head]:
+    """The trajectories that a filter takes, sorted."""
+    taken = [head for head in index.heads if filter.takes(head)]
+    name = filter.sort.removeprefix("-")
+    if name == "turns":
+        taken.sort(key=lambda head: head.turns)
+    elif name == "thoughts":
+        taken.sort(key=lambda head: head.thoughts)
+    elif name == "refused":
+        taken.sort(key=lambda head: len(head.refused))
+    if filter.sort.startswith("-"):
+        taken.reverse()
+    return taken
+
+
+@dataclass(frozen=True)
+class Count:
+    """A count: of what, how many, its share of all, and the paper's share; None for none."""
+
+    name: str
+    n: int
+    share: float
+    paper: float | None = None
+
+
+def counted(counts: Mapping[str, int], papers: Mapping[str, int] | None = None) -> list[Count]:
+    """Counts with their shares, the greatest first."""
+    every, theirs = sum(counts.values()), sum((papers or {}).values())
+    return [
+        Count(name, n, n / every, papers[name] / theirs if papers and name in papers else None)
+        for name, n in sorted(counts.items(), key=lambda one: (-one[1], one[0]))
+        if n
+    ]
+
+
+def overview(index: CollectionIndex, t: Translator) -> dict[str, Any]:
+    """The counts and pictures of a collection's page."""
+    heads, found = index.heads, index.found
+    states = {state: t.name(f"state_{state}") for state in STATES}
+    longest = max(index.lengths, default=1)
+    lengths = [(float(n), float(index.lengths[n])) for n in range(1, longest + 1)]
+    return {
+        "parts_counted": counted(Counter(head.part for head in heads)),
+        "kinds": counted(Counter(head.kind for head in heads)),
+        "types": counted(found.task_types, paper.TASK_TYPES),
+        "languages": counted(found.languages),
+        "actors": counted(Counter(head.actor for head in heads)),
+        "thoughts": [
+            Count(
+                kind,
+                found.thoughts[kind],
+                found.thoughts[kind] / max(1, found.all_thoughts),
+                paper.THOUGHTS[kind] / sum(paper.THOUGHTS.values()),
+            )
+            for kind in THOUGHT_KINDS
+        ],
+        "refusals": counted(found.refused),
+        "succeeded": sum(head.success for head in heads),
+        "shares": found.transition_shares(),
+        "papers": paper.TRANSITIONS,
+        "states": STATES,
+        "mean_turns": mean_and_most(index.lengths)[0],
+        "flow": flow(
+            "flow", t("what_follows"), found.transitions, states, (t("after_this"), t("comes_this"))
+        ),
+        "lengths": chart(
+            "lengths", t("by_turns"), Axis(t("turns"), low=0.0, high=longest + 1.0),
+            Axis(t("trajectories"), low=0.0),
+            [Series(t("trajectories"), points(lengths), "bars")],
+        ) if heads else "",
+    }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class TurnView:
+    """A turn of a trajectory.
+
+    Attributes:
+        number: from 0.
+        turn: as the trajectory has it.
+        tags: the CSS class of each thought.
+        pictures: the numbers of the trajectory's pictures that the agent was shown for it.
+        total: the reward so far.
+        done: the numbers of the key actions that were done in it.
+    """
+
+    number: int
+    turn: Turn
+    tags: Sequence[str]
+    pictures: Sequence[int]
+    total: float
+    done: Sequence[int]
+
+
+def turns_of(trajectory: Trajectory) -> tuple[list[TurnView], list[PictureRecord]]:
+    """The turns, and all pictures in order."""
+    pictures: list[PictureRecord] = []
+    views, total = [], 0.0
+    left = list(range(len(trajectory.key_actions)))
+    for number, turn in enumerate(trajectory.turns):
+        shown = range(len(pictures), len(pictures) + len(turn.pictures))
+        pictures += turn.pictures
+        total += turn.reward
+        done = [place for place in left[:1] if turn.earned]
+        left = left[len(done) :]
+        tags = [TAG_OF_KIND[thought.kind].lower() for thought in turn.thoughts]
+        views.append(TurnView(number, turn, tags, list(shown), total, done))
+    return views, pictures

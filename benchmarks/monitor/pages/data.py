@@ -1,0 +1,214 @@
+"""Data: the list of collections, a collection, and a trajectory turn by turn."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+
+from fastapi import Request, Response
+from fastapi.responses import HTMLResponse
+from markupsafe import Markup
+from PIL import Image
+
+from benchmarks.monitor import formats
+from benchmarks.monitor.collection_index import Collections
+from benchmarks.monitor.data_view import (
+    PAGE_ROWS,
+    DataFilter,
+    chosen,
+    outcome_of,
+    overview,
+    turns_of,
+)
+from benchmarks.monitor.episode_view import file_inside
+from benchmarks.monitor.growth import changed, in_use, parts_of
+from benchmarks.monitor.pages.episodes import PICTURE_KINDS
+from benchmarks.monitor.places import Place
+from benchmarks.monitor.room_map import room_map
+from benchmarks.monitor.run_view import RunSummary
+from benchmarks.monitor.site import AN_HOUR, NothingThere, Routes, Site
+from benchmarks.monitor.world import CannotReplay, Worlds
+from er_gym.data.collection import PARTS, Collection, CollectionManifest
+from er_gym.data.line_index import trajectory_at
+from er_gym.data.trajectory import Trajectory
+from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.run_directory import Manifest, RunDirectory
+
+
+@dataclass(frozen=True)
+class CollectionRow:
+    """What the list says of a collection.
+
+    Attributes:
+        place: its directory.
+        manifest: what is collected; None if that cannot be read.
+        state: ``running``, ``finished`` or ``stopped``.
+        trajectories: how many are taken; None before the file is written.
+        changed: when it changed last, seconds since the epoch.
+    """
+
+    place: Place
+    manifest: CollectionManifest | None
+    state: str
+    trajectories: int | None
+    changed: float
+
+
+class DataPages:
+    """See the file."""
+
+    def __init__(self, site: Site) -> None:
+        self._site = site
+        self._collections = Collections()
+        self._worlds = Worlds()
+
+    def routes(self) -> Routes:
+        """The pages by address."""
+        return {
+            "/data": self.all,
+            "/data/{id}": self.collection,
+            "/data/{id}/trajectory": self.trajectory,
+            "/data/{id}/picture": self.picture,
+            "/data/{id}/map": self.map,
+            "/data/{id}/frame": self.frame,
+        }
+
+    def all(self, request: Request) -> Response:
+        """All collections."""
+        rows = [self._row(place) for place in self._site.places.of_kind("collection")]
+        rows.sort(key=lambda row: (row.state != "running", row.place.name))
+        told = {"rows": rows, "roots": self._site.places.roots, "live": "*", "at": "data"}
+        return self._site.show(request, "data.html", told)
+
+    def collection(self, request: Request, id: str) -> Response:
+        """A collection."""
+        place = self._site.place(id, "collection")
+        filter = DataFilter.of(request.query_params)
+        with self._collections.use(place) as index:
+            taken = chosen(index, filter)
+            told = overview(index, self._site.translator(request))
+            told |= {"total": len(index.heads), "found": index.found, "damaged": index.damaged}
+        last = max(1, -(-len(taken) // PAGE_ROWS))
+        page = min(filter.page, last)
+        told |= {
+            "row": self._row(place),
+            "filter": filter,
+            "heads": taken[(page - 1) * PAGE_ROWS : page * PAGE_ROWS],
+            "taken": len(taken),
+            "page": page,
+            "last": last,
+            "outcome_of": outcome_of,
+            "playing": self._parts(place),
+            "live": id,
+            "at": "data",
+        }
+        return self._site.show(request, "collection.html", told)
+
+    def trajectory(self, request: Request, id: str, key: str = "") -> Response:
+        """A trajectory, turn by turn."""
+        place = self._site.place(id, "collection")
+        filter = DataFilter.of(request.query_params)
+        trajectory = self._trajectory(place, key)
+        with self._collections.use(place) as index:
+            ids = [head.id for head in chosen(index, filter)]
+        at = ids.index(key) if key in ids else -1
+        turns, pictures = turns_of(trajectory)
+        told = {
+            "place": place,
+            "key": key,
+            "trajectory": trajectory,
+            "turns": turns,
+            "pictures": pictures,
+            "filter": filter,
+            "before": ids[at - 1] if at > 0 else "",
+            "after": ids[at + 1] if 0 <= at < len(ids) - 1 else "",
+            "scripts": ("episode.js",),
+            "at": "data",
+        }
+        return self._site.show(request, "trajectory.html", told)
+
+    def picture(self, id: str, key: str = "", n: int = 0) -> Response:
+        """A picture of a trajectory."""
+        place = self._site.place(id, "collection")
+        _, pictures = turns_of(self._trajectory(place, key))
+        file = file_inside(place.path, PARTS, pictures[n].path) if 0 <= n < len(pictures) else None
+        kind = PICTURE_KINDS.get(file.suffix.lower()) if file else None
+        if file is None or kind is None:
+            raise NothingThere
+        try:
+            return Response(file.read_bytes(), media_type=kind, headers=AN_HOUR)
+        except OSError:
+            raise NothingThere from None
+
+    def map(self, request: Request, id: str, key: str = "") -> Response:
+        """The room of a trajectory from above, as SVG, or why it cannot be drawn."""
+        trajectory = self._trajectory(self._site.place(id, "collection"), key)
+        words = self._site.translator(request)
+        try:
+            world = self._worlds.world(*self._played(id, trajectory))
+        except CannotReplay as error:
+            text = words("no_replay", why=formats.brief(str(error)))
+            return HTMLResponse(Markup("<p class=empty>{}</p>").format(text))
+        wanted = {key_action.object_id for key_action in trajectory.key_actions}
+        return HTMLResponse(room_map(world, wanted, words("map")))
+
+    def frame(self, id: str, key: str = "", n: int = 0) -> Response:
+        """What the agent could see before a turn, drawn now."""
+        trajectory = self._trajectory(self._site.place(id, "collection"), key)
+        try:
+            manifest, record = self._played(id, trajectory)
+            if not 0 <= n < len(record.steps):
+                raise NothingThere
+            picture = self._worlds.frame(manifest, record, n)
+        except CannotReplay:
+            raise NothingThere from None
+        data = io.BytesIO()
+        Image.fromarray(picture).save(data, "JPEG", quality=85)
+        return Response(data.getvalue(), media_type="image/jpeg", headers=AN_HOUR)
+
+    def _trajectory(self, place: Place, key: str) -> Trajectory:
+        with self._collections.use(place) as index:
+            head = index.at(key)
+        if head is None:
+            raise NothingThere
+        try:
+            return trajectory_at(Collection.open(place.path), head.offset)
+        except (ValueError, OSError):
+            raise NothingThere from None
+
+    def _played(self, id: str, trajectory: Trajectory) -> tuple[Manifest, EpisodeRecord]:
+        """The part's manifest, and the record of the episode that became a trajectory.
+
+        Raises:
+            CannotReplay: the part has none.
+        """
+        place = self._site.place(id, "collection")
+        if trajectory.part not in parts_of(place.path):
+            raise CannotReplay("its part is not there")
+        try:
+            run = RunDirectory.open(place.path / PARTS / trajectory.part)
+            record = run.episode(trajectory.id)
+        except (ValueError, OSError) as error:
+            raise CannotReplay(str(error).splitlines()[0]) from None
+        # Several trajectories of a task are different episodes; the room is the task's.
+        return run.manifest, record.model_copy(update={"task_id": trajectory.task_id})
+
+    def _row(self, place: Place) -> CollectionRow:
+        try:
+            manifest = Collection.open(place.path).manifest
+        except (ValueError, OSError):
+            manifest = None
+        count = self._collections.count(place)
+        working = in_use(place.path) or any(
+            in_use(place.path / PARTS / part) for part in parts_of(place.path)
+        )
+        state = "running" if working else "stopped" if count is None else "finished"
+        return CollectionRow(place, manifest, state, count, changed(place))
+
+    def _parts(self, place: Place) -> list[tuple[str, RunSummary]]:
+        """The parts as runs: how far each has come."""
+        found = []
+        for part in parts_of(place.path):
+            run = Place(f"{place.id}/{part}", "run", place.path / PARTS / part, part)
+            found.append((part, self._site.summary(run)))
+        return found
