@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -171,4 +172,31 @@ def _filter(only: Sequence[str]) -> Any:
 
 
 def _video(options: FileOptions, out: Path) -> None:
-    raise BadInput("not yet")
+    from benchmarks.monitor.video import FORMATS, as_webp, film, write_mp4
+    from benchmarks.monitor.world import Worlds
+    from er_gym.rollout.run_directory import RunDirectory
+    from er_gym.writing import write_atomic
+
+    assert options.video is not None
+    suffix = out.suffix.lower()
+    if suffix not in FORMATS:
+        raise BadInput(f"{out}: a video is {' or '.join(FORMATS)}; give --out with such an ending")
+    if suffix == ".mp4" and importlib.util.find_spec("imageio_ffmpeg") is None:
+        raise BadInput(
+            "a .mp4 needs imageio-ffmpeg, which is not installed: pip install imageio-ffmpeg, or "
+            "give a name that ends in .webp"
+        )
+    if (out.exists() or out.is_symlink()) and not options.overwrite:
+        raise BadInput(f"{out} is there already; choose another --out, or give --overwrite")
+    with bad_input():
+        run = RunDirectory.open(options.video)
+        key = options.episode or next((each.key for each in run.episodes()), "")
+        if not key:
+            raise BadInput(f"{options.video} has no episode yet")
+        frames = film(run, key, Worlds())
+        if suffix == ".mp4":
+            write_mp4(frames, out)
+        else:
+            write_atomic(out, as_webp(frames))
+    seconds = sum(frame.seconds for frame in frames)
+    echo(f"{out}: {key}, {len(frames)} frames, {seconds:.0f} s")

@@ -92,7 +92,11 @@ def chart(name: str, title: str, x: Axis, y: Axis, series: Sequence[Series]) -> 
         series: at most eight, which look different.
     """
     shown = [
-        (_GREY if each.kind == "bars" else number % _STYLES, each, _fitting(each.points, x, y))
+        (
+            _GREY if each.kind == "bars" and len(series) > 1 else number % _STYLES,
+            each,
+            _fitting(each.points, x, y),
+        )
         for number, each in enumerate(series)
     ]
     shown = [one for one in shown if one[2]]

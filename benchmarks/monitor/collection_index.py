@@ -242,7 +242,9 @@ class Collections:
             state = status.st_ino, status.st_size, status.st_mtime_ns
             if file not in self._counts or self._counts[file][0] != state:
                 with file.open("rb") as lines:
-                    number = sum(chunk.count(b"\n") for chunk in iter(lambda: lines.read(2**20), b""))
+                    number = sum(
+                        chunk.count(b"\n") for chunk in iter(lambda: lines.read(2**20), b"")
+                    )
                 self._counts[file] = state, number
             return self._counts[file][1]
         except OSError:

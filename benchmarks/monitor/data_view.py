@@ -15,6 +15,8 @@ from benchmarks.monitor.language import Translator
 from er_gym.data import paper_figures as paper
 from er_gym.data.statistics import STATES, mean_and_most
 from er_gym.data.trajectory import TAG_OF_KIND, THOUGHT_KINDS, PictureRecord, Trajectory, Turn
+from er_gym.rollout.records import EpisodeRecord, StepRecord
+from er_gym.tasks.verbs import INIT
 
 PAGE_ROWS = 100
 _SORTS = ("order", "turns", "thoughts", "refused")
@@ -66,7 +68,9 @@ class DataFilter:
             and self.language in ("", head.language)
             and self.outcome in ("", outcome_of(head))
             and (not self.refused or self.refused in head.refused)
-            and (not self.text or self.text.casefold() in f"{head.id} {head.instruction}".casefold())
+            and (
+                not self.text or self.text.casefold() in f"{head.id} {head.instruction}".casefold()
+            )
         )
 
     def query(self, **changes: Any) -> str:
@@ -190,3 +194,34 @@ def turns_of(trajectory: Trajectory) -> tuple[list[TurnView], list[PictureRecord
         tags = [TAG_OF_KIND[thought.kind].lower() for thought in turn.thoughts]
         views.append(TurnView(number, turn, tags, list(shown), total, done))
     return views, pictures
+
+
+def record_of(trajectory: Trajectory) -> EpisodeRecord:
+    """The episode that became a trajectory, as far as playing it again needs it."""
+    steps = [
+        StepRecord(
+            verb=turn.verb,
+            object_type=turn.object_type,
+            object_id=turn.object_id,
+            success=turn.success,
+            reward=turn.reward,
+        )
+        for turn in trajectory.turns
+    ]
+    return EpisodeRecord(
+        task_id=trajectory.task_id,
+        task_type=trajectory.task_type,
+        scene=trajectory.scene,
+        instruction=trajectory.instruction,
+        name=trajectory.name,
+        key_actions=trajectory.key_actions,
+        max_steps=trajectory.max_steps,
+        agent=trajectory.actor,
+        seed=trajectory.seed,
+        steps=[StepRecord(verb=INIT, success=True), *steps],
+        success=trajectory.success,
+        search_targets=trajectory.search_targets,
+        end_reason=trajectory.end_reason,
+        total_reward=sum(step.reward for step in steps),
+        seconds=0.0,
+    )

@@ -121,8 +121,11 @@ def file_inside(root: Path, folder: str, path: str) -> Path | None:
         folder: relative to it.
         path: relative to ``root``; it comes from a file that anyone may have written.
     """
-    top = os.path.realpath(root)
-    within, found = os.path.realpath(root / folder), os.path.realpath(root / path)
+    try:
+        top = os.path.realpath(root)
+        within, found = os.path.realpath(root / folder), os.path.realpath(root / path)
+    except (ValueError, OSError):  # no file can have this name
+        return None
     inside = found.startswith(within + os.sep) and within.startswith(top + os.sep)
     return Path(found) if inside and os.path.isfile(found) else None
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-_WIDTH, _HEIGHT, _GAP, _NODE = 560, 380, 13, 11
-_LEFT, _RIGHT, _TOP = 112, 112, 26
+_WIDTH, _HEIGHT, _GAP, _NODE = 620, 380, 13, 11
+_LEFT, _RIGHT, _TOP = 138, 138, 26
 _THINNEST = 0.4
 """A band that would be thinner than this is not drawn."""
 
@@ -58,7 +58,9 @@ def flow(
             count = row.get(state, 0)
             wide = count * scale
             if count and wide >= _THINNEST:
-                told = f"{words[node.name]} → {words[state]}: {count:,} ({100 * count / whole:.0f} %)"
+                told = (
+                    f"{words[node.name]} → {words[state]}: {count:,} ({100 * count / whole:.0f} %)"
+                )
                 parts.append(_band(node.name, begin, ends[state], wide, told))
             begin += wide
             ends[state] += wide
@@ -77,9 +79,7 @@ def flow(
     ).format(_WIDTH, _HEIGHT, name, name, name, title, name, described, Markup("").join(parts))
 
 
-def _stacked(
-    names: Sequence[str], counts: Sequence[int], scale: float, room: float
-) -> list[_Node]:
+def _stacked(names: Sequence[str], counts: Sequence[int], scale: float, room: float) -> list[_Node]:
     """Nodes below one another, in the middle of the height."""
     used = sum(counts) * scale + _GAP * (len(names) - 1)
     top, nodes = _TOP + (room - used) / 2, []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import html
 import json
 import os
@@ -137,7 +138,7 @@ def test_a_ladder_shows_its_phases_and_the_success_of_each_rung(tmp_path, visit,
     for name, kind in (("evaluations/0-base", "runs"), ("1-imitation", "training")):
         assert f'href="/{kind}/{ids[root / name]}"' in text
     results = text[text.index('id="results"') : text.index('id="phases"')]
-    assert "imitation 0 % 8 100.0 % 95 % interval 67.6 to 100.0 %" in said(results)
+    assert "imitation 0 % 8 100.0 % 67.6 – 100.0 %" in said(results)
     assert "this ladder: 2, 0 … 100" in text
     assert "the paper&#39;s models" in text
     listed = said(visit(tmp_path).get("/training").text)
@@ -181,11 +182,8 @@ def test_who_holds_the_lock_is_seen_without_touching_it(tmp_path):
     assert not in_use(tmp_path)
     with exclusive_use(tmp_path):
         assert in_use(tmp_path)
-        with pytest.raises(BlockingIOError):  # the lock is still held
-            import fcntl
-
-            with (tmp_path / LOCK).open() as file:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with (tmp_path / LOCK).open() as file, pytest.raises(BlockingIOError):  # it is still held
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     ended = os.fork()
     if not ended:
         os._exit(0)

@@ -18,6 +18,7 @@ from benchmarks.monitor.data_view import (
     chosen,
     outcome_of,
     overview,
+    record_of,
     turns_of,
 )
 from benchmarks.monitor.episode_view import file_inside
@@ -177,7 +178,7 @@ class DataPages:
             raise NothingThere from None
 
     def _played(self, id: str, trajectory: Trajectory) -> tuple[Manifest, EpisodeRecord]:
-        """The part's manifest, and the record of the episode that became a trajectory.
+        """The part's manifest, and the episode that became a trajectory.
 
         Raises:
             CannotReplay: the part has none.
@@ -187,11 +188,9 @@ class DataPages:
             raise CannotReplay("its part is not there")
         try:
             run = RunDirectory.open(place.path / PARTS / trajectory.part)
-            record = run.episode(trajectory.id)
         except (ValueError, OSError) as error:
             raise CannotReplay(str(error).splitlines()[0]) from None
-        # Several trajectories of a task are different episodes; the room is the task's.
-        return run.manifest, record.model_copy(update={"task_id": trajectory.task_id})
+        return run.manifest, record_of(trajectory)
 
     def _row(self, place: Place) -> CollectionRow:
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import threading
 
 from fastapi import Request, Response
 from fastapi.responses import HTMLResponse
@@ -14,8 +15,10 @@ from benchmarks.monitor.episode_view import picture_file, view_of
 from benchmarks.monitor.room_map import room_map
 from benchmarks.monitor.run_view import Filter
 from benchmarks.monitor.site import AN_HOUR, NothingThere, Routes, Site
+from benchmarks.monitor.video import as_webp, film
 from benchmarks.monitor.world import CannotReplay, Worlds
 from er_gym.rollout.run_directory import RunDirectory
+from er_gym.writing import file_stem
 
 PICTURE_KINDS = {
     ".jpg": "image/jpeg",
@@ -31,6 +34,7 @@ class EpisodePages:
     def __init__(self, site: Site) -> None:
         self._site = site
         self._worlds = Worlds()
+        self._filming = threading.Lock()
 
     def routes(self) -> Routes:
         """The pages by address."""
@@ -39,6 +43,7 @@ class EpisodePages:
             "/runs/{id}/picture": self.picture,
             "/runs/{id}/map": self.map,
             "/runs/{id}/frame": self.frame,
+            "/runs/{id}/video": self.video,
         }
 
     def episode(self, request: Request, id: str, key: str = "") -> Response:
@@ -100,3 +105,14 @@ class EpisodePages:
         data = io.BytesIO()
         Image.fromarray(picture).save(data, "JPEG", quality=85)
         return Response(data.getvalue(), media_type="image/jpeg", headers=AN_HOUR)
+
+    def video(self, id: str, key: str = "") -> Response:
+        """An episode as an animated WebP, to keep."""
+        try:
+            run = RunDirectory.open(self._site.place(id, "run").path)
+            with self._filming:  # one at a time: it is the costliest page
+                data = as_webp(film(run, key, self._worlds))
+        except (ValueError, OSError):
+            raise NothingThere from None
+        named = f'attachment; filename="{file_stem(key)}.webp"'
+        return Response(data, media_type="image/webp", headers={"Content-Disposition": named})
