@@ -61,6 +61,7 @@ fits counts."""
 
 NOT_OURS_TO_REQUIRE = {
     "deepspeed": "used where a setting has asked for it",
+    "imageio_ffmpeg": "asked for by the ending of a name, and the error says what to install",
     "wandb": "asked for by a setting, whose error says what to install",
 }
 

@@ -271,9 +271,8 @@ class _Draw:
                 style, each, _ = shown[number]
                 yield Markup('<g class="s{} key">').format(style)
                 if each.kind == "bars":
-                    yield Markup('<rect class="bar" x="{:.1f}" y="{}" width="22" height="9"/>').format(
-                        left, y - 5
-                    )  # fmt: skip
+                    box = Markup('<rect class="bar" x="{:.1f}" y="{}" width="22" height="9"/>')
+                    yield box.format(left, y - 5)
                 else:
                     if each.kind == "line":
                         yield Markup('<path class="line" d="M{:.1f} {}h22"/>').format(left, y)
@@ -301,9 +300,8 @@ class _Draw:
         yield Markup('<text class="label x" x="{}" y="{}">{}</text>').format(
             (left + right) / 2, self.height - 8, x.label
         )
-        yield Markup('<text class="label y" transform="translate(13 {:.0f}) rotate(-90)">{}</text>').format(
-            (self.top + bottom) / 2, y.label
-        )  # fmt: skip
+        upright = '<text class="label y" transform="translate(13 {:.0f}) rotate(-90)">{}</text>'
+        yield Markup(upright).format((self.top + bottom) / 2, y.label)
 
     @property
     def _any_x(self) -> float:

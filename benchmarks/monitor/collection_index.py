@@ -19,7 +19,7 @@ from pathlib import Path
 from sys import intern
 from typing import Any
 
-from pydantic_core import from_json
+from pydantic import TypeAdapter
 
 from benchmarks.monitor.places import Place
 from er_gym.data.collection import TRAJECTORIES
@@ -27,6 +27,7 @@ from er_gym.data.paper_figures import ACTION, BEGIN
 from er_gym.data.statistics import Statistics
 from er_gym.data.trajectory import THOUGHT_KINDS
 
+_JSON: TypeAdapter[Any] = TypeAdapter(Any)
 _TURN, _VERB, _TURNS, _END = b'"purpose":"', b',"verb":"', b',"turns":[', b'],"success":'
 _THOUGHT = re.compile(
     rb'\{"kind":"(\w+)","text":"[^"\\]*(?:\\.[^"\\]*)*","writer":"[^"\\]*","refused":\[([^\]]*)\]'
@@ -167,8 +168,8 @@ def _searched(line: bytes) -> tuple[dict[str, Any], _Turns, int] | None:
     begin, end = line.find(_TURNS), line.rfind(_END)
     if not line.startswith(_FORMAT) or not 0 < begin < end:
         return None
-    told = from_json(line[:begin] + b"}")
-    told |= from_json(b"{" + line[end + 2 :])
+    told = _JSON.validate_json(line[:begin] + b"}")
+    told |= _JSON.validate_json(b"{" + line[end + 2 :])
     _, *parts = line[begin:end].split(_TURN)
     turns = []
     for part in parts:
@@ -180,7 +181,7 @@ def _searched(line: bytes) -> tuple[dict[str, Any], _Turns, int] | None:
 
 def _parsed(line: bytes) -> tuple[dict[str, Any], _Turns, int]:
     """The same of any line."""
-    told = from_json(line)
+    told = _JSON.validate_json(line)
     turns = []
     for turn in told["turns"]:
         thoughts = turn.get("thoughts", [])

@@ -13,10 +13,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pydantic_core import from_json
+from pydantic import TypeAdapter
 
 from benchmarks.monitor.charts import MOST_POINTS, Point
 
+_JSON: TypeAdapter[Any] = TypeAdapter(Any)
 _CHUNK = 2**20
 _LONGEST = 2**20
 """A longer line is skipped."""
@@ -121,7 +122,7 @@ class CurveTail:
         if len(self._rest) > _LONGEST:
             self._rest, self._skipping = b"", True
         found = _parsed(lines)
-        all_xs = [each.get(self.over) for each in found]
+        all_xs: list[Any] = [each.get(self.over) for each in found]
         if not _all_numbers(all_xs):
             found = [each for each in found if _is_number(each.get(self.over))]
             all_xs = [each[self.over] for each in found]
@@ -131,7 +132,8 @@ class CurveTail:
                 if len(self.series) >= _MOST_NAMES:
                     continue
                 self.series[name] = Thinned()
-            xs, ys = all_xs, [each.get(name) for each in found]
+            xs = all_xs
+            ys: list[Any] = [each.get(name) for each in found]
             if not _all_numbers(ys):
                 told = [pair for pair in zip(xs, ys, strict=True) if _is_number(pair[1])]
                 xs, ys = [x for x, _ in told], [y for _, y in told]
@@ -157,12 +159,12 @@ def last_line(file: Path) -> dict[str, Any]:
 def _parsed(lines: Sequence[bytes]) -> list[dict[str, Any]]:
     """The objects among some lines; a half-written line is skipped."""
     try:
-        found = from_json(b"[" + b",".join(filter(None, lines)) + b"]")
+        found = _JSON.validate_json(b"[" + b",".join(filter(None, lines)) + b"]")
     except ValueError:
         found = []
         for line in lines:
             try:
-                found.append(from_json(line))
+                found.append(_JSON.validate_json(line))
             except ValueError:
                 continue
     return [each for each in found if isinstance(each, dict)]

@@ -8,8 +8,8 @@
     x/episodes/0003.html        a replay
     x/pictures/0003-000.jpeg    its pictures
 
-It is made of the server's own pages (:mod:`benchmarks.monitor.offline`). Nothing of the run is in a
-script: scripts are those of ``static/``, and the page's own policy forbids all others, and requests.
+It is made of the server's own pages (:mod:`benchmarks.monitor.offline`). Nothing of the run is in
+a script: scripts are those of ``static/``; the page's own policy forbids all others, and requests.
 """
 
 from __future__ import annotations

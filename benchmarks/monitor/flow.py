@@ -1,4 +1,4 @@
-"""What follows what, as a picture: bands from each state to the next, as wide as they are frequent."""
+"""What follows what, as a picture: bands from state to state, as wide as they are frequent."""
 
 from __future__ import annotations
 

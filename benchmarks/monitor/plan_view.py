@@ -174,7 +174,7 @@ def studies(settings: AblationSettings, inside: Inside, t: Translator) -> list[S
         name: _measured(name, 0.0, [evaluation_of(name, s) for s in settings.seeds], inside)
         for name in settings.rows
     }
-    found = []
+    found: list[StudyView] = []
     for name, study in settings.studies.items():
         own = [rows[each] for each in study.rows]
         places = study.numbers or range(len(own))
