@@ -11,6 +11,7 @@ import click
 from benchmarks.cli.errors import BadInput
 from benchmarks.cli.options import Place
 from benchmarks.cli.terminal import echo
+from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
 
 _LOOPBACK = "127.0.0.1"
 
@@ -38,10 +39,26 @@ _LOOPBACK = "127.0.0.1"
 )
 @click.option("--token", help="The token for another --host.  [default: a random one]")
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
-def ui(folders: tuple[Path, ...], host: str, port: int, token: str | None, no_browser: bool) -> int:
+@click.option(
+    "--play",
+    type=Place(file_okay=False, path_type=Path),
+    metavar="OUT",
+    help="Let a person play, alone or in place of an agent; the runs are written below OUT.",
+)
+@with_vlm_options
+def ui(
+    folders: tuple[Path, ...],
+    host: str,
+    port: int,
+    token: str | None,
+    no_browser: bool,
+    play: Path | None,
+    vlm_options: VLMOptions,
+) -> int:
     """Show runs in the browser, while they grow or after.
 
-    FOLDERs hold run directories, at any depth; without one, ./runs. Nothing in them is changed.
+    FOLDERs hold run directories, at any depth; without one, ./runs. Nothing in them is changed. The
+    options from --agent-config on are for vision-language agents that a person watches with --play.
     """
     try:
         import uvicorn
@@ -51,7 +68,10 @@ def ui(folders: tuple[Path, ...], host: str, port: int, token: str | None, no_br
         raise BadInput(
             f"{error.name} is not installed, and er-gym ui needs it: pip install 'er-gym[ui]'"
         ) from error
-    roots = folders or (Path("runs"),)
+    if play is None and vlm_options.given:
+        raise BadInput(f"{vlm_options.given[0]} is for agents that a person watches; give --play")
+    usual = Path("runs")
+    roots = folders or ((usual,) if play is None or usual.is_dir() else ())
     missing = next((root for root in roots if not root.is_dir()), None)
     if missing is not None:
         raise BadInput(f"{missing} does not exist; give the folder that holds your runs")
@@ -71,6 +91,12 @@ def ui(folders: tuple[Path, ...], host: str, port: int, token: str | None, no_br
     echo(address)
     if not no_browser:
         click.launch(address)
-    config = uvicorn.Config(make_app(roots, secret), log_level="warning", access_log=False)
+    # A page that waits for news never ends by itself, so Ctrl-C must not wait for it.
+    config = uvicorn.Config(
+        make_app(roots, secret, play, vlm_options),
+        log_level="warning",
+        access_log=False,
+        timeout_graceful_shutdown=1,
+    )
     uvicorn.Server(config).run(sockets=[listener])
     return 0

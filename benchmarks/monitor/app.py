@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hmac
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
 from fastapi import FastAPI, Request, Response
@@ -14,10 +16,14 @@ from starlette.middleware.base import RequestResponseEndpoint
 
 from benchmarks.monitor.pages.episodes import EpisodePages
 from benchmarks.monitor.pages.live import LivePages
+from benchmarks.monitor.pages.play import PlayPages
 from benchmarks.monitor.pages.runs import RunPages
 from benchmarks.monitor.pages.static import StaticPages
 from benchmarks.monitor.places import Places
 from benchmarks.monitor.site import NothingThere, Site
+
+if TYPE_CHECKING:
+    from benchmarks.cli.vlm_options import VLMOptions
 
 _LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 _HEADERS = {
@@ -31,7 +37,12 @@ _HEADERS = {
 _TOKEN = "er-gym-token"
 
 
-def make_app(roots: Sequence[Path], token: str = "") -> FastAPI:
+def make_app(
+    roots: Sequence[Path],
+    token: str = "",
+    play: Path | None = None,
+    options: VLMOptions | None = None,
+) -> FastAPI:
     """The application.
 
     Args:
@@ -39,9 +50,20 @@ def make_app(roots: Sequence[Path], token: str = "") -> FastAPI:
         token: must be given once as ``?token=``; "" where only this machine can connect. Then
             requests must name this machine as their host, so that no foreign page can read along
             through a name that it made point here.
+        play: the directory for the runs that a person plays; None if nobody may play.
+        options: for vision-language agents that a person watches.
     """
-    app = FastAPI(title="er-gym", docs_url=None, redoc_url=None, openapi_url=None)
-    site = Site(Places(roots))
+    site = Site(Places(roots if play is None else (*roots, play)))
+    playing = PlayPages(site, play, options)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        yield
+        await run_in_threadpool(playing.sessions.close)
+
+    app = FastAPI(
+        title="er-gym", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan
+    )
 
     @app.middleware("http")
     async def guard(request: Request, call_next: RequestResponseEndpoint) -> Response:
@@ -58,6 +80,7 @@ def make_app(roots: Sequence[Path], token: str = "") -> FastAPI:
     for pages in (RunPages(site), EpisodePages(site), LivePages(site), StaticPages()):
         for path, page in pages.routes().items():
             app.add_api_route(path, page, methods=["GET"], response_class=HTMLResponse)
+    playing.add_to(app)
     return app
 
 
