@@ -16,7 +16,7 @@ from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
 _LOOPBACK = "127.0.0.1"
 
 
-@click.command()
+@click.command(name="ui")
 @click.argument(
     "folders",
     nargs=-1,

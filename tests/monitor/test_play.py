@@ -209,7 +209,9 @@ def test_the_episode_in_play_begins_again_with_the_pictures_of_a_vision_language
     assert [each.by for each in kept.rounds] == ["person", "person"]
     replay = re.search(r'href="(/runs/\w+/episode[^"]+)"', player.get(session))
     assert replay is not None
-    assert player.get(replay[1].replace("&amp;", "&")).count("data-picture=") == 5
+    page = player.get(replay[1].replace("&amp;", "&"))
+    assert page.count("data-picture=") == 5
+    assert WORDS["said"] not in page  # there is no model
 
     assert player.post(session, do="next").status_code == 303
     after = player.get(session)
@@ -254,6 +256,11 @@ def test_a_step_decided_in_place_of_a_model_is_its_own_turn(
     assert [each.by for each in kept.rounds] == ["", "person", ""]
     assert [each.action for each in kept.rounds] == ["observe", chosen, "end"]
     assert kept.rounds[1].success == run.episode(FIRST.id).steps[2].success
+    replay = re.search(r'href="(/runs/\w+/episode[^"]+)"', player.get(session))
+    assert replay is not None
+    page = player.get(replay[1].replace("&amp;", "&"))
+    assert page.count(WORDS["play_by_person_record"]) == 1
+    assert page.count(WORDS["said"]) == 2
     asked = [event.step for event in read_events(run.path) if isinstance(event, Reply)]
     assert asked == [1, 3]
 

@@ -197,11 +197,11 @@ class PlayPages:
         return RedirectResponse(f"/play/{session.id}", 303)
 
     def picture(self, id: str, step: int = 0, n: int = 0) -> Response:
-        """A picture of the turn that is shown now."""
-        turn = self._session(id).now.turn
-        if turn is None or turn.number != step or not 0 <= n < len(turn.pictures):
+        """A picture of a turn of the episode in play."""
+        pictures = self._session(id).now.shown.get(step, ())
+        if not 0 <= n < len(pictures):
             raise NothingThere
-        picture = [*turn.pictures.values()][n]
+        picture = pictures[n]
         return Response(picture.data, media_type=picture.media_type)
 
     async def news(self, request: Request, id: str) -> Response:

@@ -10,10 +10,11 @@ import secrets
 import threading
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias
 
 from agents.vlm.agent import VLMAgent
+from agents.vlm.chat import Picture
 from benchmarks.monitor.play.plan import Cast, Plan
 from benchmarks.monitor.play.turn import Turn, turn_of
 from er_gym.envs.actions import Action, text_of
@@ -87,6 +88,7 @@ class Moment:
         going: whether the agent goes on by itself.
         yields: whether the agent plays on after a step that a person decided.
         turn: what the person is shown; None before the first episode.
+        shown: the pictures of this episode by the number of their turn.
         deeds: of this episode.
         ended: how the last episode ended; None while one is played.
         done, wanted: how many tasks of the session are finished, and how many it has.
@@ -99,6 +101,7 @@ class Moment:
     going: bool = False
     yields: bool = True
     turn: Turn | None = None
+    shown: Mapping[int, Sequence[Picture]] = field(default_factory=dict)
     deeds: Sequence[Deed] = ()
     ended: EpisodeEnded | None = None
     done: int = 0
@@ -254,6 +257,7 @@ class Session:
                 phase="starting",
                 ended=None,
                 turn=None,
+                shown={},
                 deeds=(),
                 yields=isinstance(agent, CanBeOverruled),
             )
@@ -314,6 +318,7 @@ class Session:
             self._become(
                 phase="acting" if going else "deciding",
                 turn=turn,
+                shown={**self._now.shown, turn.number: (*turn.pictures.values(),)},
                 deeds=_answered(self._now.deeds, turn),
             )
         if going:

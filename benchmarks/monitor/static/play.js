@@ -6,10 +6,14 @@ if (board()) {
   const address = "/play/" + board().dataset.session;
   let sending = false, again = false;
 
-  const take = (text) => {
+  const take = async (text) => {
     const page = new DOMParser().parseFromString(text, "text/html");
-    const fresh = page.getElementById("play");
-    if (!fresh) { location.reload(); return; }
+    if (!page.getElementById("play")) { location.reload(); return; }
+    const fresh = document.importNode(page.getElementById("play"), true);
+    // The old pictures stay until the new ones are there.
+    const pictures = [...fresh.querySelectorAll("img")].map((one) => one.decode());
+    await Promise.race([Promise.allSettled(pictures), new Promise((done) => setTimeout(done, 2000))]);
+    if (Number(fresh.dataset.version) < Number(board().dataset.version)) return;
     // What was opened, and the focus, stay where they are.
     const open = new Set([...board().querySelectorAll(".deeds details[open]")].map((one) => one.closest("li").value));
     const pressed = document.activeElement && document.activeElement.dataset.press;
@@ -24,7 +28,7 @@ if (board()) {
     try {
       const answer = await fetch(address, { headers: { Accept: "text/html" } });
       const text = await answer.text();
-      if (sending) again = true; else take(text);
+      if (sending) again = true; else await take(text);
     } catch (error) {
       // The server is away; the stream below says when it is back.
     }
@@ -36,9 +40,9 @@ if (board()) {
     const fields = new URLSearchParams(new FormData(form));
     if (submitter && submitter.name) fields.set(submitter.name, submitter.value);
     try {
-      const answer = await fetch(form.action, { method: "POST", body: fields });
+      const answer = await fetch(form.getAttribute("action"), { method: "POST", body: fields });
       const text = await answer.text();
-      if ((answer.headers.get("content-type") || "").startsWith("text/html")) take(text); else location.reload();
+      if ((answer.headers.get("content-type") || "").startsWith("text/html")) await take(text); else location.reload();
     } catch (error) {
       delete board().dataset.busy;
     } finally {
@@ -70,14 +74,14 @@ if (board()) {
         if (named.length) {
           event.preventDefault();
           named[(named.indexOf(event.target) + 1) % named.length].focus();
+          return;
         }
       }
-      return;
     }
     if (key === " " && event.target.tagName === "BUTTON" && !event.target.dataset.press) return;
     const pressed = board().querySelector(`[data-press="${CSS.escape(key)}"]`) || (key === " " && board().querySelector('[data-press=" "]'));
     if (pressed) { event.preventDefault(); pressed.click(); return; }
-    const group = /^[a-z]$/.test(key) && board().querySelector(`fieldset[data-verb="${key}"] button`);
+    const group = /^[a-z]$/.test(key) && board().querySelector(`fieldset[data-verb="${key}"] button, button[data-verb="${key}"]`);
     if (group) { event.preventDefault(); group.focus(); }
   });
 
