@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import secrets
 import socket
+import threading
 from pathlib import Path
+from types import FrameType
 
 import click
 
@@ -91,12 +94,17 @@ def ui(
     echo(address)
     if not no_browser:
         click.launch(address)
-    # A page that waits for news never ends by itself, so Ctrl-C must not wait for it.
-    config = uvicorn.Config(
-        make_app(roots, secret, play, vlm_options),
-        log_level="warning",
-        access_log=False,
-        timeout_graceful_shutdown=1,
-    )
-    uvicorn.Server(config).run(sockets=[listener])
+    closing = threading.Event()
+    app = make_app(roots, secret, closing, play=play, options=vlm_options)
+    config = uvicorn.Config(app, log_level="error", access_log=False, timeout_graceful_shutdown=5)
+    server = uvicorn.Server(config)
+    leave = server.handle_exit
+
+    def handle_exit(number: int, frame: FrameType | None) -> None:
+        closing.set()
+        leave(number, frame)
+
+    server.handle_exit = handle_exit  # type: ignore[assignment, method-assign]
+    with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C is how it ends
+        server.run(sockets=[listener])
     return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hmac
+import threading
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -14,6 +15,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware.base import RequestResponseEndpoint
 
+from benchmarks.monitor.pages.compare import ComparePages
 from benchmarks.monitor.pages.episodes import EpisodePages
 from benchmarks.monitor.pages.live import LivePages
 from benchmarks.monitor.pages.play import PlayPages
@@ -40,6 +42,8 @@ _TOKEN = "er-gym-token"
 def make_app(
     roots: Sequence[Path],
     token: str = "",
+    closing: threading.Event | None = None,
+    *,
     play: Path | None = None,
     options: VLMOptions | None = None,
 ) -> FastAPI:
@@ -50,11 +54,13 @@ def make_app(
         token: must be given once as ``?token=``; "" where only this machine can connect. Then
             requests must name this machine as their host, so that no foreign page can read along
             through a name that it made point here.
+        closing: set when the server is to end, so that pages that wait for news let go.
         play: the directory for the runs that a person plays; None if nobody may play.
         options: for vision-language agents that a person watches.
     """
     site = Site(Places(roots if play is None else (*roots, play)))
-    playing = PlayPages(site, play, options)
+    closing = closing or threading.Event()
+    playing = PlayPages(site, closing, play, options)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -77,7 +83,11 @@ def make_app(
     async def gone(request: Request, error: Exception) -> Response:
         return await run_in_threadpool(site.show, request, "gone.html", {}, 404)
 
-    for pages in (RunPages(site), EpisodePages(site), LivePages(site), StaticPages()):
+    live = LivePages(site, closing)
+    every = (
+        RunPages(site), EpisodePages(site), ComparePages(site), live, StaticPages(),
+    )  # fmt: skip
+    for pages in every:
         for path, page in pages.routes().items():
             app.add_api_route(path, page, methods=["GET"], response_class=HTMLResponse)
     playing.add_to(app)

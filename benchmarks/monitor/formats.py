@@ -12,6 +12,16 @@ def percent(rate: float | None) -> str:
     return "–" if rate is None else f"{100 * rate:.1f} %"
 
 
+def signed(rate: float) -> str:
+    """A difference of fractions in percentage points, with its sign."""
+    return f"{100 * rate:+.1f}"
+
+
+def chance(p: float) -> str:
+    """A p value, with two digits that say something."""
+    return "< 0.0001" if p < 1e-4 else f"{p:.2g}"
+
+
 def duration(seconds: float | None) -> str:
     """``1:02:03``."""
     if seconds is None:
@@ -35,13 +45,20 @@ def money(dollars: float) -> str:
     return f"${dollars:,.2f}" if dollars else "–"
 
 
-def visible(text: str) -> str:
+def visible(text: str, most: int = 200_000) -> str:
     """A text in which characters that turn or hide text can be seen.
 
     A model can say them, and could so make a page look like another: bidirectional controls, and
-    other characters without a shape, are written as their code points.
+    other characters without a shape, are written as their code points. Of a longer text than
+    ``most`` the rest is left out.
     """
-    return "".join(char if _is_plain(char) else f"⟨U+{ord(char):04X}⟩" for char in text)
+    shown = "".join(char if _is_plain(char) else f"⟨U+{ord(char):04X}⟩" for char in text[:most])
+    return shown + " …" if len(text) > most else shown
+
+
+def brief(text: str) -> str:
+    """As :func:`visible`, for what is usually a line."""
+    return visible(text, 2_000)
 
 
 def _is_plain(char: str) -> bool:
@@ -50,10 +67,13 @@ def _is_plain(char: str) -> bool:
 
 FILTERS: Mapping[str, Callable[..., Any]] = {
     "percent": percent,
+    "signed": signed,
+    "chance": chance,
     "duration": duration,
     "moment": moment,
     "count": count,
     "money": money,
     "visible": visible,
+    "brief": brief,
 }
 """The functions by their names in templates."""

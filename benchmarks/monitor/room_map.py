@@ -14,6 +14,10 @@ _SCALE = 60.0
 _MARGIN = 0.4
 _SIGHT = 1.5
 """How far the view cone is drawn, metres: as far as the agent reaches."""
+_LETTER = 7.6
+"""About how wide a letter is."""
+_LARGE = 0.25
+"""Furniture with a larger area is named, square metres."""
 _SMALLEST = 0.12
 """The least side at which an object is drawn, metres."""
 
@@ -34,13 +38,15 @@ def room_map(world: World, wanted: Collection[str], label: str) -> Markup:
     south = min(z - d / 2 for _, z, _, d in boxes) - _MARGIN
     north = max(z + d / 2 for _, z, _, d in boxes) + _MARGIN
     draw = _Draw(west, north)
+    marked = draw.all_wanted([each for each in world.objects if each.object_id in wanted])
+    furniture = sorted((each for each in world.objects if each.holds), key=_area, reverse=True)
     body = Markup("").join(
         (
             *(draw.box("floor", x, z, GRID, GRID) for x, z in world.floor.tolist()),
-            *(draw.thing(each) for each in sorted(world.objects, key=_area, reverse=True)
-              if each.holds),
+            *(draw.thing(each) for each in furniture),
+            *(draw.name(each) for each in furniture if each.object_id not in wanted),
             draw.way(world.stands),
-            *draw.all_wanted([each for each in world.objects if each.object_id in wanted]),
+            *marked,
             *(draw.hidden(each) for each in world.objects
               if each.inside and each.object_id not in wanted),
             *draw.stands(world.stands, world.field_of_view),
@@ -55,11 +61,24 @@ def _area(one: Footprint) -> float:
     return one.width * one.depth
 
 
+def _sides(one: Footprint) -> tuple[float, float]:
+    return max(one.width, _SMALLEST), max(one.depth, _SMALLEST)
+
+
 class _Draw:
     """Turns the world's metres, x east and z north, into the drawing's units."""
 
     def __init__(self, west: float, north: float) -> None:
         self._west, self._north = west, north
+        self._words: list[tuple[float, float, float, float]] = []
+
+    def free(self, left: float, middle: float, words: str) -> bool:
+        """Whether words fit at a height without touching others; if so the room is taken."""
+        right, top, bottom = left + _LETTER * len(words), middle - 8, middle + 8
+        if any(left < r and a < right and top < b and t < bottom for a, t, r, b in self._words):
+            return False
+        self._words.append((left, top, right, bottom))
+        return True
 
     def at(self, x: float, z: float) -> tuple[float, float]:
         return _SCALE * (x - self._west), _SCALE * (self._north - z)
@@ -77,21 +96,27 @@ class _Draw:
         )
 
     def thing(self, one: Footprint) -> Markup:
-        width, depth = max(one.width, _SMALLEST), max(one.depth, _SMALLEST)
-        shown = self.box("thing", one.x, one.z, width, depth)
-        named = self.text("name", one.x, one.z, one.object_type) if width * depth > 0.25 else ""
-        return Markup("<g><title>{}</title>{}{}</g>").format(one.object_type, shown, named)
+        shown = self.box("thing", one.x, one.z, *_sides(one))
+        return Markup("<g><title>{}</title>{}</g>").format(one.object_type, shown)
 
-    def all_wanted(self, things: Sequence[Footprint]) -> Iterator[Markup]:
+    def name(self, one: Footprint) -> Markup:
+        """The name of large furniture, where there is room for it."""
+        width, depth = _sides(one)
+        x, y = self.at(one.x, one.z)
+        left = x - _LETTER * len(one.object_type) / 2
+        if width * depth < _LARGE or not self.free(left, y, one.object_type):
+            return Markup("")
+        return self.text("name", one.x, one.z, one.object_type)
+
+    def all_wanted(self, things: Sequence[Footprint]) -> list[Markup]:
         """The marked objects; the names of those in one place stand one below the other."""
-        named: list[tuple[float, float]] = []
+        drawn = []
         for one in things:
-            x, y = self.at(one.x, one.z)
-            down = y
-            while any(abs(x - a) < 90 and abs(down - b) < 15 for a, b in named):
-                down += 16
-            named.append((x, down))
-            yield self.wanted(one, down)
+            x, down = self.at(one.x, one.z)
+            while not self.free(x + 12, down, one.object_type):
+                down += 4
+            drawn.append(self.wanted(one, down))
+        return drawn
 
     def wanted(self, one: Footprint, down: float) -> Markup:
         """A marked object, its name at a height of its own."""

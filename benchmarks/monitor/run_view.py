@@ -11,6 +11,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 from benchmarks.monitor.event_tail import EpisodeRow, EventTail
+from benchmarks.monitor.failure_counts import FailureCounts
 from benchmarks.monitor.places import Place
 from benchmarks.scoring.metrics import wilson
 from er_gym.rollout.run_directory import Manifest, RunDirectory, RunDirectoryError
@@ -192,9 +193,11 @@ class RunView:
 
     Attributes:
         place: its directory.
+        failures: why its episodes failed.
     """
 
     place: Place
+    failures: FailureCounts = field(default_factory=FailureCounts)
     _tail: EventTail = field(init=False)
     _manifest: Manifest | None = None
     _problem: str = ""
@@ -211,6 +214,14 @@ class RunView:
             except (RunDirectoryError, OSError) as error:
                 self._problem = str(error)
         self._tail.read()
+
+    def count_failures(self, seconds: float) -> None:
+        """Read why episodes failed, for a while."""
+        try:
+            run = RunDirectory.open(self.place.path)
+        except (RunDirectoryError, OSError):
+            return
+        self.failures.read(run, self._tail.rows, seconds)
 
     @property
     def rows(self) -> Mapping[str, EpisodeRow]:

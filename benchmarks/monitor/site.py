@@ -12,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from benchmarks.monitor import formats, svg
 from benchmarks.monitor.episode_view import MOST_TEXT
+from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.language import Translator, chosen_language
 from benchmarks.monitor.places import Kind, Place, Places
 from benchmarks.monitor.run_view import RunSummary, RunViews
@@ -24,6 +25,9 @@ LANGUAGE = "er-gym-language"
 """The cookie with the reader's choice."""
 AN_HOUR = {"Cache-Control": "private, max-age=3600"}
 """For what does not change: pictures."""
+
+_COUNT_SECONDS = 0.3
+"""How long failures are counted at a time, while a page waits for news."""
 
 
 class NothingThere(Exception):
@@ -89,12 +93,25 @@ class Site:
         with self.runs.use(place) as view:
             return view.summary()
 
-    def version(self, place: Place) -> object:
-        """What changes whenever a directory does."""
+    def rows(self, place: Place) -> dict[str, EpisodeRow]:
+        """A run's episodes by key."""
+        with self.runs.use(place) as view:
+            return dict(view.rows)
+
+    def version(self, place: Place, closely: bool = False) -> object:
+        """What changes whenever a directory does.
+
+        Args:
+            place: the directory.
+            closely: whether a page shows it alone, and so why its episodes failed.
+        """
         if place.kind != "run":
             return None
-        summary = self.summary(place)
-        return summary.version, summary.state
+        with self.runs.use(place) as view:
+            if closely:
+                view.count_failures(_COUNT_SECONDS)
+            summary = view.summary()
+            return summary.version, summary.state, view.failures.done
 
     def record(self, id: str, key: str) -> tuple[EpisodeRecord, Manifest]:
         """An episode's record, and its run's manifest.

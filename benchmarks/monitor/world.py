@@ -21,9 +21,9 @@ from er_gym.envs.actions import NO_ACTION, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.records import ERROR, EpisodeRecord
 from er_gym.rollout.run_directory import Manifest
-from er_gym.sim.space.walkable_floor import standing_places
 from er_gym.tasks.suites import load_suite, suite_names
 from er_gym.tasks.task import Task
+from er_gym.thor import make_controller
 
 GRID = 0.25
 """The side of a square of floor, metres."""
@@ -191,8 +191,18 @@ def _played_again(env: EmbodiedEnv, task: Task, record: EpisodeRecord, angle: fl
         if over or cut:
             break
     stands += [stands[-1]] * (len(record.steps) - len(stands))
-    floor = standing_places(task.scene.removesuffix("_physics"), GRID, (0.0, 0.0))
-    return World(np.asarray(floor, float), objects, stands, angle, differs)
+    return World(_floor(task.scene), objects, stands, angle, differs)
+
+
+@lru_cache(maxsize=120)
+def _floor(scene: str) -> NDArray[np.float64]:
+    """(n, 2): x and z of the places where an agent can stand, metres."""
+    controller = make_controller(scene=scene, gridSize=GRID, headless=True)
+    try:
+        places = controller.step(action="GetReachablePositions").metadata["actionReturn"]
+    finally:
+        controller.stop()
+    return np.array([(each["x"], each["z"]) for each in places], float)
 
 
 def _horizontal(env: Mapping[str, Any]) -> float:

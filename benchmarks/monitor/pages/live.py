@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import AsyncIterator
 
 from fastapi import Request, Response
@@ -18,10 +19,15 @@ _BEAT_SECONDS = 15.0
 
 
 class LivePages:
-    """See the file."""
+    """See the file.
 
-    def __init__(self, site: Site) -> None:
-        self._site = site
+    Args:
+        site: what is shown.
+        closing: once it is set, nobody waits for news any more.
+    """
+
+    def __init__(self, site: Site, closing: threading.Event) -> None:
+        self._site, self._closing = site, closing
 
     def routes(self) -> Routes:
         """The pages by address."""
@@ -38,7 +44,7 @@ class LivePages:
     async def _news(self, request: Request, of: frozenset[str]) -> AsyncIterator[str]:
         yield "retry: 1000\n\n"
         told, silent = await run_in_threadpool(self._version, of), 0.0
-        while not await request.is_disconnected():
+        while not (self._closing.is_set() or await request.is_disconnected()):
             await asyncio.sleep(_LOOK_SECONDS)
             now = await run_in_threadpool(self._version, of)
             silent += _LOOK_SECONDS
@@ -52,4 +58,6 @@ class LivePages:
     def _version(self, of: frozenset[str]) -> object:
         """What changes whenever one of the directories does."""
         places = [each for each in self._site.places.all() if "*" in of or each.id in of]
-        return tuple((place.id, self._site.version(place)) for place in places)
+        return tuple(
+            (place.id, self._site.version(place, closely=place.id in of)) for place in places
+        )

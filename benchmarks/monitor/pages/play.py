@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,12 +54,20 @@ class PlayPages:
 
     Args:
         site: what all pages share.
+        closing: set when the server is to end.
         folder: holds the runs that a person plays; None if nobody may play.
         options: for vision-language agents that a person watches.
     """
 
-    def __init__(self, site: Site, folder: Path | None, options: VLMOptions | None = None) -> None:
+    def __init__(
+        self,
+        site: Site,
+        closing: threading.Event,
+        folder: Path | None,
+        options: VLMOptions | None = None,
+    ) -> None:
         self._site, self._folder, self._options = site, folder, options
+        self._closing = closing
         self.sessions = Sessions()
         self._forms = Forms()
 
@@ -207,7 +216,7 @@ class PlayPages:
     async def news(self, request: Request, id: str) -> Response:
         """Server-sent events: one for each change of a session."""
         return StreamingResponse(
-            _news(request, self._session(id)),
+            _news(request, self._session(id), self._closing),
             media_type="text/event-stream",
             headers={"X-Accel-Buffering": "no"},
         )
@@ -251,10 +260,10 @@ def _asked(session: Session, form: Mapping[str, str]) -> Moment:
     return session.order(wanted)  # type: ignore[arg-type]
 
 
-async def _news(request: Request, session: Session) -> AsyncIterator[str]:
+async def _news(request: Request, session: Session, closing: threading.Event) -> AsyncIterator[str]:
     yield "retry: 1000\n\n"
     told, silent = session.now.version, 0.0
-    while not await request.is_disconnected():
+    while not closing.is_set() and not await request.is_disconnected():
         now = session.now
         if now.version != told:
             told, silent = now.version, 0.0

@@ -2,10 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from fastapi import Request, Response
 
+from benchmarks.ladder.paper_rungs import PAPER
 from benchmarks.monitor.run_view import Filter
 from benchmarks.monitor.site import Routes, Site
+from er_gym.tasks.types import COMPOSITE, MANIPULATE, SEARCH, TRANSPORT
+
+_COUNT_SECONDS = 0.1
+"""How long a page may wait for failures to be counted; the rest follows while it is open."""
+_PAPER_GROUPS = (SEARCH, MANIPULATE, TRANSPORT, COMPOSITE)
+"""The groups, in the order of the paper's table."""
+
+
+def _paper_rows() -> list[tuple[str, Mapping[str, float], float]]:
+    """The paper's models: name, success by group, and over all, in %."""
+    return [
+        (rung.name, dict(zip(_PAPER_GROUPS, rung.groups, strict=True)), rung.success)
+        for rung in PAPER.values()
+    ]
 
 
 class RunPages:
@@ -30,6 +47,7 @@ class RunPages:
         place = self._site.place(id, "run")
         chosen = Filter.of(request.query_params)
         with self._site.runs.use(place) as view:
+            view.count_failures(_COUNT_SECONDS)
             groups, types = view.tallies()
             told = {
                 "run": view.summary(),
@@ -38,6 +56,8 @@ class RunPages:
                 "groups": groups,
                 "types": types,
                 "choices": view.choices(),
+                "failures": view.failures,
+                "paper": _paper_rows(),
                 "live": id,
             }
         return self._site.show(request, "run.html", told)

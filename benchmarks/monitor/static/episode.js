@@ -1,8 +1,10 @@
 // An episode: slider, buttons and keys choose a step; pictures are loaded when they are shown.
+// Two episodes beside each other move together.
 "use strict";
 
-const player = document.querySelector("[data-player]");
-if (player) {
+const numbers = (text) => (text ? text.split(",").map(Number) : []);
+
+const setUp = (player, moved) => {
   const last = Number(player.dataset.last);
   const slider = player.querySelector("[data-slider]");
   const output = player.querySelector("[data-number]");
@@ -12,7 +14,6 @@ if (player) {
   const map = player.querySelector("[data-map]");
   const frame = player.querySelector("[data-frame]");
   let drawn = false;
-  const numbers = (text) => (text ? text.split(",").map(Number) : []);
   const show = (number, scroll) => {
     const now = Math.max(0, Math.min(last, number));
     slider.value = now;
@@ -36,20 +37,16 @@ if (player) {
     for (const stand of map.querySelectorAll("[data-map-step]"))
       stand.classList.toggle("now", Number(stand.dataset.mapStep) === now);
     if (frame && drawn) { frame.src = frame.dataset.frame + "&n=" + now; frame.hidden = false; }
-    if (scroll && steps[now]) steps[now].scrollIntoView({ block: "nearest" });
-    history.replaceState(null, "", "#step-" + now);
+    if (scroll && steps[now]) {  // the list alone scrolls, not the page
+      const list = steps[now].parentElement;
+      if (list.scrollHeight > list.clientHeight)
+        list.scrollTop = steps[now].offsetTop - list.offsetTop - list.clientHeight / 3;
+    }
   };
-  slider.addEventListener("input", () => show(Number(slider.value), true));
+  slider.addEventListener("input", () => moved(Number(slider.value), true));
   for (const button of player.querySelectorAll("[data-move]"))
-    button.addEventListener("click", () => show(Number(slider.value) + Number(button.dataset.move), true));
-  for (const step of steps) step.addEventListener("click", () => show(Number(step.dataset.step), false));
-  document.addEventListener("keydown", (event) => {
-    if (event.altKey || event.ctrlKey || event.metaKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName) && event.target !== slider) return;
-    const to = { ArrowLeft: Number(slider.value) - 1, ArrowRight: Number(slider.value) + 1, Home: 0, End: last }[event.key];
-    if (to !== undefined) { event.preventDefault(); show(to, true); }
-    const link = document.querySelector(`a[data-key="${event.key === "j" || event.key === "k" ? event.key : "-"}"]`);
-    if (link) location.href = link.href;
-  });
+    button.addEventListener("click", () => moved(Number(slider.value) + Number(button.dataset.move), true));
+  for (const step of steps) step.addEventListener("click", () => moved(Number(step.dataset.step), false));
   fetch(map.dataset.map).then((answer) => (answer.ok ? answer.text() : "")).then((text) => {
     map.innerHTML = text;
     show(Number(slider.value), false);
@@ -57,6 +54,30 @@ if (player) {
   player.querySelector("[data-hidden]").addEventListener("change", (event) => map.classList.toggle("with-hidden", event.target.checked));
   const draw = player.querySelector("[data-draw]");
   if (draw) draw.addEventListener("click", () => { drawn = true; draw.hidden = true; show(Number(slider.value), false); });
-  const asked = /^#step-(\d+)$/.exec(location.hash);
-  show(asked ? Number(asked[1]) : 0, Boolean(asked));
+  return { slider, last, show };
+};
+
+const players = [];
+const longest = () => Math.max(...players.map((each) => each.last));
+let now = 0;
+const moveTo = (number, scroll) => {
+  now = Math.max(0, Math.min(longest(), number));
+  for (const each of players) each.show(now, scroll);
+  history.replaceState(null, "", "#step-" + now);
+};
+for (const player of document.querySelectorAll("[data-player]")) players.push(setUp(player, moveTo));
+if (players.length) {
+  document.addEventListener("keydown", (event) => {
+    const onSlider = players.some((each) => each.slider === event.target);
+    if (event.altKey || event.ctrlKey || event.metaKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName) && !onSlider) return;
+    const to = { ArrowLeft: now - 1, ArrowRight: now + 1, Home: 0, End: longest() }[event.key];
+    if (to !== undefined) { event.preventDefault(); moveTo(to, true); }
+    const link = document.querySelector(`a[data-key="${event.key === "j" || event.key === "k" ? event.key : "-"}"]`);
+    if (link) location.href = link.href;
+  });
+  for (const link of document.querySelectorAll("[data-go]"))
+    link.addEventListener("click", (event) => { event.preventDefault(); moveTo(Number(link.dataset.go), true); });
+  const asked = /^#(?:[a-z]+-)?step-(\d+)$/.exec(location.hash);
+  if (asked) moveTo(Number(asked[1]), true);
+  else players.forEach((each) => each.show(0, false));
 }

@@ -1,0 +1,119 @@
+"""Runs side by side, and two episodes of the same task."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fastapi import Request, Response
+
+from benchmarks.monitor.comparison import CHANGES, Pair, by_type, difference, pairs_of
+from benchmarks.monitor.episode_view import EpisodeView, view_of
+from benchmarks.monitor.places import Place
+from benchmarks.monitor.site import NothingThere, Routes, Site
+from er_gym.rollout.run_directory import RunDirectory
+
+MOST_RUNS = 12
+"""No more runs are compared at once."""
+PAGE_ROWS = 100
+
+
+@dataclass(frozen=True)
+class Side:
+    """One of two episodes.
+
+    Attributes:
+        place: its run's directory.
+        agent: who plays.
+        episode: the episode.
+        parts_at: the number of the first step that the other episode does not have there.
+    """
+
+    place: Place
+    agent: str
+    episode: EpisodeView
+    parts_at: int
+
+
+class ComparePages:
+    """See the file."""
+
+    def __init__(self, site: Site) -> None:
+        self._site = site
+
+    def routes(self) -> Routes:
+        """The pages by address."""
+        return {"/compare": self.compare, "/compare/episode": self.episodes}
+
+    def compare(self, request: Request) -> Response:
+        """Every run beside the first, and which tasks changed in one of them."""
+        asked = list(dict.fromkeys(request.query_params.getlist("of")))[:MOST_RUNS]
+        places = [self._site.place(id, "run") for id in asked]
+        runs = [(self._site.summary(place), self._site.rows(place)) for place in places]
+        by = request.query_params.get("by", "")
+        chosen = asked.index(by) if by in asked[1:] else 1
+        change = request.query_params.get("change", "")
+        change = change if change in CHANGES else ""
+        differences = [
+            (summary, difference("", pairs_of(runs[0][1], rows))) for summary, rows in runs[1:]
+        ]
+        pairs: list[Pair] = []
+        if len(runs) > 1:
+            pairs = pairs_of(runs[0][1], runs[chosen][1])
+        flipped = [
+            pair
+            for pair in pairs
+            if (pair.change == change if change else pair.change in ("gained", "lost"))
+        ]
+        flipped.sort(key=lambda pair: (CHANGES.index(pair.change), pair.key))
+        last = max(1, -(-len(flipped) // PAGE_ROWS))
+        number = request.query_params.get("page", "1")
+        page = min(int(number), last) if number.isascii() and number[:7].isdigit() else 1
+        page = max(1, page)
+        told = {
+            "every": [self._site.summary(place) for place in self._site.places.of_kind("run")],
+            "asked": asked,
+            "first": runs[0][0] if runs else None,
+            "second": runs[chosen][0] if len(runs) > 1 else None,
+            "differences": differences,
+            "types": by_type(pairs),
+            "flipped": flipped[(page - 1) * PAGE_ROWS : page * PAGE_ROWS],
+            "total": len(flipped),
+            "change": change,
+            "changes": CHANGES,
+            "page": page,
+            "last": last,
+            "live": ",".join(asked),
+        }
+        return self._site.show(request, "compare.html", told)
+
+    def episodes(self, request: Request, key: str = "") -> Response:
+        """Two episodes of a task, step by step."""
+        asked = request.query_params.getlist("of")
+        if len(asked) != 2:
+            raise NothingThere
+        places = [self._site.place(id, "run") for id in asked]
+        try:
+            runs = [RunDirectory.open(place.path) for place in places]
+            views = [view_of(run, key) for run in runs]
+        except (ValueError, OSError):
+            raise NothingThere from None
+        parts_at = _parts_at(*views)
+        told = {
+            "key": key,
+            "asked": asked,
+            "sides": [
+                Side(place, run.manifest.agent, view, parts_at)
+                for place, run, view in zip(places, runs, views, strict=True)
+            ],
+            "parts_at": parts_at,
+            "scripts": ("episode.js",),
+        }
+        return self._site.show(request, "compare_episode.html", told)
+
+
+def _parts_at(one: EpisodeView, other: EpisodeView) -> int:
+    """The number of the first step in which two episodes differ."""
+    for first, second in zip(one.steps, other.steps, strict=False):
+        if (first.action, first.record.success) != (second.action, second.record.success):
+            return first.number
+    return min(len(one.steps), len(other.steps))

@@ -1,0 +1,168 @@
+"""The monitor in a real browser: it moves by itself, and can be clicked through."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sync_api = pytest.importorskip(
+    "playwright.sync_api", reason="needs playwright: pip install playwright"
+)
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+if CHROMIUM is None:
+    pytest.skip("needs the browser: apt-get install chromium", allow_module_level=True)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with sync_api.sync_playwright() as playwright:
+        # Chromium's sandbox does not start for root; the pages are this test's own.
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(browser) -> Iterator[Any]:
+    """A page; nothing may be asked of another host, and nothing may go wrong in the console."""
+    context = browser.new_context()
+    page = context.new_page()
+    page.set_default_timeout(30_000)
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda one: one.type == "error" and wrong.append(one.text))
+    page.on("request", lambda one: "127.0.0.1" in one.url or wrong.append(one.url))
+    page.wrong = wrong
+    yield page
+    context.close()
+    # While a server is away, the browser tells that it does not reach it.
+    assert [each for each in wrong if "net::ERR_" not in each] == []
+
+
+def bench(out: Path) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "benchmarks.cli", "bench", "--suite", "mini", "--agent"]
+    return subprocess.Popen(
+        [*command, "random", "--out", str(out)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+def finished(page: Any) -> int:
+    """How many episodes the page says have ended."""
+    found = re.search(r"(\d+) of 132", page.inner_text("#summary"))
+    return int(found[1]) if found else -1
+
+
+def wait_until(page: Any, enough: int) -> None:
+    page.wait_for_function(
+        "enough => Number((/(\\d+) of 132/.exec(document.querySelector('#summary').innerText)"
+        " || [0, -1])[1]) >= enough",
+        arg=enough,
+        timeout=120_000,
+    )
+
+
+def test_a_run_fills_by_itself_though_run_and_server_are_killed(page, serve, tmp_path):
+    server = serve(tmp_path)
+    page.goto(server.address)
+    assert "Nothing here yet" in page.inner_text("main")
+    page.evaluate("window.here = 1")
+    process = bench(tmp_path / "runs" / "live")
+    try:
+        page.click("a:has-text('runs/live')")  # it has appeared without reload
+        page.evaluate("window.here = 1")
+        wait_until(page, 5)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        killed_at = finished(page)
+        server.stop()
+        process = bench(tmp_path / "runs" / "live")  # goes on where it was
+        time.sleep(1)
+        serve(tmp_path, server.port)
+        wait_until(page, killed_at + 5)
+        wait_until(page, 132)
+        assert page.evaluate("window.here") == 1
+        page.wait_for_selector(".state.finished")
+        assert page.locator("#rows tbody tr").count() == 100
+        page.click("#rows >> text=Next >> nth=0")
+        assert page.locator("#rows tbody tr").count() == 32
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def test_filter_slider_keys_and_comparison(page, serve, runs):
+    page.goto(serve(runs).address)
+    page.click("a:has-text('/random')")
+    page.select_option("select[name=outcome]", "failure")
+    page.fill("input[name=steps]", "2-")
+    page.click("button:has-text('Filter')")
+    assert "outcome=failure" in page.url
+    page.click("th a:has-text('Steps')")
+    page.click("#rows tbody a >> nth=0")
+    page.wait_for_selector("li.now")
+    last = int(page.get_attribute("[data-player]", "data-last"))
+    page.keyboard.press("End")
+    assert page.locator("li.now").get_attribute("data-step") == str(last)
+    page.keyboard.press("ArrowLeft")
+    assert page.locator("li.now").get_attribute("data-step") == str(last - 1)
+    page.locator("[data-slider]").fill("1")
+    assert page.url.endswith("#step-1")
+    page.wait_for_selector("svg.room .stand.now")
+    page.click("[data-draw]")
+    page.wait_for_function("() => document.querySelector('[data-frame]').naturalWidth > 0")
+    address = page.url
+    page.keyboard.press("j")
+    page.wait_for_function(
+        "address => location.href.split('#')[0] !== address.split('#')[0]", arg=address
+    )
+
+    page.goto(page.url.split("/runs/")[0] + "/compare")
+    for box in page.locator("input[name=of]").all():
+        box.check()
+    page.click("button:has-text('Compare')")
+    assert page.locator("#differences tbody tr").count() == 1
+    page.click("#flipped tbody a >> nth=0")
+    page.wait_for_selector(".sides svg.room >> nth=1")
+    page.keyboard.press("ArrowRight")
+    assert page.locator("li.now").count() == 2
+
+
+def test_it_fits_a_telephone_in_the_dark_and_in_chinese(browser, serve, runs):
+    context = browser.new_context(
+        viewport={"width": 360, "height": 740}, color_scheme="dark", locale="zh-CN"
+    )
+    page = context.new_page()
+    address = serve(runs).address
+    page.goto(address)
+    assert page.locator("html").get_attribute("lang") == "zh"
+    places = [address, *(f"{address}{a.get_attribute('href')}" for a in page.locator("td a").all())]
+    page.goto(places[1])
+    places.append(address + page.locator("#rows tbody a").first.get_attribute("href"))
+    places.append(f"{address}/compare")
+    for each in places:
+        page.goto(each)
+        too_wide = page.evaluate("document.documentElement.scrollWidth > innerWidth")
+        assert not too_wide, each
+        style = "getComputedStyle(document.body)"
+        paper, ink = page.evaluate(f"[{style}.backgroundColor, {style}.color]")
+        assert brightness(paper) < 60 < 180 < brightness(ink)
+    context.close()
+
+
+def brightness(colour: str) -> float:
+    return sum(map(int, re.findall(r"\d+", colour)[:3])) / 3

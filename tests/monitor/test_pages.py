@@ -1,0 +1,142 @@
+"""What the monitor's pages say, over real runs."""
+
+from __future__ import annotations
+
+import html
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from fastapi.testclient import TestClient
+
+from benchmarks.monitor.app import make_app
+from benchmarks.monitor.places import Places
+from er_gym.rollout.run_directory import RunDirectory
+
+
+@pytest.fixture
+def client(runs: Path, visit) -> TestClient:
+    return visit(runs)
+
+
+@pytest.fixture
+def ids(runs: Path) -> dict[str, str]:
+    """The addresses' ids of both runs, by name."""
+    return {place.path.name: place.id for place in Places([runs]).all()}
+
+
+def rows(text: str) -> list[str]:
+    """The rows of the table of episodes."""
+    body = text[text.index('id="rows"') :]
+    return re.findall(r"<tr>\n(.*?)</tr>", body[body.index("<tbody>") :], re.DOTALL)
+
+
+def said(text: str) -> str:
+    return html.unescape(re.sub(r"<[^>]+>", " ", text))
+
+
+def test_the_first_page_lists_the_runs(client, ids):
+    answer = client.get("/")
+    assert answer.status_code == 200
+    for name, id in ids.items():
+        assert f'<a href="/runs/{id}">' in answer.text
+        assert f"/{name}</a>" in answer.text
+    assert "8 of 8" in said(answer.text)
+    assert "100.0 %" in said(answer.text)
+
+
+def test_a_run_can_be_filtered_and_sorted_by_its_address(client, ids, runs):
+    address = f"/runs/{ids['random']}"
+    episodes = {each.key: each for each in RunDirectory.open(runs / "random").episodes()}
+    assert len(rows(client.get(address).text)) == 8
+    kind = next(iter(episodes.values())).task_type
+    filtered = rows(client.get(address, params={"type": kind}).text)
+    assert len(filtered) == sum(each.task_type == kind for each in episodes.values())
+    short = [each for each in episodes.values() if each.num_steps <= 10]
+    assert len(rows(client.get(address, params={"steps": "-10"}).text)) == len(short)
+    in_order = [
+        int(re.search(r'"number">(\d+)/\d+<', row)[1])
+        for row in rows(client.get(address, params={"sort": "steps"}).text)
+    ]
+    assert in_order == sorted(in_order)
+    again = client.get(address, params={"sort": "-steps", "page": "77", "outcome": "failure"})
+    downward = [int(re.search(r'"number">(\d+)/\d+<', row)[1]) for row in rows(again.text)]
+    assert downward == sorted(downward, reverse=True)
+    assert not rows(client.get(address, params={"text": "no such task"}).text)
+
+
+def test_a_run_tells_success_why_it_failed_and_the_papers_rows(client, ids):
+    text = said(client.get(f"/runs/{ids['random']}").text)
+    assert "Why episodes failed" in text
+    assert re.search(r"\d of 8 failed episodes read", text)
+    for figure in ("Qwen2-VL-7B", "Interactor", "Explorer", "Reasoner", "81.0 %", "65.2 %"):
+        assert figure in text
+
+
+def test_an_episode_shows_every_step_and_the_key_actions(client, ids, runs):
+    episode = next(iter(RunDirectory.open(runs / "oracle").episodes()))
+    answer = client.get(f"/runs/{ids['oracle']}/episode", params={"key": episode.key})
+    text = said(answer.text)
+    assert episode.instruction in text
+    steps = re.findall(r"<li id=\"step-\d+\".*?</li>", answer.text, re.DOTALL)
+    assert len(steps) == len(episode.steps)
+    done: list[str] = []
+    for step, shown in zip(episode.steps[1:], steps[1:], strict=True):
+        assert f"{step.verb} {step.object_type}".strip() in said(shown)
+        assert html.escape(step.feedback, quote=False) in shown or step.feedback in said(shown)
+        done += filter(None, re.search(r'data-done="([\d,]*)"', shown)[1].split(","))
+    assert sorted(map(int, done)) == list(range(len(episode.key_actions)))
+
+
+def test_the_room_from_above_is_drawn_by_playing_again(client, ids, runs):
+    episode = next(iter(RunDirectory.open(runs / "oracle").episodes()))
+    answer = client.get(f"/runs/{ids['oracle']}/map", params={"key": episode.key})
+    drawing = ElementTree.fromstring(answer.text)
+    stands = [each for each in drawing.iter() if "data-map-step" in each.attrib]
+    assert len(stands) == len(episode.steps)
+    last = len(episode.steps) - 1
+    frame = client.get(f"/runs/{ids['oracle']}/frame", params={"key": episode.key, "n": last})
+    assert (frame.status_code, frame.content[:3]) == (200, b"\xff\xd8\xff")
+    beyond = client.get(f"/runs/{ids['oracle']}/frame", params={"key": episode.key, "n": last + 1})
+    assert beyond.status_code == 404
+
+
+def test_runs_are_compared_task_by_task(client, ids, runs):
+    both = {"of": [ids["random"], ids["oracle"]]}
+    answer = client.get("/compare", params=both)
+    text = said(answer.text)
+    lost = sum(each.success for each in RunDirectory.open(runs / "random").episodes())
+    assert f"+{8 - lost}" in text
+    assert f"{100 * (8 - lost) / 8:+.1f}" in text
+    links = re.findall(r'href="(/compare/episode\?[^"]+)"', answer.text)
+    assert len(links) == 8 - lost
+    diff = client.get(html.unescape(links[0]))
+    assert diff.status_code == 200
+    assert diff.text.count("data-player") == 2
+    assert re.search(r"They part at step \d+", said(diff.text))
+    neither = client.get("/compare", params=both | {"change": "neither"})
+    assert "/compare/episode" not in neither.text
+    assert client.get("/compare").status_code == 200
+    assert client.get("/compare", params={"of": ["nothing"]}).status_code == 404
+
+
+def test_pages_speak_chinese(client, ids):
+    chosen = client.get("/language/zh", params={"back": f"/runs/{ids['oracle']}"})
+    assert chosen.status_code == 303
+    assert chosen.headers["location"] == f"/runs/{ids['oracle']}"
+    assert '<html lang="zh">' in client.get("/").text
+    client.cookies.clear()
+    by_browser = client.get("/", headers={"accept-language": "zh-CN,zh;q=0.9"})
+    assert '<html lang="zh">' in by_browser.text
+
+
+def test_another_machine_needs_the_token(runs):
+    with TestClient(make_app([runs], "secret"), base_url="http://192.0.2.7:8010") as client:
+        assert client.get("/").status_code == 403
+        assert client.get("/", params={"token": "guess"}).status_code == 403
+        let_in = client.get("/", params={"token": "secret", "a": "b"}, follow_redirects=False)
+        assert (let_in.status_code, let_in.headers["location"]) == (303, "/?a=b")
+        assert client.get("/").status_code == 200
+    with TestClient(make_app([runs], ""), base_url="http://rebound.example:8010") as client:
+        assert client.get("/").status_code == 403
