@@ -6,6 +6,7 @@ import json
 import re
 import time
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -76,14 +77,16 @@ class Player:
         assert answer.status_code == 200, answer.text
         return str(answer.text)
 
+    @cached_property
     def secret(self) -> str:
+        """What a page of this server has in its forms."""
         found = re.search(r'name="secret" value="([^"]+)"', self.get("/play"))
         assert found is not None
         return found[1]
 
     def post(self, address: str, origin: str | None = HERE, **fields: str) -> Any:
         """Send a form, as a page of this server does unless something else is given."""
-        fields = {"secret": self.secret(), **fields} if "secret" not in fields else fields
+        fields = fields if "secret" in fields else {"secret": self.secret, **fields}
         headers = {} if origin is None else {"Origin": origin}
         return self.client.post(address, data=fields, headers=headers)
 
