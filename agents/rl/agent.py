@@ -12,8 +12,8 @@ import torch
 from agents.rl.config import load_config
 from agents.rl.greedy import GreedyPolicy
 from agents.rl.policy_file import CONFIG, policy_file, untrusted_model
-from agents.rl.policy_observation import PolicyObservation
-from er_gym.envs.actions import ACTIONS
+from agents.rl.policy_observation import Obs, PolicyObservation
+from er_gym.envs.actions import ACTIONS, Action
 from er_gym.rollout.agent import Decision
 from er_gym.tasks.task import Task
 
@@ -49,12 +49,18 @@ class RLAgent:
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """The policy's best action."""
-        if self._instruction is not None:
-            seen = self._policy_observation.reset(obs, info, self._instruction)
-            self._instruction = None
-        else:
-            seen = self._policy_observation.observe(obs, info)
-        return Decision(ACTIONS[self._policy.best(seen, info["action_mask"])])
+        return Decision(ACTIONS[self._policy.best(self._see(obs, info), info["action_mask"])])
+
+    def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        """Somebody else decides this step; what is seen before it is remembered as ever."""
+        self._see(obs, info)
+
+    def _see(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Obs:
+        """The policy's observation, which remembers the earlier ones."""
+        if self._instruction is None:
+            return self._policy_observation.observe(obs, info)
+        instruction, self._instruction = self._instruction, None
+        return self._policy_observation.reset(obs, info, instruction)
 
 
 @lru_cache(maxsize=4)

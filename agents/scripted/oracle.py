@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from er_gym.envs.actions import Action
 from er_gym.envs.solver import Solver
 from er_gym.rollout.agent import Decision
 from er_gym.tasks.task import Task
@@ -25,3 +26,6 @@ class OracleAgent:
         if key is None:
             return Decision(action, "Everything is done.")
         return Decision(action, f"The next key action is {key.verb} {key.actual_type}.")
+
+    def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        """Nothing to remember: the key actions that are left say where it stands."""

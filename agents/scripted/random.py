@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from er_gym.envs.actions import Action
 from er_gym.rollout.agent import Decision
 from er_gym.tasks.task import Task
 
@@ -29,3 +30,6 @@ class RandomAgent:
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """A random legal action."""
         return Decision(int(self._random.choice(np.flatnonzero(info["action_mask"]))))
+
+    def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        """Nothing to remember."""

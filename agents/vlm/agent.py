@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture, model_reply
+from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture, Reply, model_reply
 from agents.vlm.matching import Matcher
 from agents.vlm.parsing import ParsedReply, parse
+from agents.vlm.parsing.vocabulary import DECISION
 from agents.vlm.pictures import encode
-from agents.vlm.prompt_set import LastAction, PromptSet, TurnContext, interleave_pictures
+from agents.vlm.prompt_set import Decide, LastAction, PromptSet, TurnContext, interleave_pictures
 from agents.vlm.record import (
     ConversationRecord,
     MessageRecord,
@@ -25,7 +27,7 @@ from er_gym.data.dialects import shows_anew
 from er_gym.data.scene_text import Perceived
 from er_gym.envs.actions import NO_ACTION, Action, applies
 from er_gym.rollout.agent import Decision
-from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.records import PERSON, By, EpisodeRecord
 from er_gym.rollout.run_directory import CONVERSATIONS, PICTURES
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
@@ -87,7 +89,15 @@ class VLMAgent:
             CannotGoOn: no later request can succeed either.
         """
         self._messages.append(self._turn(obs, info))
-        reply = self._client.reply(self._history(), self._seed)
+        return self._read(self._client.reply(self._history(), self._seed), info)
+
+    def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        """Somebody else decides this step. The conversation goes on as if the model had said so."""
+        self._messages.append(self._turn(obs, info))
+        self._read(_in_form(action, self._settings.decide), info, by=PERSON)
+
+    def _read(self, reply: Reply, info: Mapping[str, Any], by: By = "") -> Decision:
+        """Read a reply, and add it to the conversation."""
         parsed = parse(reply.text, reply.call, self._settings.decide)
         action, problem, matched = self._resolve(parsed, info)
         self._last_action = action
@@ -103,11 +113,17 @@ class VLMAgent:
                 matched=matched,
                 rules=list(parsed.rules),
                 problem=problem,
+                by=by,
                 **reply_fields(reply),
             )
         )
         thought = "\n".join(f"{each.kind}: {each.text}" for each in parsed.thoughts)
         return Decision(action or _unreadable_action(parsed, said), thought, model_reply(reply))
+
+    @property
+    def messages(self) -> Sequence[Message]:
+        """The conversation so far."""
+        return self._messages
 
     @property
     def rounds(self) -> Sequence[RoundRecord]:
@@ -241,6 +257,13 @@ class VLMAgent:
         )
         files[f"{CONVERSATIONS}/{stem}.json"] = (record.model_dump_json(indent=1) + "\n").encode()
         return files
+
+
+def _in_form(action: Action, decide: Decide) -> Reply:
+    """The reply by which a model would decide on an action, without a thought."""
+    fields = json.dumps({"action": action.verb, "object": action.object_type})
+    texts = {"tags": f"<{DECISION}>{action}</{DECISION}>", "json": fields, "tools": ""}
+    return Reply(texts[decide], call=fields if decide == "tools" else "", finish="")
 
 
 def _unreadable_action(parsed: ParsedReply, said: str) -> str:

@@ -105,12 +105,18 @@ class AgentFactory:
         self._session = ModelSession(name, settings, directory, budget)
         self.client, self.supervisor = self._session.client, self._session.supervisor
 
-    def agent(self, seed: int) -> VLMAgent:
-        """An agent for an episode."""
+    def agent(self, seed: int, name: str = "") -> VLMAgent:
+        """An agent for an episode; ``name`` is how its conversation names it, where that is not
+        the factory's."""
         from agents.vlm.agent import VLMAgent
 
         return VLMAgent(
-            self.client, self.settings, self.prompts, self._matcher, seed=seed, name=self.name
+            self.client,
+            self.settings,
+            self.prompts,
+            self._matcher,
+            seed=seed,
+            name=name or self.name,
         )
 
     @property

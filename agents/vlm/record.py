@@ -10,11 +10,12 @@ import os
 from typing import Any, Literal
 from urllib.parse import urlsplit, urlunsplit
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
 
 from agents.vlm.chat import Reply, Role, Usage
 from agents.vlm.clients.redaction import Secrets
 from agents.vlm.settings import AgentSettings
+from er_gym.rollout.records import By
 
 
 class _Record(BaseModel):
@@ -68,6 +69,8 @@ class RoundRecord(_Record):
         estimated: whether the token counts are upper bounds, since the server's counts cannot be
             true.
         kept: whether the reply came from the reply cache; an earlier request paid for it.
+        by: who decided in place of the model, so that no model wrote the reply; ``""`` if nobody
+            did. Such a reply is written without it, as before anybody could.
     """
 
     message: int
@@ -89,6 +92,14 @@ class RoundRecord(_Record):
     finish: str = ""
     model: str = ""
     kept: bool = False
+    by: By = ""
+
+    @model_serializer(mode="wrap")
+    def _without_nobody(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        told: dict[str, Any] = handler(self)
+        if not self.by:
+            told.pop("by", None)
+        return told
 
     @property
     def usage(self) -> Usage:

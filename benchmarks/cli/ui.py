@@ -15,11 +15,12 @@ from benchmarks.cli.errors import BadInput
 from benchmarks.cli.options import Place
 from benchmarks.cli.terminal import echo
 from benchmarks.cli.ui_export import FileOptions, file_options, write_files
+from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
 
 _LOOPBACK = "127.0.0.1"
 
 
-@click.command()
+@click.command(name="ui")
 @click.argument(
     "folders",
     nargs=-1,
@@ -42,18 +43,28 @@ _LOOPBACK = "127.0.0.1"
 )
 @click.option("--token", help="The token for another --host.  [default: a random one]")
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
+@click.option(
+    "--play",
+    type=Place(file_okay=False, path_type=Path),
+    metavar="OUT",
+    help="Let a person play, alone or in place of an agent; the runs are written below OUT.",
+)
 @file_options
+@with_vlm_options
 def ui(
     folders: tuple[Path, ...],
     host: str,
     port: int,
     token: str | None,
     no_browser: bool,
+    play: Path | None,
+    vlm_options: VLMOptions,
     files: FileOptions,
 ) -> int:
     """Show runs in the browser, while they grow or after.
 
-    FOLDERs hold run directories, at any depth; without one, ./runs. Nothing in them is changed.
+    FOLDERs hold run directories, at any depth; without one, ./runs. Nothing in them is changed. The
+    options from --agent-config on are for vision-language agents that a person watches with --play.
 
     With --export or --video nothing is shown: a run's pages, or an episode's video, are written.
     """
@@ -68,7 +79,10 @@ def ui(
         raise BadInput(
             f"{error.name} is not installed, and er-gym ui needs it: pip install 'er-gym[ui]'"
         ) from error
-    roots = folders or (Path("runs"),)
+    if play is None and vlm_options.given:
+        raise BadInput(f"{vlm_options.given[0]} is for agents that a person watches; give --play")
+    usual = Path("runs")
+    roots = folders or ((usual,) if play is None or usual.is_dir() else ())
     missing = next((root for root in roots if not root.is_dir()), None)
     if missing is not None:
         raise BadInput(f"{missing} does not exist; give the folder that holds your runs")
@@ -89,7 +103,7 @@ def ui(
     if not no_browser:
         click.launch(address)
     closing = threading.Event()
-    app = make_app(roots, secret, closing)
+    app = make_app(roots, secret, closing, play=play, options=vlm_options)
     config = uvicorn.Config(app, log_level="error", access_log=False, timeout_graceful_shutdown=5)
     server = uvicorn.Server(config)
     leave = server.handle_exit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
@@ -95,14 +96,13 @@ _OPTIONS: Sequence[Callable[[Any], Any]] = (
 def file_options(command: _Command) -> _Command:
     """Adds the options; the command gets them as its argument ``files``."""
 
+    @functools.wraps(command)
     def with_files(**given: Any) -> Any:
         mine = {each.name: given.pop(each.name) for each in fields(FileOptions)}
         return command(files=FileOptions(**mine), **given)
 
-    with_files.__doc__ = command.__doc__
-    with_files.__name__ = command.__name__
     for option in reversed(_OPTIONS):
-        with_files = option(with_files)
+        option(with_files)
     return with_files  # type: ignore[return-value]
 
 

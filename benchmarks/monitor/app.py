@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hmac
 import threading
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
 from fastapi import FastAPI, Request, Response
@@ -17,11 +19,15 @@ from benchmarks.monitor.pages.compare import ComparePages
 from benchmarks.monitor.pages.data import DataPages
 from benchmarks.monitor.pages.episodes import EpisodePages
 from benchmarks.monitor.pages.live import LivePages
+from benchmarks.monitor.pages.play import PlayPages
 from benchmarks.monitor.pages.runs import RunPages
 from benchmarks.monitor.pages.static import StaticPages
 from benchmarks.monitor.pages.training import TrainingPages
 from benchmarks.monitor.places import Places
 from benchmarks.monitor.site import NothingThere, Site
+
+if TYPE_CHECKING:
+    from benchmarks.cli.vlm_options import VLMOptions
 
 _LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 _HEADERS = {
@@ -36,7 +42,12 @@ _TOKEN = "er-gym-token"
 
 
 def make_app(
-    roots: Sequence[Path], token: str = "", closing: threading.Event | None = None
+    roots: Sequence[Path],
+    token: str = "",
+    closing: threading.Event | None = None,
+    *,
+    play: Path | None = None,
+    options: VLMOptions | None = None,
 ) -> FastAPI:
     """The application.
 
@@ -46,9 +57,21 @@ def make_app(
             requests must name this machine as their host, so that no foreign page can read along
             through a name that it made point here.
         closing: set when the server is to end, so that pages that wait for news let go.
+        play: the directory for the runs that a person plays; None if nobody may play.
+        options: for vision-language agents that a person watches.
     """
-    app = FastAPI(title="er-gym", docs_url=None, redoc_url=None, openapi_url=None)
-    site = Site(Places(roots))
+    site = Site(Places(roots if play is None else (*roots, play)))
+    closing = closing or threading.Event()
+    playing = PlayPages(site, closing, play, options)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        yield
+        await run_in_threadpool(playing.sessions.close)
+
+    app = FastAPI(
+        title="er-gym", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan
+    )
 
     @app.middleware("http")
     async def guard(request: Request, call_next: RequestResponseEndpoint) -> Response:
@@ -62,7 +85,7 @@ def make_app(
     async def gone(request: Request, error: Exception) -> Response:
         return await run_in_threadpool(site.show, request, "gone.html", {}, 404)
 
-    live = LivePages(site, closing or threading.Event())
+    live = LivePages(site, closing)
     every = (
         RunPages(site), EpisodePages(site), ComparePages(site), TrainingPages(site),
         DataPages(site), live, StaticPages(),
@@ -70,6 +93,7 @@ def make_app(
     for pages in every:
         for path, page in pages.routes().items():
             app.add_api_route(path, page, methods=["GET"], response_class=HTMLResponse)
+    playing.add_to(app)
     return app
 
 

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 from er_gym.envs.actions import Action
-from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.records import By, EpisodeRecord
 from er_gym.tasks.task import Task
 
 
@@ -41,11 +41,13 @@ class Decision:
             its text, or its index.
         thought: the agent's reasoning; it goes into the episode's record, not to the environment.
         reply: the cost of the model's reply, if the agent asks a model.
+        by: who decided in place of the agent; ``""`` if nobody did.
     """
 
     action: Action | str | int
     thought: str = ""
     reply: ModelReply | None = None
+    by: By = ""
 
 
 class CannotGoOn(Exception):
@@ -66,6 +68,17 @@ class Agent(Protocol):
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """Choose an action; ``obs`` and ``info`` are what the last reset or step returned."""
+
+
+@runtime_checkable
+class CanBeOverruled(Protocol):
+    """An agent that plays on after a step that somebody else decided in its place."""
+
+    def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        """Somebody else decides this step; called in place of ``act``, with what ``act`` would get.
+
+        The next ``act`` gets the result, as if the agent had decided it.
+        """
 
 
 class MakeAgent(Protocol):

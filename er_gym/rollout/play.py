@@ -78,7 +78,7 @@ def play_episode(
         emit(_begun(task, info["max_steps"]))
         for each in transitions(env, agent, obs, info):
             info = each.info
-            steps.append(_stepped(info, each.reward, each.decision.thought))
+            steps.append(_stepped(info, each.reward, each.decision))
             _emit_step(emit, task.id, len(steps) - 1, each.decision, steps[-1])
             if info.get("end_appended"):
                 steps.append(_appended(steps[-1]))
@@ -161,7 +161,7 @@ def _appended(last: StepRecord) -> StepRecord:
     )
 
 
-def _stepped(info: Mapping[str, Any], reward: float, thought: str) -> StepRecord:
+def _stepped(info: Mapping[str, Any], reward: float, decision: Decision) -> StepRecord:
     action = info["action"]
     return StepRecord(
         verb=ERROR if action is None else action.verb,
@@ -172,6 +172,7 @@ def _stepped(info: Mapping[str, Any], reward: float, thought: str) -> StepRecord
         navigable=list(info["navigable"]),
         interactable=list(info["interactable"]),
         reward=reward,
-        thought=_encodable(thought),
+        thought=_encodable(decision.thought),
         text=_encodable(info["action_text"]),
+        by=decision.by,
     )

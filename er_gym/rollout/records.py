@@ -6,7 +6,7 @@ reader would misread takes a new ``format``.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from pydantic import (
     AfterValidator,
@@ -25,6 +25,11 @@ from er_gym.writing import writable
 
 ERROR = "error"
 """The verb recorded for a reply that named no known action."""
+
+PERSON: Final = "person"
+"""Who decided a step in place of the agent."""
+By: TypeAlias = Literal["", "person"]
+"""Who decided a step: ``""`` for the agent itself."""
 
 Words: TypeAlias = Annotated[str, AfterValidator(writable)]
 """A text of an agent, a model or an exception: it may hold characters that UTF-8 cannot hold."""
@@ -77,6 +82,8 @@ class StepRecord(_Record):
         text: the action as the agent gave it.
         appended: whether the protocol took the step instead of the agent: the ``end`` that the
             paper's runner appends (:data:`er_gym.envs.protocol.PAPER`).
+        by: who decided the step in place of the agent; ``""`` if nobody did. Such a step is written
+            without it, as before anybody could.
     """
 
     verb: str
@@ -90,6 +97,14 @@ class StepRecord(_Record):
     thought: Words = ""
     text: Words = ""
     appended: bool = False
+    by: By = ""
+
+    @model_serializer(mode="wrap")
+    def _without_nobody(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        told: dict[str, Any] = handler(self)
+        if not self.by:
+            told.pop("by", None)
+        return told
 
 
 class EpisodeRecord(_Record):

@@ -1,0 +1,1 @@
+"""A person plays: alone, or in place of an agent that they watch."""
