@@ -104,7 +104,7 @@ def chart(name: str, title: str, x: Axis, y: Axis, series: Sequence[Series]) -> 
         return Markup("")
     every = [point for _, _, found in shown for point in found]
     bars = any(each.kind == "bars" for _, each, _ in shown)
-    across = _Scale.over([point.x for point in every], x, 0.5 if x.names else 0.0, 0.0)
+    across = _Scale.over([*(point.x for point in every), *x.at], x, 0.5 if x.names else 0.0, 0.0)
     reached = [end for point in every for end in (point.low, point.high)]
     up = _Scale.over(reached + [0.0] * bars, y, 0.0, 0.04)
     rows = _legend_rows([each.name for _, each, _ in shown])
@@ -176,7 +176,7 @@ class _Scale:
             low, high = 0.0, float(len(axis.names) - 1)
         if axis.log:
             logs = math.log10(low), math.log10(high)
-            more = max(pad * (logs[1] - logs[0]), 0.02)
+            more = max(pad, 0.04) * max(logs[1] - logs[0], 0.5)
             return _Scale(logs[0] - more, logs[1] + more, True)
         open_low, open_high = axis.low is None, axis.high is None
         low = low if axis.low is None else axis.low
@@ -358,7 +358,9 @@ class _Draw:
 def _labelled(axis: Axis, scale: _Scale, about: int) -> list[tuple[float, str]]:
     if axis.names:
         return list(enumerate(axis.names))
-    ticks = list(axis.at) or scale.ticks(about)
+    if axis.at:
+        return [(value, f"{value:.10g}") for value in axis.at]
+    ticks = scale.ticks(about)
     return [(value, tick_label(value, [value] if scale.log else ticks)) for value in ticks]
 
 

@@ -72,7 +72,7 @@ def test_one_file_holds_everything_and_needs_no_other(runs, tmp_path, capsys):
     for address in page.addresses():
         assert not address or address.startswith(("?", "#", "data:")), address
     assert page.tags.count("template") == 2
-    rows = [json.loads(told["data-values"]) for _, told in page.told if "data-values" in told]
+    rows = [json.loads(str(told["data-values"])) for _, told in page.told if "data-values" in told]
     assert len(rows) == 8
     pictures = [told["data-src"] for _, told in page.told if "data-picture" in told]
     assert len(pictures) > 2
