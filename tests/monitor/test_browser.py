@@ -15,6 +15,8 @@ from typing import Any
 
 import pytest
 
+from er_gym.rollout.run_directory import RunDirectory
+
 sync_api = pytest.importorskip(
     "playwright.sync_api", reason="needs playwright: pip install playwright"
 )
@@ -140,6 +142,39 @@ def test_filter_slider_keys_and_comparison(page, serve, runs):
     page.wait_for_selector(".sides svg.room >> nth=1")
     page.keyboard.press("ArrowRight")
     assert page.locator("li.now").count() == 2
+
+
+def test_a_person_plays_a_whole_task_to_success(page, serve, runs, tmp_path):
+    """The oracle's actions by mouse, the last one by keyboard; then the replay of them."""
+    record = next(iter(RunDirectory.open(runs / "oracle").episodes()))
+    page.goto(serve(tmp_path, play=tmp_path / "played").address)
+    page.click("text=Play")
+    page.select_option("select[name=suite]", "mini")
+    page.click("button:has-text('Show')")
+    page.select_option("select[name=task]", record.task_id)
+    page.click("button.main")
+    for number, step in enumerate(record.steps[1:], 1):
+        action = f"{step.verb} {step.object_type}".strip()
+        page.wait_for_selector(f"input[name=step][value='{number}']", state="attached")
+        button = page.locator(f"button[name=action][value='{action}']")
+        button.wait_for()
+        assert page.locator("figure img").first.evaluate(
+            "image => image.decode().then(() => image.naturalWidth)"
+        )
+        if step.verb == "end":
+            page.keyboard.press("e")
+            page.keyboard.press("Enter")
+        else:
+            button.click()
+    page.wait_for_selector("p.result.good")
+    page.click("a:has-text('See the episode again')")
+    page.wait_for_selector("li.now")
+    assert page.locator("[data-step]").count() == len(record.steps)
+    assert page.locator(".outcome.success").count() == 1
+    page.keyboard.press("ArrowRight")
+    page.wait_for_function(
+        "() => document.querySelector('.pictures img:not([hidden])').naturalWidth"
+    )
 
 
 def test_it_fits_a_telephone_in_the_dark_and_in_chinese(browser, serve, runs):
