@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from agents.finetune.settings import STAGES, Stage
-from benchmarks.ladder.settings import LadderSettings, StageSettings
+from benchmarks.ladder.settings import Eyes, LadderSettings, StageSettings
 
 BASE = "base"
+_NEW, _FRAMES = "new-model", "data/frames"
 
 
 @dataclass(frozen=True)
@@ -78,8 +79,11 @@ class _Plan:
 
     def phases(self) -> Iterator[Phase]:
         settings = self.settings
-        model = settings.base.model or self._at(BASE)
+        eyes = settings.base.eyes
+        model = self._at(BASE) if eyes else settings.base.model or self._at(BASE)
         learnt_before: list[str] = []
+        if eyes is not None:
+            yield self._frames(eyes)
         before = BASE
         for stage, row in settings.stages.items():
             data = []
@@ -89,7 +93,9 @@ class _Plan:
                 yield phase
             if before == BASE:
                 if settings.base.architecture:
-                    yield self._new_model(data)
+                    yield self._new_model([*data, *([_FRAMES] if eyes else [])])
+                if eyes is not None:
+                    yield self._see(eyes)
                 if settings.evaluation.base:
                     yield self._evaluate(BASE, model, 0.0)
             yield self._finetune(stage, row, model, [*learnt_before * row.again, *data])
@@ -145,6 +151,7 @@ class _Plan:
                 *("collect", "--suite", self.settings.suite, "--recipe", row.collect.recipe),
                 *("--parts", ",".join(row.collect.parts)),
                 *self._instances,
+                *self._types,
                 *self._collecting(row.collect.limit),
             )
 
@@ -153,14 +160,33 @@ class _Plan:
         return (
             *("--language", settings.language, "--seed", str(settings.seed)),
             *("--workers", str(settings.workers)),
-            *(() if settings.pictures else ("--no-pictures",)),
+            *(self._size if settings.pictures else ("--no-pictures",)),
             *(() if limit is None else ("--limit", str(limit))),
+        )
+
+    def _frames(self, eyes: Eyes) -> Phase:
+        return self._phase(
+            "base/frames",
+            _FRAMES,
+            *("data", "frames", "--suite", self.settings.suite, "--frames", str(eyes.frames)),
+            *self._size,
+            *("--seed", str(self.settings.seed), "--workers", str(self.settings.workers)),
+        )
+
+    def _see(self, eyes: Eyes) -> Phase:
+        base = self.settings.base
+        return self._phase(
+            "base/eyes",
+            BASE,
+            *("finetune", "--config", eyes.finetune, "--model", base.model or self._at(_NEW)),
+            *self._data_options([_FRAMES]),
+            *self._finetuning(eyes.set),
         )
 
     def _new_model(self, data: Sequence[str]) -> Phase:
         return self._phase(
             "base/new-model",
-            BASE,
+            _NEW if self.settings.base.eyes else BASE,
             *("new-model", self.settings.base.architecture),
             *self._data_options(data),
             *("--dialect", self.settings.dialect, "--seed", str(self.settings.seed)),
@@ -172,19 +198,25 @@ class _Plan:
             _stage(stage),
             *("finetune", "--config", row.finetune, "--model", model),
             *self._data_options(data),
-            *_overrides(
-                f"data.dialect={self.settings.dialect}",
-                f"training.seed={self.settings.seed}",
-                "data.parts=[]",
-                *row.set,
-            ),
+            *self._finetuning(row.set),
+        )
+
+    def _finetuning(self, overrides: Sequence[str]) -> tuple[str, ...]:
+        return _overrides(
+            f"data.dialect={self.settings.dialect}",
+            *((f"data.language={self.settings.language}",) if self.settings.base.eyes else ()),
+            f"training.seed={self.settings.seed}",
+            "data.parts=[]",
+            *overrides,
         )
 
     def _evaluate(self, name: str, model: str, faults: float) -> Phase:
         evaluation = self.settings.evaluation
         out = _evaluation(name, faults)
         play = list(evaluation.set)
-        if name == BASE and self.settings.base.architecture:  # no stage has told it how to converse
+        base = self.settings.base
+        if name == BASE and base.architecture and not base.eyes:
+            # No stage has told it how to converse.
             sees = () if self.settings.pictures else ("sees=text",)
             play = [f"prompts.dialect={self.settings.dialect}", *sees, *play]
         return self._phase(
@@ -200,6 +232,7 @@ class _Plan:
             *("bench", "--suite", suite, "--agent", agent),
             *(() if limit is None else ("--limit", str(limit), "--spread")),
             *self._instances,
+            *self._types,
             *("--seed", str(self.settings.seed)),
         )
 
@@ -209,6 +242,20 @@ class _Plan:
             *("--concurrency", str(self.settings.concurrency)),
             *_overrides(*self.settings.play),
         )
+
+    @property
+    def _size(self) -> tuple[str, ...]:
+        sizes = {"--width": self.settings.width, "--height": self.settings.height}
+        return tuple(
+            each
+            for name, pixels in sizes.items()
+            if pixels is not None
+            for each in (name, str(pixels))
+        )
+
+    @property
+    def _types(self) -> tuple[str, ...]:
+        return ("--types", ",".join(self.settings.types)) if self.settings.types else ()
 
     @property
     def _instances(self) -> tuple[str, ...]:

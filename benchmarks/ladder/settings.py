@@ -20,17 +20,33 @@ class _Settings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+class Eyes(_Settings):
+    """What the base model learns to see by, before the first stage.
+
+    Attributes:
+        frames: how many are drawn of the suite's rooms (:mod:`er_gym.data.frames`).
+        finetune: a fine-tuning configuration.
+        set: overrides of it.
+    """
+
+    frames: Positive
+    finetune: str
+    set: tuple[str, ...] = ()
+
+
 class Base(_Settings):
-    """The model at the foot of the ladder; one of the two.
+    """The model at the foot of the ladder; a model or an architecture.
 
     Attributes:
         model: a directory, or a name on the Hugging Face hub.
         architecture: a new model of this architecture (:mod:`agents.finetune.architecture`); its
-            tokenizer is learnt from the first stage's conversations.
+            tokenizer is learnt from the first stage's conversations, and from the frames.
+        eyes: how it is taught to see first; None for not at all.
     """
 
     model: str = ""
     architecture: str = ""
+    eyes: Eyes | None = None
 
     @model_validator(mode="after")
     def _one(self) -> Base:
@@ -141,6 +157,8 @@ class LadderSettings(_Settings):
             choice.
         dialect, language: of the conversations.
         pictures: whether trajectories are recorded with pictures; a model that reads needs none.
+        width, height: of these pictures, pixels; None for the suite's own.
+        types: the task types of the training and the evaluation; empty for all.
         seed: of everything that is drawn.
         workers: processes that play.
         concurrency: conversations at once.
@@ -156,6 +174,9 @@ class LadderSettings(_Settings):
     dialect: str = "paper"
     language: Language = "en"
     pictures: bool = True
+    width: Positive | None = None
+    height: Positive | None = None
+    types: tuple[str, ...] = ()
     seed: int = Field(0, ge=0, lt=2**32)
     workers: Positive = 2
     concurrency: Positive = 8
@@ -172,6 +193,12 @@ class LadderSettings(_Settings):
                 f"the stages are {', '.join(stages)}; give the first ones of {', '.join(STAGES)}"
             )
         return {name: stages[name] for name in first}
+
+    @model_validator(mode="after")
+    def _pictures_for_eyes(self) -> LadderSettings:
+        if self.base.eyes is not None and not self.pictures:
+            raise ValueError("base.eyes needs pictures; set pictures to true, or leave out eyes")
+        return self
 
     @model_validator(mode="after")
     def _something_to_learn(self) -> LadderSettings:
