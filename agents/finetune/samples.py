@@ -144,8 +144,7 @@ def _of_frames(frames: FrameSet, settings: DataSettings) -> _Source:
     dialect, language = load_dialect(settings.dialect), settings.language or "en"
     try:
         chats = tuple(
-            frame_chat(dialect, each, language)
-            for each in islice(frames.frames(), settings.limit)
+            frame_chat(dialect, each, language) for each in islice(frames.frames(), settings.limit)
         )
     except ValueError as error:
         raise ValueError(f"{frames.path}: {error}; set data.dialect or data.language") from None

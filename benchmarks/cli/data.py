@@ -1,4 +1,4 @@
-"""``er-gym data``: count trajectories, verify them, look at them, export and import them; frames."""
+"""``er-gym data``: count, verify, look at, export and import trajectories; draw frames."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from agents.finetune.settings import STAGES, Stage
-from benchmarks.ladder.settings import Eyes, LadderSettings, StageSettings
+from benchmarks.ladder.settings import CONTROLS, Control, Eyes, LadderSettings, StageSettings
 
 BASE = "base"
 _NEW, _FRAMES = "new-model", "data/frames"
@@ -37,7 +37,7 @@ class Rung:
     """A model that is measured.
 
     Attributes:
-        name: ``base``, or the stage that made it.
+        name: ``base``, the stage that made it, or a control.
         faults: the rate of faults.
         run: the run directory of its evaluation, relative to the ladder's.
     """
@@ -67,7 +67,9 @@ def rungs(settings: LadderSettings) -> list[Rung]:
             for name in settings.stages
             if name != STAGES[0]
         ]
-    return found
+    return found + [
+        Rung(name, 0.0, _evaluation(name, 0.0)) for name in settings.evaluation.controls
+    ]
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,8 @@ class _Plan:
             if stage != STAGES[0]:
                 for rate in settings.evaluation.faults:
                     yield self._evaluate(stage, model, rate)
+        for control in settings.evaluation.controls:
+            yield self._control(control, model)
 
     def _data(self, stage: Stage, row: StageSettings, model: str) -> Iterator[Phase]:
         number = _stage(stage)
@@ -227,6 +231,16 @@ class _Plan:
             *_overrides(*play),
         )
 
+    def _control(self, name: Control, model: str) -> Phase:
+        evaluation, out = self.settings.evaluation, _evaluation(name, 0.0)
+        if name == "blind":
+            noise = _overrides(*evaluation.set, "pictures.noise=true")
+            command = (*self._bench_model(model, evaluation.suite, evaluation.limit), *noise)
+        else:
+            workers = ("--workers", str(self.settings.workers))
+            command = (*self._bench(name, evaluation.suite, evaluation.limit), *workers)
+        return self._phase(out, out, *command)
+
     def _bench(self, agent: str, suite: str, limit: int | None) -> tuple[str, ...]:
         return (
             *("bench", "--suite", suite, "--agent", agent),
@@ -280,5 +294,9 @@ def _stage(stage: Stage) -> str:
 
 
 def _evaluation(name: str, faults: float) -> str:
-    number = STAGES.index(name) + 1 if name in STAGES else 0
+    number = 0
+    if name in STAGES:
+        number = STAGES.index(name) + 1
+    elif name in CONTROLS:
+        number = len(STAGES) + 1
     return f"evaluations/{number}-{name}" + (f"-faults-{faults:g}" if faults else "")

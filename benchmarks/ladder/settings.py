@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
@@ -14,6 +14,9 @@ from er_gym.data.trajectory import Language
 KIND = "ladder"
 _WHAT = "ladder"
 Positive = Annotated[int, Field(gt=0)]
+Control: TypeAlias = Literal["random", "blind"]
+"""Who plays beside the ladder: actions at random, or the last model with noise for pictures."""
+CONTROLS: tuple[Control, ...] = ("random", "blind")
 
 
 class _Settings(BaseModel):
@@ -136,6 +139,7 @@ class Evaluation(_Settings):
         limit: how many tasks, spread over the suite; None for all.
         faults: fault rates of further evaluations, after the stages from the second on.
         base: whether the model at the foot is measured, too.
+        controls: who else plays the same tasks, at the end.
         set: overrides of the agent's settings.
     """
 
@@ -143,6 +147,7 @@ class Evaluation(_Settings):
     limit: Positive | None = None
     faults: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
     base: bool = True
+    controls: tuple[Control, ...] = ()
     set: tuple[str, ...] = ()
 
 
@@ -196,6 +201,8 @@ class LadderSettings(_Settings):
 
     @model_validator(mode="after")
     def _pictures_for_eyes(self) -> LadderSettings:
+        if "blind" in self.evaluation.controls and not self.pictures:
+            raise ValueError("the control blind needs pictures; leave it out")
         if self.base.eyes is not None and not self.pictures:
             raise ValueError("base.eyes needs pictures; set pictures to true, or leave out eyes")
         return self

@@ -34,7 +34,7 @@ VISIT = 16
 """Frames of a visit. To set a room up takes as long as some of them."""
 _OPENED, _SWITCHED = 0.12, 0.3
 """The shares of things that are opened, and switched on or off, at the beginning of a visit."""
-_IN_FRONT, _OPEN_IT, _AROUND = 0.5, 0.5, 0.15
+_IN_FRONT, _OPEN_IT, _AROUND = 0.5, 0.5, 0.06
 """The shares of frames that are taken in front of a thing, of such openable things that are opened
 or closed then, and of frames with a look around."""
 _DIAGONAL = 0.2
@@ -215,10 +215,12 @@ class _Tour:
         kind = self._draw.choice(np.unique(table.kinds[rows]))
         row = int(self._draw.choice(rows[table.kinds[rows] == kind]))
         there = skills.navigate(self._controller, now, row, self._floor)
+        if not there.success:
+            return self._looked(self._any_pose()), ""
         if table.has["openable"][row] and self._draw.random() < _OPEN_IT:
             self._open_or_close(now, row)
             there = replace(there, perception=self._looked(_pose(there, now)))
-        return there.perception or now, table.ids[row] if there.success else ""
+        return there.perception or now, table.ids[row]
 
     def _open_or_close(self, now: Perception, row: int) -> None:
         table = now.objects

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -34,6 +35,20 @@ _CAME = LastDeed(verbs.NAVIGATE, True, "")
 _LOOKED_AROUND = LastDeed(verbs.OBSERVE, True, "")
 
 
+@dataclass(frozen=True)
+class Question:
+    """A question about a type, and the true answer.
+
+    Attributes:
+        kind: the type.
+        text, answer: in the dialect's words.
+    """
+
+    kind: str
+    text: str
+    answer: str
+
+
 def frame_chat(dialect: Dialect, frame: Frame, language: Language = "en") -> Chat:
     """The conversation about a frame.
 
@@ -50,7 +65,7 @@ def frame_chat(dialect: Dialect, frame: Frame, language: Language = "en") -> Cha
     picture = user_turn(texts, "", _CAME, [("ahead", frame.pictures[0])])
     before = seen_ahead(frame)
     sees = in_tag(SEEN, told_scene(texts, before, None, None))
-    rounds = list(_questions(words, scene, frame, draw))
+    rounds = [(each.text, each.answer) for each in questions(words, scene, frame, draw)]
     if not rounds or draw.random() < 0.5:
         said = [(picture, sees), *(((asked,), answer) for asked, answer in rounds)]
     else:
@@ -87,10 +102,11 @@ def words_for_frames(dialect: Dialect, language: Language) -> tuple[FrameWords, 
     return texts.frames, texts.scene
 
 
-def _questions(
+def questions(
     words: FrameWords, scene: SceneWords, frame: Frame, draw: np.random.Generator
-) -> Iterator[tuple[str, str]]:
-    """Questions about single types, of which some are not in view, and the answers."""
+) -> Iterator[Question]:
+    """Questions about single types, of which some are not in view: as many as there are, but no
+    more than :data:`QUESTIONS`."""
     nearest = {each.type: each for each in reversed(frame.view)}
     there, absent = sorted(nearest), frame.absent
     unseen = int(draw.binomial(QUESTIONS, _UNSEEN)) if there else QUESTIONS
@@ -98,12 +114,13 @@ def _questions(
     for kind in _drawn(draw, asked_for, QUESTIONS):  # in an order that gives nothing away
         asked = words.where.replace("{thing}", kind)
         if kind not in nearest:
-            yield asked, words.unseen.replace("{thing}", kind)
+            yield Question(kind, asked, words.unseen.replace("{thing}", kind))
             continue
         one = nearest[kind]
         said = thing_text(scene, one, seen_ahead(frame))
         side = getattr(words, one.side)
-        yield asked, words.found.replace("{thing}", said).replace("{side}", side)
+        answer = words.found.replace("{thing}", said).replace("{side}", side)
+        yield Question(kind, asked, answer)
 
 
 def _drawn(draw: np.random.Generator, kinds: list[str], number: int) -> list[str]:
