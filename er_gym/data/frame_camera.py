@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.data.cells import cells_of
 from er_gym.data.frames import PICTURES, Frame, FrameSet, visit_name
 from er_gym.data.pictures import encode_picture
 from er_gym.data.trajectory import PictureRecord, SeenObject
@@ -151,6 +152,7 @@ def _started(scene: str, env: Mapping[str, Any]) -> Any:
         gridSize=env["grid_size"],
         visibilityDistance=env["visibility_distance"],
         snapToGrid=False,
+        renderInstanceSegmentation=True,
     )
 
 
@@ -242,6 +244,7 @@ class _Tour:
         held = now.objects.held
         room = {now.objects.type_of(k) for k in range(len(now.objects)) if k != held}
         pose = now.pose
+        covers, cells = cells_of(now)
         return Frame(
             id=name,
             scene=self._visit.room.scene,
@@ -259,6 +262,8 @@ class _Tour:
             navigable=list(type_names(type_mask(np.concatenate(clear)))),
             interactable=list(available.in_reach),
             absent=sorted(room - {*now.visible_names} - verbs.NOWHERE),
+            covers=covers,
+            cells=cells,
         )
 
     def _picture(self, name: str, direction: str, rgb: NDArray[np.uint8] | None) -> PictureRecord:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er_gym.data.cells import CoveredPicture
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.dialects import (
     SEEN,
@@ -23,7 +24,7 @@ from er_gym.data.dialects import (
 )
 from er_gym.data.frames import Frame
 from er_gym.data.scene_text import FrameWords, Perceived, SceneWords, thing_text
-from er_gym.data.trajectory import Language
+from er_gym.data.trajectory import Language, PictureRecord
 from er_gym.tasks import verbs
 
 QUESTIONS = 4
@@ -62,7 +63,7 @@ def frame_chat(dialect: Dialect, frame: Frame, language: Language = "en") -> Cha
     texts = dialect.texts_in(language)
     words, scene = words_for_frames(dialect, language)
     draw = np.random.default_rng(zlib.crc32(frame.id.encode()))
-    picture = user_turn(texts, "", _CAME, [("ahead", frame.pictures[0])])
+    picture = user_turn(texts, "", _CAME, [("ahead", _covered(frame, scene))])
     before = seen_ahead(frame)
     sees = in_tag(SEEN, told_scene(texts, before, None, None))
     rounds = [(each.text, each.answer) for each in questions(words, scene, frame, draw)]
@@ -80,6 +81,15 @@ def frame_chat(dialect: Dialect, frame: Frame, language: Language = "en") -> Cha
     for user, assistant in said:
         turns += (ChatTurn("user", user), ChatTurn("assistant", (assistant,), train=True))
     return Chat(frame.id, tuple(turns), texts.reply_told)
+
+
+def _covered(frame: Frame, words: SceneWords) -> PictureRecord:
+    """The picture ahead with what covers it, as far as that is known, in the scene's words."""
+    ahead = frame.pictures[0]
+    if not frame.cells:
+        return ahead
+    covers = tuple(each or words.nothing for each in frame.covers)
+    return CoveredPicture(**ahead.model_dump(), covers=covers, cells=frame.cells)
 
 
 def seen_ahead(frame: Frame) -> Perceived:

@@ -50,6 +50,8 @@ class Frame(_Record):
         navigable: the types that one can navigate to from what is seen here, ``views`` included.
         interactable: the types within reach.
         absent: the types of things in the room that are not in view ahead.
+        covers, cells: what covers the squares of the view ahead
+            (:class:`er_gym.data.cells.CoveredPicture`); empty if that is not known.
     """
 
     id: str
@@ -65,6 +67,8 @@ class Frame(_Record):
     navigable: list[str] = []
     interactable: list[str] = []
     absent: list[str] = []
+    covers: tuple[str, ...] = ()
+    cells: str = ""
 
 
 class FramesManifest(_Record):

@@ -96,7 +96,7 @@ def test_a_frame_is_what_an_agent_sees_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(frame_camera._Tour, "_change", lambda self, now: None)
-    task = next(each for each in SUITE.tasks if each.arrangement.poses)
+    task = next(each for each in load_suite("train").tasks if each.arrangement.poses)
     env = EmbodiedEnv((), obs_mode="rgb+objects", width=96, height=54)
     settings = {"backend": "embedded", **SUITE.env, "width": 96, "height": 54}
     camera = frame_camera.Camera(tmp_path, settings, "jpeg", 80, 0)
