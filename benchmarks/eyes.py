@@ -5,6 +5,8 @@
 
 The model is shown pictures of rooms that it did not learn from, by the client that plays, and is
 asked for all that is in view, and for single types. The blind copy is the same model, shown noise.
+Noise may confuse a model more than it blinds it, so its answers are also held against the truth of
+other frames: what is right then, it could have guessed without looking.
 The dialect must have words for frames, such as ``sight``.
 """
 
@@ -14,7 +16,7 @@ import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
@@ -66,12 +68,14 @@ class Examiner:
     """
 
     def __init__(self, model: str, frames: FrameSet, settings: AgentSettings) -> None:
+        from agents.finetune.libraries import quiet_libraries
         from agents.vlm.clients.local import LocalClient
 
         self._frames, self._settings = frames, settings
         dialect = load_dialect(settings.prompts.dialect or "sight")
         self._words, self._scene = words_for_frames(dialect, settings.prompts.language)
-        self._client = LocalClient(model, settings)
+        with quiet_libraries():
+            self._client = LocalClient(model, settings)
 
     def answers(self, frame: Frame, blind: bool) -> Answers:
         """The answers about a frame, by the model or its blind copy."""
@@ -150,6 +154,13 @@ def precision_recall_f1(answers: Iterable[Answers]) -> tuple[float, float, float
     return 100 * precision, 100 * recall, 100 * 2 * right / max(named + there, 1)
 
 
+def misplaced(answers: Sequence[Answers]) -> list[Answers]:
+    """The answers with what is in view in another frame: that half of the list away."""
+    half = len(answers) // 2
+    others = [*answers[half:], *answers[:half]]
+    return [replace(each, there=other.there) for each, other in zip(answers, others, strict=True)]
+
+
 def f1_interval(answers: Sequence[Answers]) -> tuple[float, float]:
     """The 95 % interval of F1, by resampling frames."""
     draw = np.random.default_rng(0)
@@ -168,6 +179,8 @@ def figures(found: Mapping[str, Sequence[Answers]]) -> Table:
     scores = {name: precision_recall_f1(answers) for name, answers in found.items()}
     for place, name in enumerate(("precision", "recall", "F1")):
         rows.append((f"types in view, {name}", *(f"{each[place]:.1f}" for each in scores.values())))
+    guessed = {name: precision_recall_f1(misplaced(each))[2] for name, each in found.items()}
+    rows.append(("F1 for another frame", *(f"{each:.1f}" for each in guessed.values())))
     spans = {name: f1_interval(answers) for name, answers in found.items()}
     rows.append(("F1, 95 %", *(f"{low:.1f} to {high:.1f}" for low, high in spans.values())))
     measures = dict.fromkeys(m for answers in found.values() for e in answers for m in e.right)
@@ -179,6 +192,7 @@ def figures(found: Mapping[str, Sequence[Answers]]) -> Table:
         tuple(rows),
         1,
         (
+            "F1 for another frame: the same answers, held against what is in view elsewhere",
             "where: of questions about single types, those answered rightly: present, absent: "
             "whether it is in view; the others where it is in view and the model says so",
         ),

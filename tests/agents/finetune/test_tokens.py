@@ -208,7 +208,7 @@ def test_the_tokens_of_a_covered_picture_learn_what_is_in_their_square(
 ) -> None:
     files = open_model(models())
     image = files.config.image_token_id
-    collate = Collator(files.image_processor, image, DataSettings(), 0)
+    collate = Collator(files.image_processor, image, DataSettings(**BOUNDS), 0)
     plain = next(each for each in chats if len(each.pictures) > 1)
     cells = "".join(SYMBOLS[k % 3] for k in range(ROWS * COLUMNS))
     names = ("nothing", "Fridge", "Mug")
