@@ -83,6 +83,13 @@ workers_option = click.option(
     help="The number of processes.  [default: one for each processor]",
 )
 
+width_option = click.option(
+    "--width", type=click.IntRange(16, 4096), help="Of pictures, pixels.  [default: the suite's]"
+)
+height_option = click.option(
+    "--height", type=click.IntRange(16, 4096), help="Of pictures, pixels.  [default: the suite's]"
+)
+
 force_option = click.option(
     "--force", is_flag=True, help="Also replace files that er-gym did not write."
 )

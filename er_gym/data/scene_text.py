@@ -80,6 +80,27 @@ class SceneWords(BaseModel):
     off: str
 
 
+class FrameWords(BaseModel):
+    """The words for questions about a frame and their answers (:mod:`er_gym.data.frame_chat`).
+
+    Attributes:
+        look: asks for all that is in view. ``where``: asks for one type, ``{thing}``.
+        found: answers that, ``{thing}`` as the scene tells it, and ``{side}``; ``unseen``: where
+            none is in view, ``{thing}``.
+        left, ahead, right: sides.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    look: str
+    where: str
+    found: str
+    unseen: str
+    left: str
+    ahead: str
+    right: str
+
+
 @dataclass(frozen=True)
 class _Thing:
     """All objects in view that are told alike."""
@@ -129,6 +150,11 @@ def scene_text(words: SceneWords, now: Perceived, before: Perceived | None, *, s
     if now.held and (lines or before is None or now.held != before.held):
         lines.append(words.held.replace("{things}", now.held))
     return "\n".join(lines)
+
+
+def thing_text(words: SceneWords, one: SeenObject, perceived: Perceived) -> str:
+    """One object as :func:`scene_text` tells it, with what it lies in or on."""
+    return _listed(words, _things(words, [one], perceived))
 
 
 def _things(words: SceneWords, objects: Iterable[SeenObject], perceived: Perceived) -> list[_Thing]:
