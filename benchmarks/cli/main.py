@@ -133,7 +133,8 @@ def report(
     for name, given in (("--misses", misses), ("--by-split", by_split)):
         if given and layout == "csv":
             raise BadInput(
-                f"{name} does not go with --format csv, which holds means; choose md or table"
+                f"{name} does not go with --format csv, which holds means; choose "
+                f"{'json, md' if misses else 'md'} or table"
             )
     with bad_input():
         loaded = [reports.load_run(path) for path in runs]

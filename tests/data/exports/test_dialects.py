@@ -220,9 +220,8 @@ def test_turns_that_are_not_learnt_can_be_told_by_the_user(trajectories: list[Tr
 
 
 def test_unknown_and_damaged_dialects_say_what_there_is(tmp_path: Path) -> None:
-    with pytest.raises(
-        ValueError, match=r"choose one of: paper, sight, tags, text; or give a folder"
-    ):
+    names = "paper, sight, tags, text, text-actions"
+    with pytest.raises(ValueError, match=f"choose one of: {names}; or give a folder"):
         load_dialect("pirate")
     own = (Path(__file__).parents[3] / "configs/dialects/paper/en.yaml").read_text()
     (tmp_path / "en.yaml").write_text(own)
