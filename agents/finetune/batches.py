@@ -130,6 +130,7 @@ class Collator:
         The label of a picture's token stands one place later, as those of all tokens do: the token
         says what is in its square, not which token comes next.
         """
+        assert self.image_token is not None
         sides = iter((grids[:, 1:] // self.image_processor.merge_size).tolist())
         for row, chat in enumerate(chats):
             places = ids[row].eq(self.image_token).nonzero()[:, 0]

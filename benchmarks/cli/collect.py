@@ -24,10 +24,10 @@ from benchmarks.cli.errors import (
 from benchmarks.cli.options import (
     Place,
     Words,
-    height_option,
+    given_size,
     named,
     seed_option,
-    width_option,
+    size_options,
     workers_option,
 )
 from benchmarks.cli.terminal import stdout, terminal
@@ -95,8 +95,7 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
     is_flag=True,
     help="Record what is seen in words alone, for models that read: many times as fast.",
 )
-@width_option
-@height_option
+@size_options
 @click.option(
     "--correct",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
@@ -182,8 +181,7 @@ def collect(
             asked = selection.collected
         else:
             source, env = source_of(suite, tasks_file, correct)
-        size = {"width": width, "height": height}
-        env |= {name: pixels for name, pixels in size.items() if pixels is not None}
+        env |= given_size(width, height)
         if instances is not None:
             if selection is not None or correct is not None:
                 raise BadInput("--instances is that of the run; leave it out")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import Place, height_option, seed_option, width_option, workers_option
+from benchmarks.cli.options import Place, given_size, seed_option, size_options, workers_option
 from benchmarks.cli.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -29,8 +29,7 @@ _QUALITY = 80
     help="How many; the same command with more goes on.",
 )
 @click.option("--scenes", metavar="SCENE,…", help="Only these rooms of the suite.")
-@width_option
-@height_option
+@size_options
 @click.option(
     "--out", required=True, type=Place(file_okay=False, path_type=Path), help="The directory."
 )
@@ -90,7 +89,6 @@ def _plan(
     from er_gym.tasks.suites import load_suite
 
     suite = chosen_tasks(load_suite(name), (), named("--scenes", scenes))
-    size = {"width": width, "height": height}
     env = {
         "backend": "embedded",
         "width": 800,
@@ -99,7 +97,7 @@ def _plan(
         "grid_size": 0.1,
         "visibility_distance": 20.0,
         **{key: value for key, value in suite.env.items() if key != "instances"},
-        **{key: value for key, value in size.items() if value is not None},
+        **given_size(width, height),
     }
     if env["backend"] != "embedded":
         raise BadInput(f"the suite {name} plays on {env['backend']}; frames need the embedded one")
