@@ -11,7 +11,7 @@ from agents.expert.candidates import Candidate, Candidates
 from agents.expert.course import Intent, View
 from agents.expert.expert import replayed_purpose
 from agents.expert.explorer import Strength
-from agents.expert.legs import legs_of
+from agents.expert.legs import at_hand, legs_of
 from agents.expert.players import PlaySettings, header_of
 from agents.expert.recipe import Part, Recipe
 from agents.expert.recorder import (
@@ -113,10 +113,8 @@ class DecidingAgent:
 
     def _subgoal(self, view: View) -> Subgoal:
         """What the next action may be for: the first part of the task that is not done."""
-        legs = self._legs
-        left = (leg for leg in legs if any(key in view.left for key in leg.actions))
-        leg = next(left, legs[-1] if legs else None)
-        return leg.subgoal if leg else Subgoal()
+        here = at_hand(self._legs, view.left)
+        return here[1] if here else Subgoal()
 
     def _record(self, kind: Any, text: str, knowledge: Knowledge) -> ThoughtRecord:
         """A thought, with the reasons of the critic against it."""

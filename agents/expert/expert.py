@@ -5,7 +5,7 @@ from __future__ import annotations
 from random import Random
 
 from agents.expert.course import Intent
-from agents.expert.legs import Leg
+from agents.expert.legs import Leg, at_hand
 from agents.expert.places import (
     DrawnPlaces,
     PlaceChooser,
@@ -163,13 +163,11 @@ class CorrectedCourse(ExpertCourse):
 
     def _replayed(self, action: Action) -> Intent:
         """The intent that a replayed action seems to have."""
-        leg = next(
-            (one for one in self._legs if any(key in self.view.left for key in one.actions)),
-            self._legs[-1],
-        )
-        self._subgoal = leg.subgoal
+        here = at_hand(self._legs, self.view.left)
+        if here is not None:
+            self._subgoal = here[1]
         purpose = replayed_purpose(action, self.view.held)
-        if purpose == "search" and self._in_view(leg.thing):
+        if purpose == "search" and here is not None and self._in_view(here[0].thing):
             purpose = "approach"
         return Intent(
             action,

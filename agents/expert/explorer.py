@@ -117,7 +117,7 @@ class ExplorerCourse(TaskCourse):
 
     def _ready(self, leg: Leg) -> bool:
         """Whether the leg's first key action can be done, or its object is within reach."""
-        left = [key for key in leg.actions if key in self.view.left]
+        left = [leg.actions[index] for index in self._left(leg)]
         if not left:
             return self._within_reach(leg.thing)
         first = left[0]

@@ -12,7 +12,7 @@ from typing import Any
 from agents.expert.candidates import Candidate
 from agents.expert.course import Intent, View
 from agents.expert.expert import replayed_purpose
-from agents.expert.legs import legs_of
+from agents.expert.legs import at_hand, legs_of
 from agents.expert.own_words import OwnWords, own_words
 from agents.expert.players import PlaySettings, header_of
 from agents.expert.recorder import (
@@ -71,15 +71,15 @@ class ReplayedCourse:
             yield Intent(Action(verbs.END), "finish", Subgoal(), train=False)
 
     def _intent(self, action: Action, train: bool, again: bool) -> Intent:
-        left = (leg for leg in self._legs if any(key in self.view.left for key in leg.actions))
-        leg = next(left, self._legs[-1] if self._legs else None)
+        here = at_hand(self._legs, self.view.left)
+        subgoal = here[1] if here else Subgoal()
         purpose = "retry" if again else replayed_purpose(action, self.view.held)
-        if purpose == "search" and leg is not None and leg.thing in self.view.visible:
+        if purpose == "search" and here is not None and here[0].thing in self.view.visible:
             purpose = "approach"
         return Intent(
             action,
             purpose,
-            leg.subgoal if leg else Subgoal(),
+            subgoal,
             plan=(action.object_type,) if action.verb == verbs.NAVIGATE else (),
             train=train,
         )

@@ -8,7 +8,7 @@ from random import Random
 from typing import TypeAlias
 
 from agents.expert.course import Intent, View
-from agents.expert.legs import Leg, legs_of, purpose_of
+from agents.expert.legs import Leg, keys_left, legs_of, purpose_of
 from agents.expert.thought_kinds import Check
 from agents.scripted.searcher import search_priors
 from er_gym.data.trajectory import Purpose, Subgoal
@@ -84,15 +84,18 @@ class TaskCourse:
     # -- legs ------------------------------------------------------------------------------------
 
     def _leg(self, leg: Leg) -> Intents:
-        left = [key for key in leg.actions if key in self.view.left]
+        left = self._left(leg)
         if leg.actions and not left:
             return True
-        there = bool(left) and self._legal(left[0]) and leg.navigate not in self.view.left
+        there = (
+            bool(left) and self._legal(leg.actions[left[0]]) and leg.navigate not in self.view.left
+        )
         if not there and (leg.actions or not self._within_reach(leg.thing)):
             yield from self._find(leg)
-        for key in left:
-            if key in self.view.left:
-                yield from self._do_key(key, leg)
+        for index in left:
+            if index in self._left(leg):
+                self._subgoal = leg.subgoals[index]
+                yield from self._do_key(leg.actions[index], leg)
         if not leg.actions:
             yield from self._reach_thing(leg)
         return True
@@ -202,6 +205,10 @@ class TaskCourse:
         return (yield from self._do(Intent(action, "look around", self._subgoal)))
 
     # -- what is known ---------------------------------------------------------------------------
+
+    def _left(self, leg: Leg) -> tuple[int, ...]:
+        """The indices of a leg's actions that are not done."""
+        return keys_left(self._legs, self.view.left)[self._legs.index(leg)]
 
     def _legal(self, key: KeyAction) -> Action | None:
         """The action that does a key action now; None if none is legal."""

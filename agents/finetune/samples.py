@@ -153,9 +153,9 @@ def _of_frames(frames: FrameSet, settings: DataSettings) -> _Source:
 def _check_choice(paths: Sequence[Path], settings: DataSettings) -> None:
     """Refuse parts and kinds that none of the collections has. A ShareGPT file has neither."""
     collections = [Collection.open(path) for path in paths if (path / MANIFEST).is_file()]
-    if collections and (settings.parts or settings.kinds):
-        there = {(one.part, one.kind) for each in collections for one in each.trajectories()}
-        settings.check_choice(", ".join(str(each.path) for each in collections), there)
+    if collections:
+        names = ", ".join(str(each.path) for each in collections)
+        settings.check_choice(names, (one for each in collections for one in each.trajectories()))
 
 
 def _told(prompts: Mapping[str, str]) -> str:

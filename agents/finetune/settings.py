@@ -6,21 +6,21 @@ er-gym's own files are ``configs/finetune/NAME.yaml``. Every field has a default
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from agents import configs
-from er_gym.data.trajectory import Language
+from er_gym.data.trajectory import Language, Trajectory
 
 KIND = "finetune"
 _WHAT = "fine-tuning run"
 Stage: TypeAlias = Literal["imitation", "exploration", "reflection"]
 """The paper's three stages, in order; they make the Interactor, the Explorer and the Reasoner."""
 STAGES: tuple[Stage, ...] = ("imitation", "exploration", "reflection")
-Mask: TypeAlias = Literal["turns", "released"]
-"""Which turns of the assistant get loss, see :class:`DataSettings`."""
+Mask: TypeAlias = Literal["turns", "released", "all"]
+"""Which tokens get loss, see :class:`DataSettings`."""
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Positive = Annotated[int, Field(gt=0, le=2**31)]
@@ -75,7 +75,8 @@ class DataSettings(_Settings):
         mask: ``turns``: the turns that the trajectories mark ``train`` get loss, so that in the
             third stage the faulty step and all before it get none, as the paper describes.
             ``released``: all turns after the first ``<|feedback|>`` get loss, and if there is none,
-            all; so does the paper's released code.
+            all; so does the paper's released code. ``all``: as ``turns``, and all that the
+            assistant is told, without pictures; a model from random weights learns faster so.
         max_length: the most tokens of a conversation. A longer one is an error: to cut it would cut
             pictures.
         min_pixels, max_pixels: a picture with fewer or more is scaled.
@@ -104,16 +105,19 @@ class DataSettings(_Settings):
         """Whether a trajectory of this part and kind is learnt from."""
         return (not self.parts or part in self.parts) and (not self.kinds or kind in self.kinds)
 
-    def check_choice(self, where: str, there: Collection[tuple[str, str]]) -> None:
+    def check_choice(self, where: str, trajectories: Iterable[Trajectory]) -> None:
         """Refuse a part or a kind that no trajectory has.
 
         Args:
             where: the name of what holds the trajectories.
-            there: the part and the kind of each.
+            trajectories: read only if something is chosen.
 
         Raises:
             ValueError: see above.
         """
+        if not (self.parts or self.kinds):
+            return
+        there = {(each.part, each.kind) for each in trajectories}
         for name, wanted, place in (("part", self.parts, 0), ("kind", self.kinds, 1)):
             found = sorted({each[place] for each in there})
             missing = sorted(set(wanted) - set(found))
@@ -130,6 +134,8 @@ class TrainingSettings(_Settings):
 
     Attributes:
         learning_rate, epochs, weight_decay, max_grad_norm: as there.
+        optimizer: ``adamw``; or ``muon`` for the matrices of the layers, with AdamW for all other
+            weights: a model from random weights learns faster so.
         batch, accumulation: conversations a device and step, and steps an update.
         warmup: the share of the updates in which the learning rate rises; then it follows a cosine.
         checkpointing: whether activations are computed again instead of stored.
@@ -145,6 +151,7 @@ class TrainingSettings(_Settings):
     epochs: float = Field(1.0, gt=0, le=10_000)
     weight_decay: Fraction = 0.0
     max_grad_norm: float = Field(1.0, gt=0)
+    optimizer: Literal["adamw", "muon"] = "adamw"
     batch: Positive = 1
     accumulation: Positive = 1
     warmup: Fraction = 0.1

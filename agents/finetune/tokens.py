@@ -164,7 +164,8 @@ class Encoder:
         return int(patches) // int(self._image_processor.merge_size) ** 2
 
     def _learnt(self, ids: list[int], train: Sequence[bool]) -> list[bool]:
-        return mask(ids, train, self._settings.mask, self.begin, self.end, self._feedback)
+        found = mask(ids, train, self._settings.mask, self.begin, self.end, self._feedback)
+        return [each and one != self._image_token for each, one in zip(found, ids, strict=True)]
 
     def _marks(self) -> tuple[str, str]:
         """What stands before and after a reply, found by probing the template."""
@@ -221,6 +222,7 @@ def mask(
         train: for each turn of the assistant, whether it is marked to be learnt.
         mode: ``turns``: of the assistant's turns, those that are marked. ``released``: what the
             assistant says after the first ``<|feedback|>``, marked or not; all if there is none.
+            ``all``: every token but the assistant's turns that are not marked.
         begin, end: the tokens around a turn of the assistant.
         feedback: the token of ``<|feedback|>``; None if the model has none.
 
@@ -229,6 +231,9 @@ def mask(
     """
     if mode == "turns":
         return train_mask(ids, train, begin=begin, end=end)
+    if mode == "all":
+        unmarked = train_mask(ids, [not each for each in train], begin=begin, end=end)
+        return [not each for each in unmarked]
     found = train_mask(ids, [True] * len(train), begin=begin, end=end)
     if feedback is not None and feedback in ids:
         first = list(ids).index(feedback)

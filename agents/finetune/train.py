@@ -38,6 +38,7 @@ from agents.finetune.model_files import (
     open_model,
     settings_as_json,
 )
+from agents.finetune.optimizer import MuonAdamW
 from agents.finetune.run_files import (
     Manifest,
     RunFiles,
@@ -176,6 +177,11 @@ def _train(
         has = machine.on_gpu() and torch.cuda.is_bf16_supported()
         dtype = "bfloat16" if has else "float32"
     arguments = _arguments(settings, run, dtype)
+    if settings.training.optimizer == "muon" and is_sharded(arguments):
+        raise ValueError(
+            "training.optimizer=muon needs whole matrices, which DeepSpeed and FSDP divide; set "
+            "training.optimizer=adamw"
+        )
     needed = _memory(settings, files, chats, dtype, arguments.world_size)
     free = machine.free_memory()
     if needed.total > free and not ignore_memory:
@@ -219,6 +225,7 @@ def _train(
         settings.training.keep,
         data_collator=Collator(files.image_processor, image_token, settings.data, padding),
         train_dataset=EncodedChats(chats),
+        optimizers=(_optimizer(network, settings), None),
     )
     trainer.accelerator.wait_for_everyone()
     last = run.last_checkpoint()
@@ -292,6 +299,14 @@ def _arguments(
         )
     except (OSError, ImportError, json.JSONDecodeError) as error:
         raise ValueError(f"training.deepspeed or training.fsdp: {one_line(error)}") from None
+
+
+def _optimizer(network: Any, settings: FinetuneSettings) -> MuonAdamW | None:
+    """The optimizer, None for the trainer's own, AdamW."""
+    training = settings.training
+    if training.optimizer == "adamw":
+        return None
+    return MuonAdamW(network, training.learning_rate, training.weight_decay)
 
 
 def _memory(

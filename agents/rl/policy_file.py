@@ -128,7 +128,8 @@ def load_network(file: Path, *, trust: bool = False) -> TypeNetwork:
         check_about(about, _about(config))
         network.load_state_dict(weights)
     # zipfile, numpy and torch raise these for files that are damaged, cut short, encrypted,
-    # compressed in a way unknown here, or that hold other arrays.
+    # compressed in a way unknown here, or that hold other arrays. NotImplementedError is zipfile's
+    # for the compression, EOFError for a file cut short; SafetensorError is safetensors' for all.
     except (
         zipfile.BadZipFile, OSError, KeyError, TypeError, ValueError, RuntimeError, MemoryError,
         NotImplementedError, EOFError, SafetensorError,

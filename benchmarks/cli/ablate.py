@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.errors import bad_input, print_problem
-from benchmarks.cli.options import Place, overrides_option
-from benchmarks.cli.plan import carry_out
+from benchmarks.cli.plan import carry_out, plan_options
 from benchmarks.cli.terminal import echo, stdout
 
 if TYPE_CHECKING:
@@ -18,20 +17,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option(
-    "--config",
-    required=True,
-    metavar="NAME",
-    help="The ablation: a YAML file, or the name of one of er-gym's own.",
-)
-@overrides_option("evaluation.limit=100")
-@click.option(
-    "--out",
-    type=Place(file_okay=False, path_type=Path),
-    help="The ablation's directory.  [default: runs/ablation/CONFIG]",
-)
-@click.option("--until", metavar="PHASE", help="Stop after this phase.")
-@click.option("--print", "only_print", is_flag=True, help="Print the phases and run none of them.")
+@plan_options("ablation")
 def ablate(
     config: str, overrides: tuple[str, ...], out: Path | None, until: str | None, only_print: bool
 ) -> int:

@@ -124,17 +124,21 @@ def report(
     """Show the results in one or several run directories.
 
     Rates have Wilson's 95 % interval. The json format carries every metric, slice, score and miss,
-    whatever the other options.
+    whatever the other options, but no splits.
     """
     from benchmarks.scoring import report as reports
     from benchmarks.scoring.splits import split_results, split_table
     from benchmarks.scoring.tables import as_markdown, print_tables, tables
 
-    for name, given in (("--misses", misses), ("--by-split", by_split)):
-        if given and layout == "csv":
+    for name, given, refused in (
+        ("--misses", misses, ("csv",)),
+        ("--by-split", by_split, ("csv", "json")),
+    ):
+        if given and layout in refused:
+            fitting = [each for each in FORMATS if each not in refused]
             raise BadInput(
-                f"{name} does not go with --format csv, which holds means; choose "
-                f"{'json, md' if misses else 'md'} or table"
+                f"{name} does not go with --format {layout}, which lacks it; choose "
+                f"{', '.join(fitting)}"
             )
     with bad_input():
         loaded = [reports.load_run(path) for path in runs]

@@ -2,15 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import reduce
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import click
 
 from benchmarks.cli.errors import INTERRUPTED, bad_input, print_problem
+from benchmarks.cli.options import Place, overrides_option
 from benchmarks.cli.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from benchmarks.plan.phase import Phase
     from benchmarks.plan.run import Plan
+
+
+def plan_options(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """The options of a command that runs a plan.
+
+    Args:
+        what: the plan's kind, such as ``ladder``, which is also the name of its runs' folder.
+    """
+    options = (
+        click.option(
+            "--config",
+            required=True,
+            metavar="NAME",
+            help=f"The {what}: a YAML file, or the name of one of er-gym's own.",
+        ),
+        overrides_option("evaluation.limit=100"),
+        click.option(
+            "--out",
+            type=Place(file_okay=False, path_type=Path),
+            help=f"The {what}'s directory.  [default: runs/{what}/CONFIG]",
+        ),
+        click.option("--until", metavar="PHASE", help="Stop after this phase."),
+        click.option(
+            "--print", "only_print", is_flag=True, help="Print the phases and run none of them."
+        ),
+    )
+    return lambda command: reduce(lambda made, option: option(made), reversed(options), command)
 
 
 def carry_out(plan: Plan, out: Path, until: str | None, only_print: bool) -> int:

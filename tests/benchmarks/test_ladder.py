@@ -143,6 +143,18 @@ BAD = {
         "base.eyes needs pictures",
     ),
     "unknown": ({"speed": 3}, "speed"),
+    "rewritten": (
+        {
+            "stages": {
+                **SMALL["stages"],
+                "reflection": {
+                    "sample": {"tasks": 1, "rewrite_thoughts": True},
+                    "finetune": "tiny",
+                },
+            }
+        },
+        "leave out rewrite_thoughts",
+    ),
 }
 
 

@@ -80,9 +80,7 @@ def open_source(path: Path, settings: DataSettings) -> Source:
     dialect = load_dialect(settings.dialect)
     if (path / MANIFEST).is_file():
         collection = Collection.open(path)
-        settings.check_choice(
-            str(collection.path), {(each.part, each.kind) for each in collection.trajectories()}
-        )
+        settings.check_choice(str(collection.path), collection.trajectories())
         return Source(path, collection, dialect, lambda: _of_collection(collection, settings))
     if path.is_dir() and not (path / "dataset_info.json").is_file():
         raise ValueError(

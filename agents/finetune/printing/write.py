@@ -53,11 +53,16 @@ def write_files(
 
     Raises:
         ValueError: no such program, model or data; a conversation is longer than
-            ``data.max_length``; or ``out`` is not empty.
+            ``data.max_length``; the program does not know the mask or the optimizer; or ``out`` is
+            not empty.
         OSError: something cannot be written.
     """
     if program not in PROGRAMS:
         raise ValueError(f"there is no program {program!r:.60}; choose of {', '.join(PROGRAMS)}")
+    if settings.data.mask == "all" and program != "deepspeed":  # that runs er-gym finetune
+        raise ValueError(f"{program} cannot learn with data.mask=all; set turns or released")
+    if settings.training.optimizer != "adamw":
+        raise ValueError(f"{program} cannot learn with training.optimizer=muon; set adamw")
     chosen = choose_model(model)
     _check_out(out)
     count = gpus or (LORA_GPUS if settings.model.lora else FULL_GPUS)

@@ -211,11 +211,17 @@ def test_after_kills_it_goes_on_as_if_nothing_had_been(
     assert not again().new
 
 
+@pytest.mark.parametrize("optimizer", ["adamw", "muon"])
 def test_full_fine_tuning_goes_on_too(
-    models: Any, played: Collection, settings: Any, tmp_path: Path
+    optimizer: str, models: Any, played: Collection, settings: Any, tmp_path: Path
 ) -> None:
     """With pictures: transformers' own checkpoints of Qwen2.5-VL would not be read again."""
-    made = settings("training.epochs=2", "training.batch=4", "training.save_every=2")
+    made = settings(
+        "training.epochs=2",
+        "training.batch=4",
+        "training.save_every=2",
+        f"training.optimizer={optimizer}",
+    )
     whole, run = RunFiles(tmp_path / "whole"), RunFiles(tmp_path / "killed")
     train(made, models(), [played.path], whole.path)
     killed(lambda: train(made, models(), [played.path], run.path), "update", 3)
@@ -329,6 +335,7 @@ def test_bad_input_is_told_in_a_line(
             "data.parts=[imitation]",
             "no trajectories of the part imitation; it has: mixed",
         ),
+        ("--set", "data.kinds=[z]", "no trajectories of the kind z; it has: "),
         ("--set", "data.dialect=pirate", "there is no dialect 'pirate'"),
         ("--set", "data.max_length=100", "data.max_length 100, and 7 others are too long; set"),
         ("--set", "model.lora.targets=[elbow]", "model.lora does not fit the model"),

@@ -231,6 +231,8 @@ def test_the_readme_tells_the_memory_of_every_model(collection: Collection, tmp_
         ("trl", "qwen9", (), "there is no model 'qwen9'"),
         ("trl", "qwen2-vl-7b", ("data.max_length=300",), "more than data.max_length 300; set"),
         ("trl", "qwen2-vl-7b", ("data.parts=[corrections]",), "no trajectories of the part"),
+        ("deepspeed", "qwen2-vl-7b", ("training.optimizer=muon",), "deepspeed cannot learn with t"),
+        ("trl", "qwen2-vl-7b", ("data.mask=all",), "trl cannot learn with data.mask=all; set"),
     ],
 )
 def test_bad_input_is_told_in_one_line(

@@ -14,6 +14,7 @@ import torch
 from agents.finetune.batches import Collator, Order
 from agents.finetune.feedback import add_feedback
 from agents.finetune.model_files import open_model
+from agents.finetune.new_model import make_tokenizer
 from agents.finetune.settings import DataSettings
 from agents.finetune.tokens import FEEDBACK, EncodedChat, Encoder, check_lengths, expanded
 from agents.vlm.chat import Message, Picture
@@ -81,6 +82,24 @@ def test_the_released_mask_learns_all_that_is_said_after_the_first_feedback(
         found = made.encode(chat)
         assert (found.ids.tolist(), found.learnt.tolist()) == (ids, wanted)
     assert 0 < told < len(chats)
+
+
+def test_the_mask_all_learns_all_but_pictures_and_turns_that_are_not_marked(
+    models: Any, chats: tuple[Chat, ...]
+) -> None:
+    made = encoder(models(), mask="all")
+    pictures = 0
+    for chat in chats:
+        ids, refused = by_hand(made, chat, [not each for each in chat.train])
+        pictures += len(chat.pictures)
+        wanted = [
+            not each and one != made.tokenizer.convert_tokens_to_ids("<|image_pad|>")
+            for each, one in zip(refused, ids, strict=True)
+        ]
+        found = made.encode(chat)
+        assert (found.ids.tolist(), found.learnt.tolist()) == (ids, wanted)
+    assert pictures
+    assert not all(all(chat.train) for chat in chats)
 
 
 def test_what_is_learnt_is_what_is_read_at_play(
@@ -233,3 +252,11 @@ def test_the_tokens_of_a_covered_picture_learn_what_is_in_their_square(
     # All others are as without.
     rest = [k for k in range(len(labels)) if k - 1 not in places[:count]]
     assert [labels[k] for k in rest] == [batch["labels"][0].tolist()[k] for k in rest]
+
+
+def test_in_a_new_models_tokenizer_a_tag_and_a_role_are_a_token_each() -> None:
+    words = ["assistant\n<Planning>goal</Planning>\n<DecisionMaking>end</DecisionMaking>"] * 9
+    tokenizer = make_tokenizer([*words, "user\nsee Mug"], 400)
+    told = tokenizer.tokenize(words[0])
+    assert {"assistant", "<Planning>", "</Planning>", "<DecisionMaking>"} <= set(told)
+    assert tokenizer.decode(tokenizer(words[0])["input_ids"]) == words[0]

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from agents.configs import dump
-from agents.rl.config import config_file, config_names, load_config
+from agents.rl.config import config_file, config_names, how_learnt, load_config
 
 
 @pytest.fixture
@@ -87,3 +87,14 @@ def test_what_needs_the_warm_start(file: Path) -> None:
     with pytest.raises(ValueError, match="practice goes with the teacher searcher"):
         load_config(file, overrides)
     load_config(file, [*overrides, "env.subtasks=true"])
+
+
+def test_how_a_policy_was_trained_is_told_in_words() -> None:
+    config = load_config(config_file("all"))
+    assert how_learnt(config, 0) == (
+        "4,000 cloned episodes of the searcher, then 4 rounds of DAgger of 16,000 steps on state "
+        "and subtask"
+    )
+    assert how_learnt(load_config(config_file("qrdqn")), 60_032) == (
+        "60,032 steps of QR-DQN over legal actions on state"
+    )

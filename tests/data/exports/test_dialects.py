@@ -242,6 +242,18 @@ def test_unknown_and_damaged_dialects_say_what_there_is(tmp_path: Path) -> None:
             load_dialect(str(tmp_path))
 
 
+def test_a_dialect_may_state_only_how_it_differs_from_another(tmp_path: Path) -> None:
+    file = tmp_path / "en.yaml"
+    file.write_text("like: text\nthoughts: none\n")
+    whole, own = load_dialect("text").texts["en"], load_dialect(str(tmp_path)).texts["en"]
+    assert whole.thoughts == "notes"
+    assert own == whole.model_copy(update={"thoughts": "none"})
+    assert own == load_dialect("text-actions").texts["en"]
+    file.write_text("like: pirate\n")
+    with pytest.raises(ValueError, match=r"no en dialect 'pirate' to be like; choose one of: pap"):
+        load_dialect(str(tmp_path))
+
+
 def test_languages_of_a_dialect_have_the_same_entries() -> None:
     for name in dialect_names():
         texts = load_dialect(name).texts
