@@ -20,8 +20,16 @@ from pydantic import BaseModel, ConfigDict, model_validator
 
 from er_gym.data.chat import Chat, ChatTurn, Shown, joined
 from er_gym.data.knowledge import AROUND
+from er_gym.data.mentions import named_in
 from er_gym.data.notes import NoteWords, note
-from er_gym.data.scene_text import FrameWords, Perceived, SceneWords, scene_text
+from er_gym.data.scene_text import (
+    FrameWords,
+    NamedWords,
+    Perceived,
+    SceneWords,
+    named_text,
+    scene_text,
+)
 from er_gym.data.trajectory import (
     TAG_OF_KIND,
     THOUGHT_KINDS,
@@ -75,6 +83,8 @@ class DialectTexts(BaseModel):
             (:func:`er_gym.data.chat.told_by_user`).
         openers, closers: sentences, for ``speech``.
         scene: the words for what the agent perceives; None if nobody tells it.
+        named: the words for how far the things are that the instruction names, told after the
+            scene by the user; None if nobody tells it.
         scene_by: who tells it: ``user``: the user, in place of pictures; ``assistant``: the
             assistant, as its first thought about each new picture, before its note.
         notes: the words of ``notes``.
@@ -100,6 +110,7 @@ class DialectTexts(BaseModel):
     openers: dict[ThoughtKind, list[str]] = {}
     closers: list[str] = []
     scene: SceneWords | None = None
+    named: NamedWords | None = None
     scene_by: Literal["user", "assistant"] = "user"
     notes: NoteWords | None = None
     frames: FrameWords | None = None
@@ -133,6 +144,8 @@ class DialectTexts(BaseModel):
                 raise ValueError(f"give openers of {without}" if without else "give closers")
         if self.thoughts == "notes" and self.notes is None:
             raise ValueError("thoughts are notes, but there are no words for them; give notes")
+        if self.named is not None and self.sees != "text":
+            raise ValueError("named goes with a scene that the user tells; leave it out")
         if self.scene_by == "assistant" and (self.scene is None or self.thoughts != "notes"):
             raise ValueError("scene_by is assistant; give scene, and set thoughts to notes")
         return self
@@ -301,7 +314,10 @@ def user_turn(
         shown = _shown(pictures)
         text = getattr(texts, _text_for(last, [direction for direction, _ in shown]))
         return _with_pictures(text, [picture for _, picture in shown], values)
-    values["scene"] = told_scene(texts, now, before, last)
+    lines = [told_scene(texts, now, before, last)]
+    if texts.named is not None and now is not None:
+        lines.append(named_text(texts.named, named_in(instruction), now))
+    values["scene"] = "\n".join(filter(None, lines))
     around = [*now.views] if now else []
     told = _filled(getattr(texts, _text_for(last, around)).strip(), values)
     return (told.strip(),)

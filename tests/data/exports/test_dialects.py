@@ -10,8 +10,16 @@ import pytest
 from agents.vlm.parsing import parse
 from er_gym.data.chat import IMAGE, Chat, told_by_user, trained_prefixes
 from er_gym.data.collection import Collection
-from er_gym.data.dialects import dialect_names, load_dialect
-from er_gym.data.trajectory import TAG_OF_KIND, PictureRecord, ThoughtRecord, Trajectory, Turn
+from er_gym.data.dialects import LastDeed, dialect_names, load_dialect, user_turn
+from er_gym.data.scene_text import Perceived
+from er_gym.data.trajectory import (
+    TAG_OF_KIND,
+    PictureRecord,
+    SeenObject,
+    ThoughtRecord,
+    Trajectory,
+    Turn,
+)
 from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
 
@@ -263,3 +271,24 @@ def test_languages_of_a_dialect_have_the_same_entries() -> None:
             kind: len(each) for kind, each in texts["zh"].openers.items()
         }
         assert Action(verbs.NAVIGATE, "Fridge").verb in texts["zh"].actions
+
+
+def test_the_user_tells_how_far_the_things_are_that_the_instruction_names() -> None:
+    texts = load_dialect("text").texts["en"]
+    book = SeenObject(type="Book", side="left", distance=3.0, on="Shelf", open=False)
+    mug = SeenObject(type="Mug", side="left", distance=3.0)
+    pen = SeenObject(type="Pen", side="left", distance=0.5, on="Desk")
+    now = Perceived(
+        view=[pen, book], views={"behind": [mug]}, held="CD", interactable=["Pen", "Desk"]
+    )
+    asked = "Put the CD on the Desk, the Pen by the Book, and the Mug in the Drawer."
+    (told,) = user_turn(texts, asked, LastDeed("observe", True, ""), [], now, now)
+    assert str(told).splitlines()[-1] == (
+        "asked CD held, Desk near, Pen near, Book in view at Shelf, Mug in view, Drawer hidden"
+    )
+    (told,) = user_turn(texts, "Look around.", None, [], now, None)
+    assert "asked" not in str(told)
+    with pytest.raises(ValueError, match="named goes with a scene that the user tells"):
+        texts.model_validate(
+            {**load_dialect("sight").texts["en"].model_dump(), "named": texts.named}
+        )
