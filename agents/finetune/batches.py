@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -118,7 +119,28 @@ class Collator:
         if pictures and self.image_token is not None:
             batch |= self._pixels(pictures)
             batch["mm_token_type_ids"] = ids.eq(self.image_token).int()
+            self._learn_cells(chats, ids, labels, batch["image_grid_thw"])
         return batch
+
+    def _learn_cells(
+        self, chats: Sequence[EncodedChat], ids: torch.Tensor, labels: torch.Tensor, grids: Any
+    ) -> None:
+        """Add to the labels what covers each square of a picture, where that is known.
+
+        The label of a picture's token stands one place later, as those of all tokens do: the token
+        says what is in its square, not which token comes next.
+        """
+        assert self.image_token is not None
+        sides = iter((grids[:, 1:] // self.image_processor.merge_size).tolist())
+        for row, chat in enumerate(chats):
+            places = ids[row].eq(self.image_token).nonzero()[:, 0]
+            start = 0
+            for count, cells in zip_longest(chat.picture_tokens, chat.cells):
+                rows, columns = next(sides)
+                if cells is not None:
+                    said = torch.tensor(cells.on_grid(rows, columns))
+                    labels[row, places[start : start + count] + 1] = said
+                start += count
 
     def _pixels(self, pictures: Sequence[PictureRecord]) -> dict[str, Any]:
         """Pictures as patches, exactly as agents/vlm/clients/local.py makes them at play."""

@@ -14,8 +14,11 @@ from agents.finetune.settings import DataSettings
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import MANIFEST, Collection
 from er_gym.data.dialects import load_dialect
+from er_gym.data.frame_chat import frame_chat
+from er_gym.data.frames import FrameSet, is_frame_set
 from er_gym.data.sharegpt_files import open_sharegpt
 from er_gym.data.trajectory import PictureRecord
+from er_gym.tasks.splits import EVALUATION_SCENES
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,8 @@ def open_samples(paths: Sequence[Path], settings: DataSettings) -> Samples:
     """Open training data; pictures are only looked up, not read.
 
     Args:
-        paths: each is a collection of ``er-gym collect``, or a ShareGPT file with pictures.
+        paths: each is a collection of ``er-gym collect``, what ``er-gym data frames`` drew, or a
+            ShareGPT file with pictures.
         settings: which part of it, and how it is put into words.
 
     Raises:
@@ -99,6 +103,8 @@ def open_samples(paths: Sequence[Path], settings: DataSettings) -> Samples:
 def _opened(path: Path, settings: DataSettings) -> _Source:
     if (path / MANIFEST).is_file():
         return _of_collection(Collection.open(path), settings)
+    if is_frame_set(path):
+        return _of_frames(FrameSet.open(path), settings)
     if not path.exists():
         raise ValueError(
             f"{path} does not exist; give what er-gym collect wrote, or a ShareGPT file"
@@ -126,6 +132,22 @@ def _of_collection(collection: Collection, settings: DataSettings) -> _Source:
     language = settings.language or languages.most_common(1)[0][0]
     prompts = {"dialect": settings.dialect, "language": language}
     return _Source(chats, collection.path, prompts, collection.manifest.settings)
+
+
+def _of_frames(frames: FrameSet, settings: DataSettings) -> _Source:
+    kept = sorted({*frames.manifest.settings["scenes"]} & {*EVALUATION_SCENES})
+    if kept:
+        raise ValueError(
+            f"{frames.path} shows rooms that are kept for evaluation, such as {kept[0]}; learn "
+            "from frames of the suite train, and measure with these: python -m benchmarks.eyes"
+        )
+    dialect, language = load_dialect(settings.dialect), settings.language or "en"
+    try:
+        chats = tuple(frame_chat(dialect, each, language) for each in frames.frames())
+    except ValueError as error:
+        raise ValueError(f"{frames.path}: {error}; set data.dialect or data.language") from None
+    prompts = {"dialect": settings.dialect, "language": language}
+    return _Source(chats, frames.path, prompts, frames.manifest.settings)
 
 
 def _check_choice(paths: Sequence[Path], settings: DataSettings) -> None:

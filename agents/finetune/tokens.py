@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.finetune.settings import DataSettings, Mask
+from er_gym.data.cells import CoveredPicture, on_grid
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.train_mask import train_mask
 from er_gym.data.trajectory import PictureRecord
@@ -19,6 +20,23 @@ from er_gym.data.trajectory import PictureRecord
 FEEDBACK = "<|feedback|>"
 """Stands before the environment's answer to an action that could not be done; a token."""
 _PROBE = ("USER1", "REPLY1", "USER2", "REPLY2")
+
+
+@dataclass(frozen=True)
+class EncodedCells:
+    """What covers a picture, in tokens.
+
+    Attributes:
+        cells: as :class:`er_gym.data.cells.CoveredPicture` has them.
+        tokens: the token for each thing that covers it: the first of its name.
+    """
+
+    cells: str
+    tokens: tuple[int, ...]
+
+    def on_grid(self, rows: int, columns: int) -> list[int]:
+        """The token for each square of the grid of a picture's tokens, row by row."""
+        return [self.tokens[each] for each in on_grid(self.cells, rows, columns)]
 
 
 @dataclass(frozen=True)
@@ -31,6 +49,8 @@ class EncodedChat:
         learnt: (tokens,) bool; whether a token gets loss.
         pictures: in order.
         picture_tokens: for each picture, how many tokens it will be.
+        cells: for each picture what covers it, which is learnt at its tokens; None if that is not
+            known.
     """
 
     id: str
@@ -38,6 +58,7 @@ class EncodedChat:
     learnt: NDArray[np.bool_]
     pictures: tuple[PictureRecord, ...]
     picture_tokens: tuple[int, ...]
+    cells: tuple[EncodedCells | None, ...] = ()
 
     @property
     def length(self) -> int:
@@ -47,7 +68,8 @@ class EncodedChat:
     @property
     def learnt_tokens(self) -> int:
         """How many tokens get loss."""
-        return int(self.learnt.sum())
+        covered = zip(self.picture_tokens, self.cells, strict=False)
+        return int(self.learnt.sum()) + sum(count for count, cells in covered if cells)
 
 
 class Encoder:
@@ -112,7 +134,19 @@ class Encoder:
             raise ValueError(f"{chat.id}: {error}") from None
         counts = tuple(self.picture_tokens(each) for each in chat.pictures)
         return EncodedChat(
-            chat.id, np.array(ids, np.int32), np.array(learnt, bool), chat.pictures, counts
+            chat.id,
+            np.array(ids, np.int32),
+            np.array(learnt, bool),
+            chat.pictures,
+            counts,
+            tuple(self._cells(each) for each in chat.pictures),
+        )
+
+    def _cells(self, picture: PictureRecord) -> EncodedCells | None:
+        if not isinstance(picture, CoveredPicture):
+            return None
+        return EncodedCells(
+            picture.cells, tuple(self.tokens(f" {each}")[0] for each in picture.covers)
         )
 
     def picture_tokens(self, picture: PictureRecord) -> int:

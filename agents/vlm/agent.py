@@ -11,7 +11,7 @@ from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture, Reply, mod
 from agents.vlm.matching import Matcher
 from agents.vlm.parsing import ParsedReply, parse
 from agents.vlm.parsing.vocabulary import DECISION
-from agents.vlm.pictures import encode
+from agents.vlm.pictures import encode, noise_like
 from agents.vlm.prompt_set import Decide, LastAction, PromptSet, TurnContext, interleave_pictures
 from agents.vlm.record import (
     ConversationRecord,
@@ -192,8 +192,19 @@ class VLMAgent:
         pictures = {name: encode(each, self._settings.pictures) for name, each in shown.items()}
         before, self._last_picture = self._last_picture, [*pictures.values()][-1].data
         if not self._prompts.as_recorded or after is None or len(pictures) > 1:
-            return pictures
-        return pictures if shows_anew(after.success, self._last_picture, before) else {}
+            return self._as_shown(pictures)
+        anew = shows_anew(after.success, self._last_picture, before)
+        return self._as_shown(pictures) if anew else {}
+
+    def _as_shown(self, pictures: Mapping[str, Picture]) -> dict[str, Picture]:
+        """The pictures, or noise in their place."""
+        settings = self._settings.pictures
+        if not settings.noise:
+            return dict(pictures)
+        return {
+            direction: noise_like(picture, settings, (self._seed, len(self._rounds), place))
+            for place, (direction, picture) in enumerate(pictures.items())
+        }
 
     def _history(self) -> list[Message]:
         """The messages of the next request."""

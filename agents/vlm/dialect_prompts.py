@@ -87,7 +87,11 @@ def dialect_prompts(dialect: str, language: Language) -> DialectPrompts:
     """
     loaded = load_dialect(dialect)
     texts = loaded.texts_in(language)
-    digest = hashlib.sha256(texts.model_dump_json().encode())
+    # Not what a prompt does not depend on, nor what older versions did not have, so that older
+    # runs can be continued.
+    left_out = {"frames", *(("scene_by",) if texts.scene_by == "user" else ())}
+    left_out |= {"named"} if texts.named is None else set()
+    digest = hashlib.sha256(texts.model_dump_json(exclude=left_out).encode())
     if verbs.ADDED:
         digest.update(repr(verbs.ADDED).encode())
     return DialectPrompts(

@@ -41,8 +41,8 @@ _NOT_COMPARED: Mapping[str, Any] = {
 """Settings that change when and where a model answers, but not its replies. The digest stands for
 the prompts."""
 
-_ADDED = ("model_min_pixels", "model_max_pixels")
-"""Settings of pictures that older versions did not have."""
+_ADDED = {"model_min_pixels": None, "model_max_pixels": None, "noise": False}
+"""Settings of pictures that older versions did not have, with what those did."""
 
 
 def load_settings(
@@ -132,7 +132,7 @@ class AgentFactory:
 def comparable_settings(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:
     """The settings that decide an agent's replies. Two runs are comparable if these are equal."""
     kept = settings.model_dump(mode="json", exclude=dict(_NOT_COMPARED))
-    for name in _ADDED:  # so that older runs, without these entries, can be continued
-        if kept["pictures"][name] is None:
+    for name, before in _ADDED.items():  # so that older runs, without them, can be continued
+        if kept["pictures"][name] is before:
             del kept["pictures"][name]
     return {**without_secrets(settings, kept), "prompts_digest": prompts_digest}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from io import BytesIO
 from math import ceil, floor, sqrt
 
@@ -66,6 +67,21 @@ def encode(rgb: NDArray[np.uint8], settings: Pictures) -> Picture:
         )
     height, width, _ = rgb.shape
     size = fitted(width, height, settings)
+    data = encode_picture(rgb, size, form=settings.format, quality=settings.quality)
+    return Picture(data, f"image/{settings.format}", *size)
+
+
+def noise_like(picture: Picture, settings: Pictures, seed: Sequence[int]) -> Picture:
+    """A picture of noise of the size of another: each value is drawn on its own.
+
+    Args:
+        picture: the other.
+        settings: the file format.
+        seed: equal seeds give equal noise.
+    """
+    shape = picture.height, picture.width, 3
+    rgb = np.random.default_rng(seed).integers(0, 256, shape, dtype=np.uint8)
+    size = picture.width, picture.height
     data = encode_picture(rgb, size, form=settings.format, quality=settings.quality)
     return Picture(data, f"image/{settings.format}", *size)
 

@@ -43,6 +43,8 @@ class Pictures(_Settings):
             cache.
         views: whether the three pictures that ``observe`` takes are sent.
         width, height: the size of rendered frames in pixels; None for the suite's own size.
+        noise: whether the model is shown noise in place of every picture: a blind copy of it, by
+            which one can tell what its eyes are worth.
     """
 
     format: Literal["jpeg", "png"] = "jpeg"
@@ -55,6 +57,7 @@ class Pictures(_Settings):
     views: bool = True
     width: Pixels | None = None
     height: Pixels | None = None
+    noise: bool = False
 
     @model_validator(mode="after")
     def _bounds_in_order(self) -> Pictures:

@@ -21,7 +21,15 @@ from benchmarks.cli.errors import (
     print_problem,
     report_set_aside,
 )
-from benchmarks.cli.options import Place, Words, named, seed_option, workers_option
+from benchmarks.cli.options import (
+    Place,
+    Words,
+    given_size,
+    named,
+    seed_option,
+    size_options,
+    workers_option,
+)
 from benchmarks.cli.terminal import stdout, terminal
 
 if TYPE_CHECKING:
@@ -87,6 +95,7 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
     is_flag=True,
     help="Record what is seen in words alone, for models that read: many times as fast.",
 )
+@size_options
 @click.option(
     "--correct",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
@@ -117,6 +126,8 @@ def collect(
     thoughts: str,
     language: str,
     no_pictures: bool,
+    width: int | None,
+    height: int | None,
     correct: Path | None,
     allow_empty: bool,
     workers: int,
@@ -170,6 +181,7 @@ def collect(
             asked = selection.collected
         else:
             source, env = source_of(suite, tasks_file, correct)
+        env |= given_size(width, height)
         if instances is not None:
             if selection is not None or correct is not None:
                 raise BadInput("--instances is that of the run; leave it out")

@@ -1,4 +1,4 @@
-"""``er-gym data``: count trajectories, verify them, look at them, export and import them."""
+"""``er-gym data``: count, verify, look at, export and import trajectories; draw frames."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.data_export import export
+from benchmarks.cli.data_frames import frames
 from benchmarks.cli.data_import import import_
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import Place, force_option, workers_option
@@ -31,10 +32,11 @@ _collection = click.argument("collection", metavar="DIR", type=_directory)
 
 @click.group()
 def data() -> None:
-    """Trajectories that er-gym collect has written: count, verify, show, export."""
+    """Trajectories that er-gym collect has written: count, verify, show, export; and frames."""
 
 
 data.add_command(export)
+data.add_command(frames)
 data.add_command(import_)
 
 

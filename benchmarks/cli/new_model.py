@@ -20,7 +20,7 @@ from benchmarks.cli.terminal import echo
     multiple=True,
     required=True,
     type=Place(file_okay=False, path_type=Path),
-    help="A collection from which the tokenizer learns; may be repeated.",
+    help="A collection, or frames, from which the tokenizer learns; may be repeated.",
 )
 @click.option(
     "--dialect",
@@ -53,7 +53,7 @@ def new_model(
     """Make a small model with random weights, to be taught from nothing.
 
     ARCHITECTURE is a YAML file, or the name of one of er-gym's own. The tokenizer is learnt from
-    the conversations of collections.
+    the conversations of collections and frames.
     """
     from agents.finetune.architecture import load_architecture
 
@@ -82,12 +82,20 @@ def _texts(collections: tuple[Path, ...], dialect: str) -> Iterator[str]:
     """
     from er_gym.data.collection import Collection
     from er_gym.data.dialects import load_dialect
+    from er_gym.data.frame_chat import frame_chat
+    from er_gym.data.frames import FrameSet, is_frame_set
 
     words = load_dialect(dialect)
-    opened = [Collection.open(path) for path in collections]
-    return (
-        f"{turn.role}\n{turn.text}"
-        for collection in opened
-        for trajectory in collection.trajectories()
-        for turn in words.chat(trajectory).turns
+    opened = [
+        FrameSet.open(path) if is_frame_set(path) else Collection.open(path) for path in collections
+    ]
+    chats = (
+        chat
+        for each in opened
+        for chat in (
+            (frame_chat(words, frame) for frame in each.frames())
+            if isinstance(each, FrameSet)
+            else (words.chat(trajectory) for trajectory in each.trajectories())
+        )
     )
+    return (f"{turn.role}\n{turn.text}" for chat in chats for turn in chat.turns)

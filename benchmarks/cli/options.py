@@ -83,6 +83,22 @@ workers_option = click.option(
     help="The number of processes.  [default: one for each processor]",
 )
 
+
+def size_options(command: Any) -> Any:
+    """``--width`` and ``--height``, of pictures; None for the suite's own."""
+    for name in ("--height", "--width"):
+        command = click.option(
+            name, type=click.IntRange(16, 4096), help="Of pictures, pixels.  [default: the suite's]"
+        )(command)
+    return command
+
+
+def given_size(width: int | None, height: int | None) -> dict[str, int]:
+    """The environment's arguments that these options give."""
+    size = {"width": width, "height": height}
+    return {name: pixels for name, pixels in size.items() if pixels is not None}
+
+
 force_option = click.option(
     "--force", is_flag=True, help="Also replace files that er-gym did not write."
 )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.ladder.paper_rungs import PAPER
 from benchmarks.ladder.result import RungResult
+from benchmarks.ladder.settings import CONTROLS
 from benchmarks.scoring.drawing import GRID, INK, MUTED, canvas, note
 
 if TYPE_CHECKING:
@@ -37,8 +38,20 @@ def draw_ladder(results: Sequence[RungResult], heading: str) -> Figure:
     for x, model in paper:
         at = (x + 0.3, model.success)
         note(axes, f"{model.success:.0f}", at, (-3, 3), ha="right", va="bottom")
-    for rate in dict.fromkeys(each.rung.faults for each in results):
-        line = [each for each in results if each.rung.faults == rate]
+    ladder = [each for each in results if each.rung.name not in CONTROLS]
+    lines = [
+        (
+            [each for each in ladder if each.rung.faults == rate],
+            f"this ladder, {100 * rate:g} % of actions fail" if rate else "this ladder",
+            _FAULTS if rate else _OURS,
+            "-",
+        )
+        for rate in dict.fromkeys(each.rung.faults for each in ladder)
+    ]
+    if len(ladder) < len(results):
+        controls = [each for each in results if each.rung.name in CONTROLS]
+        lines.append((controls, "played beside it", MUTED, "none"))
+    for line, label, colour, style in lines:
         rates = [each.summary["success"] for each in line]
         lengths = [
             [100 * (each.mean - (each.low or 0.0)) for each in rates],
@@ -48,11 +61,12 @@ def draw_ladder(results: Sequence[RungResult], heading: str) -> Figure:
             [place[each.rung.name] for each in line],
             [100 * each.mean for each in rates],
             yerr=lengths,
-            color=_FAULTS if rate else _OURS,
+            color=colour,
             marker="o",
             capsize=4,
             linewidth=2,
-            label=f"this ladder, {100 * rate:g} % of actions fail" if rate else "this ladder",
+            linestyle=style,
+            label=label,
         )
         for each, mean in zip(line, rates, strict=True):
             point = (place[each.rung.name], 100 * mean.mean)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from agents.finetune.settings import STAGES, Stage
-from benchmarks.ladder.settings import LadderSettings, StageSettings
+from benchmarks.ladder.settings import CONTROLS, Control, LadderSettings, StageSettings
 from benchmarks.plan.commands import Commands
 from benchmarks.plan.phase import Phase
 from benchmarks.plan.run import Plan
 
 BASE = "base"
+_NEW, _FRAMES = "new-model", "data/frames"
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class Rung:
     """A model that is measured.
 
     Attributes:
-        name: ``base``, or the stage that made it.
+        name: ``base``, the stage that made it, or a control.
         faults: the rate of faults.
         run: the run directory of its evaluation, relative to the ladder's.
     """
@@ -50,7 +51,9 @@ def rungs(settings: LadderSettings) -> list[Rung]:
             for name in settings.stages
             if name != STAGES[0]
         ]
-    return found
+    return found + [
+        Rung(name, 0.0, _evaluation(name, 0.0)) for name in settings.evaluation.controls
+    ]
 
 
 @dataclass(frozen=True)
@@ -62,8 +65,11 @@ class _Ladder:
 
     def phases(self) -> Iterator[Phase]:
         settings, make = self.settings, self.make
-        model = settings.base.model or make.at(BASE)
+        eyes = settings.base.eyes
+        model = make.at(BASE) if eyes else settings.base.model or make.at(BASE)
         learnt_before: list[str] = []
+        if eyes is not None:
+            yield make.frames("base/frames", _FRAMES, eyes.frames)
         before = BASE
         for stage, row in settings.stages.items():
             data = []
@@ -74,7 +80,21 @@ class _Ladder:
             if before == BASE:
                 if architecture := settings.base.architecture:
                     yield make.new_model(
-                        "base/new-model", BASE, architecture, data, settings.dialect, settings.seed
+                        "base/new-model",
+                        _NEW if eyes else BASE,
+                        architecture,
+                        [*data, *([_FRAMES] if eyes else [])],
+                        settings.dialect,
+                        settings.seed,
+                    )
+                if eyes is not None:
+                    yield make.finetune(
+                        "base/eyes",
+                        BASE,
+                        eyes.finetune,
+                        settings.base.model or make.at(_NEW),
+                        [_FRAMES],
+                        *self._finetuning(eyes.set),
                     )
                 if settings.evaluation.base:
                     yield self._evaluate(BASE, model, 0.0)
@@ -84,10 +104,7 @@ class _Ladder:
                 row.finetune,
                 model,
                 [*learnt_before * row.again, *data],
-                f"data.dialect={settings.dialect}",
-                f"training.seed={settings.seed}",
-                "data.parts=[]",
-                *row.set,
+                *self._finetuning(row.set),
             )
             learnt_before += data
             model, before = make.at(_stage(stage)), stage
@@ -95,6 +112,19 @@ class _Ladder:
             if stage != STAGES[0]:
                 for rate in settings.evaluation.faults:
                     yield self._evaluate(stage, model, rate)
+        for control in settings.evaluation.controls:
+            yield self._control(control, model)
+
+    def _finetuning(self, changes: Sequence[str]) -> tuple[str, ...]:
+        """The overrides of every fine-tuning."""
+        settings = self.settings
+        return (
+            f"data.dialect={settings.dialect}",
+            *((f"data.language={settings.language}",) if settings.base.eyes else ()),
+            f"training.seed={settings.seed}",
+            "data.parts=[]",
+            *changes,
+        )
 
     def _data(self, stage: Stage, row: StageSettings, model: str) -> Iterator[Phase]:
         make, number = self.make, _stage(stage)
@@ -131,12 +161,22 @@ class _Ladder:
         evaluation = self.settings.evaluation
         out = _evaluation(name, faults)
         play = list(evaluation.set)
-        if name == BASE and self.settings.base.architecture:  # no stage has told it how to converse
+        base = self.settings.base
+        if name == BASE and base.architecture and not base.eyes:
+            # No stage has told it how to converse.
             sees = () if self.settings.pictures else ("sees=text",)
             play = [f"prompts.dialect={self.settings.dialect}", *sees, *play]
         return self.make.bench_model(
             out, out, model, evaluation.suite, evaluation.limit, *play, faults=faults
         )
+
+    def _control(self, name: Control, model: str) -> Phase:
+        evaluation, out = self.settings.evaluation, _evaluation(name, 0.0)
+        suite, limit = evaluation.suite, evaluation.limit
+        if name == "blind":
+            noise = (*evaluation.set, "pictures.noise=true")
+            return self.make.bench_model(out, out, model, suite, limit, *noise)
+        return self.make.bench(out, out, name, suite, limit)
 
 
 def _stage(stage: Stage) -> str:
@@ -144,5 +184,9 @@ def _stage(stage: Stage) -> str:
 
 
 def _evaluation(name: str, faults: float) -> str:
-    number = STAGES.index(name) + 1 if name in STAGES else 0
+    number = 0
+    if name in STAGES:
+        number = STAGES.index(name) + 1
+    elif name in CONTROLS:
+        number = len(STAGES) + 1
     return f"evaluations/{number}-{name}" + (f"-faults-{faults:g}" if faults else "")

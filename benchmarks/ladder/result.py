@@ -10,7 +10,7 @@ from typing import Any
 
 from benchmarks.ladder.paper_rungs import PAPER
 from benchmarks.ladder.phases import Rung, rungs
-from benchmarks.ladder.settings import LadderSettings
+from benchmarks.ladder.settings import CONTROLS, LadderSettings
 from benchmarks.scoring.metrics import Estimate, Score, Summary, summarise, summarise_by
 from benchmarks.scoring.paired import paired_change, paired_difference
 from benchmarks.scoring.report import by_group, load_run
@@ -37,6 +37,7 @@ class RungResult:
         by_key_actions: success by the number of key actions.
         tokens: tokens of the model's replies in an episode; None if there are no conversations.
         gain: the difference in success to the rung before, paired over tasks; None for the first.
+            Of a control, that to the last rung.
         change: with faults, the difference in success to the same rung without them, paired over
             tasks; None without.
         spared: how much smaller a loss that is than the rung's before; None for the first.
@@ -92,7 +93,8 @@ def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
                 spared=spared,
             )
         )
-        before[rung.faults] = scores
+        if rung.name not in CONTROLS:
+            before[rung.faults] = scores
     return found
 
 
@@ -150,7 +152,8 @@ def result_tables(results: Sequence[RungResult]) -> list[Table]:
             rows=tuple(rows),
             text_columns=1,
             notes=(
-                "gain: in success over the rung above it, paired over tasks",
+                "gain: in success over the rung above it, paired over tasks; of random and blind, "
+                "over the last rung",
                 "SE: search efficiency; TC: task completeness; repeated: the share of navigations "
                 "to a type visited before; tokens: of the replies in an episode",
                 "paper: arXiv 2503.21696, other tasks, in Unity's rooms",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, field_validator, model_validator
 
@@ -15,17 +15,38 @@ KIND = "ladder"
 _WHAT = "ladder"
 
 
+Control: TypeAlias = Literal["random", "blind"]
+"""Who plays beside the ladder: actions at random, or the last model with noise for pictures."""
+CONTROLS: tuple[Control, ...] = ("random", "blind")
+
+
+class Eyes(StrictSettings):
+    """What the base model learns to see by, before the first stage.
+
+    Attributes:
+        frames: how many are drawn of the suite's rooms (:mod:`er_gym.data.frames`).
+        finetune: a fine-tuning configuration.
+        set: overrides of it.
+    """
+
+    frames: Positive
+    finetune: str
+    set: tuple[str, ...] = ()
+
+
 class Base(StrictSettings):
-    """The model at the foot of the ladder; one of the two.
+    """The model at the foot of the ladder; a model or an architecture.
 
     Attributes:
         model: a directory, or a name on the Hugging Face hub.
         architecture: a new model of this architecture (:mod:`agents.finetune.architecture`); its
-            tokenizer is learnt from the first stage's conversations.
+            tokenizer is learnt from the first stage's conversations, and from the frames.
+        eyes: how it is taught to see first; None for not at all.
     """
 
     model: str = ""
     architecture: str = ""
+    eyes: Eyes | None = None
 
     @model_validator(mode="after")
     def _one(self) -> Base:
@@ -85,6 +106,7 @@ class Evaluation(StrictSettings):
         limit: how many tasks, spread over the suite; None for all.
         faults: fault rates of further evaluations, after the stages from the second on.
         base: whether the model at the foot is measured, too.
+        controls: who else plays the same tasks, at the end.
         set: overrides of the agent's settings.
     """
 
@@ -92,6 +114,7 @@ class Evaluation(StrictSettings):
     limit: Positive | None = None
     faults: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
     base: bool = True
+    controls: tuple[Control, ...] = ()
     set: tuple[str, ...] = ()
 
 
@@ -117,6 +140,14 @@ class LadderSettings(PlaySettings):
                 f"the stages are {', '.join(stages)}; give the first ones of {', '.join(STAGES)}"
             )
         return {name: stages[name] for name in first}
+
+    @model_validator(mode="after")
+    def _pictures_for_eyes(self) -> LadderSettings:
+        if "blind" in self.evaluation.controls and not self.pictures:
+            raise ValueError("the control blind needs pictures; leave it out")
+        if self.base.eyes is not None and not self.pictures:
+            raise ValueError("base.eyes needs pictures; set pictures to true, or leave out eyes")
+        return self
 
     @model_validator(mode="after")
     def _something_to_learn(self) -> LadderSettings:

@@ -38,6 +38,7 @@ class Commands:
             *("collect", "--suite", self.settings.suite, "--recipe", collected.recipe),
             *("--parts", ",".join(collected.parts)),
             *self._instances,
+            *self._types,
             *self.collecting(collected.limit),
         )
 
@@ -71,8 +72,18 @@ class Commands:
         return (
             *("--language", settings.language, "--seed", str(settings.seed)),
             *("--workers", str(settings.workers)),
-            *(() if settings.pictures else ("--no-pictures",)),
+            *(self._size if settings.pictures else ("--no-pictures",)),
             *(() if limit is None else ("--limit", str(limit))),
+        )
+
+    def frames(self, name: str, out: str, number: int) -> Phase:
+        """Draws pictures of the suite's rooms, with what is in view."""
+        return self.phase(
+            name,
+            out,
+            *("data", "frames", "--suite", self.settings.suite, "--frames", str(number)),
+            *self._size,
+            *("--seed", str(self.settings.seed), "--workers", str(self.settings.workers)),
         )
 
     def new_model(
@@ -122,13 +133,37 @@ class Commands:
             *_overrides(*changes),
         )
 
+    def bench(self, name: str, out: str, agent: str, suite: str, limit: int | None) -> Phase:
+        """Lets an agent play that is no model."""
+        return self.phase(
+            name,
+            out,
+            *self._bench(agent, suite, limit),
+            *("--workers", str(self.settings.workers)),
+        )
+
     def _bench(self, agent: str, suite: str, limit: int | None) -> tuple[str, ...]:
         return (
             *("bench", "--suite", suite, "--agent", agent),
             *(() if limit is None else ("--limit", str(limit), "--spread")),
             *self._instances,
+            *self._types,
             *("--seed", str(self.settings.seed)),
         )
+
+    @property
+    def _size(self) -> tuple[str, ...]:
+        sizes = {"--width": self.settings.width, "--height": self.settings.height}
+        return tuple(
+            each
+            for name, pixels in sizes.items()
+            if pixels is not None
+            for each in (name, str(pixels))
+        )
+
+    @property
+    def _types(self) -> tuple[str, ...]:
+        return ("--types", ",".join(self.settings.types)) if self.settings.types else ()
 
     @property
     def _instances(self) -> tuple[str, ...]:

@@ -57,6 +57,8 @@ class PlaySettings(StrictSettings):
             choice.
         dialect, language: of the conversations.
         pictures: whether trajectories are recorded with pictures; a model that reads needs none.
+        width, height: of these pictures, pixels; None for the suite's own.
+        types: the task types of the training and the evaluation; empty for all.
         seed: of everything that is drawn.
         workers: processes that play.
         concurrency: conversations at once.
@@ -69,6 +71,9 @@ class PlaySettings(StrictSettings):
     dialect: str = "paper"
     language: Language = "en"
     pictures: bool = True
+    width: Positive | None = None
+    height: Positive | None = None
+    types: tuple[str, ...] = ()
     seed: int = Field(0, ge=0, lt=2**32)
     workers: Positive = 2
     concurrency: Positive = 8

@@ -20,8 +20,16 @@ from pydantic import BaseModel, ConfigDict, model_validator
 
 from er_gym.data.chat import Chat, ChatTurn, Shown, joined
 from er_gym.data.knowledge import AROUND
+from er_gym.data.mentions import named_in
 from er_gym.data.notes import NoteWords, note
-from er_gym.data.scene_text import Perceived, SceneWords, scene_text
+from er_gym.data.scene_text import (
+    FrameWords,
+    NamedWords,
+    Perceived,
+    SceneWords,
+    named_text,
+    scene_text,
+)
 from er_gym.data.trajectory import (
     TAG_OF_KIND,
     THOUGHT_KINDS,
@@ -34,6 +42,8 @@ from er_gym.tasks.files import validated
 from er_gym.tasks.reading import read_yaml
 from er_gym.tasks.suites import config_directory
 
+SEEN: ThoughtKind = "analysis"
+"""The kind of thought by which an assistant tells what it sees."""
 _AROUND_IN_ORDER = ("right", "behind", "left")
 _SLOT = re.compile(r"\{(picture|task|actions|action|feedback|scene)\}")
 _FORBIDDEN = re.compile(
@@ -49,7 +59,8 @@ class DialectTexts(BaseModel):
 
     ``{picture}`` is the place of a picture, ``{task}`` the instruction, ``{actions}`` the actions,
     ``{action}`` the last action and ``{feedback}`` the environment's answer to it. ``{scene}`` is
-    what the agent perceives, in words; a dialect that has it shows no pictures.
+    what the agent perceives, in words, in a dialect in which the user tells that in place of
+    pictures.
 
     Attributes:
         thoughts: ``tags``: each thought in its tag; ``speech``: one running text, each thought
@@ -71,8 +82,13 @@ class DialectTexts(BaseModel):
         reply_told: how the user tells a reply of the assistant, ``{reply}``
             (:func:`er_gym.data.chat.told_by_user`).
         openers, closers: sentences, for ``speech``.
-        scene: the words for ``{scene}``; None for a dialect with pictures.
+        scene: the words for what the agent perceives; None if nobody tells it.
+        named: the words for how far the things are that the instruction names, told after the
+            scene by the user; None if nobody tells it.
+        scene_by: who tells it: ``user``: the user, in place of pictures; ``assistant``: the
+            assistant, as its first thought about each new picture, before its note.
         notes: the words of ``notes``.
+        frames: the words for questions about single pictures; None for none.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -94,19 +110,22 @@ class DialectTexts(BaseModel):
     openers: dict[ThoughtKind, list[str]] = {}
     closers: list[str] = []
     scene: SceneWords | None = None
+    named: NamedWords | None = None
+    scene_by: Literal["user", "assistant"] = "user"
     notes: NoteWords | None = None
+    frames: FrameWords | None = None
 
     @property
     def sees(self) -> Literal["pictures", "text"]:
         """What the user's turns show."""
-        return "pictures" if self.scene is None else "text"
+        return "text" if self.scene is not None and self.scene_by == "user" else "pictures"
 
     @model_validator(mode="after")
     def _fits(self) -> DialectTexts:
         for name, pictures in _PICTURES.items():
             text = getattr(self, name)
             slots = {"picture": pictures, "scene": 0}
-            if self.scene is not None:
+            if self.sees == "text":
                 slots = {"picture": 0, "scene": 1}
             for slot, count in slots.items():
                 found = text.count(f"{{{slot}}}")
@@ -125,6 +144,10 @@ class DialectTexts(BaseModel):
                 raise ValueError(f"give openers of {without}" if without else "give closers")
         if self.thoughts == "notes" and self.notes is None:
             raise ValueError("thoughts are notes, but there are no words for them; give notes")
+        if self.named is not None and self.sees != "text":
+            raise ValueError("named goes with a scene that the user tells; leave it out")
+        if self.scene_by == "assistant" and (self.scene is None or self.thoughts != "notes"):
+            raise ValueError("scene_by is assistant; give scene, and set thoughts to notes")
         return self
 
 
@@ -185,7 +208,9 @@ class Dialect:
             pictures = [(each.direction, each) for each in turn.pictures]
             told = user_turn(texts, trajectory.instruction, last, pictures, now, before)
             turns.append(ChatTurn("user", told))
-            turns.append(ChatTurn("assistant", (_reply(texts, trajectory, index),), turn.train))
+            seen = _seen(texts, trajectory, index, now, before, last)
+            reply = _reply(texts, trajectory, index, seen)
+            turns.append(ChatTurn("assistant", (reply,), turn.train))
             before, last = now, LastDeed(str(turn.action), turn.success, turn.feedback)
         return Chat(trajectory.id, tuple(turns), texts.reply_told)
 
@@ -277,7 +302,7 @@ def user_turn(
         last: the last action; None in the first turn.
         pictures: the pictures of this turn with their directions (:func:`shows_anew`).
         now: what the agent perceives, and ``before``: what it perceived before its last action, for
-            dialects without pictures. ``now`` is None if nothing was done.
+            dialects in which the user tells it. ``now`` is None if nothing was done.
     """
     values = {
         "task": plain(instruction),
@@ -285,19 +310,34 @@ def user_turn(
         "action": plain(last.action) if last else "",
         "feedback": plain(last.feedback) if last else "",
     }
-    if texts.scene is None:
+    if texts.sees == "pictures":
         shown = _shown(pictures)
         text = getattr(texts, _text_for(last, [direction for direction, _ in shown]))
         return _with_pictures(text, [picture for _, picture in shown], values)
-    values["scene"] = ""
-    if now is not None:
-        stayed = last is not None and last.on_the_spot
-        values["scene"] = scene_text(texts.scene, now, before, stayed=stayed)
-    if last is not None and last.success:
-        values["scene"] = values["scene"] or texts.scene.same
+    lines = [told_scene(texts, now, before, last)]
+    if texts.named is not None and now is not None:
+        lines.append(named_text(texts.named, named_in(instruction), now))
+    values["scene"] = "\n".join(filter(None, lines))
     around = [*now.views] if now else []
     told = _filled(getattr(texts, _text_for(last, around)).strip(), values)
     return (told.strip(),)
+
+
+def told_scene(
+    texts: DialectTexts, now: Perceived | None, before: Perceived | None, last: LastDeed | None
+) -> str:
+    """What the agent perceives, in the dialect's words; ``""`` if there is nothing to tell.
+
+    Args:
+        texts: the dialect's, with words for scenes.
+        now, before, last: as :func:`user_turn` takes them.
+    """
+    assert texts.scene is not None
+    told = ""
+    if now is not None:
+        stayed = last is not None and last.on_the_spot
+        told = scene_text(texts.scene, now, before, stayed=stayed)
+    return told or (texts.scene.same if last is not None and last.success else "")
 
 
 def shows_anew(last_success: bool, picture: bytes, last_picture: bytes) -> bool:
@@ -376,16 +416,37 @@ def plain(text: str) -> str:
 # -- the assistant's turns -------------------------------------------------------------------------
 
 
-def _reply(texts: DialectTexts, trajectory: Trajectory, index: int) -> str:
-    """What the assistant says at a turn: thoughts and decision."""
+def in_tag(kind: ThoughtKind, text: str) -> str:
+    """A thought in its tag."""
+    return f"<{TAG_OF_KIND[kind]}>{text}</{TAG_OF_KIND[kind]}>"
+
+
+def _seen(
+    texts: DialectTexts,
+    trajectory: Trajectory,
+    index: int,
+    now: Perceived,
+    before: Perceived | None,
+    last: LastDeed | None,
+) -> str:
+    """What the assistant says first of what it is shown, in a dialect in which it tells that."""
+    shown = bool(trajectory.turns[index].pictures)
+    if texts.scene_by == "user" or not shown or _thinks_itself(trajectory):
+        return ""
+    return told_scene(texts, now, before, last)
+
+
+def _reply(texts: DialectTexts, trajectory: Trajectory, index: int, seen: str) -> str:
+    """What the assistant says at a turn: what it sees, if it tells that, thoughts and decision."""
     turn = trajectory.turns[index]
     decision = f"<DecisionMaking>{turn.action}</DecisionMaking>"
     thoughts = [(each.kind, plain(each.text).strip()) for each in turn.thoughts]
     if texts.thoughts == "notes" and texts.notes is not None and not _thinks_itself(trajectory):
         thoughts = [note(texts.notes, trajectory, index)]
+    if seen:
+        thoughts.insert(0, (SEEN, seen))
     if texts.thoughts in ("tags", "notes"):
-        tagged = (f"<{TAG_OF_KIND[kind]}>{text}</{TAG_OF_KIND[kind]}>" for kind, text in thoughts)
-        return "\n".join((*tagged, decision))
+        return "\n".join((*(in_tag(kind, text) for kind, text in thoughts), decision))
     if texts.thoughts == "none" or not thoughts:
         return decision
     key = f"{trajectory.id}/{index}"

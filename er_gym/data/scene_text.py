@@ -80,6 +80,49 @@ class SceneWords(BaseModel):
     off: str
 
 
+class NamedWords(BaseModel):
+    """The words for how far the things are that the instruction names, told after the scene.
+
+    A small model learns slowly to look a name up in a long list, and quickly to repeat what was
+    said of it last.
+
+    Attributes:
+        told: tells them, ``{things}``.
+        held, near, view, hidden: in the hand, within reach, in view, and not in view.
+        at: told of a thing in view that lies in or on another, ``{place}``.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    told: str
+    held: str
+    near: str
+    view: str
+    hidden: str
+    at: str
+
+
+class FrameWords(BaseModel):
+    """The words for questions about a frame and their answers (:mod:`er_gym.data.frame_chat`).
+
+    Attributes:
+        look: asks for all that is in view. ``where``: asks for one type, ``{thing}``.
+        found: answers that, ``{thing}`` as the scene tells it, and ``{side}``; ``unseen``: where
+            none is in view, ``{thing}``.
+        left, ahead, right: sides.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    look: str
+    where: str
+    found: str
+    unseen: str
+    left: str
+    ahead: str
+    right: str
+
+
 @dataclass(frozen=True)
 class _Thing:
     """All objects in view that are told alike."""
@@ -129,6 +172,31 @@ def scene_text(words: SceneWords, now: Perceived, before: Perceived | None, *, s
     if now.held and (lines or before is None or now.held != before.held):
         lines.append(words.held.replace("{things}", now.held))
     return "\n".join(lines)
+
+
+def named_text(words: NamedWords, named: Sequence[str], now: Perceived) -> str:
+    """How far some types are, in a line; ``""`` for none."""
+    nearest: dict[str, SeenObject] = {}
+    for each in (*now.view, *(one for view in now.views.values() for one in view)):
+        nearest.setdefault(each.type, each)
+
+    def how_far(name: str) -> str:
+        if name == now.held:
+            return words.held
+        if name in now.interactable:
+            return words.near
+        if name not in nearest:
+            return words.hidden
+        place = nearest[name].on
+        return words.view + (words.at.replace("{place}", place) if place else "")
+
+    told = ", ".join(f"{name} {how_far(name)}" for name in named)
+    return words.told.replace("{things}", told) if told else ""
+
+
+def thing_text(words: SceneWords, one: SeenObject, perceived: Perceived) -> str:
+    """One object as :func:`scene_text` tells it, with what it lies in or on."""
+    return _listed(words, _things(words, [one], perceived))
 
 
 def _things(words: SceneWords, objects: Iterable[SeenObject], perceived: Perceived) -> list[_Thing]:

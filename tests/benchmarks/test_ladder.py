@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 import yaml
 from click.testing import CliRunner
@@ -64,6 +65,9 @@ def parsed(phase: Phase) -> None:
     """Let click parse a phase's command, as far as it goes without running it."""
     name, *arguments = phase.command
     command = cli.commands[name]
+    if isinstance(command, click.Group):
+        name, *arguments = arguments
+        command = command.commands[name]
     command.make_context(name, [*arguments])
 
 
@@ -100,6 +104,29 @@ def test_each_stage_learns_from_the_model_before(tmp_path: Path) -> None:
     assert option(corrected, "--out")[0] in option(third, "--data")
 
 
+def test_eyes_are_taught_before_the_first_stage_and_the_blind_copy_plays_last(
+    tmp_path: Path,
+) -> None:
+    plan = {
+        phase.name: phase.command for phase in plan_of(load_ladder("er-tiny-vl"), tmp_path).phases
+    }
+    frames = str(tmp_path / "data" / "frames")
+    made, eyes, first = (
+        plan[name] for name in ("base/new-model", "base/eyes", "1-imitation/finetune")
+    )
+    assert option(plan["base/frames"], "--out") == [frames]
+    assert option(made, "--data") == [str(tmp_path / "data" / "1-imitation"), frames]
+    assert option(eyes, "--model") == option(made, "--out") == [str(tmp_path / "new-model")]
+    assert option(eyes, "--data") == [frames]
+    assert option(first, "--model") == option(eyes, "--out") == [str(tmp_path / "base")]
+    assert list(plan)[-2:] == ["evaluations/4-random", "evaluations/4-blind"]
+    blind, last = plan["evaluations/4-blind"], plan["evaluations/3-reflection"]
+    assert option(blind, "--agent") == option(last, "--agent")
+    assert "pictures.noise=true" in option(blind, "--set")
+    for name in ("base/frames", "1-imitation/collect", "2-exploration/select"):
+        assert (option(plan[name], "--width"), option(plan[name], "--height")) == (["448"], ["252"])
+
+
 def option(command: tuple[str, ...], name: str) -> list[str]:
     return [value for key, value in pairwise(command) if key == name]
 
@@ -111,6 +138,10 @@ BAD = {
         "give the first ones of",
     ),
     "nothing": ({"stages": {"imitation": {"finetune": "tiny"}}}, "learns from nothing"),
+    "eyes": (
+        {"base": {"architecture": "tiny-vl", "eyes": {"frames": 1, "finetune": "tiny"}}},
+        "base.eyes needs pictures",
+    ),
     "unknown": ({"speed": 3}, "speed"),
     "rewritten": (
         {

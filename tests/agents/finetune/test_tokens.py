@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from agents.finetune.tokens import FEEDBACK, EncodedChat, Encoder, check_lengths
 from agents.vlm.chat import Message, Picture
 from agents.vlm.clients.local import LocalClient
 from agents.vlm.settings import AgentSettings
+from er_gym.data.cells import COLUMNS, ROWS, SYMBOLS, CoveredPicture, on_grid
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import Collection
 
@@ -218,6 +220,38 @@ def test_a_picture_of_another_size_than_its_record_is_refused(
         collate(
             [EncodedChat("x", encoded.ids, encoded.learnt, tuple(wrong), encoded.picture_tokens)]
         )
+
+
+def test_the_tokens_of_a_covered_picture_learn_what_is_in_their_square(
+    models: Any, chats: tuple[Chat, ...]
+) -> None:
+    files = open_model(models())
+    image = files.config.image_token_id
+    collate = Collator(files.image_processor, image, DataSettings(**BOUNDS), 0)
+    plain = next(each for each in chats if len(each.pictures) > 1)
+    cells = "".join(SYMBOLS[k % 3] for k in range(ROWS * COLUMNS))
+    names = ("nothing", "Fridge", "Mug")
+    first, *_ = plain.pictures
+    covered = CoveredPicture(**first.model_dump(), covers=names, cells=cells)
+    turns = tuple(
+        replace(turn, parts=tuple(covered if part is first else part for part in turn.parts))
+        for turn in plain.turns
+    )
+    with_cells = encoder(models()).encode(replace(plain, turns=turns))
+    without = encoder(models()).encode(plain)
+    count = with_cells.picture_tokens[0]
+    assert with_cells.learnt_tokens == without.learnt_tokens + count
+    batch = collate([without, with_cells])
+    ids, labels = batch["input_ids"][1].tolist(), batch["labels"][1].tolist()
+    places = [k for k, each in enumerate(ids) if each == image]
+    rows, columns = (batch["image_grid_thw"][0, 1:] // files.image_processor.merge_size).tolist()
+    assert rows * columns == count
+    first_tokens = [files.tokenizer(f" {each}")["input_ids"][0] for each in names]
+    wanted = [first_tokens[each] for each in on_grid(cells, rows, columns)]
+    assert [labels[k + 1] for k in places[:count]] == wanted
+    # All others are as without.
+    rest = [k for k in range(len(labels)) if k - 1 not in places[:count]]
+    assert [labels[k] for k in rest] == [batch["labels"][0].tolist()[k] for k in rest]
 
 
 def test_in_a_new_models_tokenizer_a_tag_and_a_role_are_a_token_each() -> None:

@@ -154,7 +154,7 @@ def as_trained(chat: Chat, files: Mapping[str, bytes]) -> list[Any]:
     ]
 
 
-@pytest.mark.parametrize("dialect", ["paper", "tags", "text"])
+@pytest.mark.parametrize("dialect", ["paper", "sight", "tags", "text"])
 def test_a_model_is_told_what_it_was_tuned_on(
     dialect: str, env: Callable[..., EmbodiedEnv], played: list[Played]
 ) -> None:
@@ -168,6 +168,28 @@ def test_a_model_is_told_what_it_was_tuned_on(
             kinds.add((before.verb if before.success else "", len(turn.pictures)))
     wanted = {(verbs.OBSERVE, 3), (verbs.MOVE_FORWARD, 1), (verbs.NAVIGATE, 1), ("", 0), ("", 1)}
     assert kinds >= wanted, "the episodes no longer have all kinds of turns"
+
+
+def test_a_blind_copy_is_shown_noise_where_it_would_be_shown_pictures(
+    env: Callable[..., EmbodiedEnv], played: list[Played]
+) -> None:
+    one = played[1]  # of which one action is not done, so that no picture follows
+    options = settings("sight", one.trajectory.language)
+    blind = options.model_copy(update={"pictures": PICTURES.model_copy(update={"noise": True})})
+    replies = spoken(load_dialect("sight").chat(one.trajectory))
+    seen, noise, again = (told(env, one, each, replies) for each in (options, blind, blind))
+    assert as_sent(noise) == as_sent(again)
+    shown = set()
+    for mine, theirs in zip(seen, noise, strict=True):
+        for part, other in zip(mine.parts, theirs.parts, strict=True):
+            if isinstance(part, Picture):
+                assert isinstance(other, Picture)
+                assert (part.width, part.height) == (other.width, other.height)
+                assert part.data != other.data
+                shown.add(other.data)
+            else:
+                assert part == other
+    assert len(shown) > 3, "each picture has noise of its own"
 
 
 def test_a_task_that_needs_another_verb_lists_it_from_the_beginning(

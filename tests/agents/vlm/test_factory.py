@@ -69,6 +69,9 @@ def test_what_makes_two_runs_differ() -> None:
     warmer = load_settings(None, ("sampling.temperature=0.5",))
     assert comparable_settings(one, "d") == comparable_settings(elsewhere, "d")
     assert comparable_settings(one, "d") != comparable_settings(warmer, "d")
+    blind = one.model_copy(update={"pictures": one.pictures.model_copy(update={"noise": True})})
+    assert comparable_settings(blind, "d")["pictures"]["noise"] is True
+    assert "noise" not in comparable_settings(one, "d")["pictures"], "older runs lack it"
     assert comparable_settings(one, "d") != comparable_settings(one, "e")
 
 

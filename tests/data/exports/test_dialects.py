@@ -10,8 +10,16 @@ import pytest
 from agents.vlm.parsing import parse
 from er_gym.data.chat import IMAGE, Chat, told_by_user, trained_prefixes
 from er_gym.data.collection import Collection
-from er_gym.data.dialects import dialect_names, load_dialect
-from er_gym.data.trajectory import TAG_OF_KIND, PictureRecord, ThoughtRecord, Trajectory, Turn
+from er_gym.data.dialects import LastDeed, dialect_names, load_dialect, user_turn
+from er_gym.data.scene_text import Perceived
+from er_gym.data.trajectory import (
+    TAG_OF_KIND,
+    PictureRecord,
+    SeenObject,
+    ThoughtRecord,
+    Trajectory,
+    Turn,
+)
 from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
 
@@ -150,13 +158,40 @@ def test_texts_from_outside_cannot_add_pictures_tags_or_special_tokens(
     last = Turn(purpose="finish", verb="end")
     changed = trajectory.model_copy(update={"instruction": evil, "turns": [failed, last]})
     for name in dialect_names():
-        chat = load_dialect(name).chat(changed, "en")
+        dialect = load_dialect(name)
+        chat = dialect.chat(changed, "en")
         pictures = sum(turn.text.count(IMAGE) for turn in chat.turns)
-        assert pictures == len(chat.pictures) == (name in WITH_PICTURES)
+        assert pictures == len(chat.pictures) == (dialect.texts["en"].sees == "pictures")
         texts = "".join(told(chat, "user") + told(chat, "assistant"))
         assert "<|im_end|>" not in texts
         assert "{action} 1 < 2" in texts
         assert parse(told(chat, "assistant")[0]).verb == "open"
+
+
+def test_in_sight_the_assistant_tells_what_the_user_tells_in_text(
+    trajectories: list[Trajectory],
+) -> None:
+    told_something = 0
+    for trajectory in trajectories:
+        sight, text = (load_dialect(name).chat(trajectory) for name in ("sight", "text"))
+        scene = load_dialect("text").texts[trajectory.language].scene
+        assert scene is not None
+        words = [each.split("{")[0] for each in (scene.view, scene.around, scene.held, scene.same)]
+        users = zip(told(sight, "user"), told(text, "user"), strict=True)
+        replies = zip(told(sight, "assistant"), told(text, "assistant"), strict=True)
+        for turn, (shown, read), (saying, without) in zip(
+            trajectory.turns, users, replies, strict=True
+        ):
+            lines = [line for line in read.splitlines() if line.startswith(tuple(words))]
+            assert not {*lines} & {*shown.splitlines()}
+            if turn.pictures:
+                seen = "<Observation>{}</Observation>\n".format("\n".join(lines))
+                assert saying == seen * bool(lines) + without
+                told_something += bool(lines)
+            else:
+                assert saying == without
+            assert parse(saying).verb == turn.verb
+    assert told_something > len(trajectories)
 
 
 def test_a_verb_beyond_the_nine_is_explained_where_the_task_asks_for_it(
@@ -193,11 +228,16 @@ def test_turns_that_are_not_learnt_can_be_told_by_the_user(trajectories: list[Tr
 
 
 def test_unknown_and_damaged_dialects_say_what_there_is(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"one of: paper, tags, text, text-actions; or give"):
+    names = "paper, sight, tags, text, text-actions"
+    with pytest.raises(ValueError, match=f"choose one of: {names}; or give a folder"):
         load_dialect("pirate")
     own = (Path(__file__).parents[3] / "configs/dialects/paper/en.yaml").read_text()
     (tmp_path / "en.yaml").write_text(own)
     assert list(load_dialect(str(tmp_path)).texts) == ["en"]
+    sight = (Path(__file__).parents[3] / "configs/dialects/sight/en.yaml").read_text()
+    (tmp_path / "en.yaml").write_text(sight.replace("thoughts: notes", "thoughts: none"))
+    with pytest.raises(ValueError, match="scene_by is assistant; give scene, and set thoughts to"):
+        load_dialect(str(tmp_path))
     for edit, problem in (
         (lambda text: text.replace("{picture}{picture}{picture}", "{picture}"), "observed has"),
         (lambda text: text.replace('"{task}"', ""), "first lacks"),
@@ -231,3 +271,24 @@ def test_languages_of_a_dialect_have_the_same_entries() -> None:
             kind: len(each) for kind, each in texts["zh"].openers.items()
         }
         assert Action(verbs.NAVIGATE, "Fridge").verb in texts["zh"].actions
+
+
+def test_the_user_tells_how_far_the_things_are_that_the_instruction_names() -> None:
+    texts = load_dialect("text").texts["en"]
+    book = SeenObject(type="Book", side="left", distance=3.0, on="Shelf", open=False)
+    mug = SeenObject(type="Mug", side="left", distance=3.0)
+    pen = SeenObject(type="Pen", side="left", distance=0.5, on="Desk")
+    now = Perceived(
+        view=[pen, book], views={"behind": [mug]}, held="CD", interactable=["Pen", "Desk"]
+    )
+    asked = "Put the CD on the Desk, the Pen by the Book, and the Mug in the Drawer."
+    (told,) = user_turn(texts, asked, LastDeed("observe", True, ""), [], now, now)
+    assert str(told).splitlines()[-1] == (
+        "asked CD held, Desk near, Pen near, Book in view at Shelf, Mug in view, Drawer hidden"
+    )
+    (told,) = user_turn(texts, "Look around.", None, [], now, None)
+    assert "asked" not in str(told)
+    with pytest.raises(ValueError, match="named goes with a scene that the user tells"):
+        texts.model_validate(
+            {**load_dialect("sight").texts["en"].model_dump(), "named": texts.named}
+        )

@@ -1,0 +1,133 @@
+"""``er-gym data frames``: pictures of rooms with what is truly in view."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
+from benchmarks.cli.options import Place, given_size, seed_option, size_options, workers_option
+from benchmarks.cli.terminal import echo, terminal
+
+if TYPE_CHECKING:
+    from er_gym.data.frame_camera import Camera, Visit
+    from er_gym.data.frames import FramesManifest
+
+_QUALITY = 80
+"""Of the JPEGs, as in a collection."""
+
+
+@click.command()
+@click.option("--suite", required=True, help="The suite whose rooms are visited, such as train.")
+@click.option(
+    "--frames",
+    "number",
+    required=True,
+    type=click.IntRange(min=1),
+    help="How many; the same command with more goes on.",
+)
+@click.option("--scenes", metavar="SCENE,…", help="Only these rooms of the suite.")
+@size_options
+@click.option(
+    "--out", required=True, type=Place(file_okay=False, path_type=Path), help="The directory."
+)
+@workers_option
+@seed_option
+def frames(
+    suite: str,
+    number: int,
+    scenes: str | None,
+    width: int | None,
+    height: int | None,
+    out: Path,
+    workers: int,
+    seed: int,
+) -> int:
+    """Draw pictures of a suite's rooms, with what is truly in view, to teach a model to see.
+
+    They are taken from poses that agents take, in the suite's arrangements, with some things opened
+    or switched on. er-gym finetune learns from them. It refuses rooms that are kept for evaluation:
+    frames of these are for measuring, by python -m benchmarks.eyes.
+    """
+    from er_gym.data.frame_camera import DrawingError, draw_frames, visits
+    from er_gym.data.frames import FRAMES, FrameSet
+    from er_gym.locking import Locked, exclusive_use
+    from er_gym.rollout.worker_pool import WorkerSetupError
+    from er_gym.writing import ForeignFile
+
+    with bad_input():
+        camera, manifest, rooms = _plan(suite, scenes, width, height, out, seed)
+        todo = visits(rooms, number, seed)
+    try:
+        with bad_input(Locked, ForeignFile), exclusive_use(out):
+            frame_set = FrameSet.create(out, manifest)
+            _draw(draw_frames(frame_set, camera, todo, workers=workers), frame_set, todo, out)
+            drawn = [each for visit in todo for each in frame_set.visit(visit.number)][:number]
+            frame_set.write(drawn)
+    except (WorkerSetupError, DrawingError) as error:
+        raise click.ClickException(str(error)) from error
+    except KeyboardInterrupt:
+        print_problem(f"interrupted; the same command continues {out}")
+        return INTERRUPTED
+    pictures = sum(len(each.pictures) for each in drawn)
+    echo(f"{out / FRAMES}: {len(drawn):,} frames with {pictures:,} pictures of {len(rooms)} rooms")
+    return 0
+
+
+def _plan(
+    name: str, scenes: str | None, width: int | None, height: int | None, out: Path, seed: int
+) -> tuple[Camera, FramesManifest, list[Any]]:
+    """How frames are drawn, the manifest that states it, and the rooms."""
+    from benchmarks.cli.collect_choice import chosen_tasks
+    from benchmarks.cli.options import named
+    from er_gym import __version__
+    from er_gym.data.frame_camera import Camera, rooms_of
+    from er_gym.data.frames import FramesManifest
+    from er_gym.envs.embodied_env import EmbodiedEnv
+    from er_gym.tasks.suites import load_suite
+
+    suite = chosen_tasks(load_suite(name), (), named("--scenes", scenes))
+    env = {
+        "backend": "embedded",
+        "width": 800,
+        "height": 450,
+        "field_of_view": 90.0,
+        "grid_size": 0.1,
+        "visibility_distance": 20.0,
+        **{key: value for key, value in suite.env.items() if key != "instances"},
+        **given_size(width, height),
+    }
+    if env["backend"] != "embedded":
+        raise BadInput(f"the suite {name} plays on {env['backend']}; frames need the embedded one")
+    EmbodiedEnv((), **env)  # so that bad arguments are found before any worker starts
+    rooms = rooms_of(suite.tasks)
+    manifest = FramesManifest(
+        suite=suite.name,
+        suite_digest=suite.digest,
+        settings={
+            "env": env,
+            "pictures": {"format": "jpeg", "quality": _QUALITY},
+            "scenes": sorted({room.scene for room in rooms}),
+        },
+        seed=seed,
+        er_gym=__version__,
+    )
+    return Camera(out, env, "jpeg", _QUALITY, seed), manifest, rooms
+
+
+def _draw(drawing: Any, frame_set: Any, todo: list[Visit], out: Path) -> None:
+    """Draw what is missing, and show how far it is."""
+    from contextlib import closing
+
+    from benchmarks.cli.progress import bar
+
+    there = sum(frame_set.has_visit(visit.number) for visit in todo)
+    console = terminal(stderr=True)
+    if there:
+        console.print(f"{there} of {len(todo)} visits are there already", style="dim")
+    with bar(console) as shown, closing(drawing) as visits:
+        task = shown.add_task(str(out), total=len(todo), completed=there, status="visits")
+        for done, _ in enumerate(visits, there + 1):
+            shown.update(task, completed=done)

@@ -1,0 +1,93 @@
+"""What covers each square of a picture: the truth about single places in it.
+
+A small model that learns to see from sentences alone takes long to find out which part of the
+picture a word is about. The engine knows what each pixel shows, so a frame can tell it for a grid
+of squares, and fine-tuning teaches it at the picture's own tokens.
+"""
+
+from __future__ import annotations
+
+import string
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from er_gym.data.trajectory import PictureRecord
+from er_gym.envs.perception import Perception
+from er_gym.tasks import verbs
+from er_gym.thor.objects import KIND_OF, TYPES
+
+ROWS, COLUMNS = 12, 20
+"""Squares of a picture."""
+SYMBOLS = string.digits + string.ascii_letters
+_SHARE = 1 / 6
+"""A thing stands for a square if it covers at least this share of it."""
+_ROOM = [KIND_OF[name] for name in sorted(verbs.NOWHERE) if name in KIND_OF]
+
+
+class CoveredPicture(PictureRecord):
+    """A picture of which it is known what covers it.
+
+    Attributes:
+        covers: what is in the picture, the room itself first.
+        cells: for each of :data:`ROWS` × :data:`COLUMNS` squares, row by row, which of ``covers``
+            it is, by one of :data:`SYMBOLS`.
+    """
+
+    covers: tuple[str, ...]
+    cells: str
+
+
+def cells_of(perception: Perception) -> tuple[tuple[str, ...], str]:
+    """What covers the squares of a view, as :class:`CoveredPicture` has it; ``""`` is the room.
+
+    Of several things that cover enough of a square, the one with the fewest pixels in the whole
+    picture stands for it: a Mug rather than the CounterTop on which it stands.
+
+    Args:
+        perception: with instance masks.
+    """
+    instances = perception.instances
+    assert instances is not None
+    kinds = np.concatenate(([-1], perception.objects.kinds))[instances]
+    kinds[np.isin(kinds, _ROOM)] = -1
+    pixels = np.bincount(kinds.ravel() + 1, minlength=len(TYPES) + 1)
+    pixels[0] = kinds.size  # the room comes last
+    height, width = kinds.shape
+    found: list[int] = []
+    for row in range(ROWS):
+        band = kinds[row * height // ROWS : (row + 1) * height // ROWS]
+        for column in range(COLUMNS):
+            square = band[:, column * width // COLUMNS : (column + 1) * width // COLUMNS]
+            there, counts = np.unique(square, return_counts=True)
+            enough = there[counts >= _SHARE * square.size].tolist()
+            found.append(min(enough, key=lambda kind: pixels[kind + 1], default=-1))
+    order = [kind for kind, _ in Counter(k for k in found if k >= 0).most_common(len(SYMBOLS) - 1)]
+    symbol = {kind: SYMBOLS[place] for place, kind in enumerate(order, 1)}
+    covers = ("", *(TYPES[kind] for kind in order))
+    return covers, "".join(symbol.get(kind, SYMBOLS[0]) for kind in found)
+
+
+def on_grid(cells: str, rows: int, columns: int) -> list[int]:
+    """What stands for each square of another grid, row by row: an index into ``covers``.
+
+    Of the squares that overlap with it, the thing that covers the fewest squares of the picture.
+    """
+    count = Counter(cells)
+    count[SYMBOLS[0]] = len(cells) + 1  # the room comes last
+    found = []
+    for row in range(rows):
+        for column in range(columns):
+            there = (
+                cells[k * COLUMNS + m]
+                for k in _overlapping(row, rows, ROWS)
+                for m in _overlapping(column, columns, COLUMNS)
+            )
+            found.append(SYMBOLS.index(min(there, key=lambda each: (count[each], each))))
+    return found
+
+
+def _overlapping(place: int, of: int, fine: int) -> Sequence[int]:
+    """The parts of a line in ``fine`` parts that overlap with one of ``of`` parts."""
+    return range(place * fine // of, -(-(place + 1) * fine // of))
