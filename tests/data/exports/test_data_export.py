@@ -33,7 +33,7 @@ def test_a_collection_becomes_training_files(collection: Collection, tmp_path: P
     [
         (["--to", "csv"], "unknown export format 'csv'"),
         (["--to", "shargpt"], "did you mean sharegpt"),
-        (["--to", "trl", "--dialect", "pirate"], "choose one of: paper, tags"),
+        (["--to", "trl", "--dialect", "pirate"], "choose one of: paper, sight, tags"),
         (["--to", "trl", "--language", "fr"], "'en', 'zh'"),
         (["--to", "trl", "--held-out", "Attic"], "no room 'Attic'"),
         (["--to", "trl", "--held-out", "2"], "give 0 to less than 1"),

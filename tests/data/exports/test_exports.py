@@ -309,7 +309,7 @@ def test_what_cannot_be_exported_is_said_in_one_line(
         (collection, "csv", out, ExportOptions(), "choose one of: sharegpt, ms-swift, trl"),
         (collection, "trl", full, ExportOptions(), "is not empty"),
         (collection, "trl", file, ExportOptions(), "is no folder"),
-        (collection, "trl", out, ExportOptions(dialect="x"), "choose one of: paper, tags"),
+        (collection, "trl", out, ExportOptions(dialect="x"), "choose one of: paper, sight, tags"),
         (collection, "trl", out, ExportOptions(held_out=("Attic",)), "no room 'Attic'"),
         (collection, "trl", out, ExportOptions(held_out=1.5), "give 0 to less than 1"),
         (collection, "trl", out, ExportOptions(held_out=float("nan")), "give 0 to less than 1"),
