@@ -46,6 +46,7 @@ MAY_USE = {
     "benchmarks/scoring/data_charts.py": ("charts",),
     "benchmarks/scoring/drawing.py": ("charts",),
     "benchmarks/cli/inspect.py": ("inspect",),
+    "benchmarks/cli/trackers.py": ("rl",),
     "benchmarks/cli/ui.py": ("ui",),
     "benchmarks/monitor": ("ui", "vlm"),
     "benchmarks/inspect_secrets.py": ("inspect",),
@@ -62,6 +63,7 @@ fits counts."""
 NOT_OURS_TO_REQUIRE = {
     "deepspeed": "used where a setting has asked for it",
     "imageio_ffmpeg": "asked for by the ending of a name, and the error says what to install",
+    "trackio": "asked for by an option, whose error says what to install",
     "wandb": "asked for by a setting, whose error says what to install",
 }
 

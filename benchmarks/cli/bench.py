@@ -40,13 +40,16 @@ if TYPE_CHECKING:
     from benchmarks.cli.progress import Progress
     from benchmarks.cli.vlm_run import VLMRun
     from er_gym.envs.faults import Faults
-    from er_gym.rollout.events import Cost
+    from er_gym.rollout.events import Cost, EventListener
     from er_gym.rollout.run_directory import Manifest, RunDirectory
     from er_gym.rollout.runner import RunSummary
     from er_gym.tasks.suites import Suite
     from er_gym.tasks.task import Task
 
 _directory = Place(file_okay=False, path_type=Path)
+
+TRACKERS = ("tensorboard", "trackio")
+"""As in ``benchmarks.cli.trackers``, which imports more; a test compares."""
 
 
 @click.command(name="bench")
@@ -84,6 +87,12 @@ _directory = Place(file_okay=False, path_type=Path)
 )
 @click.option("--types", metavar="TYPE,…", help="Play only tasks of these types.")
 @click.option("--shard", metavar="I/N", help="Play the I-th of N parts, such as 2/8.")
+@click.option(
+    "--track",
+    multiple=True,
+    type=click.Choice(TRACKERS),
+    help="Log the run's figures for this program too; may be repeated.",
+)
 @seed_option
 @click.option("--backend", help="The engine: embedded or unity.  [default: the suite's]")
 @trust_option
@@ -107,6 +116,7 @@ def bench(
     task_ids: tuple[str, ...],
     types: str | None,
     shard: str | None,
+    track: tuple[str, ...],
     seed: int,
     backend: str | None,
     trust: bool,
@@ -124,6 +134,7 @@ def bench(
     """
     from agents import RL_PREFIX
     from benchmarks.cli.progress import Progress
+    from benchmarks.cli.trackers import tracking
     from benchmarks.scoring.report import load_run
     from benchmarks.scoring.tables import print_tables, tables
     from er_gym import __version__
@@ -201,8 +212,8 @@ def bench(
             progress = Progress(console, title, len(episodes), len(before), sum(before))
             prepared = _prepared_run(run_directory, chosen, samples, workers, agent, vlm_run, trust)
             with prepared as (play, cost):
-                with progress:
-                    outcome = play(progress)
+                with progress, tracking(track, out, manifest.model_dump()) as listeners:
+                    outcome = play(progress, listeners)
                 bill = cost()
     except WorkerSetupError as error:
         raise click.ClickException(f"{error}; {_left_in(out, chosen, samples)}") from error
@@ -256,7 +267,9 @@ def _prepared_run(
     agent: str,
     vlm_run: VLMRun | None,
     trust: bool,
-) -> Iterator[tuple[Callable[[Progress], RunSummary], Callable[[], Cost | None]]]:
+) -> Iterator[
+    tuple[Callable[[Progress, list[EventListener]], RunSummary], Callable[[], Cost | None]]
+]:
     """A function that plays the chosen tasks, and one that says what that has cost."""
     from agents import NamedAgent
     from er_gym.rollout.agent import CannotGoOn
@@ -266,12 +279,12 @@ def _prepared_run(
     if vlm_run is None:
         make, parallelism = NamedAgent(agent, trust), Parallelism(workers)
         yield (
-            lambda shown: run(
+            lambda shown, more: run(
                 run_directory,
                 chosen,
                 make,
                 parallelism=parallelism,
-                listeners=[shown],
+                listeners=[shown, *more],
                 samples=samples,
             ),
             lambda: None,
@@ -281,8 +294,14 @@ def _prepared_run(
         factory = vlm_run.factory(run_directory.path)
     with closing(factory):
         yield (
-            lambda shown: vlm_run.play(
-                factory, run_directory, chosen, workers, [shown], shown.say, samples=samples
+            lambda shown, more: vlm_run.play(
+                factory,
+                run_directory,
+                chosen,
+                workers,
+                [shown, *more],
+                shown.say,
+                samples=samples,
             ),
             lambda: factory.cost,
         )
