@@ -54,6 +54,10 @@ class FailureCounts:
         """How many episodes failed."""
         return self._failed
 
+    def number(self, kind: Failure) -> int:
+        """The number of failures of a kind."""
+        return sum(failure == kind for _, failure in self._found.values())
+
     def counts(self) -> list[tuple[Failure, int]]:
         """The number of failures of each kind that occurs, most frequent first."""
         number = Counter(failure for _, failure in self._found.values() if failure)

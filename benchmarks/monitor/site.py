@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from typing import Any, TypeAlias
 from urllib.parse import urlencode
 
@@ -13,6 +14,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from benchmarks.monitor import formats, svg
 from benchmarks.monitor.episode_view import MOST_TEXT
 from benchmarks.monitor.event_tail import EpisodeRow
+from benchmarks.monitor.failure_counts import FailureCounts
 from benchmarks.monitor.growth import growth
 from benchmarks.monitor.language import Translator, chosen_language
 from benchmarks.monitor.places import Kind, Place, Places
@@ -102,6 +104,12 @@ class Site:
         """A run's episodes by key."""
         with self.runs.use(place) as view:
             return dict(view.rows)
+
+    def failures(self, place: Place) -> FailureCounts:
+        """Why a run's episodes failed, as far as that has been counted."""
+        with self.runs.use(place) as view:
+            view.count_failures(_COUNT_SECONDS / 3)
+            return deepcopy(view.failures)
 
     def version(self, place: Place, closely: bool = False) -> object:
         """What changes whenever a directory does.

@@ -8,6 +8,7 @@ from fastapi import Request, Response
 
 from benchmarks.monitor.comparison import CHANGES, Pair, by_type, difference, pairs_of
 from benchmarks.monitor.episode_view import EpisodeView, view_of
+from benchmarks.monitor.failures import FAILURES
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.site import NothingThere, Routes, Site
 from er_gym.rollout.run_directory import RunDirectory
@@ -69,7 +70,15 @@ class ComparePages:
         number = request.query_params.get("page", "1")
         page = min(int(number), last) if number.isascii() and number[:7].isdigit() else 1
         page = max(1, page)
+        counts = [self._site.failures(place) for place in places]
         told = {
+            "runs": [summary for summary, _ in runs],
+            "failures": [
+                (kind, [counted.number(kind) for counted in counts])
+                for kind in FAILURES
+                if any(counted.number(kind) for counted in counts)
+            ],
+            "counted": [(counted.done, counted.failed) for counted in counts],
             "every": [self._site.summary(place) for place in self._site.places.of_kind("run")],
             "asked": asked,
             "first": runs[0][0] if runs else None,
