@@ -13,7 +13,6 @@ import click
 
 from benchmarks.cli.errors import BadInput, bad_input
 from benchmarks.cli.options import Place
-from benchmarks.cli.progress import bar
 from benchmarks.cli.terminal import echo, terminal
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
@@ -129,6 +128,7 @@ def write_files(options: FileOptions) -> bool:
 
 
 def _export(options: FileOptions, out: Path) -> None:
+    from benchmarks.cli.progress import bar
     from benchmarks.monitor.export import USUAL_EPISODES, Wanted, export
 
     assert options.export is not None
