@@ -74,6 +74,16 @@ class Places:
         """Those of one kind."""
         return tuple(place for place in self.all() if place.kind == kind)
 
+    def at(self, path: Path, kind: Kind) -> Place | None:
+        """The directory at a path, which may have been made this moment; None if there is none."""
+        for _ in range(2):
+            for place in self.of_kind(kind):
+                if place.path == path:
+                    return place
+            with self._lock:
+                self._time = float("-inf")  # look again
+        return None
+
     def get(self, id: str) -> Place | None:
         """The directory with this id; None if there is none (any more)."""
         self.all()

@@ -174,7 +174,6 @@ class PlayPages:
         self, request: Request, session: Session, now: Moment, problem: str = "", status: int = 200
     ) -> Response:
         run = session.plan.path.resolve()
-        places = self._site.places.of_kind("run")
         told = {
             "session": session,
             "plan": session.plan,
@@ -183,7 +182,7 @@ class PlayPages:
             "keys": KEYS,
             "problem": problem,
             "secret": self._forms.secret,
-            "place": next((place for place in places if place.path == run), None),
+            "place": self._site.places.at(run, "run"),
             "scripts": ("play.js",),
         }
         return self._site.show(request, "play_session.html", told, status)
