@@ -13,6 +13,7 @@ from agents.vlm.clients.session import ModelSession
 from agents.vlm.factory import AgentFactory, comparable_settings, load_settings, settings_file
 from agents.vlm.prompts import prompts_for
 from agents.vlm.settings import AgentSettings
+from benchmarks.cli.executor import Workforce
 from benchmarks.cli.vlm_options import VLMOptions
 from er_gym.rollout.events import EventListener
 from er_gym.rollout.executor import Parallelism
@@ -85,7 +86,7 @@ class VLMRun:
         factory: AgentFactory,
         directory: RunDirectory,
         tasks: Sequence[Task],
-        workers: int,
+        workforce: Workforce,
         listeners: Iterable[EventListener] = (),
         say: Callable[[object], None] | None = None,
         samples: int = 1,
@@ -102,7 +103,9 @@ class VLMRun:
             tasks,
             lambda task, seed: factory.agent(seed),
             executor="threads",
-            parallelism=Parallelism(workers, self.concurrency),
+            parallelism=Parallelism(
+                workforce.workers, self.concurrency, machines=workforce.machines
+            ),
             listeners=listeners,
             cost=lambda: factory.cost,
             samples=samples,

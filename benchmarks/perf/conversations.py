@@ -22,10 +22,12 @@ from typing import Any
 
 import click
 
+from benchmarks.cli.executor import Workforce
 from benchmarks.cli.vlm_options import VLMOptions
 from benchmarks.cli.vlm_run import VLMRun
 from er_gym import __version__
 from er_gym.rollout.events import EpisodeEnded, Event
+from er_gym.rollout.machines import THIS_MACHINE
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks import Task, load_suite
 
@@ -149,7 +151,9 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
                 ended.append((time.perf_counter(), event.steps))
 
         with closing(vlm_run.factory(run_directory.path)) as factory:
-            outcome = vlm_run.play(factory, run_directory, tasks, workers, [note])
+            outcome = vlm_run.play(
+                factory, run_directory, tasks, Workforce(THIS_MACHINE, workers), [note]
+            )
     ours.close()
     process.join(5)
     whole = ended[-1][0] - began
