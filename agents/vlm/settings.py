@@ -178,7 +178,7 @@ class Server(_Settings):
 
 
 class Local(_Settings):
-    """How transformers runs a model in this process.
+    """How transformers runs a model in this process, or in Ray actors.
 
     Attributes:
         adapter: a directory with a LoRA adapter; "" for none.
@@ -187,6 +187,9 @@ class Local(_Settings):
         wait: seconds that a batch waits for further requests.
         reuse: whether what the model computed for the earlier turns of a conversation is kept for
             its next turn; it does not change a reply beyond rounding.
+        actors: how many copies run on a Ray cluster (``--executor ray``) instead of in this
+            process; 0 for none.
+        actor_gpus, actor_cpus: what each copy asks the cluster for, may be fractions.
     """
 
     adapter: str = ""
@@ -196,6 +199,9 @@ class Local(_Settings):
     batch: Positive = 8
     wait: float = Field(0.02, ge=0)
     reuse: bool = True
+    actors: int = Field(0, ge=0)
+    actor_gpus: float = Field(0.0, ge=0)
+    actor_cpus: float = Field(1.0, ge=0)
 
 
 class AgentSettings(_Settings):

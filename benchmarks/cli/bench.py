@@ -280,7 +280,10 @@ def _prepared_run(
     from er_gym.rollout.runner import run
 
     if vlm_run is None:
-        make = NamedAgent(agent, trust)
+        named_agent = NamedAgent(agent, trust)
+        with bad_input():
+            shared = workforce.machines.shares_files
+            make = named_agent if shared else named_agent.carried()
         parallelism = Parallelism(workforce.workers, machines=workforce.machines)
         yield (
             lambda shown, more: run(

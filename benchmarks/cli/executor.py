@@ -153,29 +153,29 @@ _OPTIONS = (
 
 
 def with_executor_options(
-    default: int | None = None,
+    default: int | None = None, *, workers: bool = True
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Add these options to a command, which gets them as one argument ``executor_options``.
 
     Args:
         default: the number of workers; None for one for each processor.
+        workers: whether the command has --workers; others have the number elsewhere.
     """
     shown = "one for each processor" if default is None else str(default)
-    workers = click.option(
+    number = click.option(
         "--workers", type=workers_type, help=f"The number of processes.  [default: {shown}]"
     )
+    added = (number, *_OPTIONS) if workers else _OPTIONS
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(command)
         def with_options(**given: Any) -> Any:
             names = ExecutorOptions.__dataclass_fields__
-            options = ExecutorOptions(**{name: given.pop(name) for name in names})
+            options = ExecutorOptions(**{name: given.pop(name, None) for name in names})
             options.check()
             return command(executor_options=options, **given)
 
-        return reduce(
-            lambda made, option: option(made), reversed((workers, *_OPTIONS)), with_options
-        )
+        return reduce(lambda made, option: option(made), reversed(added), with_options)
 
     return add
 

@@ -6,6 +6,7 @@ import contextlib
 import os
 import secrets
 import shutil
+import socket
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -19,12 +20,13 @@ if TYPE_CHECKING:
 _FOLDER = "er-gym-ray-"
 _OBJECT_STORE_BYTES = 512 * 2**20
 """Of a Ray that is started here: results are small or freed at once."""
-_LOCAL_ENVIRONMENT = {
+LOCAL_ENVIRONMENT = {
     # Ray's name for it: without clusters, every server listens on loopback alone.
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
     "RAY_USAGE_STATS_ENABLED": "0",
     "RAY_DEDUP_LOGS": "0",
 }
+_CONNECT_SECONDS = 5.0
 _PACKAGES = ("er_gym", "agents", "benchmarks")
 
 
@@ -49,7 +51,7 @@ def ray_machines(
     Raises:
         RayUnavailable: see there.
     """
-    environment = {} if settings.address else _LOCAL_ENVIRONMENT
+    environment = {} if settings.address else LOCAL_ENVIRONMENT
     with _environment(environment), contextlib.ExitStack() as stack:
         try:
             import ray
@@ -90,6 +92,7 @@ def _join(address: str, modules: Sequence[Path]) -> None:
     """Join a cluster; the code of this process travels with its workers."""
     import ray
 
+    _check_reachable(address)
     carried = [*(Path(__file__).parents[3] / name for name in _PACKAGES), *modules]
     environment: dict[str, Any] = {
         "py_modules": [str(each) for each in carried if each.exists()],
@@ -107,6 +110,20 @@ def _join(address: str, modules: Sequence[Path]) -> None:
         raise RayUnavailable(
             f"cannot join the Ray cluster at {address}: {reason[:300]}; give the address that "
             "`ray status` accepts, or none to start Ray on this machine"
+        ) from None
+
+
+def _check_reachable(address: str) -> None:
+    """Raise RayUnavailable if nobody listens at an address: Ray itself would wait for minutes."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if not colon or not port.isdigit():
+        return  # auto, or something that Ray refuses at once
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), _CONNECT_SECONDS).close()
+    except (OSError, OverflowError) as error:
+        raise RayUnavailable(
+            f"no Ray cluster answers at {address} ({error}); give the address that `ray status` "
+            "accepts, or none to start Ray on this machine"
         ) from None
 
 
