@@ -80,7 +80,7 @@ def _workers(nodes: list[dict[str, Any]], mark: tuple[Path, str] | None) -> Iter
         pinned = NodeAffinitySchedulingStrategy(node["NodeID"], soft=False)
         actor = ray.remote(JobActor).options(num_cpus=0, scheduling_strategy=pinned).remote()
         actors.append(actor)
-        begun.append(actor.begin.remote(Origin.here(), ray.cloudpickle.dumps(Probe)))
+        begun.append(actor.begin.remote(Origin.here(), (), ray.cloudpickle.dumps(Probe)))
     for node, actor, ref in zip(nodes, actors, begun, strict=True):
         part = f"node {node['NodeManagerAddress']}"
         try:

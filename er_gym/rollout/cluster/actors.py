@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pickle
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -50,13 +51,15 @@ class JobActor:
     def __init__(self) -> None:
         self._do: Callable[[Any], Any] | None = None
 
-    def begin(self, driver: Origin, make: bytes) -> Begun:
+    def begin(self, driver: Origin, path: Sequence[str], make: bytes) -> Begun:
         """Make what does the jobs.
 
         Args:
             driver: the process that sends the jobs.
+            path: where else to look for modules.
             make: a pickled function that makes it.
         """
+        sys.path += [each for each in path if each not in sys.path]
         problem = _misfit(driver)
         if not problem:
             try:

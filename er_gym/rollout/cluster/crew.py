@@ -85,11 +85,13 @@ class Terms:
     Attributes:
         options: of ``ActorClass.options``.
         memory: a worker with more resident memory is replaced, bytes.
+        path: where else than on their own path they look for modules.
         say: called with a message for the user while the cluster has no place.
     """
 
     options: dict[str, Any]
     memory: int
+    path: Sequence[str]
     say: Callable[[str], None]
 
 
@@ -144,7 +146,7 @@ class Crew(Generic[Job, Result]):
         wanted = min(self._workers, len(self._queue) + at_work)
         while len(self._members) < wanted and time.monotonic() >= self._hire_after:
             actor = self._actor_class.remote()
-            beginning = actor.begin.remote(Origin.here(), self._make)
+            beginning = actor.begin.remote(Origin.here(), self._terms.path, self._make)
             self._members.append(_Member(actor, beginning))
 
     def _dismiss(self, member: _Member[Job]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Generator, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -71,4 +72,5 @@ class RayMachines:
             "max_restarts": 0,  # the crew replaces actors, since only it knows their jobs
             "max_task_retries": 0,
         }
-        return Terms(options, self.settings.memory, self.say)
+        path = tuple(sys.path) if self.shares_files else ()
+        return Terms(options, self.settings.memory, path, self.say)

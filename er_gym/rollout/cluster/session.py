@@ -24,9 +24,10 @@ LOCAL_ENVIRONMENT = {
     # Ray's name for it: without clusters, every server listens on loopback alone.
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
     "RAY_USAGE_STATS_ENABLED": "0",
-    "RAY_DEDUP_LOGS": "0",
 }
 _CONNECT_SECONDS = 5.0
+_STARTS = 3
+"""Ray waits no more than 30 seconds for itself, which is too little on a busy machine."""
 _PACKAGES = ("er_gym", "agents", "benchmarks")
 
 
@@ -68,7 +69,8 @@ def ray_machines(
             else:
                 folder = stack.enter_context(_folder())
                 stack.enter_context(_environment({"RAY_AUTH_TOKEN": secrets.token_hex(32)}))
-                _start(folder)
+                with _loopback():
+                    _start(folder)
             stack.callback(ray.shutdown)
             stack.enter_context(_quiet())
         yield RayMachines(settings, say)
@@ -78,14 +80,35 @@ def _start(folder: Path) -> None:
     """Start Ray on this machine."""
     import ray
 
-    ray.init(
-        address="local",
-        include_dashboard=False,
-        log_to_driver=False,
-        logging_level="error",
-        object_store_memory=_OBJECT_STORE_BYTES,
-        _temp_dir=str(folder),
-    )
+    for tries_left in reversed(range(_STARTS)):
+        try:
+            ray.init(
+                address="local",
+                include_dashboard=False,
+                log_to_driver=False,
+                logging_level="error",
+                object_store_memory=_OBJECT_STORE_BYTES,
+                _temp_dir=str(folder),
+            )
+            return
+        except Exception as error:  # Ray raises bare exceptions, too
+            ray.shutdown()
+            if not tries_left:
+                reason = " ".join(str(error).split())
+                raise RayUnavailable(f"Ray cannot be started here: {reason[:300]}") from error
+
+
+@contextlib.contextmanager
+def _loopback() -> Iterator[None]:
+    """Let Ray take 127.0.0.1 for this machine's address also if it was imported before."""
+    from ray._private import ray_constants
+
+    before = ray_constants.ENABLE_RAY_CLUSTER
+    ray_constants.ENABLE_RAY_CLUSTER = False
+    try:
+        yield
+    finally:
+        ray_constants.ENABLE_RAY_CLUSTER = before
 
 
 def _join(address: str, modules: Sequence[Path]) -> None:
