@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from benchmarks.monitor.line_tail import LineTail
 from er_gym.rollout.events import EVENTS
 
-_CHUNK = 4 * 2**20
 _STEP = re.compile(
     rb'\{"time":(?P<time>[0-9.e+-]+),"kind":"step","task_id":"(?P<key>[^"\\]*)",'
     rb'"step":(?P<step>[0-9]+),"verb":"(?P<verb>[^"\\]*)","object_type":"(?P<type>[^"\\]*)",'
@@ -20,7 +19,7 @@ _STEP = re.compile(
 """How er-gym writes a step. Most lines are steps; to parse their thoughts, which are not shown
 here, would take most of the time."""
 _LONGEST = 8 * 2**20
-"""A longer line is skipped: a model may say anything."""
+"""A line with more bytes is passed over: a model may say anything."""
 
 
 @dataclass(slots=True)
@@ -90,39 +89,23 @@ class EventTail:
     why: str = ""
     time: float = 0.0
     version: int = 0
-    _offset: int = 0
-    _inode: int = 0
-    _rest: bytes = b""
-    _skipping: bool = False
+    _tail: LineTail = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._tail = LineTail(self.folder / EVENTS, _LONGEST)
 
     def read(self) -> None:
         """Read what has been added. A stream that was replaced is read from its beginning."""
-        try:
-            with (self.folder / EVENTS).open("rb") as file:
-                status = os.fstat(file.fileno())
-                if status.st_ino != self._inode or status.st_size < self._offset:
-                    self._forget(status.st_ino)
-                file.seek(self._offset)
-                while chunk := file.read(_CHUNK):
-                    self._offset += len(chunk)
-                    self._take(chunk)
-        except OSError:  # there is none (yet)
-            return
+        for some in self._tail.read():
+            if some.anew:
+                self._forget()
+            for line in some.lines:
+                if line:
+                    self._line(line)
 
-    def _forget(self, inode: int) -> None:
-        fresh = EventTail(self.folder, version=self.version + 1, _inode=inode)
-        self.__dict__.update(fresh.__dict__)
-
-    def _take(self, chunk: bytes) -> None:
-        *lines, rest = (self._rest + chunk).split(b"\n")
-        self._rest = rest
-        for line in lines:
-            if self._skipping:
-                self._skipping = False
-            elif line:
-                self._line(line)
-        if len(self._rest) > _LONGEST:
-            self._rest, self._skipping = b"", True
+    def _forget(self) -> None:
+        fresh = EventTail(self.folder, version=self.version + 1)
+        self.__dict__.update(fresh.__dict__ | {"_tail": self._tail})
 
     def _line(self, line: bytes) -> None:
         try:
