@@ -35,12 +35,13 @@ from benchmarks.monitor import formats
 from benchmarks.monitor.episode_view import EpisodeView, StepView, picture_file, view_of
 from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.language import Translator
+from benchmarks.monitor.listing import Page
 from benchmarks.monitor.offline import OfflinePage, offline
 from benchmarks.monitor.pages.episodes import PICTURE_KINDS
 from benchmarks.monitor.pages.runs import run_told
 from benchmarks.monitor.places import Places
 from benchmarks.monitor.room_map import room_map
-from benchmarks.monitor.run_view import SORTS, Filter, Page
+from benchmarks.monitor.run_view import SORTS, Filter
 from benchmarks.monitor.site import Site
 from benchmarks.monitor.world import CannotReplay, Worlds
 from er_gym.rollout.run_directory import RunDirectory
@@ -160,9 +161,7 @@ class _Maker:
         self._words = Translator(wanted.language)
         self._run = RunDirectory.open(root)
         with self._site.runs.use(place) as view:
-            rows = [row for row in view.rows.values() if wanted.filter.takes(row) and row.ended]
-            sort = wanted.filter.sort
-            rows.sort(key=SORTS[sort.removeprefix("-")], reverse=sort.startswith("-"))
+            rows = [row for row in view.chosen(wanted.filter) if row.ended]
             self.keys = [row.key for row in rows[: wanted.episodes]]
             total = sum(row.ended is not None for row in view.rows.values())
         self._numbers = {key: number for number, key in enumerate(self.keys, 1)}
@@ -173,7 +172,7 @@ class _Maker:
         with self._site.runs.use(self.place) as view:
             view.count_failures(float("inf"))
             told = run_told(view, Filter())
-            every = sorted(view.rows.values(), key=SORTS["ended"], reverse=True)
+            every = view.chosen(Filter())
             told["page"] = Page(every, len(every), 1, 1)
         told["exported"] = self.exported
         page = self._site.page("run.html", told, self._words)

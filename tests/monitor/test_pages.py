@@ -118,6 +118,9 @@ def test_runs_are_compared_task_by_task(client, ids, runs):
     assert f"{8 - lost}/{8 - lost}" in text
     neither = client.get("/compare", params=both | {"change": "neither"})
     assert "/compare/episode" not in neither.text
+    for page in ("1234567x", "9" * 5_000, "0"):  # no such page: the last or the first
+        asked = client.get("/compare", params=both | {"page": page})
+        assert asked.text.count("/compare/episode") == 8 - lost
     assert client.get("/compare").status_code == 200
     assert client.get("/compare", params={"of": ["nothing"]}).status_code == 404
 

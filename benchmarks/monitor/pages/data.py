@@ -13,7 +13,6 @@ from PIL import Image
 from benchmarks.monitor import formats
 from benchmarks.monitor.collection_index import Collections
 from benchmarks.monitor.data_view import (
-    PAGE_ROWS,
     DataFilter,
     chosen,
     outcome_of,
@@ -23,6 +22,7 @@ from benchmarks.monitor.data_view import (
 )
 from benchmarks.monitor.episode_view import file_inside
 from benchmarks.monitor.growth import changed, in_use, parts_of
+from benchmarks.monitor.listing import neighbours, page_of
 from benchmarks.monitor.pages.episodes import PICTURE_KINDS
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.room_map import room_map
@@ -89,15 +89,10 @@ class DataPages:
             taken = chosen(index, filter)
             told = overview(index, self._site.translator(request))
             told |= {"total": len(index.heads), "found": index.found, "damaged": index.damaged}
-        last = max(1, -(-len(taken) // PAGE_ROWS))
-        page = min(filter.page, last)
         told |= {
             "row": self._row(place),
             "filter": filter,
-            "heads": taken[(page - 1) * PAGE_ROWS : page * PAGE_ROWS],
-            "taken": len(taken),
-            "page": page,
-            "last": last,
+            "page": page_of(taken, filter.page),
             "outcome_of": outcome_of,
             "playing": self._parts(place),
             "live": id,
@@ -112,7 +107,7 @@ class DataPages:
         trajectory = self._trajectory(place, key)
         with self._collections.use(place) as index:
             ids = [head.id for head in chosen(index, filter)]
-        at = ids.index(key) if key in ids else -1
+        before, after = neighbours(ids, key)
         turns, pictures = turns_of(trajectory)
         told = {
             "place": place,
@@ -121,8 +116,8 @@ class DataPages:
             "turns": turns,
             "pictures": pictures,
             "filter": filter,
-            "before": ids[at - 1] if at > 0 else "",
-            "after": ids[at + 1] if 0 <= at < len(ids) - 1 else "",
+            "before": before,
+            "after": after,
             "scripts": ("episode.js",),
             "at": "data",
         }

@@ -12,6 +12,7 @@ from PIL import Image
 
 from benchmarks.monitor import formats
 from benchmarks.monitor.episode_view import picture_file, view_of
+from benchmarks.monitor.listing import neighbours
 from benchmarks.monitor.room_map import room_map
 from benchmarks.monitor.run_view import Filter
 from benchmarks.monitor.site import AN_HOUR, NothingThere, Routes, Site
@@ -55,7 +56,7 @@ class EpisodePages:
         except (ValueError, OSError):
             raise NothingThere from None
         with self._site.runs.use(place) as view:
-            before, after = view.neighbours(chosen, key)
+            before, after = neighbours([row.key for row in view.chosen(chosen)], key)
             summary = view.summary()
         told = {
             "run": summary,
