@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-_CHUNK = 4 * 2**20
+_CHUNK = 2**20
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,16 +16,21 @@ class Lines:
 
     Attributes:
         offset: of the first one's first byte in the file.
-        lines: without their newlines; they may be empty.
+        text: the lines, each with its newline.
         passed_over: how many lines that stood before them were too long: 0 or 1.
         anew: whether the file is another one than was read before, or the first; all that was
             known of it is void.
     """
 
     offset: int
-    lines: Sequence[bytes]
+    text: bytes = b""
     passed_over: int = 0
     anew: bool = False
+
+    @property
+    def lines(self) -> list[bytes]:
+        """The lines without their newlines; they may be empty."""
+        return self.text.split(b"\n")[:-1]
 
 
 @dataclass
@@ -57,7 +62,7 @@ class LineTail:
                 if status.st_ino != self._inode or status.st_size < self._offset:
                     self._inode, self._offset = status.st_ino, 0
                     self._rest, self._too_long = b"", False
-                    yield Lines(0, (), anew=True)
+                    yield Lines(0, anew=True)
                 file.seek(self._offset)
                 while chunk := file.read(min(_CHUNK, self.longest)):
                     yield self._whole(chunk)
@@ -69,12 +74,10 @@ class LineTail:
         one can be too long."""
         begin = self._offset - len(self._rest)
         self._offset += len(chunk)
-        *lines, rest = (self._rest + chunk).split(b"\n")
-        passed_over = int(bool(lines) and (self._too_long or len(lines[0]) > self.longest))
-        if passed_over:
-            begin += len(lines[0]) + 1
-            del lines[0]
-            self._too_long = False
-        self._too_long = self._too_long or len(rest) > self.longest
-        self._rest = b"" if self._too_long else rest
-        return Lines(begin, lines, passed_over)
+        text = self._rest + chunk
+        first, end = text.find(b"\n") + 1, text.rfind(b"\n") + 1
+        passed_over = first > 0 and (self._too_long or first - 1 > self.longest)
+        self._too_long = (self._too_long and not passed_over) or len(text) - end > self.longest
+        self._rest = b"" if self._too_long else text[end:]
+        skipped = first if passed_over else 0
+        return Lines(begin + skipped, text[skipped:end], int(passed_over))
