@@ -58,6 +58,12 @@ def exclusive_use(folder: Path) -> Iterator[None]:
                 path.rmdir()
 
 
+def check_unused(folder: Path, manifest: str, error: type[Exception]) -> None:
+    """Raise an error if a folder without its manifest holds anything beside the lock."""
+    if folder.exists() and any(each.name != LOCK for each in folder.iterdir()):
+        raise error(f"{folder} is not empty and holds no {manifest}; choose another --out")
+
+
 def _make(folder: Path) -> list[Path]:
     """Make a folder and its parents; return the folders made, innermost first."""
     absent = [path for path in (folder, *folder.parents) if not path.exists()]

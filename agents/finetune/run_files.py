@@ -26,7 +26,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from agents.finetune.model_files import MANIFEST, MODEL, History
-from er_gym.locking import LOCK
+from er_gym.locking import check_unused
 from er_gym.tasks.reading import read_bytes
 from er_gym.writing import make_folder, write_atomic
 
@@ -93,10 +93,7 @@ class RunFiles:
         if not self.path.exists():
             return
         if not (self.path / MANIFEST).is_file():
-            if any(each.name != LOCK for each in self.path.iterdir()):
-                raise RunConflict(
-                    f"{self.path} is not empty and holds no {MANIFEST}; choose another --out"
-                )
+            check_unused(self.path, MANIFEST, RunConflict)
             return
         try:
             there = Manifest.model_validate_json(read_bytes(self.path / MANIFEST))

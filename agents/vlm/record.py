@@ -10,12 +10,12 @@ import os
 from typing import Any, Literal
 from urllib.parse import urlsplit, urlunsplit
 
-from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
+from pydantic import BaseModel, ConfigDict
 
 from agents.vlm.chat import Reply, Role, Usage
 from agents.vlm.clients.redaction import Secrets
 from agents.vlm.settings import AgentSettings
-from er_gym.rollout.records import By
+from er_gym.rollout.records import By, GrownRecord
 
 
 class _Record(BaseModel):
@@ -52,7 +52,7 @@ class ThoughtRecord(_Record):
     text: str
 
 
-class RoundRecord(_Record):
+class RoundRecord(_Record, GrownRecord):
     """A reply and its result.
 
     Attributes:
@@ -70,8 +70,10 @@ class RoundRecord(_Record):
             true.
         kept: whether the reply came from the reply cache; an earlier request paid for it.
         by: who decided in place of the model, so that no model wrote the reply; ``""`` if nobody
-            did. Such a reply is written without it, as before anybody could.
+            did.
     """
+
+    added = ("by",)
 
     message: int
     thoughts: list[ThoughtRecord] = []
@@ -93,13 +95,6 @@ class RoundRecord(_Record):
     model: str = ""
     kept: bool = False
     by: By = ""
-
-    @model_serializer(mode="wrap")
-    def _without_nobody(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        told: dict[str, Any] = handler(self)
-        if not self.by:
-            told.pop("by", None)
-        return told
 
     @property
     def usage(self) -> Usage:

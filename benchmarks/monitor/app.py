@@ -39,6 +39,7 @@ _HEADERS = {
     "Cache-Control": "no-store",
 }
 _TOKEN = "er-gym-token"
+_READER = "er-gym-reads-runs"
 
 
 def make_app(
@@ -66,6 +67,8 @@ def make_app(
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        # Nobody waits for this thread, so that Ctrl-C need not.
+        threading.Thread(target=site.read_runs, args=(closing,), name=_READER, daemon=True).start()
         yield
         await run_in_threadpool(playing.sessions.close)
 

@@ -8,7 +8,6 @@ written ``\\"``, so a name cannot be taken for a text. Other lines are parsed.
 from __future__ import annotations
 
 import json
-import os
 import re
 import threading
 from collections import Counter, OrderedDict
@@ -21,6 +20,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from benchmarks.monitor.line_tail import LineTail
 from benchmarks.monitor.places import Place
 from er_gym.data.collection import TRAJECTORIES
 from er_gym.data.paper_figures import ACTION, BEGIN
@@ -35,7 +35,7 @@ _THOUGHT = re.compile(
 _FORMAT = b'{"format":"er-gym/trajectory/'
 _NOT_LEARNT = b'"train":false'
 _LONGEST = 64 * 2**20
-"""A longer line is passed over."""
+"""A line with more bytes is damaged."""
 _MOST_TEXT = 300
 _MOST_KEPT = 16
 
@@ -86,39 +86,33 @@ class CollectionIndex:
     found: Statistics = field(default_factory=Statistics)
     lengths: Counter[int] = field(default_factory=Counter)
     damaged: int = 0
-    _offset: int = 0
-    _state: tuple[int, int] = (0, 0)
     _places: dict[str, int] = field(default_factory=dict)
+    _tail: LineTail = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._tail = LineTail(self.folder / TRAJECTORIES, _LONGEST)
 
     def read(self) -> None:
         """Read what is new. A file that was replaced is read from its beginning."""
-        try:
-            with (self.folder / TRAJECTORIES).open("rb") as file:
-                status = os.fstat(file.fileno())
-                state = status.st_ino, status.st_size
-                if state == self._state:
-                    return
-                if status.st_ino != self._state[0] or status.st_size < self._offset:
-                    self.__dict__.update(CollectionIndex(self.folder).__dict__)
-                self._state = state
-                file.seek(self._offset)
-                while line := file.readline(_LONGEST):
-                    if not line.endswith(b"\n") and len(line) < _LONGEST:
-                        return  # it is being written
-                    self._take(line)
-                    self._offset += len(line)
-        except OSError:  # there is none (yet)
-            return
+        for some in self._tail.read():
+            if some.anew:
+                fresh = CollectionIndex(self.folder)
+                self.__dict__.update(fresh.__dict__ | {"_tail": self._tail})
+            self.damaged += some.passed_over
+            offset = some.offset
+            for line in some.lines:
+                self._take(line, offset)
+                offset += len(line) + 1
 
     def at(self, id: str) -> Head | None:
         """The trajectory with an id; None if there is none."""
         place = self._places.get(id)
         return None if place is None else self.heads[place]
 
-    def _take(self, line: bytes) -> None:
+    def _take(self, line: bytes, offset: int) -> None:
         try:
             told, turns, learnt = _searched(line) or _parsed(line)
-            head = self._head(told, turns, learnt)
+            head = self._head(offset, told, turns, learnt)
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             self.damaged += 1
             return
@@ -139,9 +133,9 @@ class CollectionIndex:
                 found.transitions[before][state] += 1
                 before = state
 
-    def _head(self, told: Mapping[str, Any], turns: _Turns, learnt: int) -> Head:
+    def _head(self, offset: int, told: Mapping[str, Any], turns: _Turns, learnt: int) -> Head:
         return Head(
-            offset=self._offset,
+            offset=offset,
             id=_text(told["id"]),
             part=_shared(told.get("part", "")),
             kind=_shared(told["kind"]),

@@ -16,11 +16,11 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from benchmarks.monitor.charts import MOST_POINTS, Point
+from benchmarks.monitor.line_tail import LineTail
 
 _JSON: TypeAdapter[Any] = TypeAdapter(Any)
-_CHUNK = 2**20
 _LONGEST = 2**20
-"""A longer line is skipped."""
+"""A line with more bytes is passed over."""
 _MOST_NAMES = 100
 """No more figures are followed."""
 _LAST_BYTES = 2**16
@@ -89,38 +89,24 @@ class CurveTail:
     series: dict[str, Thinned] = field(default_factory=dict)
     last: dict[str, float] = field(default_factory=dict)
     lines: int = 0
-    _offset: int = 0
-    _inode: int = 0
-    _rest: bytes = b""
-    _skipping: bool = False
+    _tail: LineTail = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._tail = LineTail(self.file, _LONGEST)
 
     def read(self) -> None:
         """Read what has been added. A log that was replaced is read from its beginning."""
-        try:
-            with self.file.open("rb") as file:
-                status = os.fstat(file.fileno())
-                if status.st_ino != self._inode or status.st_size < self._offset:
-                    self.__dict__.update(CurveTail(self.file, self.over).__dict__)
-                    self._inode = status.st_ino
-                file.seek(self._offset)
-                while chunk := file.read(_CHUNK):
-                    self._offset += len(chunk)
-                    self._take(chunk)
-        except OSError:  # there is none (yet)
-            return
+        for some in self._tail.read():
+            if some.anew:
+                self.series, self.last, self.lines = {}, {}, 0
+            self._take(some.lines)
 
     def points(self, name: str, scale: float = 1.0) -> list[Point]:
         """The points of a figure, its values multiplied; none if it never came."""
         found = self.series[name].points() if name in self.series else []
         return [Point(x, y * scale, low * scale, high * scale) for x, y, low, high in found]
 
-    def _take(self, chunk: bytes) -> None:
-        *lines, rest = (self._rest + chunk).split(b"\n")
-        if self._skipping and lines:
-            lines, self._skipping = lines[1:], False
-        self._rest = b"" if self._skipping else rest
-        if len(self._rest) > _LONGEST:
-            self._rest, self._skipping = b"", True
+    def _take(self, lines: Sequence[bytes]) -> None:
         found = _parsed(lines)
         all_xs: list[Any] = [each.get(self.over) for each in found]
         if not _all_numbers(all_xs):

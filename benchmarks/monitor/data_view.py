@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import Any
-from urllib.parse import urlencode
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from benchmarks.monitor.charts import Axis, Series, chart, points
 from benchmarks.monitor.collection_index import CollectionIndex, Head
 from benchmarks.monitor.flow import flow
 from benchmarks.monitor.language import Translator
+from benchmarks.monitor.listing import AddressFilter
 from er_gym.data import paper_figures as paper
 from er_gym.data.statistics import STATES, mean_and_most
 from er_gym.data.trajectory import TAG_OF_KIND, THOUGHT_KINDS, PictureRecord, Trajectory, Turn
 from er_gym.rollout.records import EpisodeRecord, StepRecord
 from er_gym.tasks.verbs import INIT
 
-PAGE_ROWS = 100
-_SORTS = ("order", "turns", "thoughts", "refused")
-
 
 @dataclass(frozen=True)
-class DataFilter:
+class DataFilter(AddressFilter):
     """Which trajectories are shown; every field is a parameter of the address.
 
     Attributes:
@@ -34,6 +31,8 @@ class DataFilter:
         page: from 1.
     """
 
+    sorts: ClassVar[Collection[str]] = ("order", "turns", "thoughts", "refused")
+
     part: str = ""
     kind: str = ""
     type: str = ""
@@ -43,21 +42,6 @@ class DataFilter:
     text: str = ""
     sort: str = "order"
     page: int = 1
-
-    @staticmethod
-    def of(parameters: Mapping[str, str]) -> DataFilter:
-        """From an address; what makes no sense there is passed over."""
-        given: dict[str, Any] = {}
-        for each in fields(DataFilter):
-            value = parameters.get(each.name, "")[:300]
-            if value and each.name != "page":
-                given[each.name] = value
-        page = parameters.get("page", "")
-        if page.isascii() and page.isdigit():
-            given["page"] = max(1, min(int(page[:7]), 10**6))
-        if str(given.get("sort", "order")).removeprefix("-") not in _SORTS:
-            given.pop("sort")
-        return DataFilter(**given)
 
     def takes(self, head: Head) -> bool:
         """Whether a trajectory is shown."""
@@ -72,13 +56,6 @@ class DataFilter:
                 not self.text or self.text.casefold() in f"{head.id} {head.instruction}".casefold()
             )
         )
-
-    def query(self, **changes: Any) -> str:
-        """The parameters of an address, with some changed or added; the page begins again."""
-        told = {each.name: getattr(self, each.name) for each in fields(self)}
-        told |= {"page": 1, **changes}
-        defaults = {each.name: each.default for each in fields(self)}
-        return urlencode({k: str(value) for k, value in told.items() if value != defaults.get(k)})
 
 
 def outcome_of(head: Head) -> str:

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from pydantic_core import from_json
+
+from benchmarks.monitor.line_tail import LineTail
 from er_gym.rollout.events import EVENTS
 
-_CHUNK = 4 * 2**20
-_STEP = re.compile(
-    rb'\{"time":(?P<time>[0-9.e+-]+),"kind":"step","task_id":"(?P<key>[^"\\]*)",'
-    rb'"step":(?P<step>[0-9]+),"verb":"(?P<verb>[^"\\]*)","object_type":"(?P<type>[^"\\]*)",'
-    rb'"success":(?:true|false),"reward":(?P<reward>[0-9.e+-]+)[,}]'
+_LINE = re.compile(
+    rb'(?:\{"time":([0-9.e+-]+),"kind":"step","task_id":"([^"]*)","step":([0-9]+),"verb":"([^"]*)",'
+    rb'"object_type":"([^"]*)","success":(?:true|false),"reward":([0-9.e+-]+)[,}][^\n]*|([^\n]+))\n'
 )
-"""How er-gym writes a step. Most lines are steps; to parse their thoughts, which are not shown
-here, would take most of the time."""
+"""How er-gym writes a step: its time, task, number, verb, type and reward; or any other line. Most
+lines are steps; to parse their thoughts, which are not shown here, would take most of the time."""
 _LONGEST = 8 * 2**20
-"""A longer line is skipped: a model may say anything."""
+"""A line with more bytes is passed over: a model may say anything."""
 
 
 @dataclass(slots=True)
@@ -90,58 +91,54 @@ class EventTail:
     why: str = ""
     time: float = 0.0
     version: int = 0
-    _offset: int = 0
-    _inode: int = 0
-    _rest: bytes = b""
-    _skipping: bool = False
+    _tail: LineTail = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._tail = LineTail(self.folder / EVENTS, _LONGEST)
 
     def read(self) -> None:
         """Read what has been added. A stream that was replaced is read from its beginning."""
+        for some in self._tail.read():
+            if some.anew:
+                self._forget()
+            self._take(some.text)
+
+    def _forget(self) -> None:
+        fresh = EventTail(self.folder, version=self.version + 1)
+        self.__dict__.update(fresh.__dict__ | {"_tail": self._tail})
+
+    def _take(self, text: bytes) -> None:
+        # A run may have hundreds of thousands of steps, and its first page waits for this loop.
+        steps, latest, row, row_of = 0, self.time, EpisodeRow(""), None
+        for time, key, number, verb, object_type, reward, other in _LINE.findall(text):
+            try:
+                if other:
+                    row_of = None  # the episode may begin again
+                    self._other(other)
+                    continue
+                action, moment = _action(verb, object_type), float(time)
+                steps_so_far, gained = int(number), float(reward)
+                if key != row_of:
+                    row, row_of = self._row(_text(key)), key
+            except (ValueError, KeyError, TypeError, RecursionError):
+                continue  # half a line of a killed process, or an event of a later version
+            row.last = action
+            row.reward += gained
+            if steps_so_far > row.steps:
+                row.steps = steps_so_far
+            if moment > latest:
+                latest = moment
+            steps += 1
+        self.time = max(self.time, latest)
+        self.version += steps
+
+    def _other(self, line: bytes) -> None:
         try:
-            with (self.folder / EVENTS).open("rb") as file:
-                status = os.fstat(file.fileno())
-                if status.st_ino != self._inode or status.st_size < self._offset:
-                    self._forget(status.st_ino)
-                file.seek(self._offset)
-                while chunk := file.read(_CHUNK):
-                    self._offset += len(chunk)
-                    self._take(chunk)
-        except OSError:  # there is none (yet)
-            return
-
-    def _forget(self, inode: int) -> None:
-        fresh = EventTail(self.folder, version=self.version + 1, _inode=inode)
-        self.__dict__.update(fresh.__dict__)
-
-    def _take(self, chunk: bytes) -> None:
-        *lines, rest = (self._rest + chunk).split(b"\n")
-        self._rest = rest
-        for line in lines:
-            if self._skipping:
-                self._skipping = False
-            elif line:
-                self._line(line)
-        if len(self._rest) > _LONGEST:
-            self._rest, self._skipping = b"", True
-
-    def _line(self, line: bytes) -> None:
-        try:
-            if match := _STEP.match(line):
-                self._step(
-                    match["key"].decode(),
-                    int(match["step"]),
-                    float(match["reward"]),
-                    b" ".join((match["verb"], match["type"])).strip().decode(),
-                )
-                self.time = max(self.time, float(match["time"]))
-                self.version += 1
-                return
-            event = json.loads(line)
-            told = _HANDLERS[event["kind"]]
-            told(self, event)
-            self.time = max(self.time, float(event["time"]))
-        except (ValueError, KeyError, TypeError, RecursionError):
-            return  # half a line of a killed process, or an event of a later version
+            event = from_json(line)
+        except ValueError:
+            event = json.loads(line)  # knows more: half a surrogate pair
+        _HANDLERS[event["kind"]](self, event)
+        self.time = max(self.time, float(event["time"]))
         self.version += 1
 
     def _row(self, key: str) -> EpisodeRow:
@@ -173,15 +170,12 @@ class EventTail:
             row.tokens += int(event["prompt_tokens"]) + int(event["completion_tokens"])
             row.cost += float(event["cost"])
 
-    def _step(self, key: str, number: int, reward: float, action: str) -> None:
-        row = self._row(key)
+    def _step(self, event: dict[str, Any]) -> None:
+        row = self._row(str(event["task_id"]))
+        number, reward = int(event["step"]), float(event["reward"])
+        row.last = f"{event['verb']} {event.get('object_type', '')}".strip()
         row.steps = max(row.steps, number)
         row.reward += reward
-        row.last = action
-
-    def _other_step(self, event: dict[str, Any]) -> None:
-        action = f"{event['verb']} {event.get('object_type', '')}".strip()
-        self._step(str(event["task_id"]), int(event["step"]), float(event["reward"]), action)
 
     def _ended(self, event: dict[str, Any]) -> None:
         row = self._row(str(event["task_id"]))
@@ -199,8 +193,18 @@ _HANDLERS = {
     "run_begun": EventTail._run_begun,
     "episode_begun": EventTail._episode_begun,
     "reply": EventTail._reply,
-    "step": EventTail._other_step,
+    "step": EventTail._step,
     "episode_ended": EventTail._ended,
     "cost": lambda tail, event: None,
     "run_ended": EventTail._run_ended,
 }
+
+
+def _text(quoted: bytes) -> str:
+    """What stands between the quotes of a JSON string."""
+    return str(json.loads(b'"%b"' % quoted)) if b"\\" in quoted else quoted.decode()
+
+
+@lru_cache(4096)
+def _action(verb: bytes, object_type: bytes) -> str:
+    return f"{_text(verb)} {_text(object_type)}".strip()

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import io
 import json
 import os
 import shutil
@@ -28,21 +27,21 @@ from pathlib import Path
 from urllib.parse import urlencode
 
 from markupsafe import Markup
-from PIL import Image
 
 from agents.vlm.record import PictureRecord
 from benchmarks.monitor import formats
 from benchmarks.monitor.episode_view import EpisodeView, StepView, picture_file, view_of
 from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.language import Translator
+from benchmarks.monitor.listing import Page
 from benchmarks.monitor.offline import OfflinePage, offline
-from benchmarks.monitor.pages.episodes import PICTURE_KINDS
+from benchmarks.monitor.pages.replays import PICTURE_KINDS, drawn_room, no_room
 from benchmarks.monitor.pages.runs import run_told
 from benchmarks.monitor.places import Places
-from benchmarks.monitor.room_map import room_map
-from benchmarks.monitor.run_view import SORTS, Filter, Page
+from benchmarks.monitor.run_view import SORTS, Filter
 from benchmarks.monitor.site import Site
 from benchmarks.monitor.world import CannotReplay, Worlds
+from er_gym.data.pictures import encode_picture
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.writing import MARKDOWN_MARK, CannotWrite, make_folder, write_atomic
 
@@ -160,9 +159,7 @@ class _Maker:
         self._words = Translator(wanted.language)
         self._run = RunDirectory.open(root)
         with self._site.runs.use(place) as view:
-            rows = [row for row in view.rows.values() if wanted.filter.takes(row) and row.ended]
-            sort = wanted.filter.sort
-            rows.sort(key=SORTS[sort.removeprefix("-")], reverse=sort.startswith("-"))
+            rows = [row for row in view.chosen(wanted.filter) if row.ended]
             self.keys = [row.key for row in rows[: wanted.episodes]]
             total = sum(row.ended is not None for row in view.rows.values())
         self._numbers = {key: number for number, key in enumerate(self.keys, 1)}
@@ -173,7 +170,7 @@ class _Maker:
         with self._site.runs.use(self.place) as view:
             view.count_failures(float("inf"))
             told = run_told(view, Filter())
-            every = sorted(view.rows.values(), key=SORTS["ended"], reverse=True)
+            every = view.chosen(Filter())
             told["page"] = Page(every, len(every), 1, 1)
         told["exported"] = self.exported
         page = self._site.page("run.html", told, self._words)
@@ -253,9 +250,7 @@ class _Maker:
         records: list[PictureRecord] = []
         try:
             for frame in self._worlds.frames(self._run.manifest, episode.record):
-                data = io.BytesIO()
-                Image.fromarray(frame).save(data, "JPEG", quality=85)
-                contents.append((data.getvalue(), ".jpeg"))
+                contents.append((encode_picture(frame), ".jpeg"))
                 height, width = frame.shape[:2]
                 records.append(PictureRecord(path="", digest="", width=width, height=height))
         except CannotReplay:
@@ -268,12 +263,10 @@ class _Maker:
 
     def _map(self, episode: EpisodeView) -> str:
         try:
-            world = self._worlds.world(self._run.manifest, episode.record)
+            drawn = drawn_room(self._worlds, self._run.manifest, episode.record, self._words)
         except CannotReplay as error:
-            why = self._words("no_replay", why=formats.brief(str(error)))
-            return str(Markup('<p class="empty">{}</p>').format(why))
-        wanted = {key_action.object_id for key_action in episode.record.key_actions}
-        return str(room_map(world, wanted, self._words("map")))
+            drawn = no_room(error, self._words)
+        return str(drawn)
 
 
 def _write_file(maker: _Maker, tell: Callable[[int, int], None]) -> None:

@@ -5,86 +5,21 @@ from __future__ import annotations
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from typing import Any
-from urllib.parse import urlencode
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from benchmarks.monitor.event_tail import EpisodeRow, EventTail
 from benchmarks.monitor.failure_counts import FailureCounts
+from benchmarks.monitor.listing import AddressFilter
 from benchmarks.monitor.places import Place
 from benchmarks.scoring.metrics import wilson
 from er_gym.rollout.run_directory import Manifest, RunDirectory, RunDirectoryError
 from er_gym.tasks.types import task_type
 
-PAGE_ROWS = 100
 _SILENT_SECONDS = 120.0
 """A run without an event for so long is not counted as playing."""
 _RECENT_SECONDS = 60.0
-
-
-@dataclass(frozen=True)
-class Filter:
-    """Which rows are shown; every field is a parameter of the address.
-
-    Attributes:
-        type, scene, outcome, reason: exact values; "" for any.
-        steps: ``5``, ``5-10``, ``-10`` or ``5-``; "" for any.
-        text: part of the name or the instruction, whatever the case.
-        sort: a column of :data:`SORTS`; with ``-`` before it, descending.
-        page: from 1.
-    """
-
-    type: str = ""
-    scene: str = ""
-    outcome: str = ""
-    reason: str = ""
-    steps: str = ""
-    text: str = ""
-    sort: str = "-ended"
-    page: int = 1
-
-    @staticmethod
-    def of(parameters: Mapping[str, str]) -> Filter:
-        """From an address; what makes no sense there is passed over."""
-        given: dict[str, Any] = {}
-        for each in fields(Filter):
-            value = parameters.get(each.name, "")[:200]
-            if value and each.name != "page":
-                given[each.name] = value
-        page = parameters.get("page", "")
-        if page.isascii() and page.isdigit():
-            given["page"] = max(1, min(int(page[:7]), 10**6))
-        if str(given.get("sort", "-ended")).removeprefix("-") not in SORTS:
-            given.pop("sort", None)
-        return Filter(**given)
-
-    def takes(self, row: EpisodeRow) -> bool:
-        """Whether a row is shown."""
-        return (
-            self.type in ("", row.task_type)
-            and self.scene in ("", row.scene)
-            and self.outcome in ("", row.outcome)
-            and self.reason in ("", row.end_reason)
-            and _within(row.steps, self.steps)
-            and (not self.text or self.text.casefold() in f"{row.key} {row.instruction}".casefold())
-        )
-
-    def query(self, **changes: Any) -> str:
-        """The parameters of an address, with some changed or added; the page begins again."""
-        told = {each.name: getattr(self, each.name) for each in fields(self)}
-        told |= {"page": 1, **changes}
-        defaults = {each.name: each.default for each in fields(self)}
-        return urlencode({k: str(value) for k, value in told.items() if value != defaults.get(k)})
-
-
-def _within(number: int, bounds: str) -> bool:
-    low, dash, high = bounds.partition("-")
-    if not all(part.isascii() and (part.isdigit() or not part) for part in (low, high)):
-        return True
-    if not dash:
-        return not low or number == int(low)
-    return (not low or number >= int(low)) and (not high or number <= int(high))
 
 
 SORTS: Mapping[str, Callable[[EpisodeRow], Any]] = {
@@ -109,19 +44,47 @@ def _room_number(scene: str) -> tuple[int, str]:
 
 
 @dataclass(frozen=True)
-class Page:
-    """Some of the rows.
+class Filter(AddressFilter):
+    """Which rows are shown; every field is a parameter of the address.
 
     Attributes:
-        rows: of this page.
-        total: how many rows the filter takes.
-        number, last: of this page and of the last one, from 1.
+        type, scene, outcome, reason: exact values; "" for any.
+        steps: ``5``, ``5-10``, ``-10`` or ``5-``; "" for any.
+        text: part of the name or the instruction, whatever the case.
+        sort: a column of :data:`SORTS`; with ``-`` before it, descending.
+        page: from 1.
     """
 
-    rows: Sequence[EpisodeRow]
-    total: int
-    number: int
-    last: int
+    sorts: ClassVar[Collection[str]] = SORTS
+
+    type: str = ""
+    scene: str = ""
+    outcome: str = ""
+    reason: str = ""
+    steps: str = ""
+    text: str = ""
+    sort: str = "-ended"
+    page: int = 1
+
+    def takes(self, row: EpisodeRow) -> bool:
+        """Whether a row is shown."""
+        return (
+            self.type in ("", row.task_type)
+            and self.scene in ("", row.scene)
+            and self.outcome in ("", row.outcome)
+            and self.reason in ("", row.end_reason)
+            and _within(row.steps, self.steps)
+            and (not self.text or self.text.casefold() in f"{row.key} {row.instruction}".casefold())
+        )
+
+
+def _within(number: int, bounds: str) -> bool:
+    low, dash, high = bounds.partition("-")
+    if not all(part.isascii() and (part.isdigit() or not part) for part in (low, high)):
+        return True
+    if not dash:
+        return not low or number == int(low)
+    return (not low or number >= int(low)) and (not high or number <= int(high))
 
 
 @dataclass(frozen=True)
@@ -261,23 +224,11 @@ class RunView:
             version=tail.version,
         )
 
-    def page(self, chosen: Filter) -> Page:
+    def chosen(self, filter: Filter) -> list[EpisodeRow]:
         """The rows that a filter takes, sorted."""
-        rows = [row for row in self._tail.rows.values() if chosen.takes(row)]
-        rows.sort(key=SORTS[chosen.sort.removeprefix("-")], reverse=chosen.sort.startswith("-"))
-        last = max(1, -(-len(rows) // PAGE_ROWS))
-        number = min(chosen.page, last)
-        return Page(rows[(number - 1) * PAGE_ROWS : number * PAGE_ROWS], len(rows), number, last)
-
-    def neighbours(self, chosen: Filter, key: str) -> tuple[str, str]:
-        """The episodes before and after one in a filter's order; "" for none."""
-        rows = [row for row in self._tail.rows.values() if chosen.takes(row)]
-        rows.sort(key=SORTS[chosen.sort.removeprefix("-")], reverse=chosen.sort.startswith("-"))
-        keys = [row.key for row in rows]
-        if key not in keys:
-            return "", ""
-        at = keys.index(key)
-        return (keys[at - 1] if at else ""), (keys[at + 1] if at + 1 < len(keys) else "")
+        rows = [row for row in self._tail.rows.values() if filter.takes(row)]
+        rows.sort(key=SORTS[filter.sort.removeprefix("-")], reverse=filter.sort.startswith("-"))
+        return rows
 
     def tallies(self) -> tuple[list[Tally], list[Tally]]:
         """Success by group and by task type, in the order of the paper's table."""

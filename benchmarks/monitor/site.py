@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping
 from copy import deepcopy
 from typing import Any, TypeAlias
@@ -99,6 +100,14 @@ class Site:
         """A run at this moment."""
         with self.runs.use(place) as view:
             return view.summary()
+
+    def read_runs(self, closing: threading.Event) -> None:
+        """Read all runs, one after the other, until ``closing`` is set: pages that are asked for
+        meanwhile wait for what is being read, and need not read it again."""
+        for place in self.places.of_kind("run"):
+            if closing.is_set():
+                return
+            self.summary(place)
 
     def rows(self, place: Place) -> dict[str, EpisodeRow]:
         """A run's episodes by key."""

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from benchmarks.plan.phase import Phase
 from benchmarks.plan.settings import FREE, PlaySettings
 from er_gym import __version__
-from er_gym.locking import Locked, exclusive_use
+from er_gym.locking import Locked, check_unused, exclusive_use
 from er_gym.rollout.processes import CONTEXT, GRACE_SECONDS, end_with_parent
 from er_gym.tasks.reading import read_text
 from er_gym.writing import make_folder, write_atomic
@@ -105,8 +105,8 @@ def read_record(plan: Plan, root: Path) -> PlanRecord | None:
     """
     file = root / plan.file
     if not file.exists():
-        if root.is_dir() and any(each.name != "run.lock" for each in root.iterdir()):
-            raise PlanError(f"{root} is not empty and holds no {file.name}; choose another --out")
+        if root.is_dir():
+            check_unused(root, file.name, PlanError)
         return None
     try:
         record = PlanRecord.model_validate_json(read_text(file))

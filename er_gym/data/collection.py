@@ -23,7 +23,7 @@ from typing import Any, BinaryIO, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from er_gym.data.trajectory import Trajectory
-from er_gym.locking import LOCK
+from er_gym.locking import LOCK, check_unused
 from er_gym.rollout.run_directory import EPISODES, RunDirectory, RunDirectoryError
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.reading import read_bytes, read_text
@@ -90,11 +90,9 @@ class Collection:
                     f"{path} holds another collection: {_difference(theirs, ours)}; choose "
                     "another --out, or repeat that command"
                 )
-        elif not begun and path.exists() and {each.name for each in path.iterdir()} - {LOCK}:
-            raise CollectionError(
-                f"{path} is not empty and holds no {MANIFEST}; choose another --out"
-            )
         else:
+            if not begun:
+                check_unused(path, MANIFEST, CollectionError)
             make_folder(path)
             write_atomic(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
         return cls(path, manifest)

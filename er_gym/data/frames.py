@@ -20,7 +20,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from er_gym.data.trajectory import PictureRecord, SeenObject
-from er_gym.locking import LOCK
+from er_gym.locking import check_unused
 from er_gym.tasks.reading import read_bytes
 from er_gym.writing import make_folder, write_atomic
 
@@ -121,9 +121,8 @@ class FrameSet:
                         f"{path} holds other frames: its {name} is {there!r:.200}, this one's "
                         f"{here!r:.200}; choose another --out, or repeat that command"
                     )
-        elif path.exists() and {each.name for each in path.iterdir()} - {LOCK}:
-            raise FramesError(f"{path} is not empty and holds no {MANIFEST}; choose another --out")
         else:
+            check_unused(path, MANIFEST, FramesError)
             make_folder(path)
             write_atomic(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
         return cls(path, manifest)

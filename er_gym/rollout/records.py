@@ -6,7 +6,7 @@ reader would misread takes a new ``format``.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeAlias
 
 from pydantic import (
     AfterValidator,
@@ -39,6 +39,25 @@ class _Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+class GrownRecord(_Record):
+    """A record that has got fields since it was first written.
+
+    Attributes:
+        added: the names of these fields. Where one has its default, the record is written without
+            it, as before.
+    """
+
+    added: ClassVar[tuple[str, ...]] = ()
+
+    @model_serializer(mode="wrap")
+    def _without_defaults(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        told: dict[str, Any] = handler(self)
+        for name in self.added:
+            if getattr(self, name) == type(self).model_fields[name].default:
+                told.pop(name, None)
+        return told
+
+
 def episode_key(task_id: str, sample: int = 1) -> str:
     """The name of an episode among those of its run: the task's id, and the number of the sample
     where it is not the first."""
@@ -66,7 +85,7 @@ class KeyActionRecord(_Record):
     spelled: str = ""
 
 
-class StepRecord(_Record):
+class StepRecord(GrownRecord):
     """One step, and the types that were legal targets after it.
 
     Attributes:
@@ -82,9 +101,10 @@ class StepRecord(_Record):
         text: the action as the agent gave it.
         appended: whether the protocol took the step instead of the agent: the ``end`` that the
             paper's runner appends (:data:`er_gym.envs.protocol.PAPER`).
-        by: who decided the step in place of the agent; ``""`` if nobody did. Such a step is written
-            without it, as before anybody could.
+        by: who decided the step in place of the agent; ``""`` if nobody did.
     """
+
+    added = ("by",)
 
     verb: str
     object_type: Words = ""
@@ -99,15 +119,8 @@ class StepRecord(_Record):
     appended: bool = False
     by: By = ""
 
-    @model_serializer(mode="wrap")
-    def _without_nobody(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        told: dict[str, Any] = handler(self)
-        if not self.by:
-            told.pop("by", None)
-        return told
 
-
-class EpisodeRecord(_Record):
+class EpisodeRecord(GrownRecord):
     """One episode of one task.
 
     Attributes:
@@ -129,9 +142,10 @@ class EpisodeRecord(_Record):
         error: the error it crashed with, in one line; ``""`` if it did not crash.
         run: in a run directory, the digest of the run's manifest; ``""`` elsewhere, and in records
             written before this field existed.
-        sample: which of the task's episodes it is, from 1. A first episode is written without it,
-            as before runs had several.
+        sample: which of the task's episodes it is, from 1.
     """
+
+    added = ("sample",)
 
     format: Literal["er-gym/episode/1"] = "er-gym/episode/1"
     task_id: str
@@ -153,13 +167,6 @@ class EpisodeRecord(_Record):
     error: Words = ""
     run: str = ""
     sample: int = Field(default=1, ge=1)
-
-    @model_serializer(mode="wrap")
-    def _without_first_sample(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        told: dict[str, Any] = handler(self)
-        if self.sample == 1:
-            told.pop("sample", None)
-        return told
 
     @property
     def key(self) -> str:

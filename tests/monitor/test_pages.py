@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import html
 import re
+import shutil
+import threading
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,6 +14,7 @@ from fastapi.testclient import TestClient
 
 from benchmarks.monitor.app import make_app
 from benchmarks.monitor.places import Places
+from benchmarks.monitor.site import Site
 from er_gym.rollout.run_directory import RunDirectory
 
 
@@ -44,6 +47,25 @@ def test_the_first_page_lists_the_runs(client, ids):
         assert f"/{name}</a>" in answer.text
     assert "8 of 8" in said(answer.text)
     assert "100.0 %" in said(answer.text)
+
+
+def test_runs_are_read_before_a_page_is_asked_for(runs, tmp_path):
+    folder = shutil.copytree(runs / "random", tmp_path / "random")
+    closing = threading.Event()
+    with TestClient(
+        make_app([folder], closing=closing), base_url="http://127.0.0.1:8010"
+    ) as client:
+        for thread in threading.enumerate():
+            if thread.name == "er-gym-reads-runs":
+                thread.join(60)
+        (folder / "events.jsonl").rename(tmp_path / "events.jsonl")
+        assert "8 of 8" in said(client.get("/").text)
+    closing.set()
+    (tmp_path / "events.jsonl").rename(folder / "events.jsonl")
+    late = Site(Places([folder]))
+    late.read_runs(closing)
+    (folder / "events.jsonl").unlink()
+    assert late.summary(late.places.all()[0]).finished == 0
 
 
 def test_a_run_can_be_filtered_and_sorted_by_its_address(client, ids, runs):
@@ -118,6 +140,9 @@ def test_runs_are_compared_task_by_task(client, ids, runs):
     assert f"{8 - lost}/{8 - lost}" in text
     neither = client.get("/compare", params=both | {"change": "neither"})
     assert "/compare/episode" not in neither.text
+    for page in ("1234567x", "9" * 5_000, "0"):  # no such page: the last or the first
+        asked = client.get("/compare", params=both | {"page": page})
+        assert asked.text.count("/compare/episode") == 8 - lost
     assert client.get("/compare").status_code == 200
     assert client.get("/compare", params={"of": ["nothing"]}).status_code == 404
 

@@ -9,13 +9,13 @@ from fastapi import Request, Response
 from benchmarks.monitor.comparison import CHANGES, Pair, by_type, difference, pairs_of
 from benchmarks.monitor.episode_view import EpisodeView, view_of
 from benchmarks.monitor.failures import FAILURES
+from benchmarks.monitor.listing import page_number, page_of
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.site import NothingThere, Routes, Site
 from er_gym.rollout.run_directory import RunDirectory
 
 MOST_RUNS = 12
 """No more runs are compared at once."""
-PAGE_ROWS = 100
 
 
 @dataclass(frozen=True)
@@ -66,10 +66,6 @@ class ComparePages:
             if (pair.change == change if change else pair.change in ("gained", "lost"))
         ]
         flipped.sort(key=lambda pair: (CHANGES.index(pair.change), pair.key))
-        last = max(1, -(-len(flipped) // PAGE_ROWS))
-        number = request.query_params.get("page", "1")
-        page = min(int(number), last) if number.isascii() and number[:7].isdigit() else 1
-        page = max(1, page)
         counts = [self._site.failures(place) for place in places]
         told = {
             "runs": [summary for summary, _ in runs],
@@ -85,12 +81,9 @@ class ComparePages:
             "second": runs[chosen][0] if len(runs) > 1 else None,
             "differences": differences,
             "types": by_type(pairs),
-            "flipped": flipped[(page - 1) * PAGE_ROWS : page * PAGE_ROWS],
-            "total": len(flipped),
             "change": change,
             "changes": CHANGES,
-            "page": page,
-            "last": last,
+            "page": page_of(flipped, page_number(request.query_params)),
             "live": ",".join(asked),
         }
         return self._site.show(request, "compare.html", told)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
+from pathlib import Path
 
 from fastapi import Request, Response
-from fastapi.responses import HTMLResponse
-from markupsafe import Markup
-from PIL import Image
 
-from benchmarks.monitor import formats
 from benchmarks.monitor.collection_index import Collections
 from benchmarks.monitor.data_view import (
-    PAGE_ROWS,
     DataFilter,
     chosen,
     outcome_of,
@@ -23,12 +18,12 @@ from benchmarks.monitor.data_view import (
 )
 from benchmarks.monitor.episode_view import file_inside
 from benchmarks.monitor.growth import changed, in_use, parts_of
-from benchmarks.monitor.pages.episodes import PICTURE_KINDS
+from benchmarks.monitor.listing import neighbours, page_of
+from benchmarks.monitor.pages.replays import ReplayPages
 from benchmarks.monitor.places import Place
-from benchmarks.monitor.room_map import room_map
 from benchmarks.monitor.run_view import RunSummary
-from benchmarks.monitor.site import AN_HOUR, NothingThere, Routes, Site
-from benchmarks.monitor.world import CannotReplay, Worlds
+from benchmarks.monitor.site import NothingThere, Routes, Site
+from benchmarks.monitor.world import CannotReplay
 from er_gym.data.collection import PARTS, Collection, CollectionManifest
 from er_gym.data.line_index import trajectory_at
 from er_gym.data.trajectory import Trajectory
@@ -55,13 +50,14 @@ class CollectionRow:
     changed: float
 
 
-class DataPages:
+class DataPages(ReplayPages):
     """See the file."""
 
+    address = "/data/{id}"
+
     def __init__(self, site: Site) -> None:
-        self._site = site
+        super().__init__(site)
         self._collections = Collections()
-        self._worlds = Worlds()
 
     def routes(self) -> Routes:
         """The pages by address."""
@@ -69,9 +65,7 @@ class DataPages:
             "/data": self.all,
             "/data/{id}": self.collection,
             "/data/{id}/trajectory": self.trajectory,
-            "/data/{id}/picture": self.picture,
-            "/data/{id}/map": self.map,
-            "/data/{id}/frame": self.frame,
+            **super().routes(),
         }
 
     def all(self, request: Request) -> Response:
@@ -89,15 +83,10 @@ class DataPages:
             taken = chosen(index, filter)
             told = overview(index, self._site.translator(request))
             told |= {"total": len(index.heads), "found": index.found, "damaged": index.damaged}
-        last = max(1, -(-len(taken) // PAGE_ROWS))
-        page = min(filter.page, last)
         told |= {
             "row": self._row(place),
             "filter": filter,
-            "heads": taken[(page - 1) * PAGE_ROWS : page * PAGE_ROWS],
-            "taken": len(taken),
-            "page": page,
-            "last": last,
+            "page": page_of(taken, filter.page),
             "outcome_of": outcome_of,
             "playing": self._parts(place),
             "live": id,
@@ -112,7 +101,7 @@ class DataPages:
         trajectory = self._trajectory(place, key)
         with self._collections.use(place) as index:
             ids = [head.id for head in chosen(index, filter)]
-        at = ids.index(key) if key in ids else -1
+        before, after = neighbours(ids, key)
         turns, pictures = turns_of(trajectory)
         told = {
             "place": place,
@@ -121,51 +110,17 @@ class DataPages:
             "turns": turns,
             "pictures": pictures,
             "filter": filter,
-            "before": ids[at - 1] if at > 0 else "",
-            "after": ids[at + 1] if 0 <= at < len(ids) - 1 else "",
+            "before": before,
+            "after": after,
             "scripts": ("episode.js",),
             "at": "data",
         }
         return self._site.show(request, "trajectory.html", told)
 
-    def picture(self, id: str, key: str = "", n: int = 0) -> Response:
-        """A picture of a trajectory."""
+    def _picture(self, id: str, key: str, n: int) -> Path | None:
         place = self._site.place(id, "collection")
         _, pictures = turns_of(self._trajectory(place, key))
-        file = file_inside(place.path, PARTS, pictures[n].path) if 0 <= n < len(pictures) else None
-        kind = PICTURE_KINDS.get(file.suffix.lower()) if file else None
-        if file is None or kind is None:
-            raise NothingThere
-        try:
-            return Response(file.read_bytes(), media_type=kind, headers=AN_HOUR)
-        except OSError:
-            raise NothingThere from None
-
-    def map(self, request: Request, id: str, key: str = "") -> Response:
-        """The room of a trajectory from above, as SVG, or why it cannot be drawn."""
-        trajectory = self._trajectory(self._site.place(id, "collection"), key)
-        words = self._site.translator(request)
-        try:
-            world = self._worlds.world(*self._played(id, trajectory))
-        except CannotReplay as error:
-            text = words("no_replay", why=formats.brief(str(error)))
-            return HTMLResponse(Markup("<p class=empty>{}</p>").format(text))
-        wanted = {key_action.object_id for key_action in trajectory.key_actions}
-        return HTMLResponse(room_map(world, wanted, words("map")))
-
-    def frame(self, id: str, key: str = "", n: int = 0) -> Response:
-        """What the agent could see before a turn, drawn now."""
-        trajectory = self._trajectory(self._site.place(id, "collection"), key)
-        try:
-            manifest, record = self._played(id, trajectory)
-            if not 0 <= n < len(record.steps):
-                raise NothingThere
-            picture = self._worlds.frame(manifest, record, n)
-        except CannotReplay:
-            raise NothingThere from None
-        data = io.BytesIO()
-        Image.fromarray(picture).save(data, "JPEG", quality=85)
-        return Response(data.getvalue(), media_type="image/jpeg", headers=AN_HOUR)
+        return file_inside(place.path, PARTS, pictures[n].path) if 0 <= n < len(pictures) else None
 
     def _trajectory(self, place: Place, key: str) -> Trajectory:
         with self._collections.use(place) as index:
@@ -177,13 +132,9 @@ class DataPages:
         except (ValueError, OSError):
             raise NothingThere from None
 
-    def _played(self, id: str, trajectory: Trajectory) -> tuple[Manifest, EpisodeRecord]:
-        """The part's manifest, and the episode that became a trajectory.
-
-        Raises:
-            CannotReplay: the part has none.
-        """
+    def _played(self, id: str, key: str) -> tuple[Manifest, EpisodeRecord]:
         place = self._site.place(id, "collection")
+        trajectory = self._trajectory(place, key)
         if trajectory.part not in parts_of(place.path):
             raise CannotReplay("its part is not there")
         try:

@@ -8,6 +8,7 @@ from typing import Any
 from fastapi import Request, Response
 
 from benchmarks.ladder.paper_rungs import PAPER
+from benchmarks.monitor.listing import page_of
 from benchmarks.monitor.run_view import Filter, RunView
 from benchmarks.monitor.site import Routes, Site
 from er_gym.tasks.types import COMPOSITE, MANIPULATE, SEARCH, TRANSPORT
@@ -32,7 +33,7 @@ def run_told(view: RunView, chosen: Filter) -> dict[str, Any]:
     return {
         "run": view.summary(),
         "filter": chosen,
-        "page": view.page(chosen),
+        "page": page_of(view.chosen(chosen), chosen.page),
         "groups": groups,
         "types": types,
         "choices": view.choices(),

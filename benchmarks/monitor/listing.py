@@ -1,0 +1,82 @@
+"""Lists that an address filters, sorts and turns the pages of."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Generic, TypeVar
+from urllib.parse import urlencode
+
+PAGE_ROWS = 100
+_MOST_TEXT = 300
+_MOST_PAGES = 10**6
+
+Row = TypeVar("Row")
+_Filter = TypeVar("_Filter", bound="AddressFilter")
+
+
+@dataclass(frozen=True)
+class AddressFilter:
+    """Which rows of a list are shown, and in which order.
+
+    Each field of a subclass is a parameter of the address: a text, ``""`` for any; or ``sort``, the
+    name of an order, with ``-`` before it if it descends; or ``page``, from 1.
+
+    Attributes:
+        sorts: the names of the orders.
+    """
+
+    sorts: ClassVar[Collection[str]] = ()
+
+    @classmethod
+    def of(cls: type[_Filter], parameters: Mapping[str, str]) -> _Filter:
+        """From an address; what makes no sense there is passed over."""
+        texts = {each.name: parameters.get(each.name, "") for each in fields(cls)}
+        if texts["sort"].removeprefix("-") not in cls.sorts:
+            del texts["sort"]
+        given: dict[str, Any] = {name: text[:_MOST_TEXT] for name, text in texts.items() if text}
+        return cls(**given | {"page": page_number(parameters)})
+
+    def query(self, **changes: Any) -> str:
+        """The parameters of an address, with some changed or added; the page begins again."""
+        told = {each.name: getattr(self, each.name) for each in fields(self)}
+        told |= {"page": 1, **changes}
+        defaults = {each.name: each.default for each in fields(self)}
+        return urlencode({k: str(value) for k, value in told.items() if value != defaults.get(k)})
+
+
+@dataclass(frozen=True)
+class Page(Generic[Row]):
+    """Some rows of a list.
+
+    Attributes:
+        rows: of this page.
+        total: how many rows the list has.
+        number, last: of this page and of the last one, from 1.
+    """
+
+    rows: Sequence[Row]
+    total: int
+    number: int
+    last: int
+
+
+def page_number(parameters: Mapping[str, str]) -> int:
+    """The page that an address asks for, from 1; 1 if it makes no sense."""
+    text = parameters.get("page", "")
+    return max(1, min(int(text[:7]), _MOST_PAGES)) if text.isascii() and text.isdigit() else 1
+
+
+def page_of(rows: Sequence[Row], number: int) -> Page[Row]:
+    """A page of a list; the last one if it has fewer."""
+    last = max(1, -(-len(rows) // PAGE_ROWS))
+    number = min(number, last)
+    return Page(rows[(number - 1) * PAGE_ROWS : number * PAGE_ROWS], len(rows), number, last)
+
+
+def neighbours(keys: Sequence[str], key: str) -> tuple[str, str]:
+    """The keys before and after one; "" for none."""
+    if key not in keys:
+        return "", ""
+    at = keys.index(key)
+    return keys[at - 1] if at else "", keys[at + 1] if at + 1 < len(keys) else ""
