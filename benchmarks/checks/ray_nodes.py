@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 import shutil
 import signal
 import tempfile
@@ -13,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from er_gym.rollout.cluster.session import LOCAL_ENVIRONMENT
+from er_gym.rollout.cluster.session import LOCAL_ENVIRONMENT, auth_token
 
 _STORE_BYTES = 100 * 2**20
 
@@ -64,8 +63,7 @@ class RayNodes:
 def ray_nodes(count: int, cpus: float = 1) -> Iterator[RayNodes]:
     """A cluster of ``count`` nodes with ``cpus`` processors each, on loopback alone."""
     folder = tempfile.mkdtemp(prefix="nodes-", dir="/tmp")
-    token = secrets.token_hex(32)
-    environment = {**LOCAL_ENVIRONMENT, "RAY_AUTH_TOKEN": token, "RAY_TMPDIR": folder}
+    environment = {**LOCAL_ENVIRONMENT, "RAY_AUTH_TOKEN": auth_token(), "RAY_TMPDIR": folder}
     os.environ.update(environment)
     Path(folder, "ray").mkdir()  # Ray writes the address there
     try:

@@ -9,6 +9,7 @@ import shutil
 import socket
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,12 +69,18 @@ def ray_machines(
                 _join(settings.address, modules)
             else:
                 folder = stack.enter_context(_folder())
-                stack.enter_context(_environment({"RAY_AUTH_TOKEN": secrets.token_hex(32)}))
+                stack.enter_context(_environment({"RAY_AUTH_TOKEN": auth_token()}))
                 with _loopback():
                     _start(folder)
             stack.callback(ray.shutdown)
             stack.enter_context(_quiet())
         yield RayMachines(settings, say)
+
+
+@lru_cache
+def auth_token() -> str:
+    """The password of every Ray that this process starts: Ray reads it once in a process."""
+    return secrets.token_hex(32)
 
 
 def _start(folder: Path) -> None:
