@@ -49,7 +49,7 @@ def main(
         here = time.perf_counter() - start
         start = time.perf_counter()
         with ray_nodes(3) as nodes:
-            killed = _play_and_kill(play, folder / "there", nodes, kills, every, head, seed)
+            killed = play_and_kill(play, folder / "there", nodes, kills, every, head, seed)
         if head:
             with ray_nodes(2) as nodes:
                 _er_gym(_on(play, folder / "there", nodes))
@@ -67,16 +67,26 @@ def _er_gym(arguments: list[str]) -> None:
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
-def _play_and_kill(
+def play_and_kill(
     play: list[str],
     out: Path,
     nodes: RayNodes,
     kills: int,
     every: float,
-    head: bool,
-    seed: int,
+    head: bool = False,
+    seed: int = 0,
 ) -> dict[str, int]:
-    """Run the command; returns how many processes of each kind were killed."""
+    """Run a command, and kill processes that work for it; returns how many of each kind.
+
+    Args:
+        play: the command's arguments.
+        out: its run directory.
+        nodes: the cluster.
+        kills: how many processes.
+        every: seconds between two of them, about.
+        head: whether the head is killed after these.
+        seed: of what is killed and when.
+    """
     draw = random.Random(seed)
     killed = {"workers": 0, "nodes": 0}
     command = [sys.executable, "-m", "benchmarks.cli", *_on(play, out, nodes)]
@@ -84,7 +94,6 @@ def _play_and_kill(
         while process.poll() is None and sum(killed.values()) < kills:
             time.sleep(draw.uniform(0.5, 1.5) * every)
             workers = nodes.workers()
-            print(time.time(), "workers", workers, flush=True)
             if workers and draw.random() < 0.7:
                 os.kill(draw.choice(workers), signal.SIGKILL)
                 killed["workers"] += 1
@@ -102,7 +111,7 @@ def _play_and_kill(
 
 def _compare(here: Path, there: Path) -> None:
     """Compare two runs; exit code 1 if they differ."""
-    ours, theirs = _episodes(here), _episodes(there)
+    ours, theirs = episodes_of(here), episodes_of(there)
     wrong = [name for name in sorted({*ours, *theirs}) if ours.get(name) != theirs.get(name)]
     crashed = [name for name, episode in theirs.items() if episode["error"]]
     print(
@@ -113,7 +122,8 @@ def _compare(here: Path, there: Path) -> None:
         raise SystemExit(1)
 
 
-def _episodes(run: Path) -> dict[str, Any]:
+def episodes_of(run: Path) -> dict[str, Any]:
+    """The episodes of a run by file name, without times."""
     found = {}
     for file in (run / "episodes").glob("*.json"):
         episode = json.loads(file.read_bytes())

@@ -24,12 +24,10 @@ class RayNodes:
     Attributes:
         address: for ``--ray-address``.
         environment: variables that a process needs to join it.
-        head: whether its first node, which knows all others, is alive.
     """
 
     cluster: Any
     environment: dict[str, str]
-    head: bool = True
     _others: list[Any] = field(default_factory=list)
 
     @property
@@ -46,9 +44,9 @@ class RayNodes:
         _kill(self._others.pop(0).all_processes["raylet"][0].process.pid)
 
     def kill_head(self) -> None:
-        """Kill the head's server, by SIGKILL."""
-        _kill(self.cluster.head_node.all_processes["gcs_server"][0].process.pid)
-        self.head = False
+        """Kill the node that knows all others, its server and its raylet, by SIGKILL."""
+        for name in ("gcs_server", "raylet"):
+            _kill(self.cluster.head_node.all_processes[name][0].process.pid)
 
     def workers(self) -> list[int]:
         """The processes that work for er-gym now."""

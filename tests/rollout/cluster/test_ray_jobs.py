@@ -32,6 +32,11 @@ def machines():
         yield ours
 
 
+def reset_for_ever(env, task):
+    while True:
+        env.reset(seed=0, options={"task": task})
+
+
 def pids(results):
     return {pid for _, (_, pid) in results}
 
@@ -67,7 +72,7 @@ def test_every_job_is_done_once_and_those_that_kill_are_given_up(machines):
 
 def test_a_worker_that_cannot_be_made_is_the_same_error_as_here(machines):
     for where in (THIS_MACHINE, machines):
-        with pytest.raises(WorkerSetupError, match="^OSError: no such engine$"):
+        with pytest.raises(WorkerSetupError, match=r"^OSError: no such engine$"):
             list(where.run_jobs(ray_jobs.no_such_engine, [1, 2], workers=2))
 
 
@@ -117,8 +122,7 @@ def test_an_environment_whose_worker_dies_is_made_anew(machines, tasks_file):
         stuck = threading.Timer(0.3, partial(ray.kill, env._worker._actor))
         stuck.start()
         with pytest.raises(EnvLost) as lost:
-            while True:
-                env.reset(seed=0, options={"task": task})
+            reset_for_ever(env, task)
         assert lost.value.at_fault
         assert "killed" in lost.value.why
         with pytest.raises(EnvLost):

@@ -30,7 +30,14 @@ def test_modules_that_are_not_installed_travel(tmp_path, monkeypatch):
     (tmp_path / "ours" / "inner").mkdir(parents=True)
     (tmp_path / "ours" / "__init__.py").touch()
     monkeypatch.syspath_prepend(tmp_path)
-    names = ["mine:Agent", "ours.inner.more:Agent", "ours:Other", "oracle", "rl:runs/x", "no_such:A"]
+    names = [
+        "mine:Agent",
+        "ours.inner.more:Agent",
+        "ours:Other",
+        "oracle",
+        "rl:runs/x",
+        "no_such:A",
+    ]
     names += ["numpy:array", "json:loads", "agents.scripted.oracle:OracleAgent"]
     assert modules_of(names) == [tmp_path / "mine.py", tmp_path / "ours"]
 
