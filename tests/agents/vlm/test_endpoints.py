@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from typing import Any
 
 import pytest
@@ -17,6 +18,7 @@ pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
 from agents.vlm.chat import Message, ModelError, Reply
 from agents.vlm.clients import endpoints
 from agents.vlm.clients.budget import Budget, Ledger
+from agents.vlm.clients.failures import Failure
 from agents.vlm.clients.openai_server import OpenAIClient
 from agents.vlm.clients.supervisor import RequestSupervisor, ServerEvent
 from agents.vlm.factory import comparable_settings
@@ -84,6 +86,10 @@ Pair = tuple[NaughtyServer, NaughtyServer]
 def echo(messages: list[dict[str, Any]]) -> str:
     said: str = messages[-1]["content"]
     return said
+
+
+def port_of(server: NaughtyServer) -> int:
+    return int(server.url.rpartition(":")[2].partition("/")[0])
 
 
 def until(true: Callable[[], object]) -> None:
@@ -160,8 +166,7 @@ def test_a_server_dies_and_comes_back(make: Make, pair: Pair) -> None:
     assert len(retries) >= 4
     assert {each.wait for each in retries} == {0.0}
 
-    port = int(one.url.rpartition(":")[2].partition("/")[0])
-    with NaughtyServer(echo, port=port) as again:
+    with NaughtyServer(echo, port=port_of(one)) as again:
         until(lambda: ask() and again.count)
         before = again.count, other.count
         for number in range(10):
@@ -178,19 +183,32 @@ def test_one_request_tries_whether_a_server_is_back(make: Make, pair: Pair) -> N
     ask()
     assert (one.count, other.count) == (1, 1)
     assert ask.lines("aside")[0].endswith("500, something broke; set aside; 1 of 2 servers left")
-    one.answer = gate
-    with ThreadPoolExecutor(1) as pool:
-        until(lambda: ask.client._endpoints._all[0].state == "trial")
-        other_before = other.count
-        trial = pool.submit(ask)
-        until(lambda: one.count == 2)
-        for number in range(5):
-            ask(number)
-        assert (one.count, other.count) == (2, other_before + 5)
+    one.answer = other.answer = gate
+    until(lambda: ask.client._endpoints._all[0].state == "trial")
+    with ThreadPoolExecutor(6) as pool:
+        asked = [pool.submit(ask) for _ in range(6)]
+        until(lambda: one.count + other.count == 2 + 6)
+        assert (one.count, other.count) == (2, 1 + 5)
         assert not ask.lines("back")
         gate.opened.set()
-        trial.result()
+        for each in asked:
+            each.result()
     assert len(ask.lines("back")) == 1
+    assert ask.client._endpoints._all[0].rests == 0
+
+
+def test_what_fails_late_does_not_set_a_server_aside_again(make: Make, pair: Pair) -> None:
+    one, other = pair
+    ask = make(one, other)
+    servers = ask.client._endpoints
+    late = Failure("reset", retryable=True, server="down")
+    with servers.use() as first, servers.use(), servers.use() as third:
+        assert first.endpoint is third.endpoint
+    servers.failed(first, late, "x")
+    until(lambda: ask() and ask.lines("back"))
+    servers.failed(third, late, "y")
+    assert servers._all[0].state == "used"
+    assert ask.lines("aside") == ["x; set aside; 1 of 2 servers left"]
 
 
 def test_a_server_that_fails_each_trial_is_told_once(make: Make, pair: Pair) -> None:
@@ -214,6 +232,22 @@ def test_a_rate_limit_is_for_one_server(make: Make) -> None:
         assert len(ask.lines("aside")) == len(ask.lines("back")) == 1
 
 
+def test_the_longest_wait_that_a_server_asks_for_counts(make: Make, pair: Pair) -> None:
+    ask = make(*pair)
+    servers = ask.client._endpoints
+    with ExitStack() as under_way:
+        first, _, second, _, third = [under_way.enter_context(servers.use()) for _ in range(5)]
+        assert first.endpoint is second.endpoint is third.endpoint
+    for used, seconds in ((first, 0.01), (second, 60.0)):
+        servers.failed(used, Failure("429", True, retry_after=seconds, server="busy"), "x")
+    servers.replied(third)  # was under way before
+    time.sleep(0.02)
+    for _ in range(3):
+        ask()
+    assert [each.count for each in pair] == [0, 3]
+    assert len(ask.shown) == 1
+
+
 def test_if_all_ask_to_wait_the_shortest_wait_counts(make: Make) -> None:
     with (
         NaughtyServer(mixture={"429": 1}, retry_after="90") as long,
@@ -227,17 +261,31 @@ def test_if_all_ask_to_wait_the_shortest_wait_counts(make: Make) -> None:
         assert first == 0 < second <= 0.3
 
 
+def test_a_server_that_comes_back_ends_a_wait(make: Make, pair: Pair) -> None:
+    limited, down = pair
+    limited.retry_after = "90"
+    limited.then("429")
+    down.close()
+    ask = make(limited, down)
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(ask)
+        until(lambda: ask.lines("retry"))
+        with NaughtyServer(echo, port=port_of(down)) as again:
+            assert waiting.result(_LONG)
+            assert again.count == 1
+    assert limited.count == 1
+
+
 def test_all_are_down_and_one_comes_back(make: Make, pair: Pair) -> None:
     one, other = pair
     ask = make(one, other, tries=20)
     ask()
-    port = int(other.url.rpartition(":")[2].partition("/")[0])
     one.close()
     other.close()
     with ThreadPoolExecutor(1) as pool:
         waiting = pool.submit(ask, "still there?")
         until(lambda: ask.lines("retry"))
-        with NaughtyServer(echo, port=port):
+        with NaughtyServer(echo, port=port_of(other)):
             assert waiting.result().text == "still there?"
     assert [line.rpartition("; ")[2] for line in ask.lines("aside")] == [
         "1 of 2 servers left",
@@ -263,6 +311,16 @@ def test_one_that_is_down_from_the_start(make: Make, pair: Pair) -> None:
         assert ask(number).text == str(number)
     assert up.count == 3
     assert len(ask.shown) == 1
+
+
+def test_one_that_is_down_is_not_all_that_there_is(make: Make, pair: Pair) -> None:
+    up, down = pair
+    down.close()
+    ask = make(up, down, tries=1)
+    ask()
+    with pytest.raises(ModelError, match="refused"):
+        ask()
+    ask()
 
 
 def test_a_late_answer_is_asked_for_twice_at_most(make: Make, pair: Pair) -> None:
