@@ -50,8 +50,12 @@ class VLMRun:
         Raises:
             ValueError: a setting does not fit.
         """
-        given = {"server.base_url": options.base_url, "prompts.dataset": options.prompts_from}
-        more = [f"{name}={json.dumps(str(value))}" for name, value in given.items() if value]
+        urls, dataset = list(options.base_url), options.prompts_from
+        given = {
+            "server.base_url": urls[0] if len(urls) == 1 else urls,
+            "prompts.dataset": str(dataset or ""),
+        }
+        more = [f"{name}={json.dumps(value)}" for name, value in given.items() if value]
         tuned_for = settings_file(name)
         if tuned_for is not None and options.prompts_from is not None:
             more.append('prompts.dialect=""')  # instead of the model's own
