@@ -3,12 +3,18 @@
 What a transformer computes for a token are a key and a value in each layer; later tokens need
 nothing else of it. A turn of a conversation repeats all turns before it, so their keys and values
 are kept, and the model processes the new turns alone.
+
+Keys and values of many conversations are hundreds of megabytes, and for a small model on a CPU to
+move them takes longer than to compute. So each conversation has memory with room for its next
+turns, to which new ones are appended; and batches use one memory again and again, since the system
+takes longer to hand out fresh memory than to fill it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import inspect
+import math
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -17,7 +23,6 @@ from itertools import pairwise
 from typing import Any
 
 import torch
-from torch.nn import functional
 from transformers import DynamicCache
 from transformers.cache_utils import DynamicLayer
 
@@ -25,7 +30,9 @@ from agents.vlm.chat import LEFT_OUT, Message
 
 MOST = 256
 """The most conversations that are kept."""
-_ROOM = 64  # tokens by which a full layer grows
+_ROOM = 64  # tokens by which a full layer of a batch grows
+_NEXT_TURNS = 256
+"""Tokens for which a conversation has room when its memory is full."""
 _ON_CPU = 2 << 30  # bytes
 _SHARE_OF_GPU = 0.25  # of the memory that is free once the model is loaded
 _WITH_PICTURES = ("qwen2_vl", "qwen2_5_vl", "qwen3_vl", "qwen3_vl_moe")
@@ -43,7 +50,7 @@ class KeptTurns:
         ids: their tokens; a picture takes as many as it has merged patches.
         pictures: the digests of their pictures; ``grids``: (pictures, 3) patches in time, height
             and width.
-        layers: keys and values of these tokens.
+        layers: keys and values of these tokens, and room for more.
     """
 
     ids: Sequence[int]
@@ -53,7 +60,7 @@ class KeptTurns:
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """Bytes, the room included."""
         return sum(each.nbytes for layer in self.layers for each in layer)
 
     def usable(self, ids: Sequence[int], pictures: Sequence[str], places: Sequence[int]) -> int:
@@ -86,6 +93,14 @@ class KeptTurns:
     def first(self, length: int) -> Layers:
         """The keys and values of the first tokens."""
         return [(keys[:, :length], values[:, :length]) for keys, values in self.layers]
+
+    def continued(self, length: int, new: Layers) -> Layers:
+        """Keys and values of the first ``length`` tokens with those of new tokens after them, in
+        the same memory where that has room. This object must not be used afterwards."""
+        return [
+            (_appended(keys, length, new_keys), _appended(values, length, new_values))
+            for (keys, values), (new_keys, new_values) in zip(self.layers, new, strict=True)
+        ]
 
 
 class KeptConversations:
@@ -168,39 +183,104 @@ def positions_of(
     return torch.cat([torch.arange(len(ids))[None], seen[:, 0]])
 
 
-def joined_past(model: Any, pasts: Sequence[Layers]) -> DynamicCache:
-    """The keys and values of several conversations as one cache, padded on the left."""
+def _appended(memory: torch.Tensor, length: int, new: torch.Tensor) -> torch.Tensor:
+    """Write (heads, tokens, size) after the first ``length`` tokens of a memory, which grows if it
+    is full."""
+    end = length + new.shape[1]
+    if end > memory.shape[1]:
+        larger = memory.new_zeros((memory.shape[0], end + _NEXT_TURNS, memory.shape[2]))
+        larger[:, :length] = memory[:, :length]
+        memory = larger
+    memory[:, length:end] = new
+    return memory
+
+
+class BatchMemory:
+    """Memory for the keys and values of a batch, used again for the next batch.
+
+    Only one batch at a time may use it. On other devices than the CPU, PyTorch itself does as much.
+    """
+
+    def __init__(self) -> None:
+        self._held: dict[tuple[int, int], torch.Tensor] = {}
+
+    def take(
+        self, place: tuple[int, int], shape: Sequence[int], like: torch.Tensor
+    ) -> torch.Tensor:
+        """A tensor of a shape; what is in it is left from before.
+
+        Args:
+            place: the layer, and 0 for keys or 1 for values.
+            shape: of the tensor.
+            like: has its type and device.
+        """
+        if like.device.type != "cpu":
+            return like.new_empty(shape)
+        size = math.prod(shape)
+        held = self._held.get(place)
+        if held is None or held.numel() < size or held.dtype != like.dtype:
+            held = self._held[place] = like.new_empty(size + size // 4)
+        return held[:size].view(*shape)
+
+    def clear(self) -> None:
+        """Give it back."""
+        self._held.clear()
+
+
+def joined_past(
+    model: Any, pasts: Sequence[Layers], room: int = _ROOM, memory: BatchMemory | None = None
+) -> DynamicCache:
+    """The keys and values of several conversations as one cache, padded on the left.
+
+    Args:
+        model: whose they are.
+        pasts: of each conversation; empty for a new one.
+        room: how many tokens will follow, at most; more make the cache move.
+        memory: for the cache; by default, fresh.
+    """
+    memory = memory or BatchMemory()
     cache = DynamicCache(config=model.config)
-    cache.layers = [_RoomyLayer() for _ in cache.layers]
+    layers = [_RoomyLayer(number, room, memory) for number in range(len(cache.layers))]
+    cache.layers = [*layers]
     longest = max(past[0][0].shape[1] if past else 0 for past in pasts)
-    if not longest:
-        return cache
-    like = next(past for past in pasts if past)
-    for number, whole in enumerate(like):
-        keys, values = (
-            torch.stack(
-                [
-                    functional.pad(
-                        past[number][part] if past else whole[part][:, :0],
-                        (0, 0, longest - (past[number][part].shape[1] if past else 0), 0),
-                    )
-                    for past in pasts
-                ]
-            )
-            for part in (0, 1)
-        )
-        cache.update(keys, values, number)
+    if longest:
+        for number, layer in enumerate(layers):
+            layer.begin([past[number] if past else None for past in pasts], longest)
     return cache
 
 
 class _RoomyLayer(DynamicLayer):
     """A layer with room for tokens to come. The library's copies all keys and values of all
-    conversations for each token, which takes a quarter of the time of a small model."""
+    conversations for each token, which takes a quarter of the time of a small model.
 
-    def __init__(self) -> None:
+    Args:
+        number: of the layer.
+        room: for how many tokens, beside those with which it begins.
+        memory: from which it takes the room.
+    """
+
+    def __init__(self, number: int, room: int, memory: BatchMemory) -> None:
         super().__init__()
-        self._rooms: list[torch.Tensor] = []
+        self._number, self._room, self._memory = number, room, memory
+        self._stores: list[torch.Tensor] = []
         self._length = 0
+
+    def begin(
+        self, pasts: Sequence[tuple[torch.Tensor, torch.Tensor] | None], longest: int
+    ) -> None:
+        """Take in what conversations have left, at the right end of the first tokens."""
+        like = next(past for past in pasts if past)
+        self.lazy_initialization(*like)
+        for part, one in enumerate(like):
+            shape = (len(pasts), one.shape[0], longest + self._room, one.shape[2])
+            store = self._memory.take((self._number, part), shape, one)
+            for row, past in enumerate(pasts):
+                start = longest - (past[part].shape[1] if past else 0)
+                store[row, :, :start] = 0  # masked, but it must be finite
+                if past:
+                    store[row, :, start:longest] = past[part]
+            self._stores.append(store)
+        self._show(longest)
 
     def update(
         self, key_states: torch.Tensor, value_states: torch.Tensor, *args: Any, **kwargs: Any
@@ -208,31 +288,39 @@ class _RoomyLayer(DynamicLayer):
         """Add keys and values of new tokens; returns all."""
         if not self.is_initialized:
             self.lazy_initialization(key_states, value_states)
-        states = (key_states, value_states)
         before, after = self._length, self._length + key_states.shape[-2]
-        if not self._rooms or after > self._rooms[0].shape[-2]:
-            larger = [
-                new.new_empty((*new.shape[:-2], after + _ROOM, new.shape[-1])) for new in states
-            ]
-            for old, room in zip(self._rooms, larger, strict=False):
-                room[..., :before, :] = old[..., :before, :]
-            self._rooms = larger
-        for room, new in zip(self._rooms, states, strict=True):
-            room[..., before:after, :] = new
-        self._length = after
-        self.keys, self.values = (room[..., :after, :] for room in self._rooms)
-        return self.keys, self.values
+        for part, new in enumerate((key_states, value_states)):
+            if part == len(self._stores):
+                room = max(self._room, after)
+                shape = (*new.shape[:-2], room, new.shape[-1])
+                self._stores.append(self._memory.take((self._number, part), shape, new))
+            if after > self._stores[part].shape[-2]:
+                larger = new.new_empty((*new.shape[:-2], after + _ROOM, new.shape[-1]))
+                larger[..., :before, :] = self._stores[part][..., :before, :]
+                self._stores[part] = larger
+            self._stores[part][..., before:after, :] = new
+        return self._show(after)
+
+    def _show(self, length: int) -> tuple[torch.Tensor, torch.Tensor]:
+        """Let the model see so many tokens."""
+        self._length = length
+        keys, values = (store[..., :length, :] for store in self._stores)
+        self.keys, self.values = keys, values
+        return keys, values
 
 
-def layers_of(cache: DynamicCache, row: int, spans: Sequence[tuple[int, int]]) -> Layers:
-    """The keys and values of a row of a cache, those of some spans of tokens, one after another."""
-    spans = [span for span in spans if span[0] < span[1]]
-
-    def cut(states: torch.Tensor) -> torch.Tensor:
-        return torch.cat([states[row, :, start:end] for start, end in spans], dim=1)
-
+def layers_of(cache: DynamicCache, row: int, start: int, end: int) -> Layers:
+    """The keys and values of some tokens of a row of a cache, in the cache's memory."""
     layers: Any = cache.layers
-    return [(cut(layer.keys), cut(layer.values)) for layer in layers]
+    return [(layer.keys[row, :, start:end], layer.values[row, :, start:end]) for layer in layers]
+
+
+def copied(layers: Layers) -> Layers:
+    """The same in memory of their own, with room for the next turns."""
+    return [
+        (_appended(keys[:, :0], 0, keys), _appended(values[:, :0], 0, values))
+        for keys, values in layers
+    ]
 
 
 def _whole(model: Any) -> Any:

@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from io import BytesIO
 from typing import Any
@@ -20,11 +21,13 @@ from typing import Any
 import jinja2
 import torch
 from PIL import Image
+from transformers import DynamicCache
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients.batching import Batcher
 from agents.vlm.clients.checkpoint import load, one_line
 from agents.vlm.clients.kept_turns import (
+    BatchMemory,
     KeptConversations,
     KeptTurns,
     conversation_name,
@@ -39,6 +42,7 @@ from er_gym.rollout.agent import CannotGoOn
 
 _THINK, _THOUGHT = "<think>", "</think>"
 _CLOSED = "the model has been closed"
+_SHORT = 32  # tokens
 
 
 class LocalClient:
@@ -99,6 +103,7 @@ class LocalClient:
         local = settings.local
         memory = memory_for(self._model) if local.reuse else 0
         self._kept = KeptConversations(memory) if memory else None
+        self._memory = BatchMemory()
         self._batcher: Batcher[EncodedPrompt, Reply] = Batcher(
             self._replies, local.batch, local.wait
         )
@@ -128,6 +133,7 @@ class LocalClient:
         self._model = None
         if self._kept is not None:
             self._kept.clear()
+        self._memory.clear()
 
     # -- conversation to tokens, in the caller's thread ------------------------------------------
 
@@ -167,7 +173,8 @@ class LocalClient:
             seed=self._seed(seed, len(messages)),
             thinking=text.rstrip().endswith(_THINK),
             name=name,
-            past=kept.first(reused) if kept and reused else [],
+            kept=kept if reused else None,
+            reused=reused,
         )
 
     def _prompt(self, messages: Sequence[Message]) -> str:
@@ -257,6 +264,7 @@ class LocalClient:
         except RuntimeError as error:
             if self._kept is not None:
                 self._kept.clear()  # memory may be short
+            self._memory.clear()
             raise _explained(error, rows) from None
         if self._closing.is_set():
             raise CannotGoOn(_CLOSED)
@@ -266,10 +274,10 @@ class LocalClient:
 
     def _generate(self, rows: Sequence[EncodedPrompt]) -> list[list[int]]:
         """The tokens that the model generates for each row, up to an end token or the limit."""
-        batch = PaddedBatch(rows)
-        inputs = batch.inputs(self._model, self._image_token, positions=self._kept is not None)
-        cache = joined_past(self._model, [row.past for row in rows]) if self._kept else None
+        if self._kept is not None:
+            rows = self._long_ones_processed(rows)
         sampling = self._settings.sampling
+        batch, inputs, cache = self._inputs(rows, sampling.max_tokens)
         choices = []
         if sampling.temperature > 0:
             choices = [
@@ -280,10 +288,8 @@ class LocalClient:
             ends = self._closing.is_set() or self._supervisor.over
             return torch.full((len(rows),), ends, device=input_ids.device)
 
-        device = self._model.device
         out = self._model.generate(
-            **{name: each.to(device) for name, each in inputs.items()},
-            **({} if cache is None else {"past_key_values": cache}),
+            **inputs,
             generation_config=self._model.generation_config,
             logits_processor=choices,
             stopping_criteria=[closing],
@@ -293,6 +299,44 @@ class LocalClient:
             for row, turns in zip(rows, batch.turns(said, cache), strict=True):
                 self._kept.keep(row.name, turns)
         return said
+
+    def _inputs(
+        self, rows: Sequence[EncodedPrompt], most: int
+    ) -> tuple[PaddedBatch, dict[str, Any], DynamicCache | None]:
+        """Rows as arguments of ``generate``, for up to ``most`` tokens; and the cache in them."""
+        batch = PaddedBatch(rows)
+        inputs = batch.inputs(self._model, self._image_token, positions=self._kept is not None)
+        told: dict[str, Any] = {name: each.to(self._model.device) for name, each in inputs.items()}
+        if self._kept is None:
+            return batch, told, None
+        room = batch.length - max(row.reused for row in rows) + most
+        cache = joined_past(self._model, [row.past for row in rows], room, self._memory)
+        return batch, {**told, "past_key_values": cache}, cache
+
+    def _long_ones_processed(self, rows: Sequence[EncodedPrompt]) -> list[EncodedPrompt]:
+        """The rows, those with many more new tokens than most processed but for the last token.
+
+        Rows of a batch are padded to the longest. A conversation that begins would make all the
+        others, which bring a short turn, as long as its instructions.
+        """
+        new = [len(row.ids) - row.reused for row in rows]
+        limit = 2 * sorted(new)[len(new) // 2] + _SHORT
+        places = [place for place, tokens in enumerate(new) if tokens > limit]
+        if not places:
+            return list(rows)
+        heads = [replace(rows[place], ids=rows[place].ids[:-1]) for place in places]
+        batch, inputs, cache = self._inputs(heads, 1)
+        assert cache is not None
+        one = copy(self._model.generation_config)
+        one.max_new_tokens = 1
+        self._model.generate(**inputs, generation_config=one)
+        found = list(rows)
+        nothing: list[list[int]] = [[] for _ in heads]
+        for place, turns in zip(places, batch.turns(nothing, cache), strict=True):
+            found[place] = replace(
+                rows[place], kept=turns, reused=len(turns.ids), new_pixels=None, new_pictures=0
+            )
+        return found
 
     def _until_end(self, said: list[int]) -> list[int]:
         """The tokens up to the end token; padding follows in rows that end early."""

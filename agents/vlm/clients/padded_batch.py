@@ -9,7 +9,13 @@ from typing import Any
 import torch
 from transformers import DynamicCache
 
-from agents.vlm.clients.kept_turns import KeptTurns, Layers, layers_of, positions_of
+from agents.vlm.clients.kept_turns import (
+    KeptTurns,
+    Layers,
+    copied,
+    layers_of,
+    positions_of,
+)
 
 
 @dataclass(frozen=True)
@@ -25,7 +31,8 @@ class EncodedPrompt:
         seed: the seed for sampling the reply.
         thinking: whether the prompt ends inside a thought.
         name: of the conversation.
-        past: the keys and values of the first tokens, if an earlier turn has left them.
+        kept: what an earlier turn has left, if any of it can be used.
+        reused: how many of the first tokens that is.
     """
 
     ids: list[int]
@@ -36,12 +43,13 @@ class EncodedPrompt:
     seed: int
     thinking: bool
     name: str
-    past: Layers
+    kept: KeptTurns | None = None
+    reused: int = 0
 
     @property
-    def reused(self) -> int:
-        """The number of tokens that an earlier turn has left."""
-        return self.past[0][0].shape[1] if self.past else 0
+    def past(self) -> Layers:
+        """Keys and values of the tokens that are reused."""
+        return self.kept.first(self.reused) if self.kept is not None else []
 
 
 class PaddedBatch:
@@ -107,13 +115,13 @@ class PaddedBatch:
         kept = cache.get_seq_length()
         for number, (row, reply) in enumerate(zip(self._rows, said, strict=True)):
             before, between = self._gaps[number]
-            end, past_end = min(self.length + len(reply), kept), before + row.reused
-            spans = [(before, past_end), (past_end + between, end)]
+            start, end = before + row.reused + between, min(self.length + len(reply), kept)
+            new = layers_of(cache, number, start, end)
             yield KeptTurns(
                 [*row.ids, *reply[: end - self.length]],
                 row.pictures,
                 row.grids,
-                layers_of(cache, number, spans),
+                row.kept.continued(row.reused, new) if row.kept is not None else copied(new),
             )
 
     def _positions(self, model: Any, image_token: int) -> torch.Tensor:

@@ -125,6 +125,42 @@ def test_replies_are_those_of_a_model_that_begins_anew_each_turn(
         each.close()
 
 
+@pytest.mark.parametrize("family", ["qwen2", "qwen2_5_vl"])
+def test_a_conversation_that_begins_among_others_is_processed_before_them(
+    models: dict[str, Path], family: str
+) -> None:
+    replies, widths = {}, []
+    for reuse in (False, True):
+        model = client(models[family], local={"reuse": reuse, "batch": 3})
+        pictures = model._image_processor is not None
+        talks = [[told(number, 0, pictures=pictures)] for number in range(3)]
+        with ThreadPoolExecutor(3) as pool:
+
+            def all_reply() -> list[str]:
+                found = pool.map(lambda n: model.reply(talks[n], n), range(3))  # noqa: B023
+                return [each.text for each in found]
+
+            for talk, text in zip(talks, all_reply(), strict=True):
+                talk += [Message("assistant", (text,)), told(1, 1, pictures=pictures)]
+            instructions = "Find the mug and put it away. " * 60
+            talks[1] = [Message("user", (*([shown(7)] if pictures else []), instructions))]
+            network = model._model.model
+
+            def note(module: Any, args: Any, given: dict[str, Any]) -> None:
+                ids = given.get("input_ids")
+                widths.append(ids.shape if ids is not None else given["inputs_embeds"].shape[:2])
+
+            handle = network.register_forward_pre_hook(note, with_kwargs=True)
+            replies[reuse] = all_reply()
+            handle.remove()
+        model.close()
+    assert replies[True] == replies[False]
+    first = widths.index(max(widths, key=lambda each: each[1] * each[0]))
+    assert widths[first][0] == 3  # without reuse, all are as long as the longest
+    long = [rows for rows, tokens in widths[first + 1 :] if tokens > 200]
+    assert long == [1]
+
+
 def test_a_conversation_that_changes_goes_on_from_where_it_does(models: dict[str, Path]) -> None:
     path = models["qwen2_5_vl"]
     anew = client(path, local={"reuse": False, "batch": 3})
