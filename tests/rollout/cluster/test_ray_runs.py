@@ -72,7 +72,7 @@ def test_an_agent_of_the_users_own_travels(nodes, tmp_path):
 
 
 def test_a_collection_is_the_same_and_is_verified_where_its_files_are(nodes, tmp_path):
-    collect = ("collect", "--suite", "train", "--limit", "4", "--width", "64", "--height", "64")
+    collect = ("collect", "--suite", "train", "--limit", "2", "--width", "64", "--height", "64")
     er_gym(*collect, "--out", tmp_path / "here")
     er_gym(*collect, "--out", tmp_path / "there", nodes=nodes)
     files = ["trajectories.jsonl", "collection.json"]
@@ -83,7 +83,7 @@ def test_a_collection_is_the_same_and_is_verified_where_its_files_are(nodes, tmp
     verify = ("data", "verify", tmp_path / "there")
     refused = er_gym(*verify, nodes=nodes, code=2)
     assert "put it where all nodes see it and give --shared-dir" in refused.stderr
-    assert "4 of 4 trajectories" in er_gym(*verify, "--shared-dir", nodes=nodes).stdout
+    assert "2 of 2 trajectories" in er_gym(*verify, "--shared-dir", nodes=nodes).stdout
 
 
 def test_tasks_are_generated_the_same(nodes, tmp_path):
