@@ -71,14 +71,14 @@ def _workers(nodes: list[dict[str, Any]], mark: tuple[Path, str] | None) -> Iter
     from ray.exceptions import RayError
     from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-    from er_gym.rollout.cluster.actors import JobActor
+    from er_gym.rollout.cluster.actors import JobActor, start_actor
     from er_gym.rollout.cluster.crew import first_line
     from er_gym.rollout.cluster.origin import Origin
 
     actors, begun = [], []
     for node in nodes:
         pinned = NodeAffinitySchedulingStrategy(node["NodeID"], soft=False)
-        actor = ray.remote(JobActor).options(num_cpus=0, scheduling_strategy=pinned).remote()
+        actor = start_actor(JobActor, {"num_cpus": 0, "scheduling_strategy": pinned})
         actors.append(actor)
         begun.append(actor.begin.remote(Origin.here(), (), ray.cloudpickle.dumps(Probe)))
     for node, actor, ref in zip(nodes, actors, begun, strict=True):

@@ -15,6 +15,7 @@ from agents.vlm.chat import Message, ModelError, Reply
 from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.agent import CannotGoOn
+from er_gym.rollout.cluster.actors import start_actor
 
 _RESTARTS = 3
 """Ray starts an actor again so often, and asks it again what it had not answered."""
@@ -47,14 +48,16 @@ class ModelActors:
             raise ValueError("local.actors needs a cluster: give --executor ray")
         local = settings.local
         self._supervisor = supervisor or RequestSupervisor()
-        actor_class = ray.remote(ModelActor).options(
-            num_cpus=local.actor_cpus,
-            num_gpus=local.actor_gpus,
-            max_concurrency=2 * local.batch,
-            max_restarts=_RESTARTS,
-            max_task_retries=_RESTARTS,
-        )
-        self._actors = [actor_class.remote(path, settings) for _ in range(local.actors)]
+        options = {
+            "num_cpus": local.actor_cpus,
+            "num_gpus": local.actor_gpus,
+            "max_concurrency": 2 * local.batch,
+            "max_restarts": _RESTARTS,
+            "max_task_retries": _RESTARTS,
+        }
+        self._actors = [
+            start_actor(ModelActor, options, path, settings) for _ in range(local.actors)
+        ]
         self._lock = threading.Lock()
         self._busy = [0] * local.actors
         self._own = threading.local()  # a conversation is a thread's

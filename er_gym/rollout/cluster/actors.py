@@ -1,4 +1,4 @@
-"""What runs on the cluster's nodes: plain classes, made into Ray actors by their callers."""
+"""What runs on the cluster's nodes: plain classes, which :func:`start_actor` makes Ray actors."""
 
 from __future__ import annotations
 
@@ -43,6 +43,13 @@ class Done:
     results: Sequence[Any]
     seconds: float
     memory: int
+
+
+def start_actor(kind: type, options: Mapping[str, Any], *args: Any) -> Any:
+    """Start an actor of a class with Ray's options; returns its handle at once."""
+    import ray
+
+    return ray.remote(kind).options(**options).remote(*args)
 
 
 class JobActor:

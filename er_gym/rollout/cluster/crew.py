@@ -19,7 +19,7 @@ import ray
 from ray import cloudpickle
 from ray.exceptions import ActorUnavailableError, RayError, RayTaskError
 
-from er_gym.rollout.cluster.actors import Begun, Done, JobActor
+from er_gym.rollout.cluster.actors import Begun, Done, JobActor, start_actor
 from er_gym.rollout.cluster.origin import Origin
 from er_gym.rollout.cluster.warm_queue import WarmQueue
 from er_gym.rollout.worker_pool import LostJob, WorkerSetupError
@@ -118,8 +118,8 @@ class Crew(Generic[Job, Result]):
         room: Callable[[Job], Hashable],
     ) -> None:
         self._terms, self._workers, self._tries = terms, workers, tries
-        self._actor_class = ray.remote(JobActor).options(**terms.options)
-        self._make = ray.put(cloudpickle.dumps(make))
+        pickled: bytes = cloudpickle.dumps(make)  # type: ignore[no-untyped-call]
+        self._make = ray.put(pickled)
         self._queue = WarmQueue((_Try(job) for job in jobs), lambda attempt: room(attempt.job))
         self._members: list[_Member[Job]] = []
         self._job_seconds = 0.0
@@ -145,7 +145,7 @@ class Crew(Generic[Job, Result]):
         at_work = sum(len(batch) for member in self._members for _, batch in member.batches)
         wanted = min(self._workers, len(self._queue) + at_work)
         while len(self._members) < wanted and time.monotonic() >= self._hire_after:
-            actor = self._actor_class.remote()
+            actor = start_actor(JobActor, self._terms.options)
             beginning = actor.begin.remote(Origin.here(), self._terms.path, self._make)
             self._members.append(_Member(actor, beginning))
 
@@ -271,7 +271,7 @@ def first_line(error: BaseException) -> str:
 
 def no_place(wanted: int, options: dict[str, Any]) -> str:
     """What to say while the cluster has no place for a worker."""
-    free = ray.available_resources()
+    free: dict[str, float] = ray.available_resources()  # type: ignore[no-untyped-call]
     asks = f"{options['num_cpus']:g} CPU and {options['memory'] / 2**30:.1f} GiB"
     has = f"{free.get('CPU', 0):g} CPU and {free.get('memory', 0) / 2**30:.1f} GiB"
     return (

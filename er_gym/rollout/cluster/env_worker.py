@@ -10,7 +10,7 @@ from typing import Any
 import ray
 from ray.exceptions import RayError
 
-from er_gym.rollout.cluster.actors import Begun, EnvActor
+from er_gym.rollout.cluster.actors import Begun, EnvActor, start_actor
 from er_gym.rollout.cluster.crew import Terms, first_line, is_nodes_fault, no_place
 from er_gym.rollout.cluster.origin import Origin
 from er_gym.rollout.env_worker import EnvLost
@@ -29,7 +29,7 @@ class RayEnvWorker:
 
     def __init__(self, terms: Terms, slots: Sequence[int], env: Mapping[str, Any]) -> None:
         self._terms = terms
-        self._actor = ray.remote(EnvActor).options(**terms.options).remote()
+        self._actor = start_actor(EnvActor, terms.options)
         self._beginning = self._actor.begin.remote(Origin.here(), [*slots], dict(env))
         self._lock = threading.Lock()
         self._asked: deque[tuple[int, Any]] = deque()

@@ -43,8 +43,8 @@ class RayMachines:
     @property
     def places(self) -> int:
         """How many workers the cluster's present nodes have processors for, at least 1."""
-        cpus = ray.cluster_resources().get("CPU", 0)
-        return max(1, math.floor(cpus / (self.settings.cpus or 1) + 1e-6))
+        has: dict[str, float] = ray.cluster_resources()  # type: ignore[no-untyped-call]
+        return max(1, math.floor(has.get("CPU", 0) / (self.settings.cpus or 1) + 1e-6))
 
     def run_jobs(
         self,

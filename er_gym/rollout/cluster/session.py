@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import secrets
 import shutil
@@ -93,7 +94,7 @@ def _start(folder: Path) -> None:
                 address="local",
                 include_dashboard=False,
                 log_to_driver=False,
-                logging_level="error",
+                logging_level=logging.ERROR,
                 object_store_memory=_OBJECT_STORE_BYTES,
                 _temp_dir=str(folder),
             )
@@ -132,7 +133,7 @@ def _join(address: str, modules: Sequence[Path]) -> None:
         ray.init(
             address=address,
             log_to_driver=False,
-            logging_level="error",
+            logging_level=logging.ERROR,
             runtime_env=environment,
         )
     except (ConnectionError, RuntimeError, ValueError, OSError, ImportError) as error:
