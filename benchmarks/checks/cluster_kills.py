@@ -32,17 +32,25 @@ _TIMES = ("seconds",)
 @click.option("--suite", default="er-1k", show_default=True)
 @click.option("--agent", default="searcher", show_default=True)
 @click.option("--limit", type=int)
+@click.option("--samples", default=1, show_default=True)
 @click.option("--kills", default=10, show_default=True)
 @click.option("--every", default=6.0, show_default=True, help="Seconds between kills, about.")
 @click.option("--head", is_flag=True, help="Kill the head too, and finish on a new cluster.")
 @click.option("--seed", default=0, show_default=True)
 def main(
-    suite: str, agent: str, limit: int | None, kills: int, every: float, head: bool, seed: int
+    suite: str,
+    agent: str,
+    limit: int | None,
+    samples: int,
+    kills: int,
+    every: float,
+    head: bool,
+    seed: int,
 ) -> None:
     """Play, kill, compare."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        play = ["bench", "--suite", suite, "--agent", agent]
+        play = ["bench", "--suite", suite, "--agent", agent, "--samples", str(samples)]
         play += ["--limit", str(limit)] if limit else []
         start = time.perf_counter()
         _er_gym([*play, "--workers", "2", "--out", str(folder / "here")])

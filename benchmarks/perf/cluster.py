@@ -4,15 +4,18 @@
 
 ``driver``: jobs a second that one driver keeps going, with jobs of 2 ms by a few actors and jobs of
 200 ms by 64 of them, beside what the actors alone would do. ``actors``: er-1k by the oracle in two
-processes of this machine and by two actors, in turn; then one actor beside two, for state and for
-pictures. ``memory``: the driver's resident memory over 50,000 jobs.
+processes of this machine, by two actors and by one, in turn, for state and for pictures: whole
+runs, and episodes a second in the middle half, when all workers play. ``memory``: the driver's
+resident memory over 50,000 jobs.
 """
 
 from __future__ import annotations
 
+import os
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -26,6 +29,7 @@ from er_gym import __version__
 from er_gym.rollout.cluster.actors import resident_memory
 from er_gym.rollout.cluster.session import ray_machines
 from er_gym.rollout.cluster.settings import RaySettings
+from er_gym.rollout.events import EpisodeEnded, Event
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.machines import THIS_MACHINE, Machines
 from er_gym.rollout.run_directory import Manifest, RunDirectory
@@ -36,14 +40,14 @@ _KINDS = ("driver", "actors", "memory")
 
 
 class Nap:
-    """A job that takes a time and no processor."""
+    """A job that takes a time and no processor; it returns its process."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
 
     def __call__(self, job: int) -> int:
         time.sleep(self._seconds)
-        return job
+        return os.getpid()
 
 
 @click.command()
@@ -65,8 +69,7 @@ def main(kinds: Sequence[str], episodes: int, picture_episodes: int, rounds: int
 def _driver() -> None:
     for seconds, workers, jobs in ((0.002, 4, 20_000), (0.2, 64, 6_400)):
         with ray_machines(RaySettings(cpus=0.01, memory=2**28), print) as machines:
-            started = _when_all_started(machines, workers)
-            spent, _ = _time(machines, partial(Nap, seconds), jobs, workers, started)
+            spent = _time(machines, seconds, jobs, workers)
             ideal = jobs * seconds / workers
             print(
                 f"{workers} workers, {jobs:,} jobs of {1000 * seconds:g} ms: {jobs / spent:,.0f} "
@@ -74,29 +77,23 @@ def _driver() -> None:
             )
 
 
-def _when_all_started(machines: Machines, workers: int) -> float:
-    """Start so many workers once, so that the next ones start from Ray's idle processes."""
-    start = time.perf_counter()
-    for _ in machines.run_jobs(partial(Nap, 2.0), range(workers), workers=workers):
-        pass
-    return time.perf_counter() - start
+def _time(machines: Machines, seconds: float, jobs: int, workers: int) -> float:
+    """Seconds for so many jobs, from the moment when all workers have done one."""
+    all_jobs = range(jobs + 100_000)
+    results = machines.run_jobs(partial(Nap, seconds), all_jobs, workers=workers)
+    with closing(results):
+        at_work: set[int] = set()
+        while len(at_work) < workers:
+            at_work.add(_process(next(results)))
+        start = time.perf_counter()
+        for _ in range(jobs):
+            next(results)
+        return time.perf_counter() - start
 
 
-def _time(
-    machines: Machines,
-    make: Callable[[], Callable[[int], int]],
-    jobs: int,
-    workers: int,
-    patience: float,
-) -> tuple[float, int]:
-    """Seconds from the first result on, scaled to all jobs; and the driver's memory, bytes."""
-    results = machines.run_jobs(make, range(jobs + 20 * workers), workers=workers)
-    for _ in range(20 * workers):  # until all have begun
-        next(results)
-    start, done = time.perf_counter(), 0
-    for _ in results:
-        done += 1
-    return (time.perf_counter() - start) * jobs / max(done, 1), resident_memory()
+def _process(result: tuple[int, Any]) -> int:
+    """The process that did a job."""
+    return int(result[1])
 
 
 def _memory() -> None:
@@ -124,20 +121,24 @@ def _actors(episodes: int, picture_episodes: int, rounds: int) -> None:
                 "two actors": (ray, 2),
                 "one actor": (ray, 1),
             }
-            spent: dict[str, list[float]] = {way: [] for way in ways}
+            spent: dict[str, list[tuple[float, float]]] = {way: [] for way in ways}
             for _ in range(rounds):
                 for way, (machines, workers) in ways.items():
                     spent[way].append(_play(tasks, obs_mode, machines, workers))
-            took = {way: median(each) for way, each in spent.items()}
-            told = ", ".join(f"{way} {seconds:.1f} s" for way, seconds in took.items())
+            whole = {way: median(seconds for seconds, _ in each) for way, each in spent.items()}
+            speed = {way: median(rate for _, rate in each) for way, each in spent.items()}
+            told = ", ".join(f"{way} {whole[way]:.1f} s ({speed[way]:.1f}/s)" for way in ways)
             print(
                 f"{name}, {number} episodes: {told}; two actors are "
-                f"{took['one actor'] / took['two actors']:.2f} x one, and take "
-                f"{took['two actors'] / took['two processes'] - 1:+.1%} against processes"
+                f"{speed['two actors'] / speed['one actor']:.2f} x one, and take "
+                f"{whole['two actors'] / whole['two processes'] - 1:+.1%} against processes"
             )
 
 
-def _play(tasks: Sequence[Any], obs_mode: str, machines: Machines, workers: int) -> float:
+def _play(
+    tasks: Sequence[Any], obs_mode: str, machines: Machines, workers: int
+) -> tuple[float, float]:
+    """Seconds of a run; and episodes a second in its middle half, when all workers play."""
     manifest = Manifest(
         suite="er-1k",
         suite_digest="",
@@ -150,9 +151,17 @@ def _play(tasks: Sequence[Any], obs_mode: str, machines: Machines, workers: int)
     with tempfile.TemporaryDirectory() as folder:
         directory = RunDirectory.create(Path(folder) / "run", manifest)
         size = replace(Parallelism(workers), machines=machines)
+        ended: list[float] = []
+
+        def note(event: Event) -> None:
+            if isinstance(event, EpisodeEnded):
+                ended.append(time.perf_counter())
+
         start = time.perf_counter()
-        run(directory, tasks, NamedAgent("oracle"), parallelism=size)
-        return time.perf_counter() - start
+        run(directory, tasks, NamedAgent("oracle"), parallelism=size, listeners=[note])
+        spent = time.perf_counter() - start
+        first, last = len(ended) // 4, 3 * len(ended) // 4
+        return spent, (last - first) / (ended[last] - ended[first])
 
 
 if __name__ == "__main__":
