@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from inspect import signature
+from pathlib import Path
 from typing import Any
 
 from agents.scripted.oracle import OracleAgent
@@ -21,7 +22,7 @@ from agents.vlm.factory import (
 from agents.zoo.index import PREFIX as ZOO_PREFIX
 from agents.zoo.index import resolved
 from er_gym.plugins import PluginError, Registry, reason
-from er_gym.rollout.agent import Agent, Decision
+from er_gym.rollout.agent import Agent, Decision, MakeAgent
 from er_gym.tasks.task import Task
 
 __all__ = [
@@ -110,6 +111,14 @@ class NamedAgent:
     def __call__(self, task: Task, seed: int) -> Agent:
         """Make the agent of an episode."""
         return make_agent(self.name, seed, trust=self.trust)
+
+    def carried(self) -> MakeAgent:
+        """The same for workers that do not see this machine's files."""
+        if not self.name.startswith(RL_PREFIX):
+            return self
+        from agents.carried_policy import CarriedPolicy
+
+        return CarriedPolicy.of(Path(self.name.removeprefix(RL_PREFIX)), self.trust)
 
 
 @lru_cache(maxsize=4)

@@ -23,6 +23,7 @@ PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["
 
 MAY_USE = {
     "er_gym": (),
+    "er_gym/rollout/cluster": ("ray",),
     "er_gym/writing.py": ("charts",),
     "er_gym/data/exports": ("data", "minari"),
     "agents": (),
@@ -34,6 +35,7 @@ MAY_USE = {
     "agents/vlm/clients/checkpoint.py": ("local",),
     "agents/vlm/clients/kept_turns.py": ("local",),
     "agents/vlm/clients/local.py": ("local",),
+    "agents/vlm/clients/model_actors.py": ("local", "ray"),
     "agents/vlm/clients/padded_batch.py": ("local",),
     "agents/vlm/clients/seeded_sampling.py": ("local",),
     "agents/vlm/merging.py": ("local",),
@@ -45,6 +47,7 @@ MAY_USE = {
     "benchmarks/scoring/curves.py": ("charts",),
     "benchmarks/scoring/data_charts.py": ("charts",),
     "benchmarks/scoring/drawing.py": ("charts",),
+    "benchmarks/cli/doctor_ray.py": ("ray",),
     "benchmarks/cli/inspect.py": ("inspect",),
     "benchmarks/cli/trackers.py": ("rl",),
     "benchmarks/cli/ui.py": ("ui",),
@@ -63,6 +66,7 @@ fits counts."""
 NOT_OURS_TO_REQUIRE = {
     "deepspeed": "used where a setting has asked for it",
     "imageio_ffmpeg": "asked for by the ending of a name, and the error says what to install",
+    "pydantic_core": "the parser of pydantic, which always brings it",
     "trackio": "asked for by an option, whose error says what to install",
     "wandb": "asked for by a setting, whose error says what to install",
 }

@@ -20,9 +20,10 @@ from agents.expert.corrections import beginning_of
 from agents.expert.silent import SilentAgent
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.rollout.machines import THIS_MACHINE, Machines
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
-from er_gym.rollout.worker_pool import LostJob, run_jobs
+from er_gym.rollout.worker_pool import LostJob
 
 ATTEMPT = "attempt"
 """What corrections name as the run of an episode that was only attempted."""
@@ -51,6 +52,7 @@ def audition(
     kinds: ThoughtKinds,
     most_actions: int,
     workers: int,
+    machines: Machines = THIS_MACHINE,
 ) -> Iterator[Verdict]:
     """Play candidates silently in worker processes; yields the verdicts as they come.
 
@@ -61,12 +63,14 @@ def audition(
         kinds: draws how tasks end.
         most_actions: longer trajectories are not taken.
         workers: the number of processes.
+        machines: where they run.
 
     Raises:
         WorkerSetupError: the environment cannot be made.
     """
     make = partial(_Auditions, dict(env), seed, kinds, most_actions)
-    with closing(run_jobs(make, [*_jobs(candidates)], workers=workers)) as results:
+    jobs = [*_jobs(candidates)]
+    with closing(machines.run_jobs(make, jobs, workers=workers, room=_room)) as results:
         for job, result in results:
             if isinstance(result, LostJob):
                 yield from (Verdict(each, "its audition crashed") for each in job)
@@ -81,6 +85,10 @@ def _jobs(candidates: Iterable[Candidate]) -> Iterator[tuple[Candidate, ...]]:
         together = tuple(group)
         for first in range(0, len(together), _MOST_AT_ONCE):
             yield together[first : first + _MOST_AT_ONCE]
+
+
+def _room(job: Sequence[Candidate]) -> str:
+    return job[0].task.scene
 
 
 class _Auditions:

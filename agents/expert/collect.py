@@ -360,6 +360,7 @@ class Collector:
             kinds=self._settings.play.kinds,
             most_actions=most,
             workers=self._parallelism.workers,
+            machines=self._parallelism.machines,
         ):
             if verdict.reason:
                 self._reject(verdict.reason)

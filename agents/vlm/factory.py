@@ -34,7 +34,7 @@ __all__ = [
 _WHAT = "agent"
 _NOT_COMPARED: Mapping[str, Any] = {
     "server": {"base_url", "key_from", "timeout", "connect", "tries", "requests_per_minute"},
-    "local": {"device_map", "batch", "wait", "reuse"},
+    "local": {"device_map", "batch", "wait", "reuse", "actors", "actor_gpus", "actor_cpus"},
     "prompts": {"dataset", "dialect"},
     "prices": True,
 }

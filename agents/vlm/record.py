@@ -141,16 +141,21 @@ class ConversationRecord(_Record):
 
 
 def settings_to_record(settings: AgentSettings) -> dict[str, Any]:
-    """The settings for a record: the server's address has no user, password and query."""
+    """The settings for a record: no server's address has user, password and query."""
     kept = without_secrets(settings, settings.model_dump(mode="json"))
-    kept["server"]["base_url"] = url_without_secrets(settings.server.base_url)
+    given = settings.server.base_url
+    kept["server"]["base_url"] = (
+        url_without_secrets(given)
+        if isinstance(given, str)
+        else [url_without_secrets(each) for each in given]
+    )
     return kept
 
 
 def without_secrets(settings: AgentSettings, value: dict[str, Any]) -> dict[str, Any]:
     """A JSON value from which the key that the settings name is removed."""
     key = os.environ.get(settings.server.key_from, "").strip()
-    plain: dict[str, Any] = Secrets(key, settings.server.base_url).redact_all(value)
+    plain: dict[str, Any] = Secrets(key, *settings.server.base_urls).redact_all(value)
     return plain
 
 

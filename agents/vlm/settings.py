@@ -17,6 +17,18 @@ def _no_bool(value: object) -> object:
     return value
 
 
+def _addresses(value: object) -> object:
+    if isinstance(value, str):
+        return value
+    if not (isinstance(value, (list, tuple)) and value and all(map(_is_text, value))):
+        raise ValueError("give the address of a server, or a list of addresses")
+    return tuple(value)
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and value != ""
+
+
 Positive = Annotated[int, BeforeValidator(_no_bool), Field(gt=0)]
 Pixels = Annotated[int, BeforeValidator(_no_bool), Field(gt=0, le=8192)]
 Seconds = Annotated[float, BeforeValidator(_no_bool), Field(gt=0, le=86_400)]
@@ -148,25 +160,26 @@ class Prices(_Settings):
 
 
 class Server(_Settings):
-    """The address and limits of an OpenAI-compatible server.
+    """The address and limits of an OpenAI-compatible server, or of several with the same model.
 
     Attributes:
         base_url: such as ``http://127.0.0.1:8000/v1``; OpenAI's own if empty. A query string is
-            sent with each request.
+            sent with each request. Or a list of such addresses: each request goes to the server
+            with the fewest under way (:mod:`agents.vlm.clients.endpoints`).
         key_from: the environment variable that holds the API key. If it is not set, no key is sent;
-            local servers need none.
+            local servers need none. All servers get the same.
         api_version: Azure's API version; if it is set, the server is taken for Azure's.
         timeout: seconds for one try, from the first byte sent to the last byte received.
         connect: the part of ``timeout`` for the connection, seconds.
         tries: the most tries of a request after a failure that may pass: no connection, 408, 409,
             425, 429, 5xx and broken answers. A request that times out is tried twice at most, since
             the server may charge for each try.
-        requests_per_minute: the limit over all episodes; None for no limit.
+        requests_per_minute: the limit of each server over all episodes; None for no limit.
         max_tokens_field: the server's name for the limit of a reply.
         extra: further fields of the request body; null removes a field that would be sent.
     """
 
-    base_url: str = ""
+    base_url: Annotated[str | tuple[str, ...], BeforeValidator(_addresses)] = ""
     key_from: str = "OPENAI_API_KEY"
     api_version: str = ""
     timeout: Seconds = 60.0
@@ -176,9 +189,15 @@ class Server(_Settings):
     max_tokens_field: Literal["max_tokens", "max_completion_tokens"] = "max_tokens"
     extra: dict[str, Any] = {}
 
+    @property
+    def base_urls(self) -> tuple[str, ...]:
+        """The addresses that are given: none for OpenAI's own."""
+        given = (self.base_url,) if isinstance(self.base_url, str) else self.base_url
+        return given if any(given) else ()
+
 
 class Local(_Settings):
-    """How transformers runs a model in this process.
+    """How transformers runs a model in this process, or in Ray actors.
 
     Attributes:
         adapter: a directory with a LoRA adapter; "" for none.
@@ -187,6 +206,9 @@ class Local(_Settings):
         wait: seconds that a batch waits for further requests.
         reuse: whether what the model computed for the earlier turns of a conversation is kept for
             its next turn; it does not change a reply beyond rounding.
+        actors: how many copies run on a Ray cluster (``--executor ray``) instead of in this
+            process; 0 for none.
+        actor_gpus, actor_cpus: what each copy asks the cluster for, may be fractions.
     """
 
     adapter: str = ""
@@ -196,6 +218,9 @@ class Local(_Settings):
     batch: Positive = 8
     wait: float = Field(0.02, ge=0)
     reuse: bool = True
+    actors: int = Field(0, ge=0)
+    actor_gpus: float = Field(0.0, ge=0)
+    actor_cpus: float = Field(1.0, ge=0)
 
 
 class AgentSettings(_Settings):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.errors import bad_input, print_problem
+from benchmarks.cli.executor import ExecutorOptions
 from benchmarks.cli.plan import carry_out, plan_options
 from benchmarks.cli.terminal import echo, stdout
 
@@ -19,7 +20,12 @@ if TYPE_CHECKING:
 @click.command()
 @plan_options("ablation")
 def ablate(
-    config: str, overrides: tuple[str, ...], out: Path | None, until: str | None, only_print: bool
+    config: str,
+    overrides: tuple[str, ...],
+    out: Path | None,
+    until: str | None,
+    only_print: bool,
+    executor_options: ExecutorOptions,
 ) -> int:
     """Train many small models, each without some part, and compare them.
 
@@ -33,7 +39,7 @@ def ablate(
     with bad_input():
         settings = load_ablation(config, overrides)
     out = out or Path("runs") / "ablation" / Path(config).stem
-    code = carry_out(plan_of(settings, out), out, until, only_print)
+    code = carry_out(plan_of(settings, out), out, until, only_print, executor_options)
     if code or only_print:
         return code
     with bad_input():

@@ -19,6 +19,7 @@ from benchmarks.cli.errors import (
     print_problem,
     report_set_aside,
 )
+from benchmarks.cli.executor import ExecutorOptions, Workforce, with_executor_options
 from benchmarks.cli.options import (
     EXISTING_FILE,
     MOST_SAMPLES,
@@ -31,7 +32,6 @@ from benchmarks.cli.options import (
     seed_option,
     split,
     trust_option,
-    workers_type,
 )
 from benchmarks.cli.terminal import stdout, terminal
 from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
@@ -66,9 +66,6 @@ TRACKERS = ("tensorboard", "trackio")
     "package.module:Class …",
 )
 @click.option("--out", type=_directory, help="The run directory.  [default: runs/SUITE-AGENT]")
-@click.option(
-    "--workers", type=workers_type, default=1, show_default=True, help="The number of processes."
-)
 @click.option("--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks.")
 @click.option(
     "--spread",
@@ -102,6 +99,7 @@ TRACKERS = ("tensorboard", "trackio")
 @protocol_option
 @faults_option
 @scorer_option
+@with_executor_options(default=1)
 @with_vlm_options
 def bench(
     suite: str | None,
@@ -109,7 +107,6 @@ def bench(
     poses: Path | None,
     agent: str,
     out: Path | None,
-    workers: int,
     limit: int | None,
     spread: bool,
     samples: int,
@@ -124,6 +121,7 @@ def bench(
     protocol: str,
     faults: Faults | None,
     scorer: str,
+    executor_options: ExecutorOptions,
     vlm_options: VLMOptions,
 ) -> int:
     """Play a suite with an agent and print the result table.
@@ -210,8 +208,13 @@ def bench(
             before = [each.success for each in finished(run_directory, chosen, samples)]
             title = f"{asked.name}, {agent}"
             progress = Progress(console, title, len(episodes), len(before), sum(before))
-            prepared = _prepared_run(run_directory, chosen, samples, workers, agent, vlm_run, trust)
-            with prepared as (play, cost):
+            with (
+                executor_options.workforce(progress.say, 1, agents=[agent]) as workforce,
+                _prepared_run(run_directory, chosen, samples, workforce, agent, vlm_run, trust) as (
+                    play,
+                    cost,
+                ),
+            ):
                 with progress, tracking(track, out, manifest.model_dump()) as listeners:
                     outcome = play(progress, listeners)
                 bill = cost()
@@ -263,7 +266,7 @@ def _prepared_run(
     run_directory: RunDirectory,
     chosen: Sequence[Task],
     samples: int,
-    workers: int,
+    workforce: Workforce,
     agent: str,
     vlm_run: VLMRun | None,
     trust: bool,
@@ -277,7 +280,11 @@ def _prepared_run(
     from er_gym.rollout.runner import run
 
     if vlm_run is None:
-        make, parallelism = NamedAgent(agent, trust), Parallelism(workers)
+        named_agent = NamedAgent(agent, trust)
+        with bad_input():
+            shared = workforce.machines.shares_files
+            make = named_agent if shared else named_agent.carried()
+        parallelism = Parallelism(workforce.workers, machines=workforce.machines)
         yield (
             lambda shown, more: run(
                 run_directory,
@@ -298,7 +305,7 @@ def _prepared_run(
                 factory,
                 run_directory,
                 chosen,
-                workers,
+                workforce,
                 [shown, *more],
                 shown.say,
                 samples=samples,

@@ -21,6 +21,7 @@ from benchmarks.cli.errors import (
     print_problem,
     report_set_aside,
 )
+from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
 from benchmarks.cli.options import (
     Place,
     Words,
@@ -28,7 +29,6 @@ from benchmarks.cli.options import (
     named,
     seed_option,
     size_options,
-    workers_option,
 )
 from benchmarks.cli.terminal import stdout, terminal
 
@@ -108,7 +108,7 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
     help="With --select and --correct: end well also if no episode can be taken.",
 )
 @with_select_options
-@workers_option
+@with_executor_options()
 @seed_option
 @with_expert_options
 def collect(
@@ -130,8 +130,8 @@ def collect(
     height: int | None,
     correct: Path | None,
     allow_empty: bool,
-    workers: int,
     seed: int,
+    executor_options: ExecutorOptions,
     expert_options: ExpertOptions,
     select_options: SelectOptions,
 ) -> int:
@@ -222,8 +222,12 @@ def collect(
     try:
         with (
             _locked(out, manifest) as collection,
+            executor_options.workforce(shown.say, processors(), agents=[writer]) as workforce,
             _players(model, make_writer, out, shown) as ready,
         ):
+            if selection is not None:
+                for each in selection.runs:
+                    workforce.must_see(each.path)
             players, cost = ready
             if selection is not None:
                 players = selection.players(make_writer, strata)
@@ -233,7 +237,11 @@ def collect(
                 players,
                 strata,
                 executor="processes" if model is None else "threads",
-                parallelism=Parallelism(workers, model.run.concurrency if model else 1),
+                parallelism=Parallelism(
+                    workforce.workers,
+                    model.run.concurrency if model else 1,
+                    machines=workforce.machines,
+                ),
                 listeners=[shown],
                 cost=cost,
                 tell=shown.taken,

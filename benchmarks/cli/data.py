@@ -11,7 +11,8 @@ from benchmarks.cli.data_export import export
 from benchmarks.cli.data_frames import frames
 from benchmarks.cli.data_import import import_
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import Place, force_option, workers_option
+from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
+from benchmarks.cli.options import Place, force_option
 from benchmarks.cli.terminal import echo, stdout, terminal
 
 if TYPE_CHECKING:
@@ -80,14 +81,14 @@ def stats(collection: Path, layout: str, plots: Path | None, force: bool) -> Non
     help="The task file that was played, if it is no bundled suite.",
 )
 @click.option("--suite", help="The suite that was played, if it is package.module:Name.")
-@workers_option
+@with_executor_options()
 def verify(
     collection: Path,
     pictures: bool,
     limit: int | None,
     tasks_file: Path | None,
     suite: str | None,
-    workers: int,
+    executor_options: ExecutorOptions,
 ) -> int:
     """Replay every trajectory, and say where anything comes out differently.
 
@@ -96,7 +97,7 @@ def verify(
     and nothing else, what must succeed does, and every fault is recovered. Exit code 1 if there is
     a difference.
     """
-    from contextlib import closing
+    from contextlib import ExitStack, closing
     from itertools import islice
 
     from benchmarks.cli.progress import Progress
@@ -113,14 +114,21 @@ def verify(
         if not number:
             raise BadInput(f"{collection} holds no trajectory yet; run er-gym collect again")
     totals, lines = Totals(), 0
+    progress = Progress(terminal(stderr=True), str(collection), number)
     try:
-        with (
-            Progress(terminal(stderr=True), str(collection), number) as progress,
-            closing(
-                verdicts_of(opened, tasks, pictures=pictures, limit=limit, workers=workers)
-            ) as verdicts,
-        ):
-            for verdict in verdicts:
+        with ExitStack() as stack:
+            workforce = stack.enter_context(executor_options.workforce(progress.say, processors()))
+            workforce.must_see(collection)
+            stack.enter_context(progress)
+            verdicts = verdicts_of(
+                opened,
+                tasks,
+                pictures=pictures,
+                limit=limit,
+                workers=workforce.workers,
+                machines=workforce.machines,
+            )
+            for verdict in stack.enter_context(closing(verdicts)):
                 totals.add(verdict)
                 progress.episode(not verdict.problems)
                 for problem in verdict.problems:

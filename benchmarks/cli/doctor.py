@@ -2,20 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import click
 
+from benchmarks.cli.errors import BadInput, bad_input
+from benchmarks.cli.options import Place, Words
 from benchmarks.cli.terminal import echo
+
+if TYPE_CHECKING:
+    from benchmarks.cli.doctor_checks import Check
 
 
 @click.command()
-def doctor() -> int:
+@click.option("--ray", is_flag=True, help="Check a Ray cluster instead, node by node.")
+@click.option(
+    "--ray-address",
+    type=Words(),
+    metavar="ADDRESS",
+    help="With --ray: the cluster.  [default: start Ray here]",
+)
+@click.option(
+    "--shared-dir",
+    type=Place(exists=True, file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="With --ray: a directory that every node is to see under the same path.",
+)
+def doctor(ray: bool, ray_address: str | None, shared_dir: Path | None) -> int:
     """Check what works on this machine, and say how to fix the rest.
 
-    The exit code is 1 if a part that er-gym always needs does not work.
+    The exit code is 1 if a part that er-gym always needs does not work; with --ray, if a worker
+    does not start on a node of the cluster.
     """
-    from benchmarks.cli.doctor_checks import run_checks
+    if not ray:
+        if ray_address or shared_dir:
+            raise BadInput("--ray-address and --shared-dir are for --ray")
+        from benchmarks.cli.doctor_checks import run_checks
 
-    checks = run_checks()
+        return _show(run_checks())
+    from benchmarks.cli.doctor_ray import ray_checks
+
+    with bad_input():
+        return _show(ray_checks(ray_address or "", shared_dir))
+
+
+def _show(checks: Iterable[Check]) -> int:
+    checks = list(checks)
     widest = max(len(check.part) for check in checks)
     for check in checks:
         mark = "ok" if check.works else "--"

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import MOST_SEED, Span, force_option, split, workers_option
+from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
+from benchmarks.cli.options import MOST_SEED, Span, force_option, split
 from benchmarks.cli.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -59,8 +60,10 @@ _DEFAULT_TOTAL = 100
     "to the templates'.",
 )
 @force_option
-@workers_option
-def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -> int:
+@with_executor_options()
+def generate(
+    executor_options: ExecutorOptions, force: bool, paraphraser: str | None, **given: Any
+) -> int:
     """Generate tasks, play each of them, and write those that can be done.
 
     The same command continues after an interruption. The same seed gives the same file. A card in
@@ -81,7 +84,7 @@ def generate(workers: int, force: bool, paraphraser: str | None, **given: Any) -
             check_output(file, force=force)
     parts = parts_folder(order.out, order.spec, order.seed)
     try:
-        made, verified = _build(order, parts, workers, console)
+        made, verified = _build(order, parts, executor_options, console)
         chosen = made.tasks
         if not chosen:
             raise click.ClickException(f"no task could be generated: {_drop_reasons(made)}")
@@ -186,14 +189,19 @@ def _option_value(value: Any) -> str:
     return f"{low:g}-{'' if high is None else f'{high:g}'}"
 
 
-def _build(order: _Order, parts: Path, workers: int, console: Console) -> tuple[BuildResult, int]:
+def _build(
+    order: _Order, parts: Path, options: ExecutorOptions, console: Console
+) -> tuple[BuildResult, int]:
     """Build the tasks and show progress; returns the chosen ones, and how many were verified."""
     from benchmarks.cli.progress import bar
     from benchmarks.cli.suite_builder import build_suite
 
     rooms = len(order.spec.rooms)
     verified = done = 0
-    with bar(console) as progress:
+    with (
+        options.workforce(lambda line: console.print(line, style="dim"), processors()) as workforce,
+        bar(console) as progress,
+    ):
         shown = progress.add_task("generating tasks", total=rooms, status="")
 
         def on_room(scene: str, made: BuildResult) -> None:
@@ -203,7 +211,14 @@ def _build(order: _Order, parts: Path, workers: int, console: Console) -> tuple[
             if not console.is_terminal and done * 10 // rooms > (done - 1) * 10 // rooms:
                 console.print(f"{done}/{rooms} rooms, {verified} tasks verified")
 
-        made = build_suite(order.spec, order.seed, parts=parts, workers=workers, on_room=on_room)
+        made = build_suite(
+            order.spec,
+            order.seed,
+            parts=parts,
+            workers=workforce.workers,
+            machines=workforce.machines,
+            on_room=on_room,
+        )
     return made, verified
 
 

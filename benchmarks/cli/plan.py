@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli.errors import INTERRUPTED, bad_input, print_problem
+from benchmarks.cli.executor import ExecutorOptions, with_executor_options
 from benchmarks.cli.options import Place, overrides_option
 from benchmarks.cli.terminal import echo, terminal
 
@@ -42,10 +44,33 @@ def plan_options(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]
             "--print", "only_print", is_flag=True, help="Print the phases and run none of them."
         ),
     )
-    return lambda command: reduce(lambda made, option: option(made), reversed(options), command)
+
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        command = with_executor_options(workers=False)(command)
+        return reduce(lambda made, option: option(made), reversed(options), command)
+
+    return add
 
 
-def carry_out(plan: Plan, out: Path, until: str | None, only_print: bool) -> int:
+_PLAYS = ("bench", "collect")
+
+
+def _executed_by(plan: Plan, options: ExecutorOptions) -> Plan:
+    """The same plan, its commands that play with these options. Episodes that are selected are
+    played again here, since the workers read their run."""
+    arguments = tuple(options.arguments())
+    phases = [
+        replace(phase, command=(*phase.command, *arguments))
+        if phase.command[0] in _PLAYS and "--select" not in phase.command
+        else phase
+        for phase in plan.phases
+    ]
+    return replace(plan, phases=phases)
+
+
+def carry_out(
+    plan: Plan, out: Path, until: str | None, only_print: bool, options: ExecutorOptions
+) -> int:
     """Run the phases of a plan that are not done yet, and tell of each.
 
     Args:
@@ -53,6 +78,7 @@ def carry_out(plan: Plan, out: Path, until: str | None, only_print: bool) -> int
         out: its directory.
         until: the name of the last phase to run; None for all.
         only_print: print the phases and run none.
+        options: where the phases play.
 
     Returns:
         The exit code, 0 if all went well.
@@ -64,6 +90,7 @@ def carry_out(plan: Plan, out: Path, until: str | None, only_print: bool) -> int
     from er_gym.locking import Locked
     from er_gym.writing import ForeignFile
 
+    plan = _executed_by(plan, options)
     if only_print:
         for phase in plan.phases:
             echo(str(phase))

@@ -21,8 +21,9 @@ from pathlib import Path
 
 from er_gym import __version__
 from er_gym.envs.verify import rejection_reason, with_difficulty
+from er_gym.rollout.machines import THIS_MACHINE, Machines
 from er_gym.rollout.verification import make_verifier
-from er_gym.rollout.worker_pool import LostJob, run_jobs
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks import jsonl_format
 from er_gym.tasks.arrangement import Arrangement
 from er_gym.tasks.generate import Generator, generator_for, select_balanced
@@ -109,6 +110,7 @@ def build_suite(
     *,
     parts: Path,
     workers: int = 1,
+    machines: Machines = THIS_MACHINE,
     on_room: Callable[[str, BuildResult], None] = lambda scene, made: None,
 ) -> BuildResult:
     """Build the tasks of a suite; the same spec and seed give the same tasks.
@@ -116,6 +118,7 @@ def build_suite(
     Args:
         parts: the folder of finished rooms; made if missing, used if it has some.
         workers: how many processes.
+        machines: where they run.
         on_room: called with each room and its tasks.
 
     Raises:
@@ -126,13 +129,11 @@ def build_suite(
     for scene, part in done.items():
         on_room(scene, part)
     todo = [scene for scene in spec.rooms if scene not in done]
-    with closing(run_jobs(partial(RoomBuilder, spec, seed), todo, workers=workers)) as results:
+    make = partial(RoomBuilder, spec, seed)
+    with closing(machines.run_jobs(make, todo, workers=workers)) as results:
         for scene, made in results:
             if isinstance(made, LostJob):
-                raise RuntimeError(
-                    f"the worker that made {scene} died {made.tries} times, last with exit code "
-                    f"{made.exitcode}"
-                )
+                raise RuntimeError(f"{scene}: {made}")
             _write(_file(parts, scene), made)
             done[scene] = made
             on_room(scene, made)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input, report_set_aside
+from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
 from benchmarks.cli.generate import generate
-from benchmarks.cli.options import Place, force_option, split, workers_option
+from benchmarks.cli.options import Place, force_option, split
 from benchmarks.cli.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -27,19 +28,20 @@ tasks.add_command(generate)
 
 @tasks.command()
 @click.argument("suites", nargs=-1, required=True, metavar="SUITE|FILE...")
-@workers_option
-def verify(suites: tuple[str, ...], workers: int) -> int:
+@with_executor_options()
+def verify(suites: tuple[str, ...], executor_options: ExecutorOptions) -> int:
     """Play every task with the solver, and list those that cannot be done.
 
     The exit code is 1 if there is such a task, or one that is set aside because it does not fit its
     scene. The solver knows the key actions; it must succeed from the task's own start, within the
     step limit, and earn the whole reward.
     """
-    from contextlib import closing
+    from contextlib import ExitStack, closing
+    from operator import attrgetter
 
     from benchmarks.cli.progress import Progress
     from er_gym.rollout.verification import make_verifier
-    from er_gym.rollout.worker_pool import LostJob, run_jobs
+    from er_gym.rollout.worker_pool import LostJob
     from er_gym.tasks.errors import summarise_set_aside
     from er_gym.tasks.resolve import resolve_tasks
 
@@ -56,11 +58,14 @@ def verify(suites: tuple[str, ...], workers: int) -> int:
         for one in aside:
             echo(f"{suite.name}: set aside: {one}")
         solved = 0
-        with (
-            Progress(console, suite.name, len(todo)) as progress,
-            closing(run_jobs(make_verifier, todo, workers=workers)) as results,
-        ):
-            for task, verdict in results:
+        progress = Progress(console, suite.name, len(todo))
+        with ExitStack() as stack:
+            workforce = stack.enter_context(executor_options.workforce(progress.say, processors()))
+            stack.enter_context(progress)
+            results = workforce.machines.run_jobs(
+                make_verifier, todo, workers=workforce.workers, room=attrgetter("scene")
+            )
+            for task, verdict in stack.enter_context(closing(results)):
                 problem = "the engine died" if isinstance(verdict, LostJob) else verdict.problem
                 solved += not problem
                 progress.episode(not problem)

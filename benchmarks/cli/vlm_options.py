@@ -25,7 +25,7 @@ class VLMOptions:
 
     agent_config: str | None = None
     overrides: Sequence[str] = ()
-    base_url: str | None = None
+    base_url: Sequence[str] = ()
     prompts_from: Path | None = None
     concurrency: int | None = None
     max_usd: float | None = None
@@ -45,7 +45,12 @@ _VLM_OPTIONS = (
     agent_config_option,
     overrides_option("sampling.temperature=0.7"),
     click.option(
-        "--base-url", type=Words(), metavar="URL", help="The address of the model's server."
+        "--base-url",
+        type=Words(),
+        multiple=True,
+        metavar="URL",
+        help="The address of the model's server. Repeat it for several servers with the same "
+        "model: each request goes to the one with the fewest under way.",
     ),
     click.option(
         "--prompts-from",

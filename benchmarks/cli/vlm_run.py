@@ -13,6 +13,7 @@ from agents.vlm.clients.session import ModelSession
 from agents.vlm.factory import AgentFactory, comparable_settings, load_settings, settings_file
 from agents.vlm.prompts import prompts_for
 from agents.vlm.settings import AgentSettings
+from benchmarks.cli.executor import Workforce
 from benchmarks.cli.vlm_options import VLMOptions
 from er_gym.rollout.events import EventListener
 from er_gym.rollout.executor import Parallelism
@@ -49,8 +50,12 @@ class VLMRun:
         Raises:
             ValueError: a setting does not fit.
         """
-        given = {"server.base_url": options.base_url, "prompts.dataset": options.prompts_from}
-        more = [f"{name}={json.dumps(str(value))}" for name, value in given.items() if value]
+        urls, dataset = list(options.base_url), options.prompts_from
+        given = {
+            "server.base_url": urls[0] if len(urls) == 1 else urls,
+            "prompts.dataset": str(dataset or ""),
+        }
+        more = [f"{name}={json.dumps(value)}" for name, value in given.items() if value]
         tuned_for = settings_file(name)
         if tuned_for is not None and options.prompts_from is not None:
             more.append('prompts.dialect=""')  # instead of the model's own
@@ -85,7 +90,7 @@ class VLMRun:
         factory: AgentFactory,
         directory: RunDirectory,
         tasks: Sequence[Task],
-        workers: int,
+        workforce: Workforce,
         listeners: Iterable[EventListener] = (),
         say: Callable[[object], None] | None = None,
         samples: int = 1,
@@ -102,7 +107,9 @@ class VLMRun:
             tasks,
             lambda task, seed: factory.agent(seed),
             executor="threads",
-            parallelism=Parallelism(workers, self.concurrency),
+            parallelism=Parallelism(
+                workforce.workers, self.concurrency, machines=workforce.machines
+            ),
             listeners=listeners,
             cost=lambda: factory.cost,
             samples=samples,

@@ -22,10 +22,12 @@ from typing import Any
 
 import click
 
+from benchmarks.cli.executor import Workforce
 from benchmarks.cli.vlm_options import VLMOptions
 from benchmarks.cli.vlm_run import VLMRun
 from er_gym import __version__
 from er_gym.rollout.events import EpisodeEnded, Event
+from er_gym.rollout.machines import THIS_MACHINE
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks import Task, load_suite
 
@@ -56,8 +58,13 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
     request_queue_size = 128
 
-    def __init__(self, replies: KeyActionReplies, latency: float) -> None:
-        super().__init__(("127.0.0.1", 0), _Handler)
+    def __init__(
+        self,
+        replies: KeyActionReplies,
+        latency: float,
+        handler: type[BaseHTTPRequestHandler] | None = None,
+    ) -> None:
+        super().__init__(("127.0.0.1", 0), handler or Handler)
         self.replies = replies
         self.latency = latency
 
@@ -67,7 +74,9 @@ class Server(ThreadingHTTPServer):
         return f"http://127.0.0.1:{self.server_port}/v1"
 
 
-class _Handler(BaseHTTPRequestHandler):
+class Handler(BaseHTTPRequestHandler):
+    """Replies to a request."""
+
     server: Server
     protocol_version = "HTTP/1.1"  # connections are kept
     disable_nagle_algorithm = True
@@ -98,6 +107,10 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
         self.wfile.write(body)
+        self.answered(asked)
+
+    def answered(self, asked: dict[str, Any]) -> None:
+        """Called after each answer."""
 
     def log_message(self, format: str, *args: object) -> None:
         """Log nothing."""
@@ -129,7 +142,7 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
     process.start()
     theirs.close()
     options = VLMOptions(
-        base_url=ours.recv(),
+        base_url=(ours.recv(),),
         overrides=[f"pictures.width={size}", f"pictures.height={size}"],
         concurrency=concurrency,
     )
@@ -149,7 +162,9 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
                 ended.append((time.perf_counter(), event.steps))
 
         with closing(vlm_run.factory(run_directory.path)) as factory:
-            outcome = vlm_run.play(factory, run_directory, tasks, workers, [note])
+            outcome = vlm_run.play(
+                factory, run_directory, tasks, Workforce(THIS_MACHINE, workers), [note]
+            )
     ours.close()
     process.join(5)
     whole = ended[-1][0] - began

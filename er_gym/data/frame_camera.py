@@ -115,10 +115,7 @@ def draw_frames(
     with closing(run_jobs(partial(_Photographer, camera), missing, workers=workers)) as results:
         for visit, drawn in results:
             if isinstance(drawn, LostJob):
-                raise DrawingError(
-                    f"the process that drew {visit.room.scene} died {drawn.tries} times, the last "
-                    f"time with exit code {drawn.exitcode}; run the command again"
-                )
+                raise DrawingError(f"{visit.room.scene}: {drawn}; run the command again")
             frames.save_visit(visit.number, drawn)
             yield len(drawn)
 

@@ -209,6 +209,13 @@ class EventLog:
         for listener in self._listeners:
             listener(event)
 
+    def append(self, events: Iterable[Event]) -> None:
+        """Append events that happened elsewhere. The listeners, which hear of a process's own
+        events, are not called."""
+        for event in events:
+            with contextlib.suppress(OSError):
+                self._lines.add(event.model_dump_json())
+
     def close(self) -> None:
         """Close the file."""
         self._lines.close()

@@ -14,6 +14,7 @@ from er_gym.rollout.agent import (
     MakeAgent,
     check_attachments,
 )
+from er_gym.rollout.machines import THIS_MACHINE, Machines
 from er_gym.rollout.play import episode_seed, one_line
 from er_gym.rollout.records import EpisodeRecord, record_episode
 from er_gym.rollout.run_directory import Manifest, RunDirectory
@@ -83,6 +84,7 @@ class Parallelism:
             episodes in one process.
         deadline: seconds within which an environment in another process must answer. The time
             includes the wait for its neighbours in that process. The process is killed after it.
+        machines: where the worker processes run.
 
     Raises:
         ValueError: a number is out of its range.
@@ -91,6 +93,7 @@ class Parallelism:
     workers: int = 1
     concurrency: int = 8
     deadline: float = 600.0
+    machines: Machines = THIS_MACHINE
 
     def __post_init__(self) -> None:
         for name, value in (("workers", self.workers), ("concurrency", self.concurrency)):
@@ -156,8 +159,7 @@ class EpisodeSettings:
 
     def lost(self, task: Task, lost: LostJob) -> EpisodeRecord:
         """The record of an episode whose worker died every time."""
-        error = f"the worker process died {lost.tries} times, last with exit code {lost.exitcode}"
-        return self.unbegun(task, error)
+        return self.unbegun(task, str(lost))
 
 
 class Executor(Protocol):

@@ -1,4 +1,9 @@
-"""The executor for agents that compute: whole episodes in worker processes."""
+"""The executor for agents that compute: whole episodes in worker processes, here or on a cluster.
+
+Workers append events to the run's stream where they can, and write the files that agents leave.
+Workers on other machines send both along with the episode. The caller's process alone writes
+episodes.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +11,12 @@ import pickle
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
-from er_gym.rollout.events import EventLog
+from er_gym.rollout.events import Event, EventLog
 from er_gym.rollout.executor import (
     Assignment,
     EpisodeSettings,
@@ -18,26 +24,37 @@ from er_gym.rollout.executor import (
 )
 from er_gym.rollout.play import one_line, play_episode
 from er_gym.rollout.processes import Terminated
-from er_gym.rollout.worker_pool import LostJob, run_jobs
+from er_gym.rollout.run_directory import RunDirectory
+from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.task import Task
 
 
 def play_in_processes(assigned: Assignment) -> None:
     """Play each task in one of ``parallelism.workers`` processes. See :class:`.Executor`."""
     make_agent, directory = assigned.make_agent, assigned.directory
-    settings, workers = assigned.episodes, assigned.parallelism.workers
+    settings, parallelism = assigned.episodes, assigned.parallelism
+    machines = parallelism.machines
     _check_picklable(make_agent)
-    worker = partial(EpisodeWorker, make_agent, settings, directory.path)
-    with closing(run_jobs(worker, assigned.tasks, workers=workers)) as results:
+    worker = partial(
+        EpisodeWorker,
+        make_agent,
+        settings,
+        directory.path.absolute(),
+        appends_events=machines.is_here,
+        writes_files=machines.shares_files and not machines.is_here,
+    )
+    results = machines.run_jobs(
+        worker, assigned.tasks, workers=parallelism.workers, room=attrgetter("scene")
+    )
+    with closing(results), closing(EventLog(directory.path)) as events:
         for task, result in results:
             if isinstance(result, _Stop):
                 raise CannotGoOn(result.message)
             if isinstance(result, LostJob):
-                played = PlayedEpisode(settings.lost(task, result))
-            else:
-                played = result
-            assigned.sink.save(played)
-            assigned.sink.ended(played)
+                result = _Result(PlayedEpisode(settings.lost(task, result)))
+            events.append(result.events)
+            assigned.sink.save(result.played)
+            assigned.sink.ended(result.played)
 
 
 def _check_picklable(make_agent: MakeAgent) -> None:
@@ -58,6 +75,19 @@ class _Stop:
     message: str
 
 
+@dataclass(frozen=True)
+class _Result:
+    """What a worker returns for a task.
+
+    Attributes:
+        played: the episode.
+        events: its events that are not in the run's stream yet.
+    """
+
+    played: PlayedEpisode
+    events: tuple[Event, ...] = ()
+
+
 class EpisodeWorker:
     """Plays one episode after another in one environment, which it makes anew after a crash.
 
@@ -67,19 +97,43 @@ class EpisodeWorker:
     Args:
         make_agent: makes the agent of an episode.
         settings: what the episodes have in common.
-        directory: the run directory; events are appended to its stream.
+        directory: the run directory.
+        appends_events: whether to append events to the stream in the run directory; else they are
+            returned with the episode.
+        writes_files: whether to write the agent's files into the run directory; else they are
+            returned with the episode.
     """
 
-    def __init__(self, make_agent: MakeAgent, settings: EpisodeSettings, directory: Path) -> None:
+    def __init__(
+        self,
+        make_agent: MakeAgent,
+        settings: EpisodeSettings,
+        directory: Path,
+        *,
+        appends_events: bool = True,
+        writes_files: bool = False,
+    ) -> None:
         self._make_agent = make_agent
         self._settings, self._manifest = settings, settings.manifest
-        self._events = EventLog(directory)
+        self._log = EventLog(directory) if appends_events else None
+        self._unsent: list[Event] = []
+        self._directory = RunDirectory(directory, self._manifest) if writes_files else None
         self._env: EmbodiedEnv | None = self._make_env()
 
     def _make_env(self) -> EmbodiedEnv:
         return EmbodiedEnv((), **self._manifest.env)
 
-    def __call__(self, task: Task) -> PlayedEpisode | _Stop:
+    def __call__(self, task: Task) -> _Result | _Stop:
+        self._unsent.clear()
+        played = self._play(task)
+        if isinstance(played, _Stop):
+            return played
+        if self._directory is not None:
+            self._directory.attach(task.id, played.attachments, played.folders)
+            played = PlayedEpisode(played.record)
+        return _Result(played, tuple(self._unsent))
+
+    def _play(self, task: Task) -> PlayedEpisode | _Stop:
         seed = self._settings.seed(task)
         try:
             if self._env is None:
@@ -99,7 +153,7 @@ class EpisodeWorker:
                 seed,
                 agent_name=self._manifest.agent,
                 max_steps=self._manifest.env.get("max_steps"),
-                emit=self._events,
+                emit=self._log or self._unsent.append,
             )
         except CannotGoOn as stop:
             return _Stop(str(stop))
@@ -116,4 +170,5 @@ class EpisodeWorker:
     def close(self) -> None:
         """Close the environment and the event stream."""
         self._close_env()
-        self._events.close()
+        if self._log is not None:
+            self._log.close()

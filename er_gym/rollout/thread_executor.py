@@ -43,7 +43,13 @@ def play_in_threads(assigned: Assignment) -> None:
     stopped: CannotGoOn | None = None
     env = directory.manifest.env
     with (
-        EnvPool(parallelism.workers, slots, env, deadline=parallelism.deadline) as pool,
+        EnvPool(
+            parallelism.workers,
+            slots,
+            env,
+            deadline=parallelism.deadline,
+            machines=parallelism.machines,
+        ) as pool,
         closing(EventLog(directory.path)) as events,
     ):
         threads = _ThreadedRun(assigned.episodes, pool, assigned.make_agent, events, todo)
@@ -144,7 +150,7 @@ class _ThreadedRun:
                     if self.stopping.is_set():
                         raise _Stopping
                     continue
-                record = self.settings.lost(task, LostJob(tries, lost.exitcode))
+                record = self.settings.lost(task, LostJob(tries, lost.exitcode, lost.why))
             return PlayedEpisode.by(agent, record)
 
     def _play(self, env: RemoteEnv, task: Task, seed: int) -> tuple[Agent | None, EpisodeRecord]:

@@ -26,11 +26,18 @@ class LostJob:
 
     Attributes:
         tries: the number of tries.
-        exitcode: the exit code of the last worker; minus the signal's number if a signal ended it.
+        exitcode: the exit code of the last worker, minus the signal's number if a signal ended it;
+            None if nobody knows.
+        why: what is known beyond the exit code.
     """
 
     tries: int
     exitcode: int | None
+    why: str = ""
+
+    def __str__(self) -> str:
+        last = f": {self.why}" if self.why else f" with exit code {self.exitcode}"
+        return f"the worker process died {self.tries} times, last{last}"
 
 
 class WorkerSetupError(RuntimeError):

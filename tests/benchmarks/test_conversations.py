@@ -106,6 +106,24 @@ def test_two_hundred_episodes_with_a_server_that_misbehaves(tmp_path: Path) -> N
     assert ends["end"] > 150
 
 
+def test_two_servers_one_of_which_dies(tmp_path: Path) -> None:
+    dying = naughty.NaughtyServer(short, ["ok"] * 6, {"reset": 1}, keep_bodies=False)
+    with dying, naughty.NaughtyServer(short, keep_bodies=False) as other:
+        urls = ("--base-url", other.url)
+        result = bench(dying.url, tmp_path, "--limit", "12", *PRICES, *urls)
+        assert result.return_value == 0, result.output
+        assert_whole(tmp_path, 12)
+        assert len(ledger(tmp_path)) == 6 + other.count == 12 * 3  # each turn is paid for once
+        assert result.output.count("; set aside; 1 of 2 servers left") == 1
+        events = (tmp_path / "server-events.jsonl").read_text().splitlines()
+        kinds = Counter(json.loads(line)["event"] for line in events)
+        assert kinds == {"aside": 1, "retry": dying.count - 6}
+        before = other.count
+        again = bench(other.url, tmp_path, "--limit", "12", *PRICES)
+        assert again.return_value == 0, again.output  # it is the same run
+        assert other.count == before
+
+
 def test_a_budget_stops_within_the_replies_under_way(tmp_path: Path) -> None:
     with naughty.NaughtyServer(short, keep_bodies=False) as server:
         more = ("--limit", "12", "--concurrency", "3")

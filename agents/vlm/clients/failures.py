@@ -9,13 +9,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import timezone
 from email.utils import parsedate_to_datetime
+from typing import Literal
 
 import httpx2
 import openai
 
 from agents.vlm.clients.chat_completions import error_text
 
-_MAY_PASS = frozenset({408, 409, 425, 429})  # and all from 500 on
+_TOO_MANY = 429
+_MAY_PASS = frozenset({408, 409, 425, _TOO_MANY})  # and all from 500 on
 _REFUSED: Mapping[int, str] = {
     401: "the server does not accept the key of {key_from}",
     402: "the server demands payment",
@@ -46,6 +48,8 @@ class Failure:
         no_server: whether no server seems to be there: neither this try nor any before it got an
             answer.
         retry_after: seconds that the server asks to wait; None if it does not ask.
+        server: what it says about the server, where another may do better: ``down``: no
+            connection, no answer in time, or 5xx; ``busy``: it asks to wait; "" for nothing.
     """
 
     message: str
@@ -54,6 +58,7 @@ class Failure:
     timed_out: bool = False
     no_server: bool = False
     retry_after: float | None = None
+    server: Literal["", "down", "busy"] = ""
 
 
 def failure_of(error: openai.OpenAIError, *, key_from: str, answered: bool) -> Failure:
@@ -72,7 +77,13 @@ def failure_of(error: openai.OpenAIError, *, key_from: str, answered: bool) -> F
         return Failure(words)
     late = isinstance(cause, httpx2.ReadTimeout)
     alone = late or isinstance(cause, (httpx2.ConnectError, httpx2.ConnectTimeout))
-    return Failure(words, retryable=True, timed_out=late, no_server=alone and not answered)
+    return Failure(
+        words,
+        retryable=True,
+        timed_out=late,
+        no_server=alone and not answered,
+        server="down" if isinstance(cause, httpx2.TransportError) else "",
+    )
 
 
 def _of_status(error: openai.APIStatusError, key_from: str, answered: bool) -> Failure:
@@ -92,7 +103,14 @@ def _of_status(error: openai.APIStatusError, key_from: str, answered: bool) -> F
         return Failure(words, fatal="every request like this will fail")
     passes = status in _MAY_PASS or status >= 500
     asked_to = headers.get("x-should-retry") != "false"
-    return Failure(words, retryable=passes and asked_to, retry_after=requested_pause(headers))
+    wait = requested_pause(headers)
+    busy = status == _TOO_MANY or (status >= 500 and wait is not None)
+    return Failure(
+        words,
+        retryable=passes and asked_to,
+        retry_after=wait,
+        server="busy" if busy else "down" if status >= 500 and asked_to else "",
+    )
 
 
 def requested_pause(headers: httpx2.Headers) -> float | None:

@@ -34,18 +34,20 @@ class Secrets:
 
     Args:
         key: the server's API key; "" for none.
-        url: the server's address; its password and the long values of its query are secrets.
+        urls: addresses; their passwords and the long values of their queries are secrets.
     """
 
-    def __init__(self, key: str, url: str = "") -> None:
-        try:
-            place = urlsplit(url)
-            password = unquote(place.password or "")
-            values = [value for _, value in parse_qsl(place.query) if len(value) >= _LONG_VALUE]
-        except ValueError:
-            password, values = "", []
-        long = {each for each in (key, password) if len(each) >= LONG}.union(values)
-        short = {each for each in (key, password) if 0 < len(each) < LONG}
+    def __init__(self, key: str, *urls: str) -> None:
+        words, values = {key}, set[str]()
+        for url in urls:
+            try:
+                place = urlsplit(url)
+                words.add(unquote(place.password or ""))
+                values.update(v for _, v in parse_qsl(place.query) if len(v) >= _LONG_VALUE)
+            except ValueError:
+                continue
+        long = {each for each in words if len(each) >= LONG} | values
+        short = {each for each in words if 0 < len(each) < LONG}
         # As plain text, in JSON and in a URL; longest first, since one may contain another.
         forms = {form for each in long for form in (each, json.dumps(each)[1:-1], quote(each, ""))}
         patterns = [re.escape(form) for form in sorted(forms, key=len, reverse=True)]

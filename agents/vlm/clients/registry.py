@@ -73,6 +73,10 @@ def _openai(
 def _local(
     path: str, settings: AgentSettings, ledger: Ledger, supervisor: RequestSupervisor
 ) -> CacheableClient:
+    if settings.local.actors:
+        from agents.vlm.clients.model_actors import ModelActors
+
+        return ModelActors(path, settings, supervisor)
     from agents.vlm.clients.local import LocalClient
 
     return LocalClient(path, settings, supervisor)
@@ -99,7 +103,7 @@ CLIENTS: Registry[ModelClientSpec] = Registry(
         ),
         "hf": ModelClientSpec(
             opens="PATH",
-            help="a transformers model in this process",
+            help="a transformers model in this process, or on a Ray cluster",
             make=_local,
             settings=agent_file,
             install="er-gym[local]",

@@ -33,13 +33,17 @@ _LONGEST_WAIT = 3600.0  # seconds of one wait; threads cannot wait for an infini
 _log = logging.getLogger(__name__)
 
 
+EventName = Literal["retry", "waiting", "failed", "stopped", "aside", "back"]
+
+
 class ServerEvent(BaseModel):
     """A delay or a failure of the server; a line of ``server-events.jsonl``.
 
     Attributes:
         time: ISO 8601 in UTC.
         event: ``retry``: a try failed, and another follows after ``wait`` seconds; ``waiting``: no
-            answer yet; ``failed``: a request was given up; ``stopped``: the run was stopped.
+            answer yet; ``failed``: a request was given up; ``stopped``: the run was stopped; of
+            several servers, ``aside``: one is set aside; ``back``: it is back in use.
         what: what happened, in one line.
         seed: the episode's seed; None for the whole run.
         attempt, of: the number of the try, and the most tries.
@@ -49,7 +53,7 @@ class ServerEvent(BaseModel):
     model_config = ConfigDict(frozen=True)
 
     time: str
-    event: Literal["retry", "waiting", "failed", "stopped"]
+    event: EventName
     what: str
     seed: int | None = None
     attempt: int = 0
@@ -97,6 +101,10 @@ class RequestSupervisor:
         """A request that begins now."""
         return Request(self, next(self._numbers), seed)
 
+    def health_check(self) -> Request:
+        """A health check of a server that begins now; the end of the run ends it, too."""
+        return _HealthCheck(self, next(self._numbers), seed=0)
+
     @property
     def over(self) -> bool:
         """Whether the time limit is reached."""
@@ -126,23 +134,30 @@ class RequestSupervisor:
             self._closed = True
             self._changed.notify_all()
 
+    def wake(self) -> None:
+        """Let waiting requests see whether they can go on."""
+        with self._changed:
+            self._changed.notify_all()
+
     def emit(
         self,
-        event: Literal["retry", "waiting", "failed", "stopped"],
+        event: EventName,
         what: str,
         seed: int | None = None,
         attempt: int = 0,
         of: int = 0,
         wait: float = 0.0,
+        shown: bool = True,
     ) -> None:
-        """Report an event; for the arguments see :class:`ServerEvent`."""
+        """Report an event; for the arguments see :class:`ServerEvent`. One that is not ``shown`` is
+        only logged."""
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
         server_event = ServerEvent(
             time=now, event=event, what=what, seed=seed, attempt=attempt, of=of, wait=wait
         )
         self._last_news = time.monotonic()
         self.log_event(server_event)
-        if event != "stopped":  # the exception says so
+        if shown and event != "stopped":  # the exception says so
             with contextlib.suppress(OSError, ValueError):  # the terminal is closed
                 self.show(server_event)
 
@@ -162,10 +177,10 @@ class RequestSupervisor:
             raise CannotGoOn(f"the {self._minutes:g} minutes are over; {AGAIN}")
         return self._ends - now
 
-    def _wait(self, request: Request, seconds: float) -> None:
+    def _wait(self, request: Request, seconds: float, unless: Callable[[], bool]) -> None:
         until = time.monotonic() + seconds
         with self._changed:
-            while (left := until - time.monotonic()) > 0:
+            while (left := until - time.monotonic()) > 0 and not unless():
                 self._changed.wait(min(left, self._left(request, False), _LONGEST_WAIT))
         self._left(request, False)
 
@@ -237,19 +252,24 @@ class Request:
         """
         return self._supervisor._left(self, answering)
 
-    def wait(self, seconds: float) -> None:
-        """Wait; raises as :meth:`left` if the run ends meanwhile."""
-        self._supervisor._wait(self, seconds)
+    def wait(self, seconds: float, unless: Callable[[], bool] = lambda: False) -> None:
+        """Wait; raises as :meth:`left` if the run ends meanwhile.
+
+        Args:
+            seconds: how long.
+            unless: ends the wait when it is true; :meth:`RequestSupervisor.wake` has it asked.
+        """
+        self._supervisor._wait(self, seconds, unless)
 
     def still_waiting(self, what: str, seconds: float) -> None:
         """Report that the answer is still missing, if there was no other event for long."""
         if self._supervisor._is_quiet():
             self._supervisor.emit("waiting", what, self.seed, self.attempt, self.of, seconds)
 
-    def retry(self, what: str, wait: float, of: int) -> None:
+    def retry(self, what: str, wait: float, of: int, *, shown: bool = True) -> None:
         """Report that a try failed and that another of ``of`` follows."""
         self._supervisor._failed(self)
-        self._supervisor.emit("retry", what, self.seed, self.attempt, of, wait)
+        self._supervisor.emit("retry", what, self.seed, self.attempt, of, wait, shown)
 
     def answered(self) -> None:
         """Report a reply."""
@@ -274,6 +294,13 @@ class Request:
             )
         self._supervisor.emit("failed", what, self.seed)
         return ModelError(what)
+
+
+class _HealthCheck(Request):
+    """A request that nobody waits for."""
+
+    def still_waiting(self, what: str, seconds: float) -> None:
+        """Say nothing."""
 
 
 def duration(seconds: float) -> str:

@@ -7,6 +7,7 @@ decompression.
 
 from __future__ import annotations
 
+import math
 import ssl
 import threading
 import time
@@ -83,9 +84,14 @@ class BoundedTransport(httpx2.BaseTransport):
             network_backend=_TimedBackend(self._deadline, connect),
         )
 
-    def begin_try(self, request: Request) -> None:
-        """Count what this thread sends next as a try of this request."""
-        self._deadline.request = request
+    def begin_try(self, request: Request, timeout: float = math.inf) -> None:
+        """Count what this thread sends next as a try of this request.
+
+        Args:
+            request: what is tried.
+            timeout: seconds for this try, where the transport's own are more.
+        """
+        self._deadline.request, self._deadline.most = request, min(timeout, self._timeout)
 
     def handle_request(self, request: httpx2.Request) -> httpx2.Response:
         """Send a request and read the answer to its end.
@@ -95,14 +101,14 @@ class BoundedTransport(httpx2.BaseTransport):
             AnswerTooLong: the answer is too long.
             CannotGoOn: the run ends meanwhile.
         """
-        self._deadline.start(self._timeout)
+        self._deadline.start()
         try:
             return self._whole(request)
         except httpcore2.TimeoutException as error:
             self._deadline.request.left(answering=True)  # it may be the run's end that came first
             if isinstance(error, _NoConnection):
                 raise httpx2.ConnectTimeout(str(error), request=request) from None
-            late = f"no whole answer within {self._timeout:g} s"
+            late = f"no whole answer within {self._deadline.most:g} s"
             raise httpx2.ReadTimeout(late, request=request) from None
         except tuple(_KNOWN_TO_THE_SDK) as error:
             known = next(
@@ -196,12 +202,13 @@ class _TryDeadline(threading.local):
     """The time that a try has left; one thread handles a request from start to end."""
 
     request: Request
+    most: float
     _end = _began = 0.0
 
-    def start(self, seconds: float) -> None:
+    def start(self) -> None:
         self.request.answering = False
         self._began = time.monotonic()
-        self._end = self._began + min(seconds, self.request.left())
+        self._end = self._began + min(self.most, self.request.left())
 
     def left(self) -> float:
         left = self._end - time.monotonic()

@@ -638,7 +638,7 @@ def test_the_key_never_appears(
         ],
         *[Raw(gossip.encode())] * 2,
     )
-    told = [repr(client), str(client.__dict__["_sdk"]), client.identity]
+    told = [repr(client), repr(vars(client._endpoints._all[0].endpoint)), client.identity]
     for _ in range(4):
         with pytest.raises((ModelError, CannotGoOn), match=r"I got 'Auth.* \*\*\*'") as caught:
             client.reply(HELLO, seed=0)

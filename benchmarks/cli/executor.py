@@ -1,0 +1,185 @@
+"""Where a command's worker processes run: ``--workers``, ``--executor`` and what Ray needs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import reduce, wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from benchmarks.cli.errors import BadInput, bad_input
+from benchmarks.cli.options import Finite, Words, workers_type
+
+if TYPE_CHECKING:
+    from er_gym.rollout.machines import Machines
+
+EXECUTORS = ("local", "ray")
+_GIB = 2**30
+
+
+@dataclass(frozen=True)
+class Workforce:
+    """The workers of a command.
+
+    Attributes:
+        machines: where they run.
+        workers: the largest number of them.
+    """
+
+    machines: Machines
+    workers: int
+
+    def must_see(self, path: Path) -> None:
+        """Raise BadInput if workers of other nodes cannot read a file or folder of this machine."""
+        if not self.machines.shares_files:
+            raise BadInput(
+                f"the workers read {path}, which other nodes may not have; put it where all nodes "
+                "see it and give --shared-dir"
+            )
+
+
+@dataclass(frozen=True)
+class ExecutorOptions:
+    """The options that say where worker processes run; None if one was not given."""
+
+    workers: int | None = None
+    executor: str | None = None
+    ray_address: str | None = None
+    shared_dir: bool | None = None
+    worker_cpus: float | None = None
+    worker_memory: float | None = None
+
+    def check(self) -> None:
+        """Refuse options that do not go together.
+
+        Raises:
+            BadInput: the message says which.
+        """
+        for_ray = ("ray_address", "shared_dir", "worker_cpus", "worker_memory")
+        given = [f"--{name.replace('_', '-')}" for name in for_ray if getattr(self, name)]
+        if given and self.executor != "ray":
+            raise BadInput(f"{given[0]} is for --executor ray")
+        if self.shared_dir and not self.ray_address:
+            raise BadInput(
+                "--shared-dir is for --ray-address; a Ray on this machine sees its files anyway"
+            )
+
+    def arguments(self) -> list[str]:
+        """The same options but for --workers, for another command."""
+        told: list[str] = []
+        for name, value in vars(self).items():
+            if name != "workers" and value is not None:
+                told.append(f"--{name.replace('_', '-')}")
+                told += [] if value is True else [str(value)]
+        return told
+
+    @contextmanager
+    def workforce(
+        self, say: Callable[[str], None], default: int, *, agents: Iterable[str] = ()
+    ) -> Iterator[Workforce]:
+        """The workers, for the length of a ``with`` statement.
+
+        Args:
+            say: called with messages for the user, from any thread.
+            default: how many there are without --workers on this machine; a cluster has as many as
+                it has processors for.
+            agents: names of agents whose modules the workers need.
+
+        Raises:
+            BadInput: the options do not go together, or there is no such cluster.
+        """
+        from er_gym.rollout.machines import THIS_MACHINE
+
+        self.check()
+        if self.executor != "ray":
+            yield Workforce(THIS_MACHINE, self.workers or default)
+            return
+        from er_gym.rollout.cluster.modules import modules_of
+        from er_gym.rollout.cluster.session import ray_machines
+        from er_gym.rollout.cluster.settings import RaySettings
+
+        with bad_input():
+            settings = RaySettings(
+                address=self.ray_address or "",
+                cpus=1.0 if self.worker_cpus is None else self.worker_cpus,
+                memory=int((self.worker_memory or 1.0) * _GIB),
+                shared_files=bool(self.shared_dir),
+            )
+            joined = ray_machines(settings, say, modules_of(agents))
+            machines = joined.__enter__()
+        try:
+            yield Workforce(machines, self.workers or machines.places)
+        finally:
+            joined.__exit__(None, None, None)
+
+
+_OPTIONS = (
+    click.option(
+        "--executor",
+        type=click.Choice(EXECUTORS),
+        help="Where the workers are: processes of this machine, or a Ray cluster.  "
+        "[default: local]",
+    ),
+    click.option(
+        "--ray-address",
+        type=Words(),
+        metavar="ADDRESS",
+        help="The cluster: auto, HOST:PORT or ray://HOST:PORT.  [default: start Ray here]",
+    ),
+    click.option(
+        "--shared-dir",
+        is_flag=True,
+        default=None,
+        help="Every node of the cluster sees this machine's files under the same paths.",
+    ),
+    click.option(
+        "--worker-cpus",
+        type=Finite(min=0),
+        help="The processors that a worker asks the cluster for.  [default: 1]",
+    ),
+    click.option(
+        "--worker-memory",
+        type=Finite(min=0.0625),
+        metavar="GIB",
+        help="The memory that a worker asks the cluster for; one that takes more is replaced.  "
+        "[default: 1]",
+    ),
+)
+
+
+def with_executor_options(
+    default: int | None = None, *, workers: bool = True
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add these options to a command, which gets them as one argument ``executor_options``.
+
+    Args:
+        default: the number of workers; None for one for each processor.
+        workers: whether the command has --workers; others have the number elsewhere.
+    """
+    shown = "one for each processor" if default is None else str(default)
+    number = click.option(
+        "--workers", type=workers_type, help=f"The number of processes.  [default: {shown}]"
+    )
+    added = (number, *_OPTIONS) if workers else _OPTIONS
+
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def with_options(**given: Any) -> Any:
+            names = ExecutorOptions.__dataclass_fields__
+            options = ExecutorOptions(**{name: given.pop(name, None) for name in names})
+            options.check()
+            return command(executor_options=options, **given)
+
+        return reduce(lambda made, option: option(made), reversed(added), with_options)
+
+    return add
+
+
+def processors() -> int:
+    """How many processors this machine has."""
+    return os.cpu_count() or 1

@@ -1,0 +1,79 @@
+"""Where worker processes run: on this machine, or on a cluster.
+
+Everything that needs worker processes asks a :class:`Machines` for them. :data:`THIS_MACHINE` has
+processes of its own; :class:`er_gym.rollout.cluster.machines.RayMachines` has Ray's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from er_gym.rollout.env_worker import EnvWorker, LocalEnvWorker
+from er_gym.rollout.worker_pool import LostJob, run_jobs
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+
+class Machines(Protocol):
+    """Where worker processes run; hashable and cheap to hold."""
+
+    @property
+    def is_here(self) -> bool:
+        """Whether all workers are on this machine, so that they may append to a file at once."""
+
+    @property
+    def shares_files(self) -> bool:
+        """Whether workers find the same files under the same absolute paths as this process."""
+
+    def run_jobs(
+        self,
+        make: Callable[[], Callable[[Job], Result]],
+        jobs: Iterable[Job],
+        *,
+        workers: int,
+        tries: int = 3,
+        room: Callable[[Job], Hashable] | None = None,
+    ) -> Generator[tuple[Job, Result | LostJob], None, None]:
+        """Do every job in a worker process; see :func:`.worker_pool.run_jobs`.
+
+        Args:
+            make: as there.
+            jobs: as there.
+            workers: as there.
+            tries: as there.
+            room: what a worker has warm once it has done a job; jobs of one room go to one worker
+                where that costs no time.
+        """
+
+    def start_env_worker(self, slots: Sequence[int], env: Mapping[str, Any]) -> EnvWorker:
+        """Start a worker process for the environments of some slots of an
+        :class:`.env_pool.EnvPool`."""
+
+
+@dataclass(frozen=True)
+class _ThisMachine:
+    """Spawned processes of this machine; see :class:`Machines`."""
+
+    is_here = True
+    shares_files = True
+
+    def run_jobs(
+        self,
+        make: Callable[[], Callable[[Job], Result]],
+        jobs: Iterable[Job],
+        *,
+        workers: int,
+        tries: int = 3,
+        room: Callable[[Job], Hashable] | None = None,
+    ) -> Generator[tuple[Job, Result | LostJob], None, None]:
+        """All rooms fit into the memory of each process, so ``room`` changes nothing."""
+        return run_jobs(make, jobs, workers=workers, tries=tries)
+
+    def start_env_worker(self, slots: Sequence[int], env: Mapping[str, Any]) -> EnvWorker:
+        return LocalEnvWorker(slots, env)
+
+
+THIS_MACHINE: Machines = _ThisMachine()

@@ -1,0 +1,170 @@
+"""Jobs, and the environments of agents in this process, on a Ray that is started here."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from functools import partial
+from pathlib import Path
+
+import agents_by_hand as by_hand
+import gymnasium
+import pytest
+import ray_jobs
+
+from er_gym.rollout.cluster.session import ray_machines
+from er_gym.rollout.cluster.settings import RaySettings
+from er_gym.rollout.env_pool import EnvLost, EnvPool
+from er_gym.rollout.executor import Parallelism
+from er_gym.rollout.machines import THIS_MACHINE
+from er_gym.rollout.run_directory import RunDirectory
+from er_gym.rollout.runner import EXECUTORS, run
+from er_gym.rollout.worker_pool import LostJob, WorkerSetupError
+from er_gym.tasks.paper_format import read_tasks
+
+ray = pytest.importorskip("ray", reason="Ray is not installed")
+
+
+@pytest.fixture(scope="module")
+def machines():
+    with ray_machines(RaySettings(cpus=0.1, memory=2**28), print) as ours:
+        yield ours
+
+
+def reset_for_ever(env, task):
+    while True:
+        env.reset(seed=0, options={"task": task})
+
+
+def pids(results):
+    return {pid for _, (_, pid) in results}
+
+
+def is_alive(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return "ray::" in Path(f"/proc/{pid}/cmdline").read_text()
+
+
+def until(check, seconds=20):
+    end = time.monotonic() + seconds
+    while not check() and time.monotonic() < end:
+        time.sleep(0.1)
+    return check()
+
+
+def test_every_job_is_done_once_and_those_that_kill_are_given_up(machines):
+    jobs = [*range(40), "die", *range(40, 80), "raise"]
+    results = list(machines.run_jobs(ray_jobs.Troubled, jobs, workers=2))
+    lost = {job: result for job, result in results if isinstance(result, LostJob)}
+    assert {job: result.tries for job, result in lost.items()} == {"die": 3, "raise": 3}
+    assert lost["raise"].why == "KeyError: 'no such thing'"
+    assert str(lost["die"]) == (
+        "the worker process died 3 times, last: The actor is dead because its worker process has "
+        "died"
+    )
+    assert sorted(job for job, _ in results if job not in lost) == list(range(80))
+    assert all(result[0] == job for job, result in results if job not in lost)
+
+
+def test_a_worker_that_cannot_be_made_is_the_same_error_as_here(machines):
+    for where in (THIS_MACHINE, machines):
+        with pytest.raises(WorkerSetupError, match=r"^OSError: no such engine$"):
+            list(where.run_jobs(ray_jobs.no_such_engine, [1, 2], workers=2))
+
+
+def test_a_worker_keeps_to_its_room(machines):
+    jobs = [(room, number) for number in range(30) for room in "ab"]
+    results = machines.run_jobs(ray_jobs.Troubled, jobs, workers=2, room=lambda job: job[0])
+    homes = {(pid, job[0]) for job, (_, pid) in results}
+    assert len(homes) <= 3  # who has finished a room helps with the other
+
+
+def test_a_worker_that_has_grown_is_replaced(machines):
+    jobs = ["grow", *range(6)]
+    assert len(pids(machines.run_jobs(ray_jobs.Troubled, jobs, workers=1))) == 2
+
+
+def test_leaving_early_ends_the_workers(machines):
+    results = machines.run_jobs(ray_jobs.Troubled, [1, *["sleep"] * 5], workers=2)
+    _, (_, pid) = next(results)
+    assert is_alive(pid)
+    results.close()
+    assert until(lambda: not is_alive(pid))
+
+
+@pytest.mark.parametrize("executor", sorted(EXECUTORS))
+def test_a_run_is_the_same_as_on_this_machine(
+    machines, executor, tmp_path, manifest, tasks_file, monkeypatch
+):
+    tasks = read_tasks(tasks_file)[:2]
+    changed = manifest.model_copy(update={"env": {"obs_mode": "text", "max_steps": 4}})
+    records = []
+    for name, where in (("here", THIS_MACHINE), ("ray", machines)):
+        directory = RunDirectory.create(tmp_path / name, changed)
+        size = Parallelism(workers=2, concurrency=2, machines=where)
+        run(directory, tasks, by_hand.ending, executor=executor, parallelism=size)
+        records.append([each.model_copy(update={"seconds": 0}) for each in directory.episodes()])
+    assert records[0] == records[1]
+    assert len(records[0]) == 2
+
+
+def test_an_environment_whose_worker_dies_is_made_anew(machines, tasks_file):
+    task = read_tasks(tasks_file)[0]
+    with EnvPool(1, 2, {"obs_mode": "text"}, machines=machines) as pool:
+        env, other = pool.env(0), pool.env(1)
+        _, info = env.reset(seed=0, options={"task": task})
+        with pytest.raises(gymnasium.error.InvalidAction, match="is not an action"):
+            env.step(10**9)
+        stuck = threading.Timer(0.3, partial(ray.kill, env._worker._actor))
+        stuck.start()
+        with pytest.raises(EnvLost) as lost:
+            reset_for_ever(env, task)
+        assert lost.value.at_fault
+        assert "killed" in lost.value.why
+        with pytest.raises(EnvLost):
+            other.step("observe")
+        fresh = pool.env(0)
+        _, again = fresh.reset(seed=0, options={"task": task})
+        assert again["feedback"] == info["feedback"]
+
+
+def test_all_servers_listen_on_loopback_alone(machines):
+    family = _descendants(os.getpid())
+    inodes = {inode for pid in family for inode in _sockets(pid)}
+    listening = [
+        address
+        for table in ("tcp", "tcp6")
+        for line in Path("/proc/net", table).read_text().splitlines()[1:]
+        for _, address, _, state, *_, inode in [[*line.split()[:4], line.split()[9]]]
+        if state == "0A" and inode in inodes
+    ]
+    assert len(listening) > 3
+    loopback = ("0100007F:", "0000000000000000FFFF00000100007F:", "0" * 24 + "01000000:")
+    assert [each for each in listening if not each.startswith(loopback)] == []
+
+
+def _descendants(root):
+    parents = {}
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = status.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        parents[int(status.parent.name)] = int(fields[1])
+    found, new = set(), {root}
+    while new:
+        found |= new
+        new = {pid for pid, parent in parents.items() if parent in new} - found
+    return found
+
+
+def _sockets(pid):
+    try:
+        links = [os.readlink(each) for each in Path(f"/proc/{pid}/fd").iterdir()]
+    except OSError:
+        return []
+    return [link[8:-1] for link in links if link.startswith("socket:[")]
