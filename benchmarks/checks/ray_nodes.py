@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from er_gym.rollout.cluster.session import LOCAL_ENVIRONMENT, auth_token
+from er_gym.rollout.cluster.session import LOCAL_ENVIRONMENT, auth_token, on_loopback, same_signals
 
 _STORE_BYTES = 100 * 2**20
 
@@ -36,7 +36,8 @@ class RayNodes:
 
     def add(self, cpus: float = 1) -> None:
         """Add a node."""
-        node = self.cluster.add_node(num_cpus=cpus, object_store_memory=_STORE_BYTES)
+        with on_loopback(), same_signals():
+            node = self.cluster.add_node(num_cpus=cpus, object_store_memory=_STORE_BYTES)
         self._others.append(node)
 
     def kill_node(self) -> None:
@@ -67,14 +68,15 @@ def ray_nodes(count: int, cpus: float = 1) -> Iterator[RayNodes]:
     try:
         from ray.cluster_utils import Cluster
 
-        cluster = Cluster(
-            initialize_head=True,
-            head_node_args={
-                "num_cpus": cpus,
-                "include_dashboard": False,
-                "object_store_memory": _STORE_BYTES,
-            },
-        )
+        with on_loopback(), same_signals():
+            cluster = Cluster(
+                initialize_head=True,
+                head_node_args={
+                    "num_cpus": cpus,
+                    "include_dashboard": False,
+                    "object_store_memory": _STORE_BYTES,
+                },
+            )
         nodes = RayNodes(cluster, environment)
         try:
             for _ in range(count - 1):

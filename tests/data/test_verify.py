@@ -18,6 +18,7 @@ from er_gym.data.course_checks import course_problems
 from er_gym.data.critic import Refusal
 from er_gym.data.line_index import lines_of
 from er_gym.data.trajectory import Trajectory
+from er_gym.rollout import machines
 from er_gym.tasks.suites import load_suite
 
 
@@ -36,12 +37,12 @@ def collection(played: Collection, tmp_path: Path) -> Collection:
 def verdicts(monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, verify.Verdict]]:
     """Verifies in this process, and returns the verdicts by id."""
 
-    def run_here(make: Any, jobs: Iterable[Any], *, workers: int) -> Iterator[tuple[Any, Any]]:
+    def run_here(make: Any, jobs: Iterable[Any], **how: Any) -> Iterator[tuple[Any, Any]]:
         worker = make()
         yield from ((job, worker(job)) for job in jobs)
         worker.close()
 
-    monkeypatch.setattr(verify, "run_jobs", run_here)
+    monkeypatch.setattr(machines, "run_jobs", run_here)
 
     def run(collection: Collection, **options: Any) -> dict[str, verify.Verdict]:
         return {one.id: one for one in verify.verify(collection, SUITE.tasks, **options)}

@@ -124,6 +124,7 @@ class Crew(Generic[Job, Result]):
         self._members: list[_Member[Job]] = []
         self._job_seconds = 0.0
         self._deaths = 0
+        self._told_of_memory = False
         self._hire_after = self._told = time.monotonic()
 
     def results(self) -> Generator[tuple[Job, Result | LostJob], None, None]:
@@ -209,6 +210,7 @@ class Crew(Generic[Job, Result]):
         self._deaths = 0
         if done.memory > self._terms.memory:
             member.retiring = True
+            self._tell_of_memory(done.memory)
         if member.retiring and not member.batches:
             self._members.remove(member)
             self._dismiss(member)
@@ -246,6 +248,16 @@ class Crew(Generic[Job, Result]):
         if self._deaths > len(self._members) + 1:
             wait = min(_LONGEST_WAIT, _FIRST_WAIT * 2 ** (self._deaths - 2))
             self._hire_after = time.monotonic() + wait
+
+    def _tell_of_memory(self, memory: int) -> None:
+        """Say once that workers grow larger than they are allowed to."""
+        if not self._told_of_memory:
+            self._told_of_memory = True
+            self._terms.say(
+                f"a worker takes {memory / 2**30:.1f} GiB, more than the "
+                f"{self._terms.memory / 2**30:.1f} GiB that it has asked for, and is replaced; if "
+                "that happens often, give a larger --worker-memory"
+            )
 
     def _tell_if_waiting(self) -> None:
         """Say so if the cluster has had no place for a single actor for long."""

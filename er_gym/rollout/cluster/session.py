@@ -7,8 +7,10 @@ import logging
 import os
 import secrets
 import shutil
+import signal
 import socket
 import tempfile
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -67,11 +69,12 @@ def ray_machines(
 
         if not ray.is_initialized():
             if settings.address:
-                _join(settings.address, modules)
+                with same_signals():
+                    _join(settings.address, modules)
             else:
                 folder = stack.enter_context(_folder())
                 stack.enter_context(_environment({"RAY_AUTH_TOKEN": auth_token()}))
-                with _loopback():
+                with on_loopback(), same_signals():
                     _start(folder)
             stack.callback(ray.shutdown)
             stack.enter_context(_quiet())
@@ -107,7 +110,7 @@ def _start(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def _loopback() -> Iterator[None]:
+def on_loopback() -> Iterator[None]:
     """Let Ray take 127.0.0.1 for this machine's address also if it was imported before."""
     from ray._private import ray_constants
 
@@ -117,6 +120,17 @@ def _loopback() -> Iterator[None]:
         yield
     finally:
         ray_constants.ENABLE_RAY_CLUSTER = before
+
+
+@contextlib.contextmanager
+def same_signals() -> Iterator[None]:
+    """Keep the handler of SIGTERM, which Ray replaces by one that ends the process at once."""
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        yield
+    finally:
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, before)
 
 
 def _join(address: str, modules: Sequence[Path]) -> None:

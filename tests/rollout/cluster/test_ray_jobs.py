@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import threading
 import time
 from functools import partial
@@ -12,6 +14,7 @@ import agents_by_hand as by_hand
 import gymnasium
 import pytest
 import ray_jobs
+from support import ROOT
 
 from er_gym.rollout.cluster.session import ray_machines
 from er_gym.rollout.cluster.settings import RaySettings
@@ -130,6 +133,34 @@ def test_an_environment_whose_worker_dies_is_made_anew(machines, tasks_file):
         fresh = pool.env(0)
         _, again = fresh.reset(seed=0, options={"task": task})
         assert again["feedback"] == info["feedback"]
+
+
+def test_nothing_is_left_of_a_ray_that_was_started_here(machines):
+    program = """
+import os, signal, sys
+import ray
+from er_gym.rollout.cluster.session import ray_machines
+from er_gym.rollout.cluster.settings import RaySettings
+with ray_machines(RaySettings(), print) as machines:
+    print(ray._private.worker._global_node.get_temp_dir_path(), flush=True)
+    if sys.argv[1:]:
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+    folders = []
+    for killed in ((), ("killed",), ()):
+        command = [sys.executable, "-c", program, *killed]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=not killed)
+        folders.append(Path(done.stdout.strip()))
+        assert folders[-1].exists() == bool(killed)
+    assert not any(folder.exists() for folder in folders)  # the next one has tidied up
+    assert until(lambda: not any(_mentions(pid, folders[1]) for pid in _descendants(1)))
+
+
+def _mentions(pid, folder):
+    try:
+        return str(folder).encode() in Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return False
 
 
 def test_all_servers_listen_on_loopback_alone(machines):

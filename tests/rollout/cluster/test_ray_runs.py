@@ -39,6 +39,14 @@ def er_gym(*arguments, cwd=ROOT, nodes=None, code=0):
     return done
 
 
+def test_the_doctor_looks_at_every_node(nodes, tmp_path):
+    told = er_gym("doctor", "--ray", "--ray-address", nodes.address, "--shared-dir", tmp_path)
+    lines = told.stdout.splitlines()
+    assert [line.split()[:2] for line in lines][:2] == [["ok", "ray"], ["ok", "cluster"]]
+    assert sum("a picture after" in line for line in lines) == len(lines) - 2 >= 2
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_run_begun_here_and_finished_there_while_processes_die(nodes, tmp_path):
     play = ["bench", "--suite", "er-1k", "--agent", "searcher", "--limit"]
     here, there = tmp_path / "here", tmp_path / "there"
@@ -64,11 +72,13 @@ def test_an_agent_of_the_users_own_travels(nodes, tmp_path):
         "    def act(self, obs, info): return Decision('end', thought='mine')\n"
         "    def attachments(self, episode, stem): return {f'notes/{stem}.txt': b'well'}\n"
     )
-    play = ("bench", "--suite", "er-1k", "--agent", "mine:Mine", "--limit", "2", "--out", "run")
-    er_gym(*play, cwd=tmp_path, nodes=nodes)
-    episodes = episodes_of(tmp_path / "run")
-    assert [each["steps"][1]["thought"] for each in episodes.values()] == ["mine", "mine"]
-    assert [each.read_bytes() for each in (tmp_path / "run" / "notes").iterdir()] == [b"well"] * 2
+    for options in ((), ("--shared-dir",)):  # files travel, or are written where they are made
+        run = tmp_path / f"run{len(options)}"
+        play = ("bench", "--suite", "er-1k", "--agent", "mine:Mine", "--limit", "2", "--out", run)
+        er_gym(*play, *options, cwd=tmp_path, nodes=nodes)
+        episodes = episodes_of(run).values()
+        assert [each["steps"][1]["thought"] for each in episodes] == ["mine", "mine"]
+        assert [each.read_bytes() for each in (run / "notes").iterdir()] == [b"well"] * 2
 
 
 def test_a_collection_is_the_same_and_is_verified_where_its_files_are(nodes, tmp_path):
@@ -109,11 +119,3 @@ def test_options_that_do_not_go_together_change_nothing(options, told, tmp_path)
     play = ("bench", "--suite", "mini", "--agent", "oracle", "--out", tmp_path / "run")
     assert told in er_gym(*play, *options, code=2).stderr
     assert not (tmp_path / "run").exists()
-
-
-def test_the_doctor_looks_at_every_node(nodes, tmp_path):
-    told = er_gym("doctor", "--ray", "--ray-address", nodes.address, "--shared-dir", tmp_path)
-    lines = told.stdout.splitlines()
-    assert [line.split()[:2] for line in lines][:2] == [["ok", "ray"], ["ok", "cluster"]]
-    assert sum("a picture after" in line for line in lines) == len(lines) - 2 >= 2
-    assert list(tmp_path.iterdir()) == []
