@@ -4,7 +4,7 @@
 
 ``driver``: jobs a second that one driver keeps going, with jobs of 2 ms by a few actors and jobs of
 200 ms by 64 of them, beside what the actors alone would do. ``actors``: er-1k by the oracle in two
-processes of this machine, by two actors and by one, in turn, for state and for pictures: whole
+processes and in one, by two actors and by one, in turn, for state and for pictures: whole
 runs, and episodes a second in the middle half, when all workers play. ``memory``: the driver's
 resident memory over 50,000 jobs.
 """
@@ -118,6 +118,7 @@ def _actors(episodes: int, picture_episodes: int, rounds: int) -> None:
             tasks = suite.tasks[:: max(1, len(suite.tasks) // number)][:number]
             ways: dict[str, tuple[Machines, int]] = {
                 "two processes": (THIS_MACHINE, 2),
+                "one process": (THIS_MACHINE, 1),
                 "two actors": (ray, 2),
                 "one actor": (ray, 1),
             }
@@ -130,7 +131,8 @@ def _actors(episodes: int, picture_episodes: int, rounds: int) -> None:
             told = ", ".join(f"{way} {whole[way]:.1f} s ({speed[way]:.1f}/s)" for way in ways)
             print(
                 f"{name}, {number} episodes: {told}; two actors are "
-                f"{speed['two actors'] / speed['one actor']:.2f} x one, and take "
+                f"{speed['two actors'] / speed['one actor']:.2f} x one, two processes "
+                f"{speed['two processes'] / speed['one process']:.2f} x one; actors take "
                 f"{whole['two actors'] / whole['two processes'] - 1:+.1%} against processes"
             )
 
