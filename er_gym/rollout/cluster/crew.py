@@ -234,7 +234,8 @@ class Crew(Generic[Job, Result]):
                 attempt.number += suspects and alone
                 attempt.lost += not suspects
                 if attempt.number > self._tries or attempt.lost > _MOST_LOSSES:
-                    yield attempt.job, LostJob(self._tries, None, first_line(error))
+                    tries = attempt.number + attempt.lost - 1
+                    yield attempt.job, LostJob(tries, None, first_line(error))
                 else:
                     self._queue.put_first(attempt)
 

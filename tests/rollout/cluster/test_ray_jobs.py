@@ -86,9 +86,10 @@ def test_a_worker_keeps_to_its_room(machines):
     assert len(homes) <= 3  # who has finished a room helps with the other
 
 
-def test_a_worker_that_has_grown_is_replaced(machines):
+def test_a_worker_that_has_grown_is_replaced(machines, capsys):
     jobs = ["grow", *range(6)]
     assert len(pids(machines.run_jobs(ray_jobs.Troubled, jobs, workers=1))) == 2
+    assert capsys.readouterr().out.count("give a larger --worker-memory") == 1
 
 
 def test_leaving_early_ends_the_workers(machines):
