@@ -15,7 +15,7 @@ from agents.expert.candidates import (
     CandidateSequence,
     FixedCandidates,
 )
-from agents.expert.corrections import beginning_of
+from agents.expert.corrections import CorrectAfter, beginning_of
 from agents.expert.explorer import Strength
 from agents.expert.players import Players, PlaySettings
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
@@ -185,7 +185,10 @@ def recipe_strata(settings: CollectSettings, limit: int | None) -> dict[tuple[st
 
 
 def correction_strata(
-    tasks: Sequence[Task], run_directory: RunDirectory, limit: int | None
+    tasks: Sequence[Task],
+    run_directory: RunDirectory,
+    limit: int | None,
+    after: CorrectAfter = "wrong",
 ) -> tuple[dict[tuple[str, str], Stratum], dict[str, int]]:
     """The failed episodes of a run, as candidates to be corrected.
 
@@ -193,6 +196,7 @@ def correction_strata(
         tasks: the tasks of the run's suite.
         run_directory: the run.
         limit: how many trajectories in all; None for as many as there are.
+        after: after which action the expert takes over.
 
     Returns:
         The candidates, all in the part :data:`CORRECTIONS`; and how many episodes cannot be
@@ -204,7 +208,7 @@ def correction_strata(
     begun: set[tuple[str, tuple[Action, ...]]] = set()
     for episode in run_directory.episodes():
         task = by_id.get(episode.task_id)
-        beginning = beginning_of(episode)
+        beginning = beginning_of(episode, after)
         problem = beginning.problem if task else "its task is not among the suite's"
         if not problem and (episode.task_id, beginning.actions) in begun:
             problem = "another sample of its task begins alike"

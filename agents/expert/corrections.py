@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 from er_gym.envs.actions import Action
 from er_gym.rollout.records import ERROR, EpisodeRecord
 from er_gym.tasks import verbs
+
+CorrectAfter: TypeAlias = Literal["wrong", "failure"]
+"""After which action of a failed episode the expert takes over: the first ``wrong`` one, which did
+no key action, as in the paper (arXiv 2503.21696); or the first ``failure`` since the last key
+action, which the environment refused. Where there is none, or it leaves fewer than
+:data:`ROOM` steps, it is the first wrong one after all."""
+ROOM = 10
+"""Steps that the expert needs after a failure."""
 
 
 @dataclass(frozen=True)
@@ -14,7 +23,7 @@ class Beginning:
     """The beginning of a failed episode.
 
     Attributes:
-        actions: up to the first that left the key actions, that one included.
+        actions: up to the one after which the expert takes over, that one included.
         problem: why there is none, ``""`` if there is.
     """
 
@@ -27,22 +36,32 @@ class Beginning:
         return len(self.actions) - 1
 
 
-def beginning_of(episode: EpisodeRecord) -> Beginning:
-    """The actions of a failed episode up to its first wrong one.
-
-    As in the paper (arXiv 2503.21696), an action is wrong that does no key action.
-    """
+def beginning_of(episode: EpisodeRecord, after: CorrectAfter = "wrong") -> Beginning:
+    """The actions of a failed episode up to the one that is corrected."""
     if episode.success:
         return Beginning(problem="the episode succeeded")
     if episode.error:
         return Beginning(problem="the episode crashed")
-    actions: list[Action] = []
-    for step in episode.steps[1:]:
-        if step.appended or step.verb == verbs.END:
-            return Beginning(problem="it ended too early, and nothing was wrong before")
-        if step.verb == ERROR:
-            return Beginning(problem="its first wrong reply names no action")
-        actions.append(Action(step.verb, step.object_type))
-        if step.reward <= 0:
-            return Beginning(tuple(actions))
-    return Beginning(problem="nothing was wrong before the steps ran out")
+    steps = episode.steps[1:]
+    wrong = _corrected(episode, after)
+    if wrong is None:
+        return Beginning(problem="nothing was wrong before the steps ran out")
+    last = steps[wrong]
+    if last.appended or last.verb == verbs.END:
+        return Beginning(problem="it ended too early, and nothing was wrong before")
+    if any(step.verb == ERROR for step in steps[: wrong + 1]):
+        return Beginning(problem="its first wrong reply names no action")
+    return Beginning(tuple(Action(step.verb, step.object_type) for step in steps[: wrong + 1]))
+
+
+def _corrected(episode: EpisodeRecord, after: CorrectAfter) -> int | None:
+    """The index of the action that is corrected, from 0; None if every one did a key action."""
+    steps = episode.steps[1:]
+    did = [step.reward > 0 for step in steps]
+    if after == "failure":
+        last_key = max((number for number, earned in enumerate(did) if earned), default=-1)
+        # Placing the agent was a step, too.
+        for number in range(last_key + 1, min(len(steps), episode.max_steps - ROOM - 1)):
+            if not steps[number].success and steps[number].verb not in (ERROR, verbs.END):
+                return number
+    return next((number for number, earned in enumerate(did) if not earned), None)

@@ -19,7 +19,8 @@ from agents.scripted.searcher import search_priors
 from er_gym.data.trajectory import Purpose
 from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
-from er_gym.tasks.task import Task
+from er_gym.tasks.equivalence import same_type
+from er_gym.tasks.task import KeyAction, Task
 
 _MOST_WRONG = 3
 """After this many wrong places the expert looks around, then goes to the right one."""
@@ -137,11 +138,11 @@ class ExpertCourse(TaskCourse):
 
 
 class CorrectedCourse(ExpertCourse):
-    """Repeats the beginning of a failed episode up to its first wrong action, then does it rightly.
+    """Repeats the beginning of a failed episode up to a wrong action, then does the rest rightly.
 
     Args:
         task: the task.
-        beginning: the actions, the first wrong one last.
+        beginning: the actions, the wrong one last.
         random, check: see :class:`ExpertCourse`.
     """
 
@@ -160,6 +161,17 @@ class CorrectedCourse(ExpertCourse):
             raise GiveUp  # nothing is wrong here: a fault made the action fail in the episode
         yield from self._free_hand()
         return True
+
+    def _get_closer(self, key: KeyAction, leg: Leg, attempt: int) -> Intents:
+        """Search the next place of the leg's type, if the agent may have come to another one.
+
+        Other courses are given up then, since there are more candidates; failed episodes are few.
+        """
+        place = self._known(leg.place)
+        lost = not (self._in_view(leg.thing) or same_type(self.view.held, leg.thing))
+        if leg.hidden and place and lost:
+            return (yield from self._visit(place, leg, (place,)))
+        return (yield from super()._get_closer(key, leg, attempt))
 
     def _replayed(self, action: Action) -> Intent:
         """The intent that a replayed action seems to have."""

@@ -15,6 +15,17 @@ def on_gpu() -> bool:
     return torch.cuda.is_available()
 
 
+def has_fast_bfloat16() -> bool:
+    """Whether matrices are multiplied faster in bfloat16 than in float32.
+
+    A CPU without such instructions can do it, too, but more slowly.
+    """
+    if on_gpu():
+        return torch.cuda.is_bf16_supported()
+    able = getattr(torch.cpu, "get_capabilities", dict)()
+    return bool(able.get("avx512_bf16") or able.get("amx_bf16"))
+
+
 def is_first() -> bool:
     """Whether this is the first of the processes that a launcher started, or the only one."""
     return os.environ.get("RANK", "0") == "0"

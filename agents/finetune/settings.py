@@ -53,7 +53,8 @@ class ModelSettings(_Settings):
         lora: the adapter; None for full fine-tuning.
         freeze: parts of a vision-language model that do not learn: ``vision`` is the vision tower,
             ``projector`` what turns its features into the language model's.
-        dtype: ``auto`` is bfloat16 on a GPU that has it and float32 on a CPU.
+        dtype: of multiplications; ``auto`` is bfloat16 on a GPU or a CPU with instructions for
+            it (AVX512-BF16, AMX), else float32. Weights that learn are kept in float32.
         attention: of ``from_pretrained``; "" for the library's choice.
     """
 

@@ -171,11 +171,10 @@ def _train(
     check_lengths(chats, settings.data.max_length, ", ".join(manifest.data))
     say(_about(chats, samples))
 
-    # -- devices: as the launcher, DeepSpeed or FSDP wants them; on a GPU in bfloat16 --
+    # -- devices: as the launcher, DeepSpeed or FSDP wants them; in bfloat16 where that is fast --
     dtype = settings.model.dtype
     if dtype == "auto":
-        has = machine.on_gpu() and torch.cuda.is_bf16_supported()
-        dtype = "bfloat16" if has else "float32"
+        dtype = "bfloat16" if machine.has_fast_bfloat16() else "float32"
     arguments = _arguments(settings, run, dtype)
     if settings.training.optimizer == "muon" and is_sharded(arguments):
         raise ValueError(
@@ -195,8 +194,10 @@ def _train(
 
     # -- the model: its weights, the token <|feedback|>, and what learns --
     set_seed(settings.training.seed)
-    # FSDP keeps weights as they are loaded; DeepSpeed keeps a copy in float32 itself.
-    network = _load(files, settings, "float32" if arguments.fsdp else dtype)
+    # FSDP keeps weights as they are loaded; DeepSpeed keeps a copy in float32 itself. Weights that
+    # learn are kept in float32: small steps would be lost in bfloat16.
+    whole = settings.model.lora is None and not arguments.deepspeed
+    network = _load(files, settings, "float32" if arguments.fsdp or whole else dtype)
     if is_new:
         add_rows(network, tokenizer)
     _freeze(network, settings)
@@ -204,8 +205,7 @@ def _train(
         network = _with_lora(network, settings.model.lora, settings, files, tokenizer, feedback)
     if dtype == "bfloat16" and not is_sharded(arguments):
         for weight in network.parameters():
-            if weight.requires_grad:
-                weight.data = weight.data.float()  # small steps would be lost in bfloat16
+            weight.data = weight.data.float() if weight.requires_grad else weight.data.bfloat16()
 
     # -- the loop --
     if first:

@@ -34,6 +34,7 @@ from benchmarks.cli.terminal import stdout, terminal
 
 if TYPE_CHECKING:
     from agents.expert.collect import CollectSettings, CollectSummary, Stratum
+    from agents.expert.corrections import CorrectAfter
     from agents.expert.players import Players
     from agents.expert.recipe import Recipe
     from agents.expert.writers.registry import NamedWriter
@@ -103,6 +104,12 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
     help="Correct the failed episodes of a run of er-gym bench; give no --recipe.",
 )
 @click.option(
+    "--correct-after",
+    type=click.Choice(("wrong", "failure")),
+    help="With --correct: the expert takes over after the first action that did no key action, or "
+    "after the first that failed since the last key action.  [default: wrong, as in the paper]",
+)
+@click.option(
     "--allow-empty",
     is_flag=True,
     help="With --select and --correct: end well also if no episode can be taken.",
@@ -129,6 +136,7 @@ def collect(
     width: int | None,
     height: int | None,
     correct: Path | None,
+    correct_after: CorrectAfter | None,
     allow_empty: bool,
     seed: int,
     executor_options: ExecutorOptions,
@@ -188,6 +196,8 @@ def collect(
             env["instances"] = instances
         source = chosen_tasks(source, named("--types", types), named("--scenes", scenes))
         fitted = fitted_tasks(source, env["backend"])
+        if correct is None and correct_after is not None:
+            raise BadInput("--correct-after is for --correct RUN; leave it out")
         if correct is not None:
             _refuse_recipe({"--recipe": recipe, "--parts": parts, "--kinds": kinds})
         elif selection is None:
@@ -204,13 +214,15 @@ def collect(
             writer=writer,
             table=thoughts,
             has_pictures=not no_pictures,
-            stated_too=selection.stated if selection else {},
+            stated_too=(selection.stated if selection else {})
+            | ({"correct_after": correct_after} if correct_after == "failure" else {}),
         )
         if selection is not None:
             screening, strata = selection.strata(settings.tasks, limit, seed, allow_empty)
             left_out: dict[str, int] = {}
         else:
-            strata, left_out = _strata(settings, correct, limit, model, allow_empty)
+            after = correct_after or "wrong"
+            strata, left_out = _strata(settings, correct, after, limit, model, allow_empty)
         make_writer = _make_writer(writer)
     report_set_aside(source.name, fitted.set_aside, fitted.substitutions)
     for reason, number in left_out.items():
@@ -364,6 +376,7 @@ def _name_of(run: Path) -> str:
 def _strata(
     settings: CollectSettings,
     correct: Path | None,
+    after: CorrectAfter,
     limit: int | None,
     model: ExpertRun | None,
     allow_empty: bool,
@@ -380,7 +393,7 @@ def _strata(
             for stratum in wanted.values():
                 stratum.sequence = ModelCandidates(stratum.sequence, model.run.name)
         return wanted, {}
-    strata, left_out = correction_strata(settings.tasks, RunDirectory.open(correct), limit)
+    strata, left_out = correction_strata(settings.tasks, RunDirectory.open(correct), limit, after)
     if not (strata or allow_empty):
         why = "; ".join(f"{number} x {reason}" for reason, number in left_out.items())
         raise BadInput(f"{correct} has no episode that can be corrected ({why or 'it is empty'})")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import secrets
 import time
 from collections.abc import Iterator
@@ -85,7 +86,9 @@ def _workers(nodes: list[dict[str, Any]], mark: tuple[Path, str] | None) -> Iter
         part = f"node {node['NodeManagerAddress']}"
         try:
             ready = ray.get(ref, timeout=_PATIENCE)
-            done = None if ready.problem else ray.get(actor.do.remote([mark]), timeout=_PATIENCE)
+            done = None
+            if not ready.problem:
+                done = ray.get(actor.do.remote(pickle.dumps([mark])), timeout=_PATIENCE)
         except (RayError, TimeoutError) as error:
             yield Check(part, False, first_line(error), "look at Ray's logs there", required=True)
             continue

@@ -86,7 +86,7 @@ def carry_out(
     Raises:
         BadInput: the directory holds another plan, or another process runs it.
     """
-    from benchmarks.plan.run import PhaseFailed, PlanError, run_plan
+    from benchmarks.plan.run import PhaseFailed, PlanError, check_phases, run_plan
     from er_gym.locking import Locked
     from er_gym.writing import ForeignFile
 
@@ -94,6 +94,8 @@ def carry_out(
     if only_print:
         for phase in plan.phases:
             echo(str(phase))
+        with bad_input(PlanError):
+            check_phases(plan.phases)
         return 0
     console = terminal(stderr=True)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from agents.finetune.settings import STAGES, Stage
-from benchmarks.ladder.settings import CONTROLS, Control, LadderSettings, StageSettings
+from benchmarks.ladder.settings import CONTROLS, Control, LadderSettings, Sampled, StageSettings
 from benchmarks.plan.commands import Commands
 from benchmarks.plan.phase import Phase
 from benchmarks.plan.run import Plan
@@ -145,17 +145,40 @@ class _Ladder:
                 faults=sample.faults,
                 samples=sample.samples,
             )
-            corrects = stage == STAGES[2]
-            yield make.phase(
-                f"{number}/{'correct' if corrects else 'select'}",
-                f"data/{number}-{'corrected' if corrects else 'selected'}",
-                "collect",
-                *("--correct" if corrects else "--select", make.at(run), "--allow-empty"),
-                *(("--rewrite-thoughts",) * sample.rewrite_thoughts),
-                *make.collecting(sample.limit),
-            )
+            if stage == STAGES[2]:
+                yield self._corrected(f"{number}/correct", f"data/{number}-corrected", run, sample)
+                for name in self._sampled_before(stage) if sample.earlier else ():
+                    yield self._corrected(
+                        f"{number}/correct-{name}",
+                        f"data/{number}-corrected-{name}",
+                        f"samples/{name}",
+                        sample,
+                    )
+            else:
+                yield make.phase(
+                    f"{number}/select",
+                    f"data/{number}-selected",
+                    *("collect", "--select", make.at(run), "--allow-empty"),
+                    *(("--rewrite-thoughts",) * sample.rewrite_thoughts),
+                    *make.collecting(sample.limit),
+                )
         if row.collect is not None:
             yield make.collect(f"{number}/collect", f"data/{number}", row.collect)
+
+    def _corrected(self, name: str, out: str, run: str, sample: Sampled) -> Phase:
+        """Corrects the failures of a run."""
+        return self.make.phase(
+            name,
+            out,
+            *("collect", "--correct", self.make.at(run), "--allow-empty"),
+            *(("--correct-after", "failure") if sample.correct_after == "failure" else ()),
+            *self.make.collecting(sample.limit),
+        )
+
+    def _sampled_before(self, stage: Stage) -> list[str]:
+        """The numbered names of the earlier stages that have samples."""
+        earlier = STAGES[: STAGES.index(stage)]
+        return [_stage(each) for each in earlier if self.settings.stages[each].sample]
 
     def _evaluate(self, name: str, model: str, faults: float) -> Phase:
         evaluation = self.settings.evaluation

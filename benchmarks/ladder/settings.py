@@ -8,6 +8,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import Field, field_validator, model_validator
 
 from agents import configs
+from agents.expert.corrections import CorrectAfter
 from agents.finetune.settings import STAGES, Stage
 from benchmarks.plan.settings import Collected, PlaySettings, Positive, StrictSettings, Taught
 
@@ -38,7 +39,7 @@ class Base(StrictSettings):
     """The model at the foot of the ladder; a model or an architecture.
 
     Attributes:
-        model: a directory, or a name on the Hugging Face hub.
+        model: a directory with a model in it, or a run of ``er-gym finetune``.
         architecture: a new model of this architecture (:mod:`agents.finetune.architecture`); its
             tokenizer is learnt from the first stage's conversations, and from the frames.
         eyes: how it is taught to see first; None for not at all.
@@ -64,6 +65,9 @@ class Sampled(StrictSettings):
         temperature, top_p: of the model's replies.
         faults: the rate at which actions fail (:mod:`er_gym.envs.faults`).
         limit: the most trajectories that are taken; None for all.
+        correct_after: of its failures, after which action the expert takes over
+            (:data:`agents.expert.corrections.CorrectAfter`).
+        earlier: whether the failures among the samples of earlier stages are corrected, too.
         rewrite_thoughts: whether the thoughts of its successes are written anew, since those of a
             weak model are often wrong.
     """
@@ -74,6 +78,8 @@ class Sampled(StrictSettings):
     top_p: float = Field(1.0, gt=0, le=1)
     faults: float = Field(0.0, ge=0, le=1)
     limit: Positive | None = None
+    correct_after: CorrectAfter = "wrong"
+    earlier: bool = False
     rewrite_thoughts: bool = False
 
 
@@ -156,6 +162,9 @@ class LadderSettings(PlaySettings):
                 raise ValueError(f"{name} has no model before it; let it collect, not sample")
             if name == STAGES[2] and stage.sample and stage.sample.rewrite_thoughts:
                 raise ValueError(f"{name} puts failures right; leave out rewrite_thoughts")
+            sample = stage.sample
+            if name != STAGES[2] and sample and (sample.earlier or sample.correct_after != "wrong"):
+                raise ValueError(f"{name} corrects nothing; leave out earlier and correct_after")
             if not (stage.collect or stage.teacher or stage.sample):
                 raise ValueError(f"{name} learns from nothing; give it collect, teacher or sample")
         return self

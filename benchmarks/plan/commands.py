@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+from benchmarks.plan import checks
 from benchmarks.plan.phase import Phase
 from benchmarks.plan.settings import Collected, PlaySettings, Taught
 
@@ -26,9 +28,11 @@ class Commands:
         """The path of a directory in the plan's."""
         return str(self.root / out)
 
-    def phase(self, name: str, out: str, *command: str) -> Phase:
+    def phase(
+        self, name: str, out: str, *command: str, checks: tuple[Callable[[], None], ...] = ()
+    ) -> Phase:
         """A phase whose command writes ``out``."""
-        return Phase(name, (*command, "--out", self.at(out)), out)
+        return Phase(name, (*command, "--out", self.at(out)), out, checks)
 
     def collect(self, name: str, out: str, collected: Collected) -> Phase:
         """Collects trajectories of the data engine."""
@@ -40,6 +44,10 @@ class Commands:
             *self._instances,
             *self._types,
             *self.collecting(collected.limit),
+            checks=(
+                partial(checks.check_tasks, self.settings, self.settings.suite),
+                partial(checks.check_recipe, collected),
+            ),
         )
 
     def teach(self, names: tuple[str, str], run: str, out: str, taught: Taught) -> list[Phase]:
@@ -57,6 +65,10 @@ class Commands:
                 run,
                 *self._bench(taught.agent, self.settings.suite, taught.tasks),
                 *("--samples", str(taught.samples), "--workers", str(self.settings.workers)),
+                checks=(
+                    partial(checks.check_tasks, self.settings, self.settings.suite),
+                    partial(checks.check_agent, taught.agent),
+                ),
             ),
             self.phase(
                 names[1],
@@ -84,6 +96,7 @@ class Commands:
             *("data", "frames", "--suite", self.settings.suite, "--frames", str(number)),
             *self._size,
             *("--seed", str(self.settings.seed), "--workers", str(self.settings.workers)),
+            checks=(partial(checks.check_tasks, self.settings, self.settings.suite),),
         )
 
     def new_model(
@@ -96,18 +109,23 @@ class Commands:
             *("new-model", architecture),
             *self._data(data),
             *("--dialect", dialect, "--seed", str(seed)),
+            checks=(partial(checks.check_new_model, architecture, dialect),),
         )
 
     def finetune(
         self, name: str, out: str, config: str, model: str, data: Iterable[str], *changes: str
     ) -> Phase:
         """Tunes a model; ``changes`` are overrides of the configuration."""
+        checked = [partial(checks.check_finetune, config, changes)]
+        if not Path(model).is_relative_to(self.root):  # else an earlier phase makes it
+            checked.append(partial(checks.check_model_there, model))
         return self.phase(
             name,
             out,
             *("finetune", "--config", config, "--model", model),
             *self._data(data),
             *_overrides(*changes),
+            checks=tuple(checked),
         )
 
     def bench_model(
@@ -131,6 +149,10 @@ class Commands:
             *(() if samples is None else ("--samples", str(samples))),
             *(("--faults", str(faults)) if faults else ()),
             *_overrides(*changes),
+            checks=(
+                partial(checks.check_tasks, self.settings, suite),
+                partial(checks.check_model_play, (*self.settings.play, *changes)),
+            ),
         )
 
     def bench(self, name: str, out: str, agent: str, suite: str, limit: int | None) -> Phase:
@@ -140,6 +162,7 @@ class Commands:
             out,
             *self._bench(agent, suite, limit),
             *("--workers", str(self.settings.workers)),
+            checks=(partial(checks.check_tasks, self.settings, suite),),
         )
 
     def _bench(self, agent: str, suite: str, limit: int | None) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from er_gym.writing import make_folder, write_atomic
 
 _RUNNING = "running"
 _PATIENCE = 3 * GRACE_SECONDS
+_KEEP_SECONDS = 10.0
 
 
 class PlanError(ValueError):
@@ -56,7 +57,8 @@ class DonePhase(BaseModel):
 
     Attributes:
         name, command: of the phase.
-        seconds: how long it took, earlier tries not counted.
+        seconds: how long it took, with the tries that were interrupted or killed, but for the last
+            seconds of the killed ones.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -74,6 +76,7 @@ class PlanRecord(BaseModel):
         settings: of the plan, as JSON has them.
         er_gym: the version that began it.
         done: the phases that have ended well, in order.
+        tried: how long the phase has been tried that has begun and not ended, seconds by its name.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -82,6 +85,7 @@ class PlanRecord(BaseModel):
     settings: dict[str, Any]
     er_gym: str
     done: list[DonePhase] = []
+    tried: dict[str, float] = {}
 
 
 class PhaseFailed(Exception):
@@ -134,6 +138,20 @@ def check_same(plan: Plan, record: PlanRecord, root: Path) -> None:
             )
 
 
+def check_phases(phases: Iterable[Phase]) -> None:
+    """Check what phases are given, before hours are spent on those before them.
+
+    Raises:
+        PlanError: the command of one would refuse it.
+    """
+    for phase in phases:
+        for check in phase.checks:
+            try:
+                check()
+            except ValueError as error:
+                raise PlanError(f"{phase.name}: {error}") from error
+
+
 def run_plan(
     plan: Plan, root: Path, tell: Callable[[Phase, int, int], None], until: str | None = None
 ) -> PlanRecord:
@@ -152,7 +170,8 @@ def run_plan(
         What the directory says in the end.
 
     Raises:
-        PlanError: the directory holds another plan, or there is no phase ``until``.
+        PlanError: the directory holds another plan, there is no phase ``until``, or the command of
+            a phase would refuse what it is given.
         Locked: another process runs it.
         PhaseFailed: a phase ended with an error.
         KeyboardInterrupt: after the running phase has ended.
@@ -164,6 +183,9 @@ def run_plan(
     names = [phase.name for phase in plan.phases]
     if until is not None and until not in names:
         raise PlanError(f"there is no phase {until!r}; there are: {', '.join(names)}")
+    asked = plan.phases if until is None else plan.phases[: names.index(until) + 1]
+    done = {each.name for each in record.done} if record else set()
+    check_phases(phase for phase in asked if phase.name not in done)
     with exclusive_use(root):
         _wait_for_running(root)
         record = PlanRecord(
@@ -171,20 +193,44 @@ def run_plan(
             settings=plan.settings.model_dump(mode="json"),
             er_gym=__version__,
             done=record.done if record else [],
+            tried=record.tried if record else {},
         )
         _write(root / plan.file, record)
-        done = {each.name for each in record.done}
         for number, phase in enumerate(plan.phases, 1):
             if phase.name not in done:
                 tell(phase, number, len(plan.phases))
-                begin = time.monotonic()
-                _run(phase, root)
-                seconds = round(time.monotonic() - begin, 1)
-                ended = DonePhase(name=phase.name, command=list(phase.command), seconds=seconds)
-                record = record.model_copy(update={"done": [*record.done, ended]})
-                _write(root / plan.file, record)
+                record = _try(phase, root, plan.file, record)
             if phase.name == until:
                 break
+    return record
+
+
+def _try(phase: Phase, root: Path, file: str, record: PlanRecord) -> PlanRecord:
+    """Run a phase to its end, and keep how long it takes.
+
+    Returns:
+        The record with the phase that is done.
+
+    Raises:
+        PhaseFailed, KeyboardInterrupt: as :func:`_run`.
+    """
+    before, begin = record.tried.get(phase.name, 0.0), time.monotonic()
+
+    def seconds() -> float:
+        return round(before + time.monotonic() - begin, 1)
+
+    def keep() -> None:
+        tried = {phase.name: seconds()}
+        _write(root / file, record.model_copy(update={"tried": tried}))
+
+    try:
+        _run(phase, root, keep)
+    except (PhaseFailed, KeyboardInterrupt):
+        keep()
+        raise
+    ended = DonePhase(name=phase.name, command=list(phase.command), seconds=seconds())
+    record = record.model_copy(update={"done": [*record.done, ended], "tried": {}})
+    _write(root / file, record)
     return record
 
 
@@ -193,8 +239,8 @@ def _write(file: Path, record: PlanRecord) -> None:
     write_atomic(file, record.model_dump_json(indent=1) + "\n")
 
 
-def _run(phase: Phase, root: Path) -> None:
-    """Run a phase to its end.
+def _run(phase: Phase, root: Path, keep: Callable[[], None]) -> None:
+    """Run a phase to its end; ``keep`` is called from time to time.
 
     Raises:
         PhaseFailed: it ended with an error.
@@ -203,7 +249,10 @@ def _run(phase: Phase, root: Path) -> None:
     process = CONTEXT.Process(target=_command, args=(phase.command, str(root / _RUNNING)))
     process.start()
     try:
-        process.join()
+        process.join(_KEEP_SECONDS)
+        while process.exitcode is None:
+            keep()
+            process.join(_KEEP_SECONDS)
     except KeyboardInterrupt:
         # A terminal sends Ctrl-C to both processes; SIGTERM from elsewhere comes to this one alone.
         process.terminate()

@@ -9,6 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from er_gym.data.trajectory import Language
 
 Positive = Annotated[int, Field(gt=0)]
+Pixels = Annotated[int, Field(ge=16, le=4096)]
+"""As the options --width and --height take them."""
 
 
 class StrictSettings(BaseModel):
@@ -71,8 +73,8 @@ class PlaySettings(StrictSettings):
     dialect: str = "paper"
     language: Language = "en"
     pictures: bool = True
-    width: Positive | None = None
-    height: Positive | None = None
+    width: Pixels | None = None
+    height: Pixels | None = None
     types: tuple[str, ...] = ()
     seed: int = Field(0, ge=0, lt=2**32)
     workers: Positive = 2

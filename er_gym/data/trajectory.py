@@ -219,7 +219,8 @@ class Correction(_Record):
     Attributes:
         run: the name of the run directory; ``episode``: the key of its failed episode, which is
             the task's id, with the number of the sample where it is not the first.
-        first_wrong: the index of the first turn that left the key actions.
+        first_wrong: the index of the turn after which the expert took over; by default the first
+            one that left the key actions.
     """
 
     run: str

@@ -145,6 +145,7 @@ class RunDirectory:
     def __init__(self, path: Path, manifest: Manifest) -> None:
         self.path = path
         self.manifest = manifest
+        self._digest = manifest.digest
 
     @classmethod
     def create(cls, path: Path, manifest: Manifest) -> RunDirectory:
@@ -204,7 +205,7 @@ class RunDirectory:
         """Write an episode; it replaces an earlier one of the same task and sample."""
         path = self._file(episode.key)
         make_folder(path.parent)
-        told = episode.model_copy(update={"run": self.manifest.digest})
+        told = episode.model_copy(update={"run": self._digest})
         write_atomic(path, told.model_dump_json(indent=1) + "\n")
         return path
 
@@ -224,6 +225,8 @@ class RunDirectory:
             attachments: path in the run directory to bytes, written in this order.
             folders: the folders for such files. The episode's earlier files in them are removed.
         """
+        if not attachments and not folders:
+            return
         stem = file_stem(key)
         played_before = self._file(key).exists()
         for folder in folders:
@@ -309,7 +312,7 @@ class RunDirectory:
             raise ValueError(f"a copy: it holds the episode of {episode.key!r:.80}, as {name}")
         manifest = self.manifest
         if episode.run:
-            told: list[tuple[str, str | int, str | int]] = [("run", episode.run, manifest.digest)]
+            told: list[tuple[str, str | int, str | int]] = [("run", episode.run, self._digest)]
         else:  # written before episodes named their run
             seed = episode_seed(manifest.seed, episode.task_id)
             told = [("agent", episode.agent, manifest.agent), ("seed", episode.seed, seed)]

@@ -16,6 +16,7 @@ from agents.finetune.settings import load_settings
 from benchmarks.ablation.phases import plan_of
 from benchmarks.ablation.settings import ablation_names, load_ablation
 from benchmarks.cli.main import cli
+from benchmarks.pages.models import main as models_page
 
 for package in ("torch", "transformers", "peft", "tensorboard"):
     pytest.importorskip(package, reason="needs the extra finetune")
@@ -68,6 +69,11 @@ def test_a_small_ablation_is_run_and_told(tmp_path: Path) -> None:
     assert second["difference"]["mean"] == second["success"]["mean"] - first["success"]["mean"]
     assert "| actions |" in (root / "result.md").read_text()
     assert (root / "both.png").stat().st_size > 0
+    page = tmp_path / "docs" / "models.md"
+    (page.parent / "images").mkdir(parents=True)
+    told = CliRunner().invoke(models_page, ["--ablation", str(root), "--out", str(page)])
+    assert told.exit_code == 0, told.output
+    assert (root / "result.md").read_text() in page.read_text()
     # The second step tunes what the first one made.
     run = json.loads((root / "models" / "actions" / "0" / "2" / "finetune.json").read_text())
     assert str(root / "models" / "actions" / "0" / "1") in json.dumps(run)

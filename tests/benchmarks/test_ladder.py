@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,9 @@ from agents.finetune.settings import load_settings
 from benchmarks.cli.main import cli
 from benchmarks.ladder.phases import plan_of, rungs
 from benchmarks.ladder.settings import ladder_names, load_ladder
+from benchmarks.pages.models import main as models_page
 from benchmarks.plan.phase import Phase
-from benchmarks.plan.run import PlanRecord, run_plan
+from benchmarks.plan.run import PhaseFailed, Plan, PlanRecord, run_plan
 
 for package in ("torch", "transformers", "peft", "tensorboard"):
     pytest.importorskip(package, reason="needs the extra finetune")
@@ -36,14 +38,12 @@ SMALL: dict[str, Any] = {
     "play": ["sampling.max_tokens=60"],
     "stages": {
         "imitation": {
-            "collect": {"parts": ["imitation"], "limit": 3},
             "teacher": {"agent": "searcher", "tasks": 2},
             "finetune": "tiny",
             "set": ["stage=imitation", "training.epochs=1"],
         },
         "exploration": {
             "sample": {"tasks": 1, "samples": 2},
-            "collect": {"parts": ["exploration"], "limit": 2},
             "finetune": "tiny",
             "again": True,
             "set": ["stage=exploration", "after=imitation", "training.epochs=1"],
@@ -55,7 +55,7 @@ SMALL: dict[str, Any] = {
             "set": ["stage=reflection", "after=exploration", "training.epochs=1"],
         },
     },
-    "evaluation": {"suite": "mini", "limit": 1},
+    "evaluation": {"suite": "mini", "limit": 1, "base": False},
 }
 """Every phase is run, but so small a model has no success to learn from: tests/agents/expert/
 test_selecting.py tests what successes become."""
@@ -104,6 +104,14 @@ def test_each_stage_learns_from_the_model_before(tmp_path: Path) -> None:
     assert option(corrected, "--out")[0] in option(third, "--data")
 
 
+def test_failures_of_earlier_stages_are_corrected_too(tmp_path: Path) -> None:
+    settings = load_ladder("tiny-text", ["stages.reflection.sample.earlier=true"])
+    plan = {phase.name: phase.command for phase in plan_of(settings, tmp_path).phases}
+    earlier = plan["3-reflection/correct-2-exploration"]
+    assert option(earlier, "--correct") == [str(tmp_path / "samples" / "2-exploration")]
+    assert option(earlier, "--out")[0] in option(plan["3-reflection/finetune"], "--data")
+
+
 def test_eyes_are_taught_before_the_first_stage_and_the_blind_copy_plays_last(
     tmp_path: Path,
 ) -> None:
@@ -143,6 +151,15 @@ BAD = {
         "base.eyes needs pictures",
     ),
     "unknown": ({"speed": 3}, "speed"),
+    "corrected": (
+        {
+            "stages": {
+                **SMALL["stages"],
+                "exploration": {"sample": {"tasks": 1, "earlier": True}, "finetune": "tiny"},
+            }
+        },
+        "exploration corrects nothing; leave out earlier",
+    ),
     "rewritten": (
         {
             "stages": {
@@ -172,6 +189,50 @@ def test_bad_settings_are_told_in_one_line(
     assert not (tmp_path / "x").exists()
 
 
+REFUSED = {
+    "architecture": ("base.architecture=nope", "base/new-model: there is no architecture 'nope'"),
+    "task type": ("types=[single_serch]", "1-imitation/teacher: unknown task type"),
+    "suite": ("evaluation.suite=er-2k", "evaluations/1-imitation: unknown suite 'er-2k'"),
+    "part": ("stages.reflection.collect.parts=[x]", "3-reflection/collect: unknown part 'x'"),
+    "recipe": (
+        "stages.reflection.collect.recipe=x",
+        "3-reflection/collect: there is no recipe 'x'",
+    ),
+    "fine-tuning": ("stages.reflection.finetune=x", "3-reflection/finetune: there is no"),
+    "override": ("stages.exploration.set=[stage=x]", "2-exploration/finetune: "),
+    "dialect": ("dialect=x", "base/new-model: there is no dialect 'x'"),
+    "play": ("play=[sampling.heat=2]", "evaluations/1-imitation: the agent has a wrong field"),
+    "instances": ("instances=all", "1-imitation/teacher: unknown instances 'all'"),
+}
+"""What only a later phase would refuse, and what is said at once."""
+
+
+@pytest.mark.parametrize("only_print", [True, False], ids=["print", "run"])
+@pytest.mark.parametrize(("change", "message"), REFUSED.values(), ids=REFUSED)
+def test_what_a_later_phase_refuses_is_refused_before_the_first(
+    change: str, message: str, only_print: bool, tmp_path: Path
+) -> None:
+    file, out = tmp_path / "ladder.yaml", tmp_path / "x"
+    file.write_text(yaml.safe_dump(SMALL), encoding="utf-8")
+    command = ["ladder", "--config", str(file), "--set", change, "--out", str(out)]
+    result = CliRunner().invoke(cli, command + ["--print"] * only_print)
+    assert result.exit_code == 2
+    assert message in result.output
+    assert not out.exists()
+
+
+def test_a_first_model_must_be_there(tmp_path: Path) -> None:
+    file, out = tmp_path / "ladder.yaml", tmp_path / "x"
+    model = tmp_path / "model"
+    file.write_text(yaml.safe_dump({**SMALL, "base": {"model": str(model)}}), encoding="utf-8")
+    command = ["ladder", "--config", str(file), "--out", str(out), "--print"]
+    told = CliRunner().invoke(cli, command)
+    assert told.exit_code == 2
+    assert f"1-imitation/finetune: {model} is not a directory" in told.output
+    model.mkdir()
+    assert CliRunner().invoke(cli, command).exit_code == 0
+
+
 def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
     file, root = tmp_path / "ladder.yaml", tmp_path / "ladder"
     file.write_text(yaml.safe_dump(SMALL), encoding="utf-8")
@@ -192,11 +253,19 @@ def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
     settings = load_ladder(str(file))
     assert done(root) == [phase.name for phase in plan_of(settings, root).phases]
     figures = json.loads((root / "result.json").read_text())
-    assert [rung["name"] for rung in figures["rungs"]] == ["base", *settings.stages]
+    assert [rung["name"] for rung in figures["rungs"]] == [*settings.stages]
     assert figures["rungs"][0]["gain"] is None
-    assert figures["rungs"][3]["tokens"] > 0
+    assert figures["rungs"][2]["tokens"] > 0
     table = (root / "result.md").read_text()
     assert "paper: Reasoner" in table
+    page = tmp_path / "docs" / "models.md"
+    (page.parent / "images").mkdir(parents=True)
+    told = CliRunner().invoke(models_page, ["--ladder", str(root), "--out", str(page)])
+    assert told.exit_code == 0, told.output
+    written = page.read_text(encoding="utf-8")
+    assert table in written
+    assert all(f"| {name} |" in written for name in done(root))
+    assert written.count("](images/") == len([*page.parent.glob("images/*.png")]) >= 2
     before = [each.stat().st_mtime_ns for each in sorted(root.rglob("*.safetensors"))]
     run_plan(plan_of(settings, root), root, lambda *phase: pytest.fail(f"{phase} runs again"))
     assert before == [each.stat().st_mtime_ns for each in sorted(root.rglob("*.safetensors"))]
@@ -204,6 +273,21 @@ def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
     told = CliRunner().invoke(cli, other)
     assert told.exit_code == 2
     assert "holds another ladder: its seed is 0, this one's 3" in told.output
+
+
+def test_the_time_of_a_phase_is_that_of_all_its_tries(tmp_path: Path) -> None:
+    refused = Phase("suites", ("suites", "--nothing"), "suites")
+    plan = Plan("ladder", load_ladder("tiny-text"), (refused,))
+    seconds = []
+    for _ in range(2):
+        with pytest.raises(PhaseFailed):
+            run_plan(plan, tmp_path / "x", lambda *phase: None)
+        record = PlanRecord.model_validate_json((tmp_path / "x" / "ladder.json").read_text())
+        seconds.append(record.tried["suites"])
+    assert 0 < seconds[0] < seconds[1]
+    mended = replace(plan, phases=(Phase("suites", ("--version",), "suites"),))
+    (ended,) = run_plan(mended, tmp_path / "x", lambda *phase: None).done
+    assert ended.seconds > seconds[1]
 
 
 def done(root: Path) -> list[str]:

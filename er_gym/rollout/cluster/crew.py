@@ -9,6 +9,7 @@ was at is tried again by itself, and a job that kills three workers is given up,
 
 from __future__ import annotations
 
+import pickle
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
@@ -53,6 +54,10 @@ class _Try(Generic[Job]):
     job: Job
     number: int = 1
     lost: int = 0
+
+    @property
+    def again(self) -> bool:
+        return self.number > 1 or self.lost > 0
 
 
 @dataclass(eq=False)
@@ -155,17 +160,25 @@ class Crew(Generic[Job, Result]):
 
     def _give(self, member: _Member[Job]) -> None:
         """Give an actor as many batches as it may have at once."""
-        depth = 2 if self._job_seconds < _SHORT_SECONDS else 1
         while (
             self._queue
             and member.beginning is None
             and not member.retiring
-            and len(member.batches) < depth
+            and len(member.batches) < self._depth(member)
         ):
             others = [one.room for one in self._members if one is not member]
             member.room, batch = self._queue.take(self._batch_size(), member.room, others)
-            jobs = [attempt.job for attempt in batch]
+            jobs = pickle.dumps([attempt.job for attempt in batch])
             member.batches.append((member.actor.do.remote(jobs), batch))
+
+    def _depth(self, member: _Member[Job]) -> int:
+        """How many batches an actor may have at once.
+
+        A job that is tried again is all that its actor has, so that no other is lost with it.
+        """
+        tried_before = any(attempt.again for _, batch in member.batches for attempt in batch)
+        short = self._job_seconds < _SHORT_SECONDS
+        return 2 if short and not self._queue.has_first and not tried_before else 1
 
     def _batch_size(self) -> int:
         """So many jobs that they take a tenth of a second; fewer towards the end, so that all
@@ -283,11 +296,13 @@ def first_line(error: BaseException) -> str:
 
 
 def no_place(wanted: int, options: dict[str, Any]) -> str:
-    """What to say while the cluster has no place for a worker."""
+    """What to say while no worker has begun: has the cluster no place, or are they slow?"""
     free: dict[str, float] = ray.available_resources()  # type: ignore[no-untyped-call]
+    cpus, memory = free.get("CPU", 0), free.get("memory", 0)
     asks = f"{options['num_cpus']:g} CPU and {options['memory'] / 2**30:.1f} GiB"
-    has = f"{free.get('CPU', 0):g} CPU and {free.get('memory', 0) / 2**30:.1f} GiB"
+    if cpus >= options["num_cpus"] and memory >= options["memory"]:
+        return f"waiting for {wanted} workers to start, with {asks} each"
     return (
         f"waiting for a place on the cluster: {wanted} workers want {asks} each, all nodes "
-        f"together have {has} free"
+        f"together have {cpus:g} CPU and {memory / 2**30:.1f} GiB free"
     )

@@ -9,10 +9,11 @@ import secrets
 import shutil
 import signal
 import socket
+import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,7 +75,7 @@ def ray_machines(
             else:
                 folder = stack.enter_context(_folder())
                 stack.enter_context(_environment({"RAY_AUTH_TOKEN": auth_token()}))
-                with on_loopback(), same_signals():
+                with on_loopback(), same_signals(), _own_session():
                     _start(folder)
             stack.callback(ray.shutdown)
             stack.enter_context(_quiet())
@@ -131,6 +132,28 @@ def same_signals() -> Iterator[None]:
     finally:
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGTERM, before)
+
+
+@contextlib.contextmanager
+def _own_session() -> Iterator[None]:
+    """Start Ray's processes in sessions of their own.
+
+    What ends a group of processes (``timeout``, a terminal that closes) would otherwise end them
+    first, and this process would die of that before it has tidied up. They die with it all the
+    same: on Linux, Ray has the kernel see to it. Elsewhere it needs the group for that.
+    """
+    from ray._private import services
+
+    name = "ConsolePopen"
+    before = getattr(services, name, None)
+    if before is None or sys.platform != "linux":
+        yield
+        return
+    setattr(services, name, partial(before, start_new_session=True))
+    try:
+        yield
+    finally:
+        setattr(services, name, before)
 
 
 def _join(address: str, modules: Sequence[Path]) -> None:

@@ -29,6 +29,11 @@ class WarmQueue(Generic[Job]):
     def __len__(self) -> int:
         return self._length
 
+    @property
+    def has_first(self) -> bool:
+        """Whether the next job is one that was put first."""
+        return bool(self._first)
+
     def put_first(self, job: Job) -> None:
         """Add a job that the next worker is to have, whatever its room."""
         self._first.append(job)

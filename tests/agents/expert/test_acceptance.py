@@ -81,6 +81,27 @@ def test_the_first_action_that_earned_nothing_was_wrong() -> None:
         assert list(beginning.actions) == [Action(one.verb, one.object_type) for one in wanted]
 
 
+def test_the_expert_can_take_over_after_a_failure() -> None:
+    """After the first refused action since the last key action, if it has steps left."""
+    steps = ("!pickup Egg", "navigate to Sink", "navigate to Sink", "!pickup Bowl", "!pickup Bowl")
+    for earned_at, most, last in (
+        ({2}, 30, 3),
+        ({2, 5}, 30, 0),  # nothing failed since: the first wrong one
+        ((), 30, 0),
+        ({2}, 15, 3),
+        ({2}, 14, 0),  # too few are left
+    ):
+        episode = failed(*steps, max_steps=most)
+        told = [
+            step.model_copy(update={"reward": float(index in earned_at)})
+            for index, step in enumerate(episode.steps)
+        ]
+        beginning = beginning_of(episode.model_copy(update={"steps": told}), "failure")
+        assert beginning.first_wrong == last, (earned_at, most)
+    unusable = failed("navigate to Sink", "error", "!pickup Bowl", earned=1, max_steps=30)
+    assert beginning_of(unusable, "failure").problem == "its first wrong reply names no action"
+
+
 def test_some_episodes_cannot_be_corrected() -> None:
     won = failed(*KEYS, earned=3).model_copy(update={"success": True})
     garbled = failed("navigate to Sink", "error", "pickup Egg", earned=1)

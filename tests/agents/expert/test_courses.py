@@ -8,9 +8,9 @@ from itertools import pairwise
 from random import Random
 
 import pytest
-from expert_courses import TASKS, Played, environment, of_each_type, play
+from expert_courses import SEED, TASKS, Played, environment, of_each_type, play
 
-from agents.expert.candidates import Candidate
+from agents.expert.candidates import Candidate, CandidateSequence
 from agents.expert.corrections import Beginning, beginning_of
 from agents.expert.explorer import Strength
 from agents.expert.legs import legs_of
@@ -289,6 +289,44 @@ def test_a_correction_begins_like_the_failed_episode(env: EmbodiedEnv) -> None:
             assert one.episode.success
             corrected += 1
     assert corrected > 8
+
+
+def test_a_correction_can_begin_after_a_failure(env: EmbodiedEnv) -> None:
+    part = RECIPE.parts["corrections"]
+    corrected = 0
+    for candidate in of_each_type(part, 6):
+        failed = play(env, candidate).episode
+        beginning = beginning_of(failed, "failure")
+        if beginning.problem or failed.steps[1 + beginning.first_wrong].success:
+            continue
+        one = play(env, replace(candidate, beginning=beginning, strength=None))
+        replayed = one.episode.steps[1 : 1 + len(beginning.actions)]
+        assert [each.success for each in replayed] == [
+            each.success for each in failed.steps[1 : 1 + len(beginning.actions)]
+        ]
+        corrected += one.episode.success
+    assert corrected
+
+
+def test_a_correction_opens_one_container_after_another() -> None:
+    """Where the environment chooses another container of the type than the task's."""
+    closed = [
+        task
+        for task in TASKS
+        if task.type.name == "single_pickup_from_closerep"
+        and task.key_actions[0].actual_type in ("Cabinet", "Drawer")
+    ]
+    part = RECIPE.parts["corrections"]
+    sequence = CandidateSequence("part", part, closed, SEED)
+    beginning = Beginning((Action(verbs.OBSERVE),))
+    several = 0
+    env = environment(instances="explore")
+    for index in range(10):
+        one = play(env, replace(sequence[index], beginning=beginning, strength=None))
+        opened = sum(action.verb == verbs.OPEN for action in one.course.actions)
+        several += one.episode.success and opened > 1
+    env.close()
+    assert several
 
 
 def test_a_fault_is_no_mistake_to_be_corrected(env: EmbodiedEnv) -> None:

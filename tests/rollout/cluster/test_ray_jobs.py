@@ -138,21 +138,27 @@ def test_an_environment_whose_worker_dies_is_made_anew(machines, tasks_file):
 
 def test_nothing_is_left_of_a_ray_that_was_started_here(machines):
     program = """
-import os, signal, sys
+import os, signal, sys, time
 import ray
+from benchmarks.cli.errors import interrupted_by_sigterm
 from er_gym.rollout.cluster.session import ray_machines
 from er_gym.rollout.cluster.settings import RaySettings
-with ray_machines(RaySettings(), print) as machines:
+with interrupted_by_sigterm(), ray_machines(RaySettings(), print) as machines:
     print(ray._private.worker._global_node.get_temp_dir_path(), flush=True)
-    if sys.argv[1:]:
-        os.kill(os.getpid(), signal.SIGKILL)
+    for _ in machines.run_jobs(lambda: time.sleep, [0.01] * 100, workers=1):
+        if sys.argv[1:]:
+            os.killpg(0, signal.Signals[sys.argv[1]])
 """
     folders = []
-    for killed in ((), ("killed",), ()):
-        command = [sys.executable, "-c", program, *killed]
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=not killed)
+    for ended_by in ((), ("SIGKILL",), ("SIGTERM",)):  # of all processes of its group
+        command = [sys.executable, "-c", program, *ended_by]
+        done = subprocess.run(
+            command, cwd=ROOT, capture_output=True, text=True, start_new_session=True
+        )
+        assert (done.returncode == 0) == (not ended_by)
+        assert "KeyboardInterrupt" in done.stderr or ended_by != ("SIGTERM",)
         folders.append(Path(done.stdout.strip()))
-        assert folders[-1].exists() == bool(killed)
+        assert folders[-1].exists() == (ended_by == ("SIGKILL",))
     assert not any(folder.exists() for folder in folders)  # the next one has tidied up
     assert until(lambda: not any(_mentions(pid, folders[1]) for pid in _descendants(1)))
 

@@ -28,7 +28,9 @@ def test_a_new_room_is_one_that_nobody_has_warm_else_the_fullest():
 def test_what_was_put_first_is_next_and_alone():
     ours = queue(["a1", "a2"])
     ours.put_first("b9")
+    assert ours.has_first
     assert ours.take(5, "a") == ("b", ["b9"])
+    assert not ours.has_first
     assert ours.take(5, "a") == ("a", ["a1", "a2"])
     with pytest.raises(IndexError, match="no more jobs"):
         ours.take(1, "a")

@@ -1,0 +1,96 @@
+"""Checks of a plan's phases before the first one runs.
+
+What a command would refuse after hours, its phase refuses at once. Each check raises ValueError, as
+the command would. What earlier phases make, such as a model, cannot be checked here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from agents import make_agent
+from agents.expert.recipe import load_recipe
+from agents.finetune.architecture import load_architecture
+from agents.finetune.settings import load_settings as load_finetune_settings
+from agents.vlm.factory import is_model_agent
+from agents.vlm.factory import load_settings as load_agent_settings
+from benchmarks.plan.settings import Collected, PlaySettings
+from er_gym.data.dialects import load_dialect
+from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.tasks.suites import load_suite
+from er_gym.tasks.types import task_type
+
+_LIBRARIES = {"local": ("torch", "transformers"), "finetune": ("torch", "transformers", "peft")}
+"""Of each extra, what a plan cannot do without."""
+
+
+def check_tasks(settings: PlaySettings, suite: str) -> None:
+    """Whether a suite can be played with a plan's settings."""
+    known = _types_of(suite)
+    wanted = {task_type(name).name for name in settings.types}
+    if wanted and not wanted & known:
+        raise ValueError(f"{suite} has no task of the types {', '.join(sorted(wanted))}")
+    stated: dict[str, Any] = {
+        "width": settings.width,
+        "height": settings.height,
+        "instances": settings.instances or None,
+    }
+    EmbodiedEnv((), **{name: value for name, value in stated.items() if value is not None})
+
+
+@lru_cache(maxsize=8)  # most phases ask for the same
+def _types_of(suite: str) -> frozenset[str]:
+    return frozenset(task.type.name for task in load_suite(suite).tasks)
+
+
+def check_recipe(collected: Collected) -> None:
+    """Whether there is a recipe, with these parts."""
+    recipe = load_recipe(collected.recipe)
+    for part in collected.parts:
+        if part not in recipe.parts:
+            raise ValueError(f"unknown part {part!r}; the recipe has: {', '.join(recipe.parts)}")
+
+
+def check_agent(name: str) -> None:
+    """Whether there is an agent of this name; a model is not loaded."""
+    if not is_model_agent(name):
+        make_agent(name)
+
+
+def check_model_play(overrides: Sequence[str]) -> None:
+    """Whether these override an agent's settings."""
+    _check_installed("local")
+    load_agent_settings(None, overrides)
+
+
+def check_new_model(architecture: str, dialect: str) -> None:
+    """Whether a model of this architecture can be made."""
+    _check_installed("local")
+    load_architecture(architecture)
+    load_dialect(dialect)
+
+
+def check_finetune(config: str, overrides: Sequence[str]) -> None:
+    """Whether there is such a configuration."""
+    _check_installed("finetune")
+    load_dialect(load_finetune_settings(config, overrides).data.dialect)
+
+
+def check_model_there(path: str) -> None:
+    """Whether there is a directory that can hold a model."""
+    if not Path(path).is_dir():
+        raise ValueError(
+            f"{path} is not a directory; give one with a model in it, or a run of er-gym finetune"
+        )
+
+
+def _check_installed(extra: str) -> None:
+    for library in _LIBRARIES[extra]:
+        if find_spec(library) is None:
+            raise ValueError(
+                f"{library} is not installed, and this needs it: pip install 'er-gym[{extra}]'"
+            )
