@@ -87,12 +87,15 @@ class Collator:
         image_processor, image_token: the model's; None where it does not see.
         settings: bounds of pictures.
         padding: the token that fills rows up.
+        multiple: the length of a batch is one of its multiples. On a CPU, libraries prepare for
+            each length anew and keep that: with few lengths, they take less memory.
     """
 
     image_processor: Any
     image_token: int | None
     settings: DataSettings
     padding: int
+    multiple: int = 1
 
     def __call__(self, chats: Sequence[EncodedChat]) -> dict[str, Any]:
         """A batch.
@@ -108,6 +111,7 @@ class Collator:
         """
         rows = [expanded(chat, self.image_token) for chat in chats]
         longest = max(len(ids) for ids, _ in rows)
+        longest += -longest % self.multiple
         ids = torch.full((len(rows), longest), self.padding)
         labels = torch.full((len(rows), longest), -100)
         for row, (tokens, wanted) in enumerate(rows):

@@ -54,6 +54,7 @@ from er_gym.locking import exclusive_use
 _EYES = {"vision": r"model\.visual\.(?!.*merger)", "projector": r"model\.visual\..*merger"}
 """Names of the weights of each part that the settings can freeze."""
 _MOST_READERS = 8
+_CPU_LENGTHS = 32  # lengths of batches are multiples
 
 
 @dataclass(frozen=True)
@@ -223,7 +224,13 @@ def _train(
         ),
         run,
         settings.training.keep,
-        data_collator=Collator(files.image_processor, image_token, settings.data, padding),
+        data_collator=Collator(
+            files.image_processor,
+            image_token,
+            settings.data,
+            padding,
+            multiple=1 if machine.on_gpu() else _CPU_LENGTHS,
+        ),
         train_dataset=EncodedChats(chats),
         optimizers=(_optimizer(network, settings), None),
     )

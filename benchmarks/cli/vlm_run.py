@@ -15,10 +15,11 @@ from agents.vlm.prompts import prompts_for
 from agents.vlm.settings import AgentSettings
 from benchmarks.cli.executor import Workforce
 from benchmarks.cli.vlm_options import VLMOptions
+from er_gym.rollout import runner
 from er_gym.rollout.events import EventListener
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.rollout.runner import RunSummary, run
+from er_gym.rollout.runner import RunSummary
 from er_gym.tasks.task import Task
 
 _CONCURRENCY = 8
@@ -102,7 +103,7 @@ class VLMRun:
         """
         if say is not None:
             factory.supervisor.show = say
-        return run(
+        return runner.run(
             directory,
             tasks,
             lambda task, seed: factory.agent(seed),

@@ -6,15 +6,13 @@ are kept, and the model processes the new turns alone.
 
 Keys and values of many conversations are hundreds of megabytes, and for a small model on a CPU to
 move them takes longer than to compute. So each conversation has memory with room for its next
-turns, to which new ones are appended; and batches use one memory again and again, since the system
-takes longer to hand out fresh memory than to fill it.
+turns, to which new ones are appended.
 """
 
 from __future__ import annotations
 
 import hashlib
 import inspect
-import math
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -155,7 +153,7 @@ def memory_for(model: Any) -> int:
     if hasattr(config, "vision_config"):
         positions = config.model_type in _WITH_PICTURES
     else:
-        positions = "position_ids" in inspect.signature(_whole(model).forward).parameters
+        positions = "position_ids" in inspect.signature(whole_model(model).forward).parameters
     layers = [] if config.is_encoder_decoder else DynamicCache(config=config).layers
     if not positions or not layers or any(type(layer) is not DynamicLayer for layer in layers):
         return 0
@@ -178,7 +176,7 @@ def positions_of(
     """
     tokens = torch.tensor([ids])
     kinds = tokens.eq(image_token).int()
-    inner = _whole(model).model  # the part without an output layer
+    inner = whole_model(model).model  # the part without an output layer
     seen, _ = inner.get_rope_index(tokens, mm_token_type_ids=kinds, image_grid_thw=grids)
     return torch.cat([torch.arange(len(ids))[None], seen[:, 0]])
 
@@ -188,59 +186,28 @@ def _appended(memory: torch.Tensor, length: int, new: torch.Tensor) -> torch.Ten
     is full."""
     end = length + new.shape[1]
     if end > memory.shape[1]:
-        larger = memory.new_zeros((memory.shape[0], end + _NEXT_TURNS, memory.shape[2]))
-        larger[:, :length] = memory[:, :length]
-        memory = larger
+        memory = grown(memory, length, end)
     memory[:, length:end] = new
     return memory
 
 
-class BatchMemory:
-    """Memory for the keys and values of a batch, used again for the next batch.
-
-    Only one batch at a time may use it. On other devices than the CPU, PyTorch itself does as much.
-    """
-
-    def __init__(self) -> None:
-        self._held: dict[tuple[int, int], torch.Tensor] = {}
-
-    def take(
-        self, place: tuple[int, int], shape: Sequence[int], like: torch.Tensor
-    ) -> torch.Tensor:
-        """A tensor of a shape; what is in it is left from before.
-
-        Args:
-            place: the layer, and 0 for keys or 1 for values.
-            shape: of the tensor.
-            like: has its type and device.
-        """
-        if like.device.type != "cpu":
-            return like.new_empty(shape)
-        size = math.prod(shape)
-        held = self._held.get(place)
-        if held is None or held.numel() < size or held.dtype != like.dtype:
-            held = self._held[place] = like.new_empty(size + size // 4)
-        return held[:size].view(*shape)
-
-    def clear(self) -> None:
-        """Give it back."""
-        self._held.clear()
+def grown(memory: torch.Tensor, length: int, tokens: int) -> torch.Tensor:
+    """A larger memory with the first ``length`` tokens of one, and room for the next turns."""
+    larger = memory.new_zeros((memory.shape[0], tokens + _NEXT_TURNS, memory.shape[2]))
+    larger[:, :length] = memory[:, :length]
+    return larger
 
 
-def joined_past(
-    model: Any, pasts: Sequence[Layers], room: int = _ROOM, memory: BatchMemory | None = None
-) -> DynamicCache:
+def joined_past(model: Any, pasts: Sequence[Layers], room: int = _ROOM) -> DynamicCache:
     """The keys and values of several conversations as one cache, padded on the left.
 
     Args:
         model: whose they are.
         pasts: of each conversation; empty for a new one.
         room: how many tokens will follow, at most; more make the cache move.
-        memory: for the cache; by default, fresh.
     """
-    memory = memory or BatchMemory()
     cache = DynamicCache(config=model.config)
-    layers = [_RoomyLayer(number, room, memory) for number in range(len(cache.layers))]
+    layers = [_RoomyLayer(room) for _ in cache.layers]
     cache.layers = [*layers]
     longest = max(past[0][0].shape[1] if past else 0 for past in pasts)
     if longest:
@@ -254,14 +221,12 @@ class _RoomyLayer(DynamicLayer):
     conversations for each token, which takes a quarter of the time of a small model.
 
     Args:
-        number: of the layer.
         room: for how many tokens, beside those with which it begins.
-        memory: from which it takes the room.
     """
 
-    def __init__(self, number: int, room: int, memory: BatchMemory) -> None:
+    def __init__(self, room: int) -> None:
         super().__init__()
-        self._number, self._room, self._memory = number, room, memory
+        self._room = room
         self._stores: list[torch.Tensor] = []
         self._length = 0
 
@@ -273,7 +238,7 @@ class _RoomyLayer(DynamicLayer):
         self.lazy_initialization(*like)
         for part, one in enumerate(like):
             shape = (len(pasts), one.shape[0], longest + self._room, one.shape[2])
-            store = self._memory.take((self._number, part), shape, one)
+            store = one.new_empty(shape)
             for row, past in enumerate(pasts):
                 start = longest - (past[part].shape[1] if past else 0)
                 store[row, :, :start] = 0  # masked, but it must be finite
@@ -293,7 +258,7 @@ class _RoomyLayer(DynamicLayer):
             if part == len(self._stores):
                 room = max(self._room, after)
                 shape = (*new.shape[:-2], room, new.shape[-1])
-                self._stores.append(self._memory.take((self._number, part), shape, new))
+                self._stores.append(new.new_empty(shape))
             if after > self._stores[part].shape[-2]:
                 larger = new.new_empty((*new.shape[:-2], after + _ROOM, new.shape[-1]))
                 larger[..., :before, :] = self._stores[part][..., :before, :]
@@ -323,6 +288,6 @@ def copied(layers: Layers) -> Layers:
     ]
 
 
-def _whole(model: Any) -> Any:
+def whole_model(model: Any) -> Any:
     """The model without an adapter around it."""
     return model.get_base_model() if hasattr(model, "get_base_model") else model

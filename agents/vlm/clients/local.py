@@ -24,24 +24,24 @@ from PIL import Image
 from transformers import DynamicCache
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
-from agents.vlm.clients.batching import Batcher
+from agents.vlm.clients.batching import CLOSED, Batcher, JobThread
 from agents.vlm.clients.checkpoint import load, one_line
 from agents.vlm.clients.kept_turns import (
-    BatchMemory,
     KeptConversations,
     KeptTurns,
     conversation_name,
     joined_past,
     memory_for,
 )
+from agents.vlm.clients.packed_rows import PackedModel, PackedRow, can_be_packed
 from agents.vlm.clients.padded_batch import EncodedPrompt, PaddedBatch
 from agents.vlm.clients.seeded_sampling import SeededSampling
+from agents.vlm.clients.stepped_jobs import SteppedJobs
 from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.agent import CannotGoOn
 
 _THINK, _THOUGHT = "<think>", "</think>"
-_CLOSED = "the model has been closed"
 _SHORT = 32  # tokens
 
 
@@ -103,10 +103,15 @@ class LocalClient:
         local = settings.local
         memory = memory_for(self._model) if local.reuse else 0
         self._kept = KeptConversations(memory) if memory else None
-        self._memory = BatchMemory()
-        self._batcher: Batcher[EncodedPrompt, Reply] = Batcher(
-            self._replies, local.batch, local.wait
-        )
+        self._packed: PackedModel | None = None
+        self._jobs: JobThread[EncodedPrompt, Reply]
+        if self._kept is not None and can_be_packed(self._model):
+            self._packed = PackedModel(
+                self._model, self._image_token if loaded.image_processor else None
+            )
+            self._jobs = SteppedJobs(self._begun, self._next_tokens, self._ended, local.batch)
+        else:
+            self._jobs = Batcher(self._replies, local.batch, local.wait)
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
         """The model's next turn.
@@ -121,19 +126,18 @@ class LocalClient:
                 fails, or :meth:`close` has been called.
         """
         if self._closing.is_set():
-            raise CannotGoOn(_CLOSED)
+            raise CannotGoOn(CLOSED.message)
         start = time.monotonic()
-        reply = self._batcher.do(self._row(messages, seed))
+        reply = self._jobs.do(self._row(messages, seed))
         return replace(reply, seconds=time.monotonic() - start)
 
     def close(self) -> None:
         """Stop at the next token and release the model; waiting callers get CannotGoOn."""
         self._closing.set()
-        self._batcher.close()
+        self._jobs.close()
         self._model = None
         if self._kept is not None:
             self._kept.clear()
-        self._memory.clear()
 
     # -- conversation to tokens, in the caller's thread ------------------------------------------
 
@@ -256,21 +260,50 @@ class LocalClient:
         text = f"{self._settings.seed} {episode} {messages}"
         return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
 
-    # -- tokens to replies, in the batcher's thread ----------------------------------------------
+    # -- tokens to replies, in the thread of the jobs: on a CPU, step by step --------------------
+
+    def _begun(self, prompt: EncodedPrompt) -> PackedRow:
+        return PackedRow(prompt, self._settings.sampling)
+
+    def _next_tokens(self, rows: Sequence[PackedRow]) -> None:
+        assert self._packed is not None
+        self._go_on()
+        try:
+            self._packed.step(rows)
+        except RuntimeError as error:
+            self._forget()
+            raise _explained(error, [row.prompt for row in rows]) from None
+
+    def _ended(self, row: PackedRow) -> Reply | None:
+        """The reply, once it has ended."""
+        full = len(row.said) == self._settings.sampling.max_tokens
+        if not (full or (row.said and row.said[-1] in self._end_tokens)):
+            return None
+        if self._kept is not None:
+            self._kept.keep(row.prompt.name, row.turns())
+        return self._reply(row.prompt, row.said)
+
+    # -- elsewhere, in whole batches ---------------------------------------------------------------
 
     def _replies(self, rows: Sequence[EncodedPrompt]) -> list[Reply]:
         try:
             generated = self._generate(rows)
         except RuntimeError as error:
-            if self._kept is not None:
-                self._kept.clear()  # memory may be short
-            self._memory.clear()
+            self._forget()
             raise _explained(error, rows) from None
+        self._go_on()
+        return [self._reply(row, said) for row, said in zip(rows, generated, strict=True)]
+
+    def _go_on(self) -> None:
         if self._closing.is_set():
-            raise CannotGoOn(_CLOSED)
+            raise CannotGoOn(CLOSED.message)
         if self._supervisor.over:
             raise CannotGoOn(f"the minutes are over; {AGAIN}")
-        return [self._reply(row, said) for row, said in zip(rows, generated, strict=True)]
+
+    def _forget(self) -> None:
+        """Give memory back, which may be short."""
+        if self._kept is not None:
+            self._kept.clear()
 
     def _generate(self, rows: Sequence[EncodedPrompt]) -> list[list[int]]:
         """The tokens that the model generates for each row, up to an end token or the limit."""
@@ -310,7 +343,7 @@ class LocalClient:
         if self._kept is None:
             return batch, told, None
         room = batch.length - max(row.reused for row in rows) + most
-        cache = joined_past(self._model, [row.past for row in rows], room, self._memory)
+        cache = joined_past(self._model, [row.past for row in rows], room)
         return batch, {**told, "past_key_values": cache}, cache
 
     def _long_ones_processed(self, rows: Sequence[EncodedPrompt]) -> list[EncodedPrompt]:

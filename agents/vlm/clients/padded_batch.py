@@ -47,9 +47,36 @@ class EncodedPrompt:
     reused: int = 0
 
     @property
+    def new_grids(self) -> torch.Tensor:
+        """(new pictures, 3)."""
+        assert self.grids is not None
+        return self.grids[len(self.grids) - self.new_pictures :]
+
+    @property
     def past(self) -> Layers:
         """Keys and values of the tokens that are reused."""
         return self.kept.first(self.reused) if self.kept is not None else []
+
+
+def new_pictures(
+    prompts: Sequence[EncodedPrompt], ids: torch.Tensor, image_token: int
+) -> dict[str, torch.Tensor]:
+    """The pictures that have not been processed yet, as a model is given them.
+
+    Args:
+        prompts: the conversations.
+        ids: their tokens.
+        image_token: the token of a picture.
+    """
+    seen = [(each.new_pixels, each.new_grids) for each in prompts if each.new_pixels is not None]
+    if not seen:
+        return {}
+    pixels, grids = zip(*seen, strict=True)
+    return {
+        "pixel_values": torch.cat(pixels),
+        "image_grid_thw": torch.cat(grids),
+        "mm_token_type_ids": ids.eq(image_token).int(),
+    }
 
 
 class PaddedBatch:
@@ -91,16 +118,7 @@ class PaddedBatch:
         inputs = {"input_ids": torch.tensor(ids), "attention_mask": torch.tensor(mask)}
         if image_token is None:
             return inputs
-        pixels = [row.new_pixels for row in self._rows if row.new_pixels is not None]
-        if pixels:
-            grids = [row.grids for row in self._rows if row.grids is not None]
-            counts = [row.new_pictures for row in self._rows if row.grids is not None]
-            new = [each[len(each) - n :] for each, n in zip(grids, counts, strict=True)]
-            inputs |= {
-                "pixel_values": torch.cat(pixels),
-                "image_grid_thw": torch.cat(new),
-                "mm_token_type_ids": inputs["input_ids"].eq(image_token).int(),
-            }
+        inputs |= new_pictures(self._rows, inputs["input_ids"], image_token)
         if positions:
             inputs["position_ids"] = self._positions(model, image_token)
         return inputs

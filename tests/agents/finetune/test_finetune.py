@@ -64,7 +64,7 @@ def test_the_loss_is_the_cross_entropy_of_the_turns_that_are_learnt(
     models: Any, played: Collection, chats: tuple[Chat, ...], settings: Any, tmp_path: Path,
 ) -> None:  # fmt: skip
     """Each conversation by itself, unpadded, with mask and new token put together by hand."""
-    made = settings("training.epochs=1", *extra)
+    made = settings("training.epochs=1", "model.dtype=float32", *extra)
     train(made, models(), [played.path], tmp_path / "run")
     [first] = RunFiles(tmp_path / "run").metrics()
 

@@ -141,7 +141,7 @@ def test_closing_serves_who_is_at_work_and_sends_the_rest_away(pool: ThreadPoolE
     assert begun.wait(LONG)
     waiting = [pool.submit(batcher.do, job) for job in ("cd", "ef")]
     closing: Future[None] = pool.submit(batcher.close)
-    while not batcher._closed:
+    while not batcher.closed:
         time.sleep(0.01)
     go_on.set()
     closing.result(LONG)
@@ -178,7 +178,7 @@ def run(jobs):
     return jobs
 
 def interrupt():
-    while batcher._waiting.empty():
+    while batcher.waiting.empty():
         time.sleep(0.01)
     os.kill(os.getpid(), signal.SIGINT)
 

@@ -104,11 +104,24 @@ def said(replies: Sequence[Sequence[Reply]]) -> list[list[Any]]:
     ]
 
 
+@pytest.fixture
+def padded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Batches as on a GPU."""
+    monkeypatch.setattr("agents.vlm.clients.local.can_be_packed", lambda model: False)
+
+
 @pytest.mark.parametrize("temperature", [0.0, 1.0])
 @pytest.mark.parametrize("family", ["qwen2", "qwen2_vl", "qwen2_5_vl", "qwen3_vl"])
+@pytest.mark.parametrize("way", ["packed", "padded"])
 def test_replies_are_those_of_a_model_that_begins_anew_each_turn(
-    models: dict[str, Path], family: str, temperature: float
+    models: dict[str, Path],
+    family: str,
+    temperature: float,
+    way: str,
+    request: pytest.FixtureRequest,
 ) -> None:
+    if way == "padded":
+        request.getfixturevalue("padded")
     sampling = {"max_tokens": 12, "temperature": temperature, "top_p": 0.9}
     anew = client(models[family], sampling=sampling, local={"reuse": False, "batch": 3})
     goes_on = client(models[family], sampling=sampling, local={"batch": 3})
@@ -125,6 +138,7 @@ def test_replies_are_those_of_a_model_that_begins_anew_each_turn(
         each.close()
 
 
+@pytest.mark.usefixtures("padded")
 @pytest.mark.parametrize("family", ["qwen2", "qwen2_5_vl"])
 def test_a_conversation_that_begins_among_others_is_processed_before_them(
     models: dict[str, Path], family: str

@@ -128,17 +128,42 @@ def at_once(client: LocalClient, talks: Sequence[Conversation]) -> list[Reply]:
         return [each.result(LONG) for each in replies]
 
 
-def recorded(client: LocalClient) -> list[list[list[int]]]:
-    """The tokens of every batch from now on."""
-    batches: list[list[list[int]]] = []
-    run = client._generate
+def recorded(client: LocalClient) -> list[list[int]]:
+    """The tokens of every reply from now on."""
+    replies: list[list[int]] = []
+    reply = client._reply
 
-    def generated(rows: Any) -> list[list[int]]:
-        batches.append(run(rows))
-        return batches[-1]
+    def noted(row: Any, said: Any) -> Reply:
+        replies.append(list(said))
+        return reply(row, said)
 
-    client._generate = generated  # type: ignore[method-assign]
-    return batches
+    client._reply = noted  # type: ignore[method-assign]
+    return replies
+
+
+def watched(client: LocalClient, before: Callable[[int], object]) -> None:
+    """Call ``before`` with the number of conversations each time before the model works on some."""
+    packed = client._packed
+    if packed is not None:
+        step = packed.step
+
+        def stepped(rows: Any) -> None:
+            before(len(rows))
+            step(rows)
+
+        packed.step = stepped  # type: ignore[method-assign]
+        return
+    generate = client._model.generate
+
+    def generated(**inputs: Any) -> Any:
+        before(len(inputs["input_ids"]))
+        return generate(**inputs)
+
+    client._model.generate = generated
+
+
+BOTH_WAYS = pytest.mark.parametrize("reuse", [True, False], ids=["packed", "padded"])
+"""Step by step in one row, as on a CPU; and by ``generate``, as without ``local.reuse``."""
 
 
 def edited(
@@ -285,19 +310,22 @@ def test_a_conversation_in_the_models_format(client: Clients, in_history: bool) 
 
 @pytest.mark.parametrize("temperature", [0.0, 1.0])
 @pytest.mark.parametrize("family", ["qwen2", *EYES])
+@BOTH_WAYS
 def test_a_batch_of_four_gives_the_replies_of_each_alone(
-    client: Clients, family: str, temperature: float
+    client: Clients, reuse: bool, family: str, temperature: float
 ) -> None:
     sampling = {"max_tokens": 24, "temperature": temperature, "top_p": 0.9}
     talks = conversations(family)
-    alone = client(family, sampling=sampling, local={"batch": 1})
+    alone = client(family, sampling=sampling, local={"batch": 1, "reuse": reuse})
     singles = recorded(alone)
     replies = [alone.reply(talk, seed) for seed, talk in enumerate(talks)]
-    together = client(family, sampling=sampling, local={"batch": 4, "wait": LONG})
-    batches = recorded(together)
+    together = client(family, sampling=sampling, local={"batch": 4, "wait": LONG, "reuse": reuse})
+    assert (together._packed is not None) == reuse
+    said, sizes = recorded(together), []
+    watched(together, sizes.append)
     assert same(at_once(together, talks), replies)
-    [batch] = batches
-    assert sorted(batch) == sorted(single for [single] in singles)
+    assert max(sizes) > 1 if reuse else sizes == [4]
+    assert sorted(said) == sorted(singles)
     assert len({reply.usage.prompt for reply in replies}) == 4
 
 
@@ -305,10 +333,11 @@ def test_twelve_episodes_and_a_batch_of_four(client: Clients) -> None:
     talks = [(*talk, user(f"It is {n}.")) for n in range(3) for talk in conversations("qwen2_5_vl")]
     alone = client(local={"batch": 1})
     together = client(local={"batch": 4, "wait": 0.05})
-    batches = recorded(together)
+    said, sizes = recorded(together), []
+    watched(together, sizes.append)
     assert same(at_once(together, talks), [alone.reply(talk, s) for s, talk in enumerate(talks)])
-    assert sum(map(len, batches)) == 12
-    assert 3 <= len(batches) < 12
+    assert len(said) == 12
+    assert 1 < max(sizes) <= 4
 
 
 def test_seeds(client: Clients) -> None:
@@ -337,28 +366,29 @@ def test_words_are_drawn_as_likely_as_they_are(top_p: float, odds: list[float]) 
     assert shares.tolist() == pytest.approx(odds, abs=0.012)
 
 
-def test_replies_end_at_the_models_end_or_at_the_limit(client: Clients) -> None:
+@BOTH_WAYS
+def test_replies_end_at_the_models_end_or_at_the_limit(client: Clients, reuse: bool) -> None:
     """So hot that any token may come, the end among them: some end early, some are cut."""
     sampling = {"max_tokens": 150, "temperature": 30.0}
-    model = client(sampling=sampling, local={"batch": 8, "wait": LONG})
-    batches = recorded(model)
+    model = client(sampling=sampling, local={"batch": 8, "wait": LONG, "reuse": reuse})
+    said = recorded(model)
     ends = set(model._tokenizer.convert_tokens_to_ids(["<|im_end|>", "<|endoftext|>"]))
     replies = at_once(model, [(user("Go", str(number)),) for number in range(8)])
-    [batch] = batches
-    assert sorted(map(len, batch)) == sorted(reply.usage.completion for reply in replies)
-    assert not any(ends.intersection(said[:-1]) for said in batch)
-    assert {(said[-1] in ends, len(said) < 150) for said in batch} == {(True, True), (False, False)}
+    assert sorted(map(len, said)) == sorted(reply.usage.completion for reply in replies)
+    assert not any(ends.intersection(each[:-1]) for each in said)
+    assert {(each[-1] in ends, len(each) < 150) for each in said} == {(True, True), (False, False)}
     assert {(reply.finish, reply.usage.completion < 150) for reply in replies} == {
         ("stop", True),
         ("length", False),
     }
     assert not any("<|im_end|>" in reply.text for reply in replies)
-    alone = client(sampling=sampling, local={"batch": 1})
+    alone = client(sampling=sampling, local={"batch": 1, "reuse": reuse})
     assert same([alone.reply((user("Go", "5"),), 5)], [replies[5]])
 
 
+@BOTH_WAYS
 def test_the_models_own_repetition_penalty_holds(
-    models: Models, tmp_path: Path, client: Clients
+    models: Models, tmp_path: Path, client: Clients, reuse: bool
 ) -> None:
     def strict(directory: Path) -> None:
         file = directory / "generation_config.json"
@@ -369,10 +399,10 @@ def test_the_models_own_repetition_penalty_holds(
         (models("qwen2_5_vl"), True),
         (edited(models, tmp_path / "x", strict), False),
     ):
-        model = client(path, sampling={"max_tokens": 60})
-        batches = recorded(model)
+        model = client(path, sampling={"max_tokens": 60}, local={"reuse": reuse})
+        replies = recorded(model)
         model.reply([user("Well. " * 9)], 0)
-        [[said]] = batches
+        [said] = replies
         assert (len(set(said)) < len(said)) == often
 
 
@@ -553,69 +583,79 @@ def test_a_template_that_does_not_take_it(models: Models, tmp_path: Path, client
         client(path).reply([user("Hello")], 0)
 
 
-def test_what_does_not_fit_into_memory_is_halved(
-    client: Clients, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    model = client(local={"batch": 4, "wait": LONG})
-    generate, sizes = model._model.generate, []
+@BOTH_WAYS
+def test_what_does_not_fit_into_memory_is_halved(client: Clients, reuse: bool) -> None:
+    model = client(local={"batch": 4, "wait": LONG, "reuse": reuse})
+    sizes: list[int] = []
 
-    def cramped(**inputs: Any) -> Any:
-        sizes.append(len(inputs["input_ids"]))
-        if sizes[-1] > 2:
+    def cramped(count: int) -> None:
+        sizes.append(count)
+        if count > 2:
             raise torch.cuda.OutOfMemoryError("CUDA out of memory")
-        return generate(**inputs)
 
-    monkeypatch.setattr(model._model, "generate", cramped)
+    watched(model, cramped)
     talks = conversations("qwen2_5_vl")
     replies = at_once(model, talks)
-    assert sizes == [4, 2, 2]
+    [failed] = [place for place, count in enumerate(sizes) if count > 2]
+    assert max(sizes[failed + 1 :]) == sizes[failed] // 2
     alone = client(local={"batch": 1})
     assert same(replies, [alone.reply(talk, 0) for talk in talks])
 
 
-def test_a_device_that_fails_ends_the_run(client: Clients, monkeypatch: pytest.MonkeyPatch) -> None:
+@BOTH_WAYS
+def test_a_device_that_fails_ends_the_run(client: Clients, reuse: bool) -> None:
     if not hasattr(torch, "AcceleratorError"):
         pytest.skip("this torch has no error of its own for devices")
-    model = client()
+    model = client(local={"reuse": reuse})
 
-    def fails(**inputs: Any) -> Any:
+    def fails(count: int) -> None:
         raise torch.AcceleratorError("CUDA error: device-side assert triggered\nmore")
 
-    monkeypatch.setattr(model._model, "generate", fails)
+    watched(model, fails)
     with pytest.raises(CannotGoOn, match=r"the device failed, .*device-side assert triggered more"):
         model.reply([user("Hello")], 0)
 
 
-def test_closing_stops_it_in_the_middle_of_a_reply(client: Clients) -> None:
-    model = client(sampling={"max_tokens": 16_000})  # a minute of words
-    model._model.generation_config.eos_token_id, model._end_tokens = None, frozenset()
-    batches = recorded(model)
-    begun, generate = threading.Event(), model._model.generate
+@pytest.fixture
+def talkative(client: Clients) -> Callable[[bool], LocalClient]:
+    """Makes a model that talks for a minute."""
 
-    def beginning(**inputs: Any) -> Any:
-        begun.set()
-        return generate(**inputs)
+    def make(reuse: bool) -> LocalClient:
+        model = client(sampling={"max_tokens": 16_000}, local={"reuse": reuse})
+        model._model.generation_config.eos_token_id, model._end_tokens = None, frozenset()
+        return model
 
-    model._model.generate = beginning
+    return make
+
+
+@BOTH_WAYS
+def test_closing_stops_it_in_the_middle_of_a_reply(
+    talkative: Callable[[bool], LocalClient], reuse: bool
+) -> None:
+    model = talkative(reuse)
+    begun, said = threading.Event(), recorded(model)
+    watched(model, lambda count: begun.set())
     with ThreadPoolExecutor(1) as pool:
         reply = pool.submit(model.reply, [user("Hello")], 0)
         assert begun.wait(LONG)
         model.close()
         with pytest.raises(CannotGoOn, match="closed"):
             reply.result(LONG)
-    assert len(batches[0][0]) < 16_000
+    assert not said
     with pytest.raises(CannotGoOn, match="closed"):
         model.reply([user("Hello")], 0)
 
 
-def test_the_minutes_stop_it_in_the_middle_of_a_reply(client: Clients) -> None:
-    model = client(sampling={"max_tokens": 16_000})  # a minute of words
-    model._model.generation_config.eos_token_id, model._end_tokens = None, frozenset()
+@BOTH_WAYS
+def test_the_minutes_stop_it_in_the_middle_of_a_reply(
+    talkative: Callable[[bool], LocalClient], reuse: bool
+) -> None:
+    model = talkative(reuse)
     model._supervisor = RequestSupervisor(max_minutes=0.5 / 60)
-    batches = recorded(model)
+    said = recorded(model)
     with pytest.raises(CannotGoOn, match="the minutes are over; run the same command again"):
         model.reply([user("Hello")], 0)
-    assert len(batches[0][0]) < 16_000
+    assert not said
 
 
 def test_a_directory_needs_no_network(client: Clients, monkeypatch: pytest.MonkeyPatch) -> None:

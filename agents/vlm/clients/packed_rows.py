@@ -1,0 +1,239 @@
+"""Generates replies to many conversations on a CPU, token by token, without padding.
+
+``generate`` of transformers pads all conversations of a batch to the longest, and works until the
+longest reply ends. On a CPU, where memory moves slowly, most of the time goes there. Here one step
+processes what is new of each conversation (a turn, or the last token of its reply) side by side in
+one row, and attention reads the keys and values of each conversation where they are kept. A
+conversation can begin and end at any step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
+
+import torch
+import transformers
+from torch.nn import functional
+from transformers import AttentionInterface
+
+from agents.vlm.clients.kept_turns import KeptTurns, grown, positions_of, whole_model
+from agents.vlm.clients.padded_batch import EncodedPrompt, new_pictures
+from agents.vlm.clients.seeded_sampling import SeededSampling
+from agents.vlm.settings import Sampling
+
+_NAME = "er_gym_packed_rows"
+_FAMILIES = ("llama", "qwen2", "qwen3", "qwen2_vl", "qwen2_5_vl", "qwen3_vl")
+"""The models whose attention is what :func:`_attention` computes. Others have, for example, caps
+on scores or sinks."""
+
+
+class PackedRow:
+    """A conversation whose reply is generated.
+
+    Args:
+        prompt: the conversation.
+        sampling: how tokens are drawn.
+
+    Attributes:
+        prompt: as above.
+        said: the tokens of the reply so far.
+        done: how many tokens have been processed.
+        draw: draws a token from scores, (1, words); None for the likeliest.
+    """
+
+    def __init__(self, prompt: EncodedPrompt, sampling: Sampling) -> None:
+        self.prompt = prompt
+        self.said: list[int] = []
+        self.done = prompt.reused
+        self.draw: SeededSampling | None = None
+        if sampling.temperature > 0:
+            self.draw = SeededSampling(sampling.temperature, sampling.top_p, [prompt.seed])
+        self._most = len(prompt.ids) + sampling.max_tokens
+        self._layers = list(prompt.kept.layers) if prompt.kept is not None else []
+        self._next_position: torch.Tensor | None = None
+
+    @property
+    def new(self) -> list[int]:
+        """The tokens to be processed next."""
+        return self.said[-1:] or self.prompt.ids[self.done :]
+
+    def turns(self) -> KeptTurns:
+        """What has been processed. This row must not be used afterwards."""
+        ids = [*self.prompt.ids, *self.said][: self.done]
+        return KeptTurns(ids, self.prompt.pictures, self.prompt.grids, self._layers)
+
+    def with_new(
+        self, layer: int, keys: torch.Tensor, values: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Keep the keys and values of the new tokens in a layer.
+
+        Args:
+            layer: its number.
+            keys, values: (heads, tokens, size).
+
+        Returns:
+            Keys and values of all tokens.
+        """
+        if layer == len(self._layers):  # a new conversation
+            self._layers.append((keys[:, :0], values[:, :0]))
+        end = self.done + keys.shape[1]
+        if end > self._layers[layer][0].shape[1]:
+            old, room = self._layers[layer], max(self._most, end)
+            self._layers[layer] = (grown(old[0], self.done, room), grown(old[1], self.done, room))
+        kept_keys, kept_values = self._layers[layer]
+        kept_keys[:, self.done : end] = keys
+        kept_values[:, self.done : end] = values
+        return kept_keys[:, :end], kept_values[:, :end]
+
+    def positions(self, model: Any, image_token: int | None) -> torch.Tensor:
+        """Of the new tokens: (1, tokens), for a model with pictures (4, tokens)."""
+        count = len(self.new)
+        if image_token is None:
+            return torch.arange(self.done, self.done + count)[None]
+        if self._next_position is None:
+            found = positions_of(model, self.prompt.ids, self.prompt.grids, image_token)
+            self._next_position = found.amax(dim=1, keepdim=True) + 1
+            self._next_position[1:] = self._next_position[1:].max()
+            return found[:, self.done :]
+        here = self._next_position
+        self._next_position = here + 1
+        return here
+
+
+class PackedModel:
+    """A model on a CPU that generates the replies to several conversations, step by step.
+
+    Args:
+        model: the model; its attention is replaced.
+        image_token: the token of a picture; None for a model without pictures.
+    """
+
+    def __init__(self, model: Any, image_token: int | None) -> None:
+        self._model, self._image_token = model, image_token
+        whole = whole_model(model)
+        if image_token is None:
+            whole.set_attn_implementation(_NAME)
+        else:
+            whole.set_attn_implementation({"text_config": _NAME})
+        penalty = model.generation_config.repetition_penalty
+        self._penalty: Any = None
+        if penalty is not None and penalty != 1:
+            self._penalty = transformers.RepetitionPenaltyLogitsProcessor(penalty)
+
+    @torch.inference_mode()
+    def step(self, rows: Sequence[PackedRow]) -> None:
+        """Add a token to the reply of each row."""
+        new = [row.new for row in rows]
+        with _attended(list(zip(rows, map(len, new), strict=True))):
+            scores = self._model(**self._inputs(rows, new)).logits[0].float()  # (rows, words)
+        for row, tokens in zip(rows, new, strict=True):
+            row.done += len(tokens)
+        likeliest = scores.argmax(dim=1).tolist()
+        for number, row in enumerate(rows):
+            token = likeliest[number]
+            if self._penalty is not None or row.draw is not None:
+                token = self._drawn(row, scores[number : number + 1])
+            row.said.append(token)
+
+    def _drawn(self, row: PackedRow, scores: torch.Tensor) -> int:
+        ids = torch.tensor([row.prompt.ids + row.said])
+        if self._penalty is not None:
+            scores = self._penalty(ids, scores)
+        if row.draw is not None:
+            scores = row.draw(ids, scores)
+        return int(scores.argmax())
+
+    def _inputs(self, rows: Sequence[PackedRow], new: Sequence[Sequence[int]]) -> dict[str, Any]:
+        ids = torch.tensor([[token for tokens in new for token in tokens]])
+        lasts = torch.tensor([len(tokens) for tokens in new]).cumsum(0) - 1
+        positions = torch.cat(
+            [row.positions(self._model, self._image_token) for row in rows], dim=1
+        )
+        inputs: dict[str, Any] = {
+            "input_ids": ids,
+            "position_ids": positions,
+            "logits_to_keep": lasts,
+            "use_cache": False,
+        }
+        if self._image_token is None:
+            return inputs
+        inputs["position_ids"] = positions[:, None]
+        begun = [row.prompt for row in rows if not row.said]
+        return inputs | new_pictures(begun, ids, self._image_token)
+
+
+def can_be_packed(model: Any) -> bool:
+    """Whether :class:`PackedModel` can run a model."""
+    config = model.config
+    texts = getattr(config, "text_config", config)
+    chosen = texts._attn_implementation in ("sdpa", "eager")
+    return model.device.type == "cpu" and config.model_type in _FAMILIES and chosen
+
+
+# -- attention -------------------------------------------------------------------------------------
+
+_rows: ContextVar[Sequence[tuple[PackedRow, int]]] = ContextVar("rows")
+
+
+@contextmanager
+def _attended(rows: Sequence[tuple[PackedRow, int]]) -> Iterator[None]:
+    """The conversations whose new tokens the model gets within the context, one after another, and
+    how many those are."""
+    token = _rows.set(rows)
+    try:
+        yield
+    finally:
+        _rows.reset(token)
+
+
+def _attention(
+    module: Any,
+    query: torch.Tensor,
+    key: torch.Tensor,
+    value: torch.Tensor,
+    attention_mask: None,
+    *,
+    scaling: float | None = None,
+    **more: Any,
+) -> tuple[torch.Tensor, None]:
+    """Attention of each conversation's new tokens to all its tokens.
+
+    Args:
+        module: the layer.
+        query: (1, heads, tokens of all conversations, size).
+        key, value: the same with the heads of keys and values.
+        scaling: of the scores.
+
+    Returns:
+        (1, tokens, heads, size).
+    """
+    _, heads, tokens, size = query.shape
+    groups = key.shape[1]
+    found = query.new_empty(1, tokens, heads, size)
+    start = 0
+    for row, count in _rows.get():
+        end = start + count
+        keys, values = row.with_new(module.layer_idx, key[0, :, start:end], value[0, :, start:end])
+        asked = query[:, :, start:end]
+        if count == 1:  # the heads of a group as the places of one
+            one = functional.scaled_dot_product_attention(
+                asked.reshape(1, groups, heads // groups, size), keys[None], values[None],
+                scale=scaling,
+            )  # fmt: skip
+            found[0, start] = one.reshape(heads, size)
+        else:
+            old = keys.shape[1] - count
+            mask = torch.ones(count, old + count, dtype=torch.bool).tril(old) if old else None
+            one = functional.scaled_dot_product_attention(
+                asked, keys[None], values[None],
+                attn_mask=mask, is_causal=mask is None, scale=scaling, enable_gqa=groups < heads,
+            )  # fmt: skip
+            found[:, start:end] = one.transpose(1, 2)
+        start = end
+    return found, None
+
+
+AttentionInterface.register(_NAME, _attention)
