@@ -36,6 +36,7 @@ MAY_USE = {
     "agents/vlm/clients/kept_turns.py": ("local",),
     "agents/vlm/clients/local.py": ("local",),
     "agents/vlm/clients/model_actors.py": ("local", "ray"),
+    "agents/vlm/clients/packed_rows.py": ("local",),
     "agents/vlm/clients/padded_batch.py": ("local",),
     "agents/vlm/clients/seeded_sampling.py": ("local",),
     "agents/vlm/merging.py": ("local",),
