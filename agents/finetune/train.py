@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import peft
-import torch
 import transformers
 from transformers.trainer_utils import set_seed
 
@@ -195,10 +194,11 @@ def _train(
 
     # -- the model: its weights, the token <|feedback|>, and what learns --
     set_seed(settings.training.seed)
-    # FSDP keeps weights as they are loaded; DeepSpeed keeps a copy in float32 itself. Weights that
-    # learn are kept in float32: small steps would be lost in bfloat16.
-    whole = settings.model.lora is None and not arguments.deepspeed
-    network = _load(files, settings, "float32" if arguments.fsdp or whole else dtype)
+    # FSDP keeps weights as they are loaded; DeepSpeed keeps a copy in float32 itself. Without an
+    # adapter, weights that stay as they are are written again, so they are not rounded.
+    as_they_are = settings.model.lora is None and dtype == "bfloat16" and not is_sharded(arguments)
+    loaded = "float32" if arguments.fsdp else "auto" if as_they_are else dtype
+    network = _load(files, settings, loaded)
     if is_new:
         add_rows(network, tokenizer)
     _freeze(network, settings)
@@ -206,7 +206,8 @@ def _train(
         network = _with_lora(network, settings.model.lora, settings, files, tokenizer, feedback)
     if dtype == "bfloat16" and not is_sharded(arguments):
         for weight in network.parameters():
-            weight.data = weight.data.float() if weight.requires_grad else weight.data.bfloat16()
+            if weight.requires_grad:
+                weight.data = weight.data.float()  # small steps would be lost in bfloat16
 
     # -- the loop --
     if first:
@@ -362,7 +363,7 @@ def _load(files: ModelFiles, settings: FinetuneSettings, dtype: str) -> Any:
     try:
         loaded: Any = maker.from_pretrained(
             files.base,
-            dtype=getattr(torch, dtype),
+            dtype=dtype,
             attn_implementation=settings.model.attention or None,
             local_files_only=True,
             output_loading_info=True,

@@ -168,9 +168,8 @@ class PackedModel:
 def can_be_packed(model: Any) -> bool:
     """Whether :class:`PackedModel` can run a model."""
     config = model.config
-    texts = getattr(config, "text_config", config)
-    chosen = texts._attn_implementation in ("sdpa", "eager")
-    return model.device.type == "cpu" and config.model_type in _FAMILIES and chosen
+    usual = getattr(config, "text_config", config)._attn_implementation == "sdpa"
+    return model.device.type == "cpu" and config.model_type in _FAMILIES and usual
 
 
 # -- attention -------------------------------------------------------------------------------------

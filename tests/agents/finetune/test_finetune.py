@@ -246,7 +246,7 @@ def test_adapters_carry_feedback_from_stage_to_stage(
     row, loss = fresh[like].mean(dim=0), 100.0
     stages = (("stage1", LORA), ("stage2", LORA), ("stage3", ()))
     for number, (config, how) in enumerate(stages, 1):
-        made = settings(*more, *how, "data.parts=[]", config=config)
+        made = settings(*more, *how, "data.parts=[]", "model.dtype=float32", config=config)
         result = train(made, model, [blind.path], tmp_path / config)
         assert number == 1 or result.first_loss == pytest.approx(loss, rel=1e-5)
         assert result.loss < result.first_loss

@@ -63,11 +63,13 @@ def test_every_job_is_done_once_and_those_that_kill_are_given_up(machines):
     jobs = [*range(40), "die", *range(40, 80), "raise"]
     results = list(machines.run_jobs(ray_jobs.Troubled, jobs, workers=2))
     lost = {job: result for job, result in results if isinstance(result, LostJob)}
-    assert {job: result.tries for job, result in lost.items()} == {"die": 3, "raise": 3}
-    assert lost["raise"].why == "KeyError: 'no such thing'"
+    assert lost.keys() == {"die", "raise"}
+    assert (lost["raise"].tries, lost["raise"].why) == (3, "KeyError: 'no such thing'")
+    # Ray may call a worker that has just died unavailable, which does not count against its job.
+    assert 3 <= lost["die"].tries <= 5
     assert str(lost["die"]) == (
-        "the worker process died 3 times, last: The actor is dead because its worker process has "
-        "died"
+        f"the worker process died {lost['die'].tries} times, last: The actor is dead because its "
+        "worker process has died"
     )
     assert sorted(job for job, _ in results if job not in lost) == list(range(80))
     assert all(result[0] == job for job, result in results if job not in lost)
