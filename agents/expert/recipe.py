@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from math import floor
 from typing import Annotated, Any, Literal
@@ -112,6 +112,18 @@ class Recipe(BaseModel):
     def size(self) -> int:
         """How many trajectories it asks for."""
         return sum(sum(part.types.values()) for part in self.parts.values())
+
+    def only(self, parts: Sequence[str]) -> Recipe:
+        """The recipe with these parts alone; with all if none is given.
+
+        Raises:
+            ValueError: it has no such part.
+        """
+        for part in parts:
+            if part not in self.parts:
+                raise ValueError(f"unknown part {part!r}; the recipe has: {', '.join(self.parts)}")
+        chosen = {name: part for name, part in self.parts.items() if not parts or name in parts}
+        return self.model_copy(update={"parts": chosen})
 
 
 def load_recipe(name: str = DEFAULT) -> Recipe:

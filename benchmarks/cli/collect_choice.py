@@ -88,14 +88,10 @@ def chosen_recipe(name: str | None, parts: Sequence[str], kinds: Sequence[str]) 
     """The recipe, by default the paper's, with only the parts and kinds that were asked for."""
     from agents.expert.recipe import DEFAULT, load_recipe
 
-    recipe = load_recipe(DEFAULT if name is None else name)
-    for part in parts:
-        if part not in recipe.parts:
-            raise BadInput(f"unknown part {part!r}; the recipe has: {', '.join(recipe.parts)}")
-    chosen = {part: row for part, row in recipe.parts.items() if not parts or part in parts}
-    if kinds:
-        chosen = _of_kinds(chosen, kinds)
-    return recipe.model_copy(update={"parts": chosen})
+    recipe = load_recipe(DEFAULT if name is None else name).only(parts)
+    if not kinds:
+        return recipe
+    return recipe.model_copy(update={"parts": _of_kinds(recipe.parts, kinds)})
 
 
 def _of_kinds(parts: Mapping[str, Any], kinds: Sequence[str]) -> dict[str, Any]:
