@@ -5,8 +5,9 @@
 ``driver``: jobs a second that one driver keeps going, with jobs of 2 ms by a few actors and jobs of
 200 ms by 64 of them, beside what the actors alone would do. ``actors``: er-1k by the oracle in two
 processes and in one, by two actors and by one, in turn, for state and for pictures: whole
-runs, and episodes a second in the middle half, when all workers play. ``memory``: the driver's
-resident memory over 50,000 jobs.
+runs, and episodes a second in the middle half, when all workers play; and beside them processes
+that only play, with no driver: what the machine itself gains by a second one. ``memory``: the
+driver's resident memory over 50,000 jobs.
 """
 
 from __future__ import annotations
@@ -18,20 +19,23 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import click
 
-from agents import NamedAgent
+from agents import NamedAgent, make_agent
 from er_gym import __version__
+from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.cluster.actors import resident_memory
 from er_gym.rollout.cluster.session import ray_machines
 from er_gym.rollout.cluster.settings import RaySettings
 from er_gym.rollout.events import EpisodeEnded, Event
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.machines import THIS_MACHINE, Machines
+from er_gym.rollout.play import play_episode
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.rollout.runner import run
 from er_gym.tasks import load_suite
@@ -126,6 +130,10 @@ def _actors(episodes: int, picture_episodes: int, rounds: int) -> None:
             for _ in range(rounds):
                 for way, (machines, workers) in ways.items():
                     spent[way].append(_play(tasks, obs_mode, machines, workers))
+            alone = [
+                median(_only_playing(tasks, obs_mode, number) for _ in range(rounds))
+                for number in (1, 2)
+            ]
             whole = {way: median(seconds for seconds, _ in each) for way, each in spent.items()}
             speed = {way: median(rate for _, rate in each) for way, each in spent.items()}
             told = ", ".join(f"{way} {whole[way]:.1f} s ({speed[way]:.1f}/s)" for way in ways)
@@ -133,8 +141,28 @@ def _actors(episodes: int, picture_episodes: int, rounds: int) -> None:
                 f"{name}, {number} episodes: {told}; two actors are "
                 f"{speed['two actors'] / speed['one actor']:.2f} x one, two processes "
                 f"{speed['two processes'] / speed['one process']:.2f} x one; actors take "
-                f"{whole['two actors'] / whole['two processes'] - 1:+.1%} against processes"
+                f"{whole['two actors'] / whole['two processes'] - 1:+.1%} against processes; two "
+                f"processes that only play are {alone[1] / alone[0]:.2f} x one"
             )
+
+
+def _only_playing(tasks: Sequence[Any], obs_mode: str, processes: int) -> float:
+    """Episodes a second of processes that share the tasks and write nothing."""
+    context = get_context("spawn")
+    with context.Pool(processes) as pool:
+        parts = [(tasks[first::processes], obs_mode) for first in range(processes)]
+        return sum(pool.starmap(_played, parts, chunksize=1))
+
+
+def _played(tasks: Sequence[Any], obs_mode: str) -> float:
+    """Episodes a second in the middle half of some."""
+    env = EmbodiedEnv((), backend="embedded", obs_mode=obs_mode)
+    ended = []
+    for task in tasks:
+        play_episode(env, make_agent("oracle"), task, 0)
+        ended.append(time.perf_counter())
+    first, last = len(ended) // 4, 3 * len(ended) // 4
+    return (last - first) / (ended[last] - ended[first])
 
 
 def _play(
