@@ -203,7 +203,8 @@ class Local(_Settings):
         adapter: a directory with a LoRA adapter; "" for none.
         dtype, device_map, attention: arguments of ``from_pretrained``.
         batch: the largest number of episodes whose turns are generated together.
-        wait: seconds that a batch waits for further requests.
+        wait: seconds that a batch waits for further requests, where conversations cannot join it
+            later (:mod:`agents.vlm.clients.packed_rows`).
         reuse: whether what the model computed for the earlier turns of a conversation is kept for
             its next turn; it does not change a reply beyond rounding.
         actors: how many copies run on a Ray cluster (``--executor ray``) instead of in this
