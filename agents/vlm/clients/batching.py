@@ -58,7 +58,13 @@ CLOSED = Failure(CannotGoOn, "the model has been closed")
 
 
 class JobThread(ABC, Generic[Job, Result]):
-    """Does jobs from many threads in a thread of its own."""
+    """Does jobs from many threads in a thread of its own, which starts in ``__init__``: a subclass
+    sets its own attributes before.
+
+    Attributes:
+        waiting: the jobs that nobody has taken yet; None wakes the thread.
+        closed: whether :meth:`close` has been called.
+    """
 
     def __init__(self) -> None:
         self.waiting: queue.SimpleQueue[Asked[Job, Result] | None] = queue.SimpleQueue()

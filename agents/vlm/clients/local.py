@@ -295,6 +295,7 @@ class LocalClient:
         return [self._reply(row, said) for row, said in zip(rows, generated, strict=True)]
 
     def _go_on(self) -> None:
+        """Raise CannotGoOn if it must not."""
         if self._closing.is_set():
             raise CannotGoOn(CLOSED.message)
         if self._supervisor.over:

@@ -53,7 +53,7 @@ class PackedRow:
             self.draw = SeededSampling(sampling.temperature, sampling.top_p, [prompt.seed])
         self._most = len(prompt.ids) + sampling.max_tokens
         self._layers = list(prompt.kept.layers) if prompt.kept is not None else []
-        self._next_position: torch.Tensor | None = None
+        self._after_prompt = torch.empty(0)
 
     @property
     def new(self) -> list[int]:
@@ -93,14 +93,12 @@ class PackedRow:
         count = len(self.new)
         if image_token is None:
             return torch.arange(self.done, self.done + count)[None]
-        if self._next_position is None:
+        if not self.said:
             found = positions_of(model, self.prompt.ids, self.prompt.grids, image_token)
-            self._next_position = found.amax(dim=1, keepdim=True) + 1
-            self._next_position[1:] = self._next_position[1:].max()
+            self._after_prompt = found.amax(dim=1, keepdim=True) + 1
+            self._after_prompt[1:] = self._after_prompt[1:].max()
             return found[:, self.done :]
-        here = self._next_position
-        self._next_position = here + 1
-        return here
+        return self._after_prompt + self.done - len(self.prompt.ids)
 
 
 class PackedModel:

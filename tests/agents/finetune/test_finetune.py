@@ -120,9 +120,9 @@ def training_image(path: Path) -> Any:
 def test_eight_trajectories_are_learnt_by_heart(
     kind: str, models: Any, played: Collection, blind: Collection, settings: Any, tmp_path: Path
 ) -> None:
-    """In full with pictures, and with LoRA without."""
+    """In full with pictures, multiplied in bfloat16; and with LoRA without pictures."""
     family, data = ("qwen2_5_vl", played) if kind == "full" else ("qwen2", blind)
-    more = LORA if kind == "lora" else ()
+    more = LORA if kind == "lora" else ("model.dtype=bfloat16",)
     steps = ("training.epochs=32", "training.batch=2", "training.log_every=16")
     result = train(settings(*steps, *more), models(family), [data.path], tmp_path / "run")
     assert result.updates == 128
@@ -134,6 +134,7 @@ def test_eight_trajectories_are_learnt_by_heart(
             name for name in before if torch.equal(before[name], after[name][: len(before[name])])
         }
         assert same == {name for name in before if "visual" in name}
+        assert {weight.dtype for weight in after.values()} == {torch.float32}
         eyes = transformers.AutoImageProcessor.from_pretrained(result.path / "model", backend="pil")
         assert (eyes.size["shortest_edge"], eyes.size["longest_edge"]) == (784, 4704)
     else:

@@ -65,7 +65,7 @@ def test_every_job_is_done_once_and_those_that_kill_are_given_up(machines):
     lost = {job: result for job, result in results if isinstance(result, LostJob)}
     assert lost.keys() == {"die", "raise"}
     assert (lost["raise"].tries, lost["raise"].why) == (3, "KeyError: 'no such thing'")
-    # Ray may call a worker that has just died unavailable, which does not count against its job.
+    # Where Ray does not say which of its jobs a worker died of, that does not count against a job.
     assert 3 <= lost["die"].tries <= 5
     assert str(lost["die"]) == (
         f"the worker process died {lost['die'].tries} times, last: The actor is dead because its "
