@@ -119,6 +119,9 @@ def test_what_is_learnt_is_what_is_read_at_play(
         ids, labels = expanded(encoded, image_token)
         batch = collate([encoded])
         assert batch["input_ids"].tolist() == [ids.tolist()]
+        longer = replace(collate, multiple=32)([encoded])
+        assert longer["input_ids"].shape[1] == len(ids) + -len(ids) % 32
+        assert longer["labels"][0, len(ids) :].eq(-100).all()
         messages = [_message(turn, played.path) for turn in chat.turns]
         for place, turn in enumerate(chat.turns):
             if turn.role != "assistant":
