@@ -151,6 +151,9 @@ def killed(run: Callable[[], Result], place: str, at: int) -> None:
     """Run in another process, which kills itself when it comes to a place the n-th time."""
 
     def child() -> None:
+        # PyTorch makes its threads anew after a fork. Where two threads ask for them first (as
+        # transformers' loaders do), one may find none: "Invalid thread pool!".
+        torch.set_num_threads(torch.get_num_threads())
         seen = iter(range(1, 1_000))
 
         def counted(call: Any) -> Any:
