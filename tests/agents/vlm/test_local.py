@@ -1,20 +1,14 @@
-"""A real, tiny Qwen in this process: its inputs, its replies and its errors."""
+"""A real, tiny Qwen in this process: what it is shown and what it replies."""
 
 from __future__ import annotations
 
 import io
 import json
 import re
-import shutil
-import socket
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
-import numpy as np
 import pytest
 from support import one_torch_thread
 
@@ -22,163 +16,33 @@ pytest.importorskip("torch", reason="needs the extra local")
 pytest.importorskip("transformers", reason="needs the extra local")
 
 import torch
+from local_clients import (
+    BOTH_WAYS,
+    EYES,
+    LONG,
+    PATCH,
+    Clients,
+    Models,
+    at_once,
+    conversations,
+    edited,
+    picture,
+    recorded,
+    same,
+    user,
+    watched,
+)
 from PIL import Image
-from tiny_qwen import make_tiny_qwen
 
-from agents.vlm.chat import Message, ModelError, Picture, Reply
-from agents.vlm.clients.local import LocalClient, _without_thought
+from agents.vlm.chat import Message, Picture
+from agents.vlm.clients.local import _without_thought
 from agents.vlm.clients.seeded_sampling import SeededSampling
-from agents.vlm.clients.supervisor import RequestSupervisor
-from agents.vlm.settings import AgentSettings
-from er_gym.rollout.agent import CannotGoOn
-
-LONG = 60.0  # seconds; only broken code waits so long
-PATCH = {"qwen2_vl": 14, "qwen2_5_vl": 14, "qwen3_vl": 16}  # pixels a side; a token is 2 by 2
-EYES = tuple(PATCH)
-
-Conversation = tuple[Message, ...]
-Models = Callable[[str], Path]
-Clients = Callable[..., LocalClient]
 
 
 @pytest.fixture(scope="module", autouse=True)
 def one_thread() -> Iterator[None]:
     with one_torch_thread():
         yield
-
-
-@pytest.fixture(scope="session")
-def models(tmp_path_factory: pytest.TempPathFactory) -> Models:
-    """The directory of a family's model."""
-    made: dict[str, Path] = {}
-
-    def directory(family: str) -> Path:
-        if family not in made:
-            made[family] = make_tiny_qwen(tmp_path_factory.mktemp(family), family=family)
-        return made[family]
-
-    return directory
-
-
-@pytest.fixture
-def client(models: Models) -> Iterator[Clients]:
-    """Makes clients, and closes them."""
-    made: list[LocalClient] = []
-
-    def make(family: str | Path = "qwen2_5_vl", /, **changes: Any) -> LocalClient:
-        path = models(family) if isinstance(family, str) else family
-        made.append(LocalClient(str(path), settings(family, **changes)))
-        return made[-1]
-
-    yield make
-    for each in made:
-        each.close()
-
-
-def settings(family: str | Path = "qwen2_5_vl", /, **changes: Any) -> AgentSettings:
-    given: dict[str, Any] = {
-        "sees": "text" if family == "qwen2" else "pictures",
-        "sampling": {"max_tokens": 16},
-        **changes,
-    }
-    given["local"] = {"dtype": "float32", "device_map": "cpu", **changes.get("local", {})}
-    return AgentSettings.model_validate(given)
-
-
-def picture(width: int, height: int, seed: int = 0) -> Picture:
-    pixels = np.random.default_rng(seed).integers(0, 256, (height, width, 3), dtype=np.uint8)
-    file = io.BytesIO()
-    Image.fromarray(pixels).save(file, "png")
-    return Picture(file.getvalue(), "image/png", width, height)
-
-
-def user(*parts: str | Picture) -> Message:
-    return Message("user", parts)
-
-
-def conversations(family: str) -> list[Conversation]:
-    """Four that differ in length and in pictures, which a family without vision is not shown."""
-    system = Message("system", ("Find it.",))
-    talks: list[Conversation] = [
-        (system, user("You see: ", picture(300, 300, 1), " What now?")),
-        (user("Hello"),),
-        (
-            system,
-            user("First", picture(120, 90, 2), "then", picture(56, 84, 3)),
-            Message("assistant", ("open Fridge",)),
-            user(picture(200, 100, 4), "That is all."),
-        ),
-        (user("Well, well. " * 9),),
-    ]
-    if family in EYES:
-        return talks
-    return [
-        tuple(
-            Message(turn.role, tuple(part for part in turn.parts if isinstance(part, str)))
-            for turn in talk
-        )
-        for talk in talks
-    ]
-
-
-def at_once(client: LocalClient, talks: Sequence[Conversation]) -> list[Reply]:
-    """What is said when each conversation has a thread of its own."""
-    with ThreadPoolExecutor(len(talks)) as pool:
-        replies = [pool.submit(client.reply, talk, seed) for seed, talk in enumerate(talks)]
-        return [each.result(LONG) for each in replies]
-
-
-def recorded(client: LocalClient) -> list[list[int]]:
-    """The tokens of every reply from now on."""
-    replies: list[list[int]] = []
-    reply = client._reply
-
-    def noted(row: Any, said: Any) -> Reply:
-        replies.append(list(said))
-        return reply(row, said)
-
-    client._reply = noted  # type: ignore[method-assign]
-    return replies
-
-
-def watched(client: LocalClient, before: Callable[[int], object]) -> None:
-    """Call ``before`` with the number of conversations each time before the model works on some."""
-    packed = client._packed
-    if packed is not None:
-        step = packed.step
-
-        def stepped(rows: Any) -> None:
-            before(len(rows))
-            step(rows)
-
-        packed.step = stepped  # type: ignore[method-assign]
-        return
-    generate = client._model.generate
-
-    def generated(**inputs: Any) -> Any:
-        before(len(inputs["input_ids"]))
-        return generate(**inputs)
-
-    client._model.generate = generated
-
-
-BOTH_WAYS = pytest.mark.parametrize("reuse", [True, False], ids=["packed", "padded"])
-"""Step by step in one row, as on a CPU; and by ``generate``, as without ``local.reuse``."""
-
-
-def edited(
-    models: Models, to: Path, edit: Callable[[Path], object], family: str = "qwen2_5_vl"
-) -> Path:
-    """A copy of a model with something done to it."""
-    shutil.copytree(models(family), to)
-    edit(to)
-    return to
-
-
-def same(replies: Sequence[Reply], others: Sequence[Reply]) -> bool:
-    """Whether they are, but for the time that they took."""
-    plain = [[(r.text, r.reasoning, r.usage, r.finish) for r in each] for each in (replies, others)]
-    return plain[0] == plain[1]
 
 
 # -- pictures --------------------------------------------------------------------------------------
@@ -406,48 +270,6 @@ def test_the_models_own_repetition_penalty_holds(
         assert (len(set(said)) < len(said)) == often
 
 
-# -- what was saved years ago
-
-
-def as_of_2024(directory: Path) -> None:
-    """Lay a checkpoint out as transformers 4 did, and as most that can be had still are."""
-    from safetensors.torch import load_file, save_file
-
-    config = json.loads((directory / "config.json").read_text())
-    words = config.pop("text_config")
-    rope = words.pop("rope_parameters")
-    words["rope_theta"] = rope["rope_theta"]
-    words["rope_scaling"] = {"type": "mrope", "mrope_section": rope["mrope_section"]}
-    del words["dtype"]
-    config |= words | {"model_type": config["model_type"], "torch_dtype": config.pop("dtype")}
-    (directory / "config.json").write_text(json.dumps(config))
-
-    file = directory / "model.safetensors"
-    save_file({old_name(name): each for name, each in load_file(file).items()}, file)
-
-    template = directory / "chat_template.jinja"
-    (directory / "chat_template.json").write_text(
-        json.dumps({"chat_template": template.read_text()})
-    )
-    template.unlink()
-
-
-def old_name(name: str) -> str:
-    """Of a weight; that of an adapter begins with what peft puts before it."""
-    return name.replace("model.language_model.", "model.").replace("model.visual.", "visual.")
-
-
-@pytest.mark.parametrize("family", ["qwen2_vl", "qwen2_5_vl"])
-def test_a_checkpoint_of_2024_says_the_same(
-    models: Models, tmp_path: Path, client: Clients, family: str
-) -> None:
-    old = edited(models, tmp_path / "old", as_of_2024, family)
-    talks = conversations(family)
-    new = client(family)
-    assert "text_config" not in json.loads((old / "config.json").read_text())
-    assert same([client(old).reply(t, 0) for t in talks], [new.reply(t, 0) for t in talks])
-
-
 # -- thoughts --------------------------------------------------------------------------------------
 
 
@@ -483,286 +305,3 @@ def test_a_thought_that_is_cut_short_is_no_reply(client: Clients) -> None:
     assert (reply.text, reply.finish) == ("", "length")
     assert reply.reasoning
     assert 0 < reply.usage.reasoning <= reply.usage.completion
-
-
-# -- what goes wrong -------------------------------------------------------------------------------
-
-
-def without_a_weight(directory: Path) -> None:
-    from safetensors.torch import load_file, save_file
-
-    weights = load_file(directory / "model.safetensors")
-    del weights["lm_head.weight"]
-    save_file(weights, directory / "model.safetensors", {"format": "pt"})
-
-
-def with_other_eyes(directory: Path) -> None:
-    file = directory / "preprocessor_config.json"
-    file.write_text(json.dumps({"image_processor_type": "CLIPImageProcessor"}))
-
-
-@pytest.mark.parametrize(
-    ("edit", "message"),
-    [
-        (lambda d: (d / "config.json").unlink(), "cannot be loaded: "),
-        (lambda d: (d / "model.safetensors").unlink(), "cannot be loaded: OSError"),
-        (lambda d: (d / "model.safetensors").write_bytes(b"?" * 99), "cannot be loaded: "),
-        (lambda d: (d / "tokenizer.json").unlink(), "cannot be loaded: "),
-        (lambda d: (d / "preprocessor_config.json").unlink(), "cannot be loaded: "),
-        (lambda d: (d / "chat_template.jinja").unlink(), "has no chat template"),
-        (with_other_eyes, "does not process pictures as Qwen's models do (CLIPImageProcessorPil)"),
-        (without_a_weight, "1 of its weights are missing, such as lm_head.weight"),
-    ],
-)
-def test_a_broken_model(
-    models: Models, tmp_path: Path, edit: Callable[[Path], object], message: str
-) -> None:
-    path = edited(models, tmp_path / "broken", edit)
-    with pytest.raises(ValueError, match=re.escape(message)) as caught:
-        LocalClient(str(path), settings())
-    assert str(caught.value).startswith(str(path))
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"decide": "tools"}, "decide: tools needs a server"),
-        ({"local": {"dtype": "float33"}}, "cannot be loaded: "),
-        ({"local": {"attention": "none at all"}}, "cannot be loaded: "),
-        ({"local": {"device_map": "cuda:77"}}, "cannot be loaded: "),
-        ({"local": {"adapter": "nowhere"}}, "local.adapter nowhere is not an adapter"),
-    ],
-)
-def test_settings_that_do_not_fit(models: Models, changes: dict[str, Any], message: str) -> None:
-    if "adapter" in changes.get("local", {}):
-        pytest.importorskip("peft")
-    with pytest.raises(ValueError, match=re.escape(message)) as caught:
-        LocalClient(str(models("qwen2_5_vl")), settings(**changes))
-    assert "\n" not in str(caught.value)
-
-
-def test_a_model_without_vision_refuses_pictures(models: Models, client: Clients) -> None:
-    with pytest.raises(ValueError, match="has no vision; set the agent's setting sees to text"):
-        LocalClient(str(models("qwen2")), settings())
-    for family in ("qwen2", "qwen2_5_vl"):
-        with pytest.raises(CannotGoOn, match="without vision"):
-            client(family, sees="text").reply([user(picture(56, 56))], 0)
-
-
-@pytest.mark.parametrize("path", ["/nowhere/at/all", "./nowhere", "a/b/c"])
-def test_a_directory_that_is_not_there(path: str) -> None:
-    with pytest.raises(ValueError, match=f"there is no directory {path}; give one with a model"):
-        LocalClient(path, settings())
-
-
-def test_conversations_that_cannot_be_had(client: Clients) -> None:
-    model = client(local={"batch": 1})
-    broken = Picture(picture(56, 56).data[:40], "image/png", 56, 56)
-    thin = picture(3, 900)
-    cases = [
-        (user(broken), "a picture cannot be processed: "),
-        (user(thin), "a picture cannot be processed: ValueError: absolute aspect ratio"),
-        (user("x" * 16_384), "more than the 16384 of .*; lower pictures.keep"),
-        (user("<|image_pad|>"), "has 0 pictures and 1 places for them"),
-    ]
-    for message, words in cases:
-        with pytest.raises(ModelError, match=words) as caught:
-            model.reply([message], 0)
-        assert "\n" not in str(caught.value)
-    assert model.reply([user("Hello")], 0).text  # the next conversation still works
-
-
-def test_a_template_that_does_not_take_it(models: Models, tmp_path: Path, client: Clients) -> None:
-    def edit(directory: Path) -> None:
-        template = "{{ raise_exception('no system, please') }}"
-        (directory / "chat_template.jinja").write_text(template)
-
-    path = edited(models, tmp_path / "strict", edit)
-    with pytest.raises(CannotGoOn, match=r"does not accept this conversation: .*no system, please"):
-        client(path).reply([user("Hello")], 0)
-
-
-@BOTH_WAYS
-def test_what_does_not_fit_into_memory_is_halved(client: Clients, reuse: bool) -> None:
-    model = client(local={"batch": 4, "wait": LONG, "reuse": reuse})
-    sizes: list[int] = []
-
-    def cramped(count: int) -> None:
-        sizes.append(count)
-        if count > 2:
-            raise torch.cuda.OutOfMemoryError("CUDA out of memory")
-
-    watched(model, cramped)
-    talks = conversations("qwen2_5_vl")
-    replies = at_once(model, talks)
-    [failed] = [place for place, count in enumerate(sizes) if count > 2]
-    assert max(sizes[failed + 1 :]) == sizes[failed] // 2
-    alone = client(local={"batch": 1})
-    assert same(replies, [alone.reply(talk, 0) for talk in talks])
-
-
-@BOTH_WAYS
-def test_a_device_that_fails_ends_the_run(client: Clients, reuse: bool) -> None:
-    if not hasattr(torch, "AcceleratorError"):
-        pytest.skip("this torch has no error of its own for devices")
-    model = client(local={"reuse": reuse})
-
-    def fails(count: int) -> None:
-        raise torch.AcceleratorError("CUDA error: device-side assert triggered\nmore")
-
-    watched(model, fails)
-    with pytest.raises(CannotGoOn, match=r"the device failed, .*device-side assert triggered more"):
-        model.reply([user("Hello")], 0)
-
-
-@pytest.fixture
-def talkative(client: Clients) -> Callable[[bool], LocalClient]:
-    """Makes a model that talks for a minute."""
-
-    def make(reuse: bool) -> LocalClient:
-        model = client(sampling={"max_tokens": 16_000}, local={"reuse": reuse})
-        model._model.generation_config.eos_token_id, model._end_tokens = None, frozenset()
-        return model
-
-    return make
-
-
-@BOTH_WAYS
-def test_closing_stops_it_in_the_middle_of_a_reply(
-    talkative: Callable[[bool], LocalClient], reuse: bool
-) -> None:
-    model = talkative(reuse)
-    begun, said = threading.Event(), recorded(model)
-    watched(model, lambda count: begun.set())
-    with ThreadPoolExecutor(1) as pool:
-        reply = pool.submit(model.reply, [user("Hello")], 0)
-        assert begun.wait(LONG)
-        model.close()
-        with pytest.raises(CannotGoOn, match="closed"):
-            reply.result(LONG)
-    assert not said
-    with pytest.raises(CannotGoOn, match="closed"):
-        model.reply([user("Hello")], 0)
-
-
-@BOTH_WAYS
-def test_the_minutes_stop_it_in_the_middle_of_a_reply(
-    talkative: Callable[[bool], LocalClient], reuse: bool
-) -> None:
-    model = talkative(reuse)
-    model._supervisor = RequestSupervisor(max_minutes=0.5 / 60)
-    said = recorded(model)
-    with pytest.raises(CannotGoOn, match="the minutes are over; run the same command again"):
-        model.reply([user("Hello")], 0)
-    assert not said
-
-
-def test_a_directory_needs_no_network(client: Clients, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*where: Any) -> None:
-        raise AssertionError(f"a connection to {where[1:]}")
-
-    monkeypatch.setattr(socket.socket, "connect", refuse)
-    monkeypatch.setattr(socket, "getaddrinfo", refuse)
-    assert client().reply([user("Hello", picture(56, 56))], 0).usage.completion
-
-
-# -- identity and adapters -------------------------------------------------------------------------
-
-
-def test_identity(models: Models, client: Clients, tmp_path: Path) -> None:
-    mine = client().identity
-    assert json.loads(mine)["dtype"] == "torch.float32"
-    assert client(local={"batch": 3, "wait": 1.0}).identity == mine
-    others = [
-        client(seed=1).identity,
-        client(sampling={"max_tokens": 17}).identity,
-        client(pictures={"max_pixels": 100_000}).identity,
-        client(local={"dtype": "bfloat16"}).identity,
-        client("qwen2_vl").identity,
-    ]
-    copy = edited(models, tmp_path / "copy", lambda directory: None)
-    others.append(client(copy).identity)
-    (copy / "generation_config.json").touch()
-    others.append(client(copy).identity)
-    assert len({mine, *others}) == 1 + len(others)
-
-
-def adapter(base: Path, to: Path) -> Path:
-    """A LoRA adapter that is not without effect."""
-    import peft
-    from transformers import AutoModelForImageTextToText
-
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(0)
-        model = AutoModelForImageTextToText.from_pretrained(base)
-        config = peft.LoraConfig(
-            r=4,
-            target_modules=["q_proj", "v_proj"],
-            init_lora_weights=False,
-            task_type="CAUSAL_LM",
-        )
-        peft.get_peft_model(model, config).save_pretrained(to)
-    return to
-
-
-def test_an_adapter_changes_what_is_said(models: Models, client: Clients, tmp_path: Path) -> None:
-    pytest.importorskip("peft", reason="adapters need peft")
-    path = adapter(models("qwen2_5_vl"), tmp_path / "adapter")
-    talks = conversations("qwen2_5_vl")
-    plain = client(local={"batch": 1})
-    tuned = client(local={"batch": 1, "adapter": str(path)})
-    assert tuned.identity != plain.identity
-    replies = [tuned.reply(talk, 0) for talk in talks]
-    for talk, reply in zip(talks, replies, strict=True):
-        assert plain.reply(talk, 0).text != reply.text
-    together = client(local={"batch": 4, "wait": LONG, "adapter": str(path)})
-    assert same(at_once(together, talks), replies)
-
-
-def test_an_adapters_directory_is_a_model(models: Models, client: Clients, tmp_path: Path) -> None:
-    pytest.importorskip("peft", reason="adapters need peft")
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "finetune.json").write_text("{}")
-    path = adapter(models("qwen2_5_vl"), tmp_path / "run" / "model")
-    talk = conversations("qwen2_5_vl")[2]
-    said = [client(local={"adapter": str(path)}).reply(talk, 0)]
-    assert same([client(path).reply(talk, 0)], said)
-    assert same([client(tmp_path / "run").reply(talk, 0)], said)
-
-
-def test_an_adapter_of_2024_says_the_same(models: Models, client: Clients, tmp_path: Path) -> None:
-    pytest.importorskip("peft", reason="adapters need peft")
-    from safetensors.torch import load_file, save_file
-
-    path = adapter(models("qwen2_5_vl"), tmp_path / "adapter")
-    talk = conversations("qwen2_5_vl")[2]
-    said = [client(local={"adapter": str(path)}).reply(talk, 0)]
-    file = path / "adapter_model.safetensors"
-    weights = load_file(file)
-    save_file({old_name(name): each for name, each in weights.items()}, file)
-    assert set(load_file(file)).isdisjoint(weights)
-    assert same([client(local={"adapter": str(path)}).reply(talk, 0)], said)
-
-
-def test_an_adapter_that_does_not_fit(models: Models, tmp_path: Path) -> None:
-    pytest.importorskip("peft", reason="adapters need peft")
-    from safetensors.torch import load_file, save_file
-
-    path = adapter(models("qwen2_5_vl"), tmp_path / "adapter")
-    file = path / "adapter_model.safetensors"
-    weights = load_file(file)
-    name = next(iter(weights))
-    cases = {
-        "size": weights | {name: torch.zeros(4, 99)},
-        "absent": {each: weight for each, weight in weights.items() if each != name},
-    }
-    for case, changed in cases.items():
-        save_file(changed, file)
-        with pytest.raises(ValueError, match="does not fit the model: ") as caught:
-            LocalClient(str(models("qwen2_5_vl")), settings(local={"adapter": str(path)}))
-        assert "\n" not in str(caught.value), case
-    config = json.loads((path / "adapter_config.json").read_text())
-    (path / "adapter_config.json").write_text(json.dumps(config | {"target_modules": ["no_proj"]}))
-    with pytest.raises(ValueError, match=r"does not fit the model: .*no_proj"):
-        LocalClient(str(models("qwen2_5_vl")), settings(local={"adapter": str(path)}))
