@@ -204,7 +204,7 @@ def _minutes(seconds: float) -> str:
 
 def _draw_losses(ladder: Climbed) -> Figure:
     """The loss of each fine-tuning over its updates."""
-    figure, axes = canvas(8.5, 3.6, f"{ladder.name}: loss of the turns that are learnt")
+    figure, axes = canvas(8.5, 3.6, f"{ladder.name}: loss of the tokens that are learnt")
     tuned = [
         phase
         for phase in plan_of(ladder.settings, ladder.path).phases
@@ -285,7 +285,7 @@ scorer. Intervals are at 95 %. Each model is the one at the end of its training;
 its evaluations. The policies of reinforcement learning are in [baselines.md](baselines.md).
 [zoo.md](zoo.md) lists the models that come with er-gym.
 
-Times are those of {machine}, with no GPU.
+Times are those of {machine}, with no GPU. Other programs used the machine meanwhile.
 
 """
 
