@@ -15,7 +15,7 @@ from agents.expert.candidates import (
     CandidateSequence,
     FixedCandidates,
 )
-from agents.expert.corrections import CorrectAfter, beginning_of
+from agents.expert.corrections import CorrectAfter, CorrectBy, beginning_of
 from agents.expert.explorer import Strength
 from agents.expert.players import Players, PlaySettings
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
@@ -189,6 +189,7 @@ def correction_strata(
     run_directory: RunDirectory,
     limit: int | None,
     after: CorrectAfter = "wrong",
+    by: CorrectBy = "expert",
 ) -> tuple[dict[tuple[str, str], Stratum], dict[str, int]]:
     """The failed episodes of a run, as candidates to be corrected.
 
@@ -196,7 +197,8 @@ def correction_strata(
         tasks: the tasks of the run's suite.
         run_directory: the run.
         limit: how many trajectories in all; None for as many as there are.
-        after: after which action the expert takes over.
+        after: after which action somebody takes over.
+        by: who takes over.
 
     Returns:
         The candidates, all in the part :data:`CORRECTIONS`; and how many episodes cannot be
@@ -225,6 +227,7 @@ def correction_strata(
                 index=len(candidates),
                 kind=CORRECTED,
                 beginning=beginning,
+                correct_by=by,
                 run=run_directory.path.resolve().name,
                 episode=episode.key,
             )

@@ -14,6 +14,9 @@ CorrectAfter: TypeAlias = Literal["wrong", "failure"]
 no key action, as in the paper (arXiv 2503.21696); or the first ``failure`` since the last key
 action, which the environment refused. Where there is none, or it leaves fewer than
 :data:`ROOM` steps, it is the first wrong one after all."""
+CorrectBy: TypeAlias = Literal["expert", "searcher"]
+"""Who takes over: the ``expert``, which knows where things are; or the ``searcher``, which knows
+the instruction and what the failed episode has seen (:mod:`agents.expert.takeover`)."""
 ROOM = 10
 """Steps that the expert needs after a failure."""
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from agents.expert.candidates import Candidate, Candidates
 from agents.expert.course import Intent, View
-from agents.expert.expert import replayed_purpose
 from agents.expert.explorer import Strength
 from agents.expert.legs import at_hand, legs_of
 from agents.expert.players import PlaySettings, header_of
@@ -21,6 +20,7 @@ from agents.expert.recorder import (
     TrajectoryRecorder,
     spoken,
 )
+from agents.expert.replayed_intents import replayed_purpose
 from agents.expert.writers.prompts import WriterPrompts
 from agents.vlm.agent import VLMAgent
 from agents.vlm.factory import AgentFactory

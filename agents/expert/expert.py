@@ -5,7 +5,7 @@ from __future__ import annotations
 from random import Random
 
 from agents.expert.course import Intent
-from agents.expert.legs import Leg, at_hand
+from agents.expert.legs import Leg
 from agents.expert.places import (
     DrawnPlaces,
     PlaceChooser,
@@ -13,10 +13,10 @@ from agents.expert.places import (
     draw_places,
     plan_of,
 )
+from agents.expert.replayed_intents import replayed_intent
 from agents.expert.task_course import GiveUp, Intents, TaskCourse
 from agents.expert.thought_kinds import Check
 from agents.scripted.searcher import search_priors
-from er_gym.data.trajectory import Purpose
 from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import same_type
@@ -175,19 +175,9 @@ class CorrectedCourse(ExpertCourse):
 
     def _replayed(self, action: Action) -> Intent:
         """The intent that a replayed action seems to have."""
-        here = at_hand(self._legs, self.view.left)
-        if here is not None:
-            self._subgoal = here[1]
-        purpose = replayed_purpose(action, self.view.held)
-        if purpose == "search" and here is not None and self._in_view(here[0].thing):
-            purpose = "approach"
-        return Intent(
-            action,
-            purpose,
-            self._subgoal,
-            plan=(action.object_type,) if action.verb == verbs.NAVIGATE else (),
-            train=False,
-        )
+        intent = replayed_intent(action, self.view, self._legs, train=False)
+        self._subgoal = intent.subgoal
+        return intent
 
     def _free_hand(self) -> Intents:
         """Put down what the wrong action took."""
@@ -201,23 +191,3 @@ class CorrectedCourse(ExpertCourse):
             if down.action in self.view.legal and (yield from self._do(down)):
                 return True
         raise GiveUp
-
-
-def replayed_purpose(action: Action, held: str) -> Purpose:
-    """Why somebody may have taken an action, given the type of the held object."""
-    if action.verb == verbs.NAVIGATE:
-        return "carry" if held else "search"
-    if action.verb == verbs.OPEN:
-        return "open to put" if held else "open to look"
-    return _PURPOSES.get(action.verb, "use")
-
-
-_PURPOSES: dict[str, Purpose] = {
-    verbs.PICKUP: "take",
-    verbs.PUT: "put",
-    verbs.TOGGLE: "switch",
-    verbs.CLOSE: "close again",
-    verbs.OBSERVE: "look around",
-    verbs.MOVE_FORWARD: "get closer",
-    verbs.END: "finish",
-}

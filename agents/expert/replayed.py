@@ -11,8 +11,7 @@ from typing import Any
 
 from agents.expert.candidates import Candidate
 from agents.expert.course import Intent, View
-from agents.expert.expert import replayed_purpose
-from agents.expert.legs import at_hand, legs_of
+from agents.expert.legs import legs_of
 from agents.expert.own_words import OwnWords, own_words
 from agents.expert.players import PlaySettings, header_of
 from agents.expert.recorder import (
@@ -22,6 +21,7 @@ from agents.expert.recorder import (
     TrajectoryRecorder,
     spoken,
 )
+from agents.expert.replayed_intents import replayed_intent
 from agents.expert.thinker import ThinkingAgent
 from agents.expert.writers.base import ThoughtWriter
 from er_gym.data.critic import check
@@ -65,24 +65,12 @@ class ReplayedCourse:
         failed: Action | None = None
         for step in self._steps:
             action = Action(step.verb, step.object_type)
-            yield self._intent(action, step.success, again=action == failed)
+            yield replayed_intent(
+                action, self.view, self._legs, train=step.success, again=action == failed
+            )
             failed = None if step.success else action
         while True:
             yield Intent(Action(verbs.END), "finish", Subgoal(), train=False)
-
-    def _intent(self, action: Action, train: bool, again: bool) -> Intent:
-        here = at_hand(self._legs, self.view.left)
-        subgoal = here[1] if here else Subgoal()
-        purpose = "retry" if again else replayed_purpose(action, self.view.held)
-        if purpose == "search" and here is not None and here[0].thing in self.view.visible:
-            purpose = "approach"
-        return Intent(
-            action,
-            purpose,
-            subgoal,
-            plan=(action.object_type,) if action.verb == verbs.NAVIGATE else (),
-            train=train,
-        )
 
 
 class QuotingAgent:

@@ -70,7 +70,14 @@ TRACKERS = ("tensorboard", "trackio")
 @click.option(
     "--spread",
     is_flag=True,
-    help="With --limit: take tasks of all types and rooms, not the first ones.",
+    help="With --limit and --skip: take tasks of all types and rooms, not the first ones.",
+)
+@click.option(
+    "--skip",
+    type=click.IntRange(min=0),
+    default=0,
+    metavar="N",
+    help="Leave out the N tasks that --limit N plays.",
 )
 @click.option(
     "--samples",
@@ -109,6 +116,7 @@ def bench(
     out: Path | None,
     limit: int | None,
     spread: bool,
+    skip: int,
     samples: int,
     task_ids: tuple[str, ...],
     types: str | None,
@@ -174,6 +182,7 @@ def bench(
             types=named("--types", types),
             shard=part,
             limit=limit,
+            skip=skip,
             spread=spread,
             set_aside=aside,
         )

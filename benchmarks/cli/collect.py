@@ -34,7 +34,7 @@ from benchmarks.cli.terminal import stdout, terminal
 
 if TYPE_CHECKING:
     from agents.expert.collect import CollectSettings, CollectSummary, Stratum
-    from agents.expert.corrections import CorrectAfter
+    from agents.expert.corrections import CorrectAfter, CorrectBy
     from agents.expert.players import Players
     from agents.expert.recipe import Recipe
     from agents.expert.writers.registry import NamedWriter
@@ -110,6 +110,12 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
     "after the first that failed since the last key action.  [default: wrong, as in the paper]",
 )
 @click.option(
+    "--correct-by",
+    type=click.Choice(("expert", "searcher")),
+    help="With --correct: who takes over. The searcher knows no more than the failed agent did.  "
+    "[default: expert]",
+)
+@click.option(
     "--allow-empty",
     is_flag=True,
     help="With --select and --correct: end well also if no episode can be taken.",
@@ -137,6 +143,7 @@ def collect(
     height: int | None,
     correct: Path | None,
     correct_after: CorrectAfter | None,
+    correct_by: CorrectBy | None,
     allow_empty: bool,
     seed: int,
     executor_options: ExecutorOptions,
@@ -196,8 +203,9 @@ def collect(
             env["instances"] = instances
         source = chosen_tasks(source, named("--types", types), named("--scenes", scenes))
         fitted = fitted_tasks(source, env["backend"])
-        if correct is None and correct_after is not None:
-            raise BadInput("--correct-after is for --correct RUN; leave it out")
+        for option, given in (("--correct-after", correct_after), ("--correct-by", correct_by)):
+            if correct is None and given is not None:
+                raise BadInput(f"{option} is for --correct RUN; leave it out")
         if correct is not None:
             _refuse_recipe({"--recipe": recipe, "--parts": parts, "--kinds": kinds})
         elif selection is None:
@@ -215,14 +223,15 @@ def collect(
             table=thoughts,
             has_pictures=not no_pictures,
             stated_too=(selection.stated if selection else {})
-            | ({"correct_after": correct_after} if correct_after == "failure" else {}),
+            | ({"correct_after": correct_after} if correct_after == "failure" else {})
+            | ({"correct_by": correct_by} if correct_by == "searcher" else {}),
         )
         if selection is not None:
             screening, strata = selection.strata(settings.tasks, limit, seed, allow_empty)
             left_out: dict[str, int] = {}
         else:
-            after = correct_after or "wrong"
-            strata, left_out = _strata(settings, correct, after, limit, model, allow_empty)
+            how = correct_after or "wrong", correct_by or "expert"
+            strata, left_out = _strata(settings, correct, how, limit, model, allow_empty)
         make_writer = _make_writer(writer)
     report_set_aside(source.name, fitted.set_aside, fitted.substitutions)
     for reason, number in left_out.items():
@@ -376,12 +385,21 @@ def _name_of(run: Path) -> str:
 def _strata(
     settings: CollectSettings,
     correct: Path | None,
-    after: CorrectAfter,
+    how: tuple[CorrectAfter, CorrectBy],
     limit: int | None,
     model: ExpertRun | None,
     allow_empty: bool,
 ) -> tuple[dict[tuple[str, str], Stratum], dict[str, int]]:
-    """The candidates, and how many failed episodes are left out, by the reason."""
+    """The candidates, and how many failed episodes are left out, by the reason.
+
+    Args:
+        settings: of the collection.
+        correct: the run whose failures are corrected; None for a recipe.
+        how: after which action somebody takes over, and who.
+        limit: how many trajectories in all.
+        model: the expert's, if it is one.
+        allow_empty: whether a run may have nothing to correct.
+    """
     from agents.expert.collect import correction_strata, recipe_strata
     from er_gym.rollout.run_directory import RunDirectory
 
@@ -393,7 +411,7 @@ def _strata(
             for stratum in wanted.values():
                 stratum.sequence = ModelCandidates(stratum.sequence, model.run.name)
         return wanted, {}
-    strata, left_out = correction_strata(settings.tasks, RunDirectory.open(correct), limit, after)
+    strata, left_out = correction_strata(settings.tasks, RunDirectory.open(correct), limit, *how)
     if not (strata or allow_empty):
         why = "; ".join(f"{number} x {reason}" for reason, number in left_out.items())
         raise BadInput(f"{correct} has no episode that can be corrected ({why or 'it is empty'})")

@@ -144,6 +144,7 @@ class _Ladder:
                 f"sampling.top_p={sample.top_p}",
                 faults=sample.faults,
                 samples=sample.samples,
+                skip=sample.skip,
             )
             if stage == STAGES[2]:
                 yield self._corrected(f"{number}/correct", f"data/{number}-corrected", run, sample)
@@ -154,11 +155,12 @@ class _Ladder:
                         f"samples/{name}",
                         sample,
                     )
-            else:
+            if stage != STAGES[2] or sample.successes:
                 yield make.phase(
                     f"{number}/select",
                     f"data/{number}-selected",
                     *("collect", "--select", make.at(run), "--allow-empty"),
+                    *(("--keep-failed",) * sample.successes),
                     *(("--rewrite-thoughts",) * sample.rewrite_thoughts),
                     *make.collecting(sample.limit),
                 )
@@ -172,6 +174,7 @@ class _Ladder:
             out,
             *("collect", "--correct", self.make.at(run), "--allow-empty"),
             *(("--correct-after", "failure") if sample.correct_after == "failure" else ()),
+            *(("--correct-by", sample.correct_by) if sample.correct_by != "expert" else ()),
             *self.make.collecting(sample.limit),
         )
 

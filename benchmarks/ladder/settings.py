@@ -8,7 +8,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import Field, field_validator, model_validator
 
 from agents import configs
-from agents.expert.corrections import CorrectAfter
+from agents.expert.corrections import CorrectAfter, CorrectBy
 from agents.finetune.settings import STAGES, Stage
 from benchmarks.plan.settings import Collected, PlaySettings, Positive, StrictSettings, Taught
 
@@ -61,24 +61,32 @@ class Sampled(StrictSettings):
 
     Attributes:
         tasks: how many tasks, spread over the suite.
+        skip: how many tasks are left out first, in the same order: those that an earlier stage
+            learnt from. A model seldom fails at what it has learnt.
         samples: how many episodes of each.
         temperature, top_p: of the model's replies.
         faults: the rate at which actions fail (:mod:`er_gym.envs.faults`).
         limit: the most trajectories that are taken; None for all.
         correct_after: of its failures, after which action the expert takes over
             (:data:`agents.expert.corrections.CorrectAfter`).
+        correct_by: who takes over (:data:`agents.expert.corrections.CorrectBy`).
+        successes: in the third stage, whether its successes are learnt from, too; those with
+            failed actions among them, but for the failed turns.
         earlier: whether the failures among the samples of earlier stages are corrected, too.
         rewrite_thoughts: whether the thoughts of its successes are written anew, since those of a
             weak model are often wrong.
     """
 
     tasks: Positive
+    skip: int = Field(0, ge=0)
     samples: Positive = 1
     temperature: float = Field(1.0, ge=0)
     top_p: float = Field(1.0, gt=0, le=1)
     faults: float = Field(0.0, ge=0, le=1)
     limit: Positive | None = None
     correct_after: CorrectAfter = "wrong"
+    correct_by: CorrectBy = "expert"
+    successes: bool = False
     earlier: bool = False
     rewrite_thoughts: bool = False
 
@@ -162,12 +170,17 @@ class LadderSettings(PlaySettings):
                 raise ValueError(f"{name} has no model before it; let it collect, not sample")
             if name == STAGES[2] and stage.sample and stage.sample.rewrite_thoughts:
                 raise ValueError(f"{name} puts failures right; leave out rewrite_thoughts")
-            sample = stage.sample
-            if name != STAGES[2] and sample and (sample.earlier or sample.correct_after != "wrong"):
-                raise ValueError(f"{name} corrects nothing; leave out earlier and correct_after")
+            if name != STAGES[2] and stage.sample and (given := _of_corrections(stage.sample)):
+                raise ValueError(f"{name} corrects nothing; leave out {' and '.join(given)}")
             if not (stage.collect or stage.teacher or stage.sample):
                 raise ValueError(f"{name} learns from nothing; give it collect, teacher or sample")
         return self
+
+
+def _of_corrections(sample: Sampled) -> list[str]:
+    """The settings that only a stage with corrections may have and that differ from the default."""
+    names = ("correct_after", "correct_by", "successes", "earlier")
+    return [name for name in names if getattr(sample, name) != Sampled.model_fields[name].default]
 
 
 def ladder_names() -> tuple[str, ...]:

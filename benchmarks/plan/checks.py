@@ -47,6 +47,13 @@ def _types_of(suite: str) -> frozenset[str]:
     return frozenset(task.type.name for task in load_suite(suite).tasks)
 
 
+def check_skip(suite: str, skip: int) -> None:
+    """Whether a suite has tasks after those that are skipped."""
+    number = len(load_suite(suite).tasks)
+    if skip >= number:
+        raise ValueError(f"{suite} has {number} tasks; skip fewer than {skip}")
+
+
 def check_recipe(collected: Collected) -> None:
     """Whether there is a recipe, with these parts."""
     load_recipe(collected.recipe).only(collected.parts)

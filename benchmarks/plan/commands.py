@@ -65,6 +65,7 @@ class Commands:
                 run,
                 *self._bench(taught.agent, self.settings.suite, taught.tasks),
                 *("--samples", str(taught.samples), "--workers", str(self.settings.workers)),
+                *(("--faults", str(taught.faults)) if taught.faults else ()),
                 checks=(
                     partial(checks.check_tasks, self.settings, self.settings.suite),
                     partial(checks.check_agent, taught.agent),
@@ -74,6 +75,7 @@ class Commands:
                 names[1],
                 out,
                 *("collect", "--select", self.at(run), "--balance", "none"),
+                *(("--keep-failed",) if taught.faults else ()),
                 *self.collecting(taught.limit),
             ),
         ]
@@ -138,6 +140,7 @@ class Commands:
         *changes: str,
         faults: float = 0.0,
         samples: int | None = None,
+        skip: int = 0,
     ) -> Phase:
         """Lets a model play; ``changes`` are overrides of the agent's settings."""
         return self.phase(
@@ -147,10 +150,12 @@ class Commands:
             *("--concurrency", str(self.settings.concurrency)),
             *_overrides(*self.settings.play),
             *(() if samples is None else ("--samples", str(samples))),
+            *(("--skip", str(skip)) if skip else ()),
             *(("--faults", str(faults)) if faults else ()),
             *_overrides(*changes),
             checks=(
                 partial(checks.check_tasks, self.settings, suite),
+                partial(checks.check_skip, suite, skip),
                 partial(checks.check_model_play, (*self.settings.play, *changes)),
             ),
         )

@@ -40,12 +40,15 @@ class Taught(StrictSettings):
         agent: as ``er-gym bench`` takes it, such as ``searcher``.
         tasks: how many tasks, spread over the suite.
         samples: how many episodes of each.
+        faults: the rate at which actions fail (:mod:`er_gym.envs.faults`). Episodes with failed
+            actions are taken, too; the failed turns are not learnt from.
         limit: the most trajectories that are taken; None for all.
     """
 
     agent: str
     tasks: Positive
     samples: Positive = 1
+    faults: float = Field(0.0, ge=0, le=1)
     limit: Positive | None = None
 
 

@@ -42,19 +42,21 @@ def select(
     types: Iterable[str] = (),
     shard: Shard | None = None,
     limit: int | None = None,
+    skip: int = 0,
     spread: bool = False,
     set_aside: Iterable[SetAsideTask] = (),
 ) -> list[Task]:
     """The tasks to play, in the suite's order.
 
     The selection starts from the named tasks (all tasks if none is named) of the named types (all
-    types if none is named). It keeps those in the shard, and of these the first ``limit``; with
-    ``spread``, the ``limit`` tasks whose ids have the lowest hashes, which are of all types and
-    rooms. A larger limit adds tasks. Tasks that were set aside are never played.
+    types if none is named). It keeps those in the shard, leaves out the first ``skip`` of these,
+    and keeps the ``limit`` after them. With ``spread`` the first tasks are those whose ids have the
+    lowest hashes, which are of all types and rooms. A larger limit adds tasks, and ``skip=n``
+    leaves out exactly what ``limit=n`` keeps. Tasks that were set aside are never played.
 
     Raises:
         ValueError: the suite has no task of a given id, or all that were named are set aside; or a
-            type is unknown, or no task is of the types.
+            type is unknown, or no task is of the types; or ``skip`` leaves none.
     """
     wanted, kinds = set(task_ids), {task_type(name).name for name in types}
     aside = [one for one in set_aside if one.task in wanted]
@@ -76,10 +78,13 @@ def select(
         raise ValueError(
             f"no task to play is of the types {', '.join(sorted(kinds))}; there are {there}"
         )
-    if spread and limit is not None:
-        kept = {task.id for task in sorted(chosen, key=lambda task: _number(task.id))[:limit]}
-        return [task for task in chosen if task.id in kept]
-    return chosen[:limit]
+    if skip and skip >= len(chosen):
+        raise ValueError(f"no task to play: all {len(chosen)} are skipped; skip fewer than {skip}")
+    end = None if limit is None else skip + limit
+    if not spread:
+        return chosen[skip:end]
+    kept = {task.id for task in sorted(chosen, key=lambda task: _number(task.id))[skip:end]}
+    return [task for task in chosen if task.id in kept]
 
 
 def _number(task_id: str) -> int:

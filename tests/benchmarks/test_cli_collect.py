@@ -223,9 +223,10 @@ def test_failed_episodes_of_a_run_are_corrected(tmp_path: Path, er_gym: ErGym) -
     code, _, told = er_gym("collect", "--correct", run, "--out", out, "--correct-after", "failure")
     assert code == 2
     assert "correct_after" in told  # the collection has others
-    code, _, told = er_gym("collect", "--suite", NAME, "--out", out, "--correct-after", "failure")
-    assert code == 2
-    assert "--correct-after is for --correct RUN" in told
+    for option, value in (("--correct-after", "failure"), ("--correct-by", "searcher")):
+        code, _, told = er_gym("collect", "--suite", NAME, "--out", out, option, value)
+        assert code == 2
+        assert f"{option} is for --correct RUN" in told
 
 
 def test_a_collection_of_nothing_is_no_success(tmp_path: Path, er_gym: ErGym) -> None:

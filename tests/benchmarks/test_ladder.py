@@ -112,6 +112,24 @@ def test_failures_of_earlier_stages_are_corrected_too(tmp_path: Path) -> None:
     assert option(earlier, "--out")[0] in option(plan["3-reflection/finetune"], "--data")
 
 
+def test_the_third_stage_learns_from_faults_and_from_what_is_new_to_the_model(
+    tmp_path: Path,
+) -> None:
+    plan = {
+        phase.name: phase.command for phase in plan_of(load_ladder("er-tiny-text"), tmp_path).phases
+    }
+    assert option(plan["3-reflection/teacher"], "--faults") == ["0.1"]
+    assert "--keep-failed" in plan["3-reflection/taught"]
+    assert "--keep-failed" not in plan["2-exploration/taught"]
+    learnt = option(plan["2-exploration/teacher"], "--limit")
+    assert option(plan["3-reflection/sample"], "--skip") == learnt
+    assert option(plan["3-reflection/correct"], "--correct-by") == ["searcher"]
+    assert "--keep-failed" in plan["3-reflection/select"]
+    data = option(plan["3-reflection/finetune"], "--data")
+    for name in ("taught", "correct", "select"):
+        assert option(plan[f"3-reflection/{name}"], "--out")[0] in data
+
+
 def test_eyes_are_taught_before_the_first_stage_and_the_blind_copy_plays_last(
     tmp_path: Path,
 ) -> None:
@@ -172,6 +190,18 @@ BAD = {
         },
         "leave out rewrite_thoughts",
     ),
+    "corrections before the third stage": (
+        {
+            "stages": {
+                **SMALL["stages"],
+                "exploration": {
+                    "sample": {"tasks": 1, "correct_by": "searcher", "successes": True},
+                    "finetune": "tiny",
+                },
+            }
+        },
+        "exploration corrects nothing; leave out correct_by and successes",
+    ),
 }
 
 
@@ -202,6 +232,10 @@ REFUSED = {
     "override": ("stages.exploration.set=[stage=x]", "2-exploration/finetune: "),
     "dialect": ("dialect=x", "base/new-model: there is no dialect 'x'"),
     "play": ("play=[sampling.heat=2]", "evaluations/1-imitation: the agent has a wrong field"),
+    "skipped tasks": (
+        "stages.exploration.sample.skip=10000",
+        "2-exploration/sample: mini has 132 tasks; skip fewer than 10000",
+    ),
     "instances": ("instances=all", "1-imitation/teacher: unknown instances 'all'"),
 }
 """What only a later phase would refuse, and what is said at once."""

@@ -140,6 +140,18 @@ def test_the_limit_is_on_what_the_shard_has(tasks):
     assert [task for task in tasks if task in more] == more
 
 
+@pytest.mark.parametrize("spread", [False, True])
+def test_what_is_skipped_is_what_the_limit_takes(tasks, spread):
+    first = select(tasks, limit=2, spread=spread)
+    rest = select(tasks, skip=2, spread=spread)
+    assert rest == [task for task in tasks if task not in first]
+    assert select(tasks, skip=1, limit=1, spread=spread) == [
+        task for task in first if task not in select(tasks, limit=1, spread=spread)
+    ]
+    with pytest.raises(ValueError, match=f"all {len(tasks)} are skipped; skip fewer than 99"):
+        select(tasks, skip=99, spread=spread)
+
+
 def test_an_unknown_task_is_named(tasks):
     with pytest.raises(ValueError, match=r"'paper-99'; ids here are such as paper-0"):
         select(tasks, task_ids=["paper-1", "paper-99"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Container, Generator, Iterable, Mapping
+from collections.abc import Container, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
@@ -91,15 +91,19 @@ class SearcherAgent:
     It uses the instruction and what the environment tells every agent: the visible and the held
     objects, the navigable and the interactable types, and the legal actions. It does not read the
     task's key actions or goal, nor which object an action affected.
+
+    Attributes:
+        goals: what the instruction asks for, in order. Set it before the first :meth:`act` to leave
+            out what is done.
     """
 
     obs_mode = "text"
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Begin an episode: read the instruction."""
-        self._goals = understand(task.instruction)
+        self.goals: Sequence[Goal] = understand(task.instruction)
         self._memory = Memory()
-        self._two_transfers = [goal.kind for goal in self._goals] == [
+        self._two_transfers = [goal.kind for goal in self.goals] == [
             instruction.PUT,
             instruction.PUT,
         ]
@@ -112,17 +116,35 @@ class SearcherAgent:
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """The next action of the plan, given the result of the last one."""
-        self._view = StepView.of(info)
-        self._update_memory()
+        self._take_result(info)
         try:
             action = next(self._steps)
         except (_OutOfSteps, StopIteration):
             action = Action(verbs.END)
-        self._repeats = self._repeats + 1 if action == self._last else 1
-        self._last = action
+        self._remember(action)
         return Decision(action, self._thought)
 
+    def watch(self, action: Action, info: Mapping[str, Any]) -> None:
+        """See another agent decide, before the first :meth:`act`: it will go on from there.
+
+        Args:
+            action: what the other agent does next.
+            info: what the environment told before.
+        """
+        self._take_result(info)
+        self._remember(action)
+
     # -- remembering -----------------------------------------------------------------------------
+
+    def _take_result(self, info: Mapping[str, Any]) -> None:
+        """Note what came of the last action."""
+        self._view = StepView.of(info)
+        self._update_memory()
+
+    def _remember(self, action: Action) -> None:
+        """Note what is done next."""
+        self._repeats = self._repeats + 1 if action == self._last else 1
+        self._last = action
 
     def _update_memory(self) -> None:
         view, memory, last = self._view, self._memory, self._last
@@ -146,7 +168,7 @@ class SearcherAgent:
     # -- the plan --------------------------------------------------------------------------------
 
     def _episode(self) -> Steps:
-        goals = self._goals
+        goals = self.goals
         for number, goal in enumerate(goals):
             yield from _DO[goal.kind](self, goal, goals[number + 1 :])
         self._thought = "Everything is done." if goals else "I do not know what to do."

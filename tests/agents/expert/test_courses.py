@@ -16,14 +16,17 @@ from agents.expert.explorer import Strength
 from agents.expert.legs import legs_of
 from agents.expert.places import candidates, draw_places, plan_of
 from agents.expert.recipe import load_recipe
+from agents.expert.takeover import goals_left
+from agents.scripted.searcher import instruction as words
 from agents.scripted.searcher import search_priors
+from agents.scripted.searcher.instruction import Goal
 from er_gym.data.course_checks import are_key_actions
 from er_gym.data.trajectory import Subgoal
 from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import same_type
-from er_gym.tasks.task import type_of_id
+from er_gym.tasks.task import KeyAction, type_of_id
 
 RECIPE = load_recipe()
 EXPERTS = RECIPE.parts["imitation"]
@@ -306,6 +309,71 @@ def test_a_correction_can_begin_after_a_failure(env: EmbodiedEnv) -> None:
         ]
         corrected += one.episode.success
     assert corrected
+
+
+def test_the_searcher_takes_over_a_failed_episode(env: EmbodiedEnv) -> None:
+    part = RECIPE.parts["corrections"]
+    corrected = 0
+    for candidate in of_each_type(part, 4):
+        failed = play(env, candidate)
+        beginning = beginning_of(failed.episode, "failure")
+        if beginning.problem:
+            continue
+        taken_over = replace(candidate, beginning=beginning, strength=None, correct_by="searcher")
+        one = play(env, taken_over)
+        cut = len(beginning.actions)
+        assert tuple(intent.action for intent in one.intents[:cut]) == beginning.actions
+        assert not any(intent.train for intent in one.intents[:cut])
+        assert all(intent.train for intent in one.intents[cut:])
+        if one.problem:
+            continue
+        assert one.episode.success
+        corrected += 1
+    assert corrected > 8
+
+
+def test_the_searcher_leaves_alone_what_is_done(env: EmbodiedEnv) -> None:
+    part = EXPERTS.model_copy(update={"kinds": {"b": 1.0}})
+    corrected = 0
+    for candidate in of_each_type(part, 6):
+        right = play(env, candidate)
+        actions = [intent.action for intent in right.intents]
+        puts = [index for index, action in enumerate(actions) if action.verb == verbs.PUT]
+        if right.problem or len(puts) < 2:
+            continue
+        begun = (*actions[: puts[0] + 1], Action(verbs.OBSERVE))
+        kind = {"kind": "corrected", "mode": "", "correct_by": "searcher"}
+        one = play(env, replace(candidate, beginning=Beginning(begun), **kind))
+        if not one.problem:
+            corrected += 1
+            taken = [step.object_id for step in one.episode.steps if step.verb == verbs.PICKUP]
+            assert len(taken) == len(set(taken))
+    assert corrected > 2
+
+
+GOALS = [
+    Goal(words.PUT, "Mug", "Shelf"),
+    Goal(words.PUT, "Cup", "Shelf"),
+    Goal(words.TOGGLE, "DeskLamp"),
+    Goal(words.FIND, "Book"),
+]
+
+
+@pytest.mark.parametrize(
+    ("done", "left"),
+    [
+        ([], GOALS),
+        ([(verbs.PICKUP, "Mug")], GOALS),
+        ([(verbs.PICKUP, "Mug"), (verbs.PUT, "Shelf")], GOALS[1:]),
+        ([(verbs.PUT, "Shelf"), (verbs.PUT, "Shelf")], GOALS[2:]),
+        ([(verbs.TOGGLE, "DeskLamp"), (verbs.NAVIGATE, "Book")], [*GOALS[:2], GOALS[3]]),
+    ],
+)
+def test_goals_are_reached_by_their_last_key_actions(
+    done: list[tuple[str, str]], left: list[Goal]
+) -> None:
+    keys = [KeyAction(verb, object_type=name) for verb, name in done]
+    assert goals_left(GOALS, keys) == left
 
 
 def test_a_correction_opens_one_container_after_another() -> None:

@@ -1,0 +1,61 @@
+"""Why somebody may have taken an action: nobody recorded it, so it is read from the task."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from agents.expert.course import Intent, View
+from agents.expert.legs import Leg, at_hand
+from er_gym.data.trajectory import Purpose, Subgoal
+from er_gym.envs.actions import Action
+from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import same_type
+
+
+def replayed_intent(
+    action: Action, view: View, legs: Sequence[Leg], *, train: bool, again: bool = False
+) -> Intent:
+    """The intent that an action seems to have.
+
+    Args:
+        action: what was done.
+        view: what the environment told before.
+        legs: of the task.
+        train: whether the turn is to be learnt from.
+        again: whether the same action has just been refused.
+    """
+    here = at_hand(legs, view.left)
+    purpose = "retry" if again else replayed_purpose(action, view.held)
+    if purpose == "search" and here is not None and _in_view(here[0].thing, view):
+        purpose = "approach"
+    return Intent(
+        action,
+        purpose,
+        here[1] if here else Subgoal(),
+        plan=(action.object_type,) if action.verb == verbs.NAVIGATE else (),
+        train=train,
+    )
+
+
+def replayed_purpose(action: Action, held: str) -> Purpose:
+    """Why somebody may have taken an action, given the type of the held object."""
+    if action.verb == verbs.NAVIGATE:
+        return "carry" if held else "search"
+    if action.verb == verbs.OPEN:
+        return "open to put" if held else "open to look"
+    return _PURPOSES.get(action.verb, "use")
+
+
+_PURPOSES: dict[str, Purpose] = {
+    verbs.PICKUP: "take",
+    verbs.PUT: "put",
+    verbs.TOGGLE: "switch",
+    verbs.CLOSE: "close again",
+    verbs.OBSERVE: "look around",
+    verbs.MOVE_FORWARD: "get closer",
+    verbs.END: "finish",
+}
+
+
+def _in_view(thing: str, view: View) -> bool:
+    return view.held != thing and any(same_type(name, thing) for name in view.visible)

@@ -1,0 +1,91 @@
+"""The searcher takes over a failed episode: it has watched, and goes on with what is left to do."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+
+from agents.expert.course import Intent, View
+from agents.expert.legs import legs_of
+from agents.expert.replayed_intents import replayed_intent
+from agents.scripted.searcher import instruction
+from agents.scripted.searcher.agent import SearcherAgent
+from agents.scripted.searcher.instruction import Goal
+from er_gym.envs.actions import Action
+from er_gym.rollout.agent import Decision
+from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import same_type
+from er_gym.tasks.task import KeyAction, Task
+
+
+class SearcherCourse:
+    """Repeats the beginning of a failed episode, then lets the searcher finish the task.
+
+    The searcher knows the instruction and what the episode has seen, as the failed agent did; it is
+    told which of its goals are done. :class:`~agents.expert.course.Course`.
+
+    Args:
+        task: the task.
+        beginning: the actions, the wrong one last.
+    """
+
+    view: View
+
+    def __init__(self, task: Task, beginning: Sequence[Action]) -> None:
+        self._task, self._beginning = task, beginning
+        self._legs = legs_of(task)
+
+    def intents(self) -> Iterator[Intent]:
+        """See :class:`~agents.expert.course.Course`."""
+        searcher = SearcherAgent()
+        searcher.reset(self._task, {}, self.view.info)
+        for action in self._beginning:
+            searcher.watch(action, self.view.info)
+            yield replayed_intent(action, self.view, self._legs, train=False)
+        searcher.goals = goals_left(searcher.goals, self._done())
+        refused: Action | None = None
+        while True:
+            decided = searcher.act({}, self.view.info)
+            assert isinstance(decided, Decision)
+            assert isinstance(decided.action, Action)
+            again = decided.action == refused
+            yield replayed_intent(decided.action, self.view, self._legs, train=True, again=again)
+            refused = None if self.view.success else decided.action
+
+    def _done(self) -> Iterator[KeyAction]:
+        """The key actions that are done. Of equal ones, any."""
+        left = Counter(self.view.left)
+        for key in self._task.key_actions:
+            if left[key]:
+                left[key] -= 1
+            else:
+                yield key
+
+
+def goals_left(goals: Iterable[Goal], done: Iterable[KeyAction]) -> list[Goal]:
+    """The goals of an instruction that are still to be reached.
+
+    A goal is reached by its last key action; each key action reaches one goal, the first that it
+    fits. Finding an object, and what an appliance does, count as open until the episode ends.
+    """
+    spent = [(key.verb, key.actual_type) for key in done]
+    left = []
+    for goal in goals:
+        verb = _LAST_ACTION.get(goal.kind, "")
+        name = goal.target if goal.kind == instruction.PUT else goal.object_type
+        found = next((one for one in spent if one[0] == verb and same_type(one[1], name)), None)
+        if found is None:
+            left.append(goal)
+        else:
+            spent.remove(found)
+    return left
+
+
+_LAST_ACTION = {
+    instruction.TAKE: verbs.PICKUP,
+    instruction.PUT: verbs.PUT,
+    instruction.TOGGLE: verbs.TOGGLE,
+    instruction.SLICE: verbs.SLICE,
+    instruction.OPEN: verbs.OPEN,
+    instruction.CLOSE: verbs.CLOSE,
+}
