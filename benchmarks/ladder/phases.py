@@ -160,7 +160,7 @@ class _Ladder:
                     f"{number}/select",
                     f"data/{number}-selected",
                     *("collect", "--select", make.at(run), "--allow-empty"),
-                    *(("--keep-failed",) * sample.successes),
+                    *(("--keep-failed", "--balance", "none") if sample.successes else ()),
                     *(("--rewrite-thoughts",) * sample.rewrite_thoughts),
                     *make.collecting(sample.limit),
                 )
