@@ -6,13 +6,15 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from er_gym.envs.actions import Action
+from er_gym.envs.info import REPEATED
 from er_gym.rollout.records import ERROR, EpisodeRecord
 from er_gym.tasks import verbs
 
 CorrectAfter: TypeAlias = Literal["wrong", "failure"]
 """After which action of a failed episode the expert takes over: the first ``wrong`` one, which did
 no key action, as in the paper (arXiv 2503.21696); or the first ``failure`` since the last key
-action, which the environment refused. Where there is none, or it leaves fewer than
+action, which the environment refused. Where the same action a fourth time ended the episode and
+nothing was refused before, it is the third time. Where there is none, or it leaves fewer than
 :data:`ROOM` steps, it is the first wrong one after all."""
 CorrectBy: TypeAlias = Literal["expert", "searcher"]
 """Who takes over: the ``expert``, which knows where things are; or the ``searcher``, which knows
@@ -63,8 +65,11 @@ def _corrected(episode: EpisodeRecord, after: CorrectAfter) -> int | None:
     did = [step.reward > 0 for step in steps]
     if after == "failure":
         last_key = max((number for number, earned in enumerate(did) if earned), default=-1)
-        # Placing the agent was a step, too.
-        for number in range(last_key + 1, min(len(steps), episode.max_steps - ROOM - 1)):
+        end = min(len(steps), episode.max_steps - ROOM - 1)  # placing the agent was a step, too
+        for number in range(last_key + 1, end):
             if not steps[number].success and steps[number].verb not in (ERROR, verbs.END):
-                return number
+                if episode.end_reason != REPEATED or number < len(steps) - 1:
+                    return number
+                if number - 1 > last_key:
+                    return number - 1
     return next((number for number, earned in enumerate(did) if not earned), None)

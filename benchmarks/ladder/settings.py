@@ -168,8 +168,10 @@ class LadderSettings(PlaySettings):
         for number, (name, stage) in enumerate(self.stages.items()):
             if not number and stage.sample:
                 raise ValueError(f"{name} has no model before it; let it collect, not sample")
-            if name == STAGES[2] and stage.sample and stage.sample.rewrite_thoughts:
-                raise ValueError(f"{name} puts failures right; leave out rewrite_thoughts")
+            if name == STAGES[2] and stage.sample and _rewrites_nothing(stage.sample):
+                raise ValueError(
+                    f"{name} puts failures right; leave out rewrite_thoughts, or set successes"
+                )
             if name != STAGES[2] and stage.sample and (given := _of_corrections(stage.sample)):
                 raise ValueError(f"{name} corrects nothing; leave out {' and '.join(given)}")
             if not (stage.collect or stage.teacher or stage.sample):
@@ -181,6 +183,11 @@ def _of_corrections(sample: Sampled) -> list[str]:
     """The settings that only a stage with corrections may have and that differ from the default."""
     names = ("correct_after", "correct_by", "successes", "earlier")
     return [name for name in names if getattr(sample, name) != Sampled.model_fields[name].default]
+
+
+def _rewrites_nothing(sample: Sampled) -> bool:
+    """Whether the third stage would take no success whose thoughts could be written anew."""
+    return sample.rewrite_thoughts and not sample.successes
 
 
 def ladder_names() -> tuple[str, ...]:

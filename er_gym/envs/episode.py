@@ -19,7 +19,7 @@ from er_gym.envs import skills
 from er_gym.envs.action_handler import ActionHandler, EpisodeSetup, Moment
 from er_gym.envs.actions import Action, AnyAction
 from er_gym.envs.faults import FaultPlan, FaultyActionHandler
-from er_gym.envs.info import Info, LegalActions
+from er_gym.envs.info import REPEATED, Info, LegalActions
 from er_gym.envs.legality import KnownTypes
 from er_gym.envs.observations import MAX_REPEATS, Memory, Observation, Situation, goal_row
 from er_gym.envs.perception import Perception
@@ -156,7 +156,7 @@ class Episode:
             return self._not_understood(text)
         self._unknown_replies = 0
         if understood == self._memory.last and self._memory.repeats >= MAX_REPEATS:
-            self.end_reason = "repeated action"
+            self.end_reason = REPEATED
             times = self._memory.repeats + 1
             feedback = (
                 f"You have tried to {understood} {times} times in a row, so the episode ends."

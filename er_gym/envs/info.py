@@ -13,6 +13,9 @@ from er_gym.envs.object_view import ObjectView
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.task import KeyAction, Task
 
+REPEATED = "repeated action"
+"""The reason why an episode is over in which the same action came a fourth time in a row."""
+
 
 class LegalActions(Sequence[Action]):
     """The actions that a mask allows, in the order of :data:`er_gym.envs.actions.ACTIONS`.

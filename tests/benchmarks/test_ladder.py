@@ -125,6 +125,7 @@ def test_the_third_stage_learns_from_faults_and_from_what_is_new_to_the_model(
     assert option(plan["3-reflection/sample"], "--skip") == learnt
     assert option(plan["3-reflection/correct"], "--correct-by") == ["searcher"]
     assert "--keep-failed" in plan["3-reflection/select"]
+    assert "--rewrite-thoughts" in plan["3-reflection/select"]
     assert option(plan["3-reflection/select"], "--balance") == ["none"]
     data = option(plan["3-reflection/finetune"], "--data")
     for name in ("taught", "correct", "select"):

@@ -102,6 +102,20 @@ def test_the_expert_can_take_over_after_a_failure() -> None:
     assert beginning_of(unusable, "failure").problem == "its first wrong reply names no action"
 
 
+def test_nobody_takes_over_an_episode_that_is_over() -> None:
+    """Where the fourth same action was refused and ended it, the third is the last."""
+    steps = ("navigate to Sink", "navigate to Shelf", "navigate to Shelf", "navigate to Shelf")
+    for last, reason, kept in (
+        ("!navigate to Shelf", "repeated action", 4),
+        ("!navigate to Shelf", "", 5),
+        ("!pickup Egg", "repeated action", 4),
+    ):
+        episode = failed(*steps, last, earned=1, max_steps=30, end_reason=reason)
+        assert len(beginning_of(episode, "failure").actions) == kept, (last, reason)
+    refused = failed(*["!pickup Egg"] * 4, max_steps=30, end_reason="repeated action")
+    assert len(beginning_of(refused, "failure").actions) == 1
+
+
 def test_some_episodes_cannot_be_corrected() -> None:
     won = failed(*KEYS, earned=3).model_copy(update={"success": True})
     garbled = failed("navigate to Sink", "error", "pickup Egg", earned=1)
