@@ -117,6 +117,10 @@ def _tasks(report: RunReport, suite: Suite) -> list[str]:
         (["--types", ",".join(types)], {"types": types}),
         (["--limit", str(number)], {"limit": number}),
         (["--limit", str(number), "--spread"], {"limit": number, "spread": True}),
+        (
+            ["--types", ",".join(types), "--limit", str(number), "--spread"],
+            {"types": types, "limit": number, "spread": True},
+        ),
     ]
     for options, selection in ways:
         chosen = [task.id for task in select(suite.tasks, **selection)]

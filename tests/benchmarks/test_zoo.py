@@ -148,6 +148,11 @@ WAYS: dict[str, tuple[list[Task], dict[str, Any], str]] = {
     "all": (list(MINI.tasks), {}, ""),
     "the first": (list(MINI.tasks[:5]), {}, "--limit 5"),
     "spread": (select(MINI.tasks, limit=5, spread=True), {}, "--limit 5 --spread"),
+    "some types, spread": (
+        select(MINI.tasks, types=["single_pickup", "single_search"], limit=5, spread=True),
+        {},
+        "--types single_pickup,single_search --limit 5 --spread",
+    ),
     "faults": (list(MINI.tasks), {"faults": 0.1}, "--faults 0.1"),
     "some faults": (
         PICKUPS, {"faults": {"open": 0.25}}, "--types single_pickup --faults open=0.25",
