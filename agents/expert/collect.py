@@ -15,7 +15,7 @@ from agents.expert.candidates import (
     CandidateSequence,
     FixedCandidates,
 )
-from agents.expert.corrections import CorrectAfter, CorrectBy, beginning_of
+from agents.expert.corrections import CorrectAfter, CorrectBy, beginnings_of
 from agents.expert.explorer import Strength
 from agents.expert.players import Players, PlaySettings
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
@@ -210,28 +210,29 @@ def correction_strata(
     begun: set[tuple[str, tuple[Action, ...]]] = set()
     for episode in run_directory.episodes():
         task = by_id.get(episode.task_id)
-        beginning = beginning_of(episode, after)
-        problem = beginning.problem if task else "its task is not among the suite's"
-        if not problem and (episode.task_id, beginning.actions) in begun:
-            problem = "another sample of its task begins alike"
-        begun.add((episode.task_id, beginning.actions))
-        if task is None or problem:
-            left_out[problem] = left_out.get(problem, 0) + 1
-            continue
-        candidates.append(
-            Candidate(
-                id=f"{episode.key}-{CORRECTED}",
-                part=CORRECTIONS,
-                actor="corrector",
-                task=task,
-                index=len(candidates),
-                kind=CORRECTED,
-                beginning=beginning,
-                correct_by=by,
-                run=run_directory.path.resolve().name,
-                episode=episode.key,
+        for beginning in beginnings_of(episode, after):
+            problem = beginning.problem if task else "its task is not among the suite's"
+            if not problem and (episode.task_id, beginning.actions) in begun:
+                problem = "another sample of its task begins alike"
+            begun.add((episode.task_id, beginning.actions))
+            if task is None or problem:
+                left_out[problem] = left_out.get(problem, 0) + 1
+                continue
+            where = f"-{len(beginning.actions)}" if after == "anywhere" else ""
+            candidates.append(
+                Candidate(
+                    id=f"{episode.key}-{CORRECTED}{where}",
+                    part=CORRECTIONS,
+                    actor="corrector",
+                    task=task,
+                    index=len(candidates),
+                    kind=CORRECTED,
+                    beginning=beginning,
+                    correct_by=by,
+                    run=run_directory.path.resolve().name,
+                    episode=episode.key,
+                )
             )
-        )
     if not candidates:
         return {}, left_out
     quota = len(candidates) if limit is None else min(limit, len(candidates))

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from random import Random
 from typing import Literal, TypeAlias
 
 from er_gym.envs.actions import Action
 from er_gym.envs.info import REPEATED
-from er_gym.rollout.records import ERROR, EpisodeRecord
+from er_gym.rollout.records import ERROR, EpisodeRecord, StepRecord
 from er_gym.tasks import verbs
 
-CorrectAfter: TypeAlias = Literal["wrong", "failure"]
+CorrectAfter: TypeAlias = Literal["wrong", "failure", "anywhere"]
 """After which action of a failed episode the expert takes over: the first ``wrong`` one, which did
 no key action, as in the paper (arXiv 2503.21696); or the first ``failure`` since the last key
 action, which the environment refused. Where the same action a fourth time ended the episode and
 nothing was refused before, it is the third time. Where there is none, or it leaves fewer than
-:data:`ROOM` steps, it is the first wrong one after all."""
+:data:`ROOM` steps, it is the first wrong one after all. Or ``anywhere``: :data:`DRAWS` actions,
+drawn at random, each the beginning of its own correction, so that the states of the failed agent
+are learnt from, as in DAgger (Ross et al. 2011, arXiv 1011.0686)."""
 CorrectBy: TypeAlias = Literal["expert", "searcher"]
 """Who takes over: the ``expert``, which knows where things are; or the ``searcher``, which knows
 the instruction and what the failed episode has seen (:mod:`agents.expert.takeover`)."""
 ROOM = 10
 """Steps that the expert needs after a failure."""
+DRAWS = 3
+"""Corrections of one episode, at most, where the expert takes over anywhere."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +47,22 @@ class Beginning:
         return len(self.actions) - 1
 
 
-def beginning_of(episode: EpisodeRecord, after: CorrectAfter = "wrong") -> Beginning:
+def beginnings_of(episode: EpisodeRecord, after: CorrectAfter = "wrong") -> list[Beginning]:
+    """The beginnings of a failed episode that are corrected; one that has a ``problem`` if none."""
+    if after != "anywhere" or episode.success or episode.error:
+        return [beginning_of(episode, "wrong" if after == "anywhere" else after)]
+    steps = episode.steps[1:]
+    end = len(steps) - 1 if episode.end_reason == REPEATED else len(steps)
+    end = min(end, episode.max_steps - ROOM - 1)  # placing the agent was a step, too
+    readable = next((n for n, one in enumerate(steps) if one.verb in (ERROR, verbs.END)), end)
+    places = range(min(readable, end))
+    if not places:
+        return [Beginning(problem="no action leaves room for a correction")]
+    drawn = Random(episode.key).sample(places, min(DRAWS, len(places)))
+    return [_until(steps, place) for place in sorted(drawn)]
+
+
+def beginning_of(episode: EpisodeRecord, after: Literal["wrong", "failure"] = "wrong") -> Beginning:
     """The actions of a failed episode up to the one that is corrected."""
     if episode.success:
         return Beginning(problem="the episode succeeded")
@@ -56,7 +77,12 @@ def beginning_of(episode: EpisodeRecord, after: CorrectAfter = "wrong") -> Begin
         return Beginning(problem="it ended too early, and nothing was wrong before")
     if any(step.verb == ERROR for step in steps[: wrong + 1]):
         return Beginning(problem="its first wrong reply names no action")
-    return Beginning(tuple(Action(step.verb, step.object_type) for step in steps[: wrong + 1]))
+    return _until(steps, wrong)
+
+
+def _until(steps: Sequence[StepRecord], last: int) -> Beginning:
+    """The actions up to the one with this index."""
+    return Beginning(tuple(Action(step.verb, step.object_type) for step in steps[: last + 1]))
 
 
 def _corrected(episode: EpisodeRecord, after: CorrectAfter) -> int | None:

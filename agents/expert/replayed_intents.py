@@ -25,24 +25,37 @@ def replayed_intent(
         again: whether the same action has just been refused.
     """
     here = at_hand(legs, view.left)
-    purpose = "retry" if again else replayed_purpose(action, view.held)
-    if purpose == "search" and here is not None and _in_view(here[0].thing, view):
+    subgoal = here[1] if here else Subgoal()
+    # What is held goes to its place; until the agent sees that, it looks for it.
+    place = subgoal.place if view.held and subgoal.thing == view.held else ""
+    sought = place or (here[0].thing if here else "")
+    purpose = replayed_purpose(action, view.held, place)
+    if again:
+        purpose = "retry"
+    elif purpose == "search" and _in_view(sought, view):
         purpose = "approach"
     return Intent(
         action,
         purpose,
-        here[1] if here else Subgoal(),
+        subgoal,
         plan=(action.object_type,) if action.verb == verbs.NAVIGATE else (),
         train=train,
     )
 
 
-def replayed_purpose(action: Action, held: str) -> Purpose:
-    """Why somebody may have taken an action, given the type of the held object."""
+def replayed_purpose(action: Action, held: str, place: str = "") -> Purpose:
+    """Why somebody may have taken an action.
+
+    Args:
+        action: what was done.
+        held: the type of the held object, ``""`` for none.
+        place: the type of where it goes; ``""`` if nobody knows.
+    """
+    brings = bool(held) and (not place or same_type(action.object_type, place))
     if action.verb == verbs.NAVIGATE:
-        return "carry" if held else "search"
+        return "carry" if brings else "search"
     if action.verb == verbs.OPEN:
-        return "open to put" if held else "open to look"
+        return "open to put" if brings else "open to look"
     return _PURPOSES.get(action.verb, "use")
 
 

@@ -105,9 +105,10 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 )
 @click.option(
     "--correct-after",
-    type=click.Choice(("wrong", "failure")),
-    help="With --correct: the expert takes over after the first action that did no key action, or "
-    "after the first that failed since the last key action.  [default: wrong, as in the paper]",
+    type=click.Choice(("wrong", "failure", "anywhere")),
+    help="With --correct: the expert takes over after the first action that did no key action; "
+    "after the first that failed since the last key action, or anywhere, at up to three actions "
+    "drawn at random.  [default: wrong, as in the paper]",
 )
 @click.option(
     "--correct-by",
@@ -223,7 +224,7 @@ def collect(
             table=thoughts,
             has_pictures=not no_pictures,
             stated_too=(selection.stated if selection else {})
-            | ({"correct_after": correct_after} if correct_after == "failure" else {})
+            | ({"correct_after": correct_after} if correct_after not in (None, "wrong") else {})
             | ({"correct_by": correct_by} if correct_by == "searcher" else {}),
         )
         if selection is not None:

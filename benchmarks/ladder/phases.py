@@ -173,7 +173,7 @@ class _Ladder:
             name,
             out,
             *("collect", "--correct", self.make.at(run), "--allow-empty"),
-            *(("--correct-after", "failure") if sample.correct_after == "failure" else ()),
+            *(("--correct-after", after) if (after := sample.correct_after) != "wrong" else ()),
             *(("--correct-by", sample.correct_by) if sample.correct_by != "expert" else ()),
             *self.make.collecting(sample.limit),
         )

@@ -6,7 +6,7 @@ import pytest
 from episodes_by_hand import make_episode, make_key, make_step
 
 from agents.expert.acceptance import PlayedCourse, rejection
-from agents.expert.corrections import beginning_of
+from agents.expert.corrections import DRAWS, beginning_of, beginnings_of
 from er_gym.envs.actions import Action
 from er_gym.rollout.records import EpisodeRecord
 
@@ -114,6 +114,38 @@ def test_nobody_takes_over_an_episode_that_is_over() -> None:
         assert len(beginning_of(episode, "failure").actions) == kept, (last, reason)
     refused = failed(*["!pickup Egg"] * 4, max_steps=30, end_reason="repeated action")
     assert len(beginning_of(refused, "failure").actions) == 1
+
+
+def test_somebody_can_take_over_anywhere() -> None:
+    """At several actions drawn at random, none of which is unusable or leaves too few steps."""
+    walk = ["navigate to Sink", "navigate to Shelf", "navigate to Bed", "pickup Egg", "open Fridge"]
+    for steps, most, reason, last in (
+        (walk, 30, "", 5),
+        (walk, 14, "max_steps", 3),
+        ([*walk, *["!pickup Egg"] * 4], 30, "repeated action", 8),
+        ([*walk, "error", *walk], 30, "", 5),
+        (["navigate to Sink", "end"], 30, "", 1),
+    ):
+        drawn = set()
+        for number in range(60):
+            episode = failed(*steps, max_steps=most, end_reason=reason, task_id=f"task-{number}")
+            begun = beginnings_of(episode, "anywhere")
+            assert begun == beginnings_of(episode, "anywhere")
+            lengths = [len(each.actions) for each in begun]
+            assert lengths == sorted(set(lengths))
+            assert len(lengths) == min(DRAWS, last)
+            wanted = [make_step(text) for text in steps[: lengths[-1]]]
+            assert begun[-1].actions == tuple(Action(one.verb, one.object_type) for one in wanted)
+            drawn |= {*lengths}
+        assert drawn == {*range(1, last + 1)}, (steps, most)
+    for episode, problem in (
+        (failed("error", "navigate to Sink"), "no action leaves room"),
+        (failed("navigate to Sink", max_steps=10), "no action leaves room"),
+        (failed("navigate to Sink", error="boom"), "the episode crashed"),
+    ):
+        (none,) = beginnings_of(episode, "anywhere")
+        assert problem in none.problem
+        assert none.actions == ()
 
 
 def test_some_episodes_cannot_be_corrected() -> None:

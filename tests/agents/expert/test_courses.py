@@ -325,6 +325,10 @@ def test_the_searcher_takes_over_a_failed_episode(env: EmbodiedEnv) -> None:
         assert tuple(intent.action for intent in one.intents[:cut]) == beginning.actions
         assert not any(intent.train for intent in one.intents[:cut])
         assert all(intent.train for intent in one.intents[cut:])
+        for intent in one.intents[cut:]:  # what is held is carried to its place and nowhere else
+            if intent.purpose == "carry" and intent.subgoal.thing:
+                place = intent.subgoal.place or intent.subgoal.thing
+                assert same_type(intent.action.object_type, place), intent
         if one.problem:
             continue
         assert one.episode.success
