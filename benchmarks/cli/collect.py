@@ -107,8 +107,8 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
     "--correct-after",
     type=click.Choice(("wrong", "failure", "anywhere")),
     help="With --correct: the expert takes over after the first action that did no key action; "
-    "after the first that failed since the last key action, or anywhere, at up to three actions "
-    "drawn at random.  [default: wrong, as in the paper]",
+    "after the first that failed since the last key action, or anywhere: after up to three "
+    "actions drawn at random, first among the refused ones.  [default: wrong, as in the paper]",
 )
 @click.option(
     "--correct-by",
