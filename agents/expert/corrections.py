@@ -25,7 +25,7 @@ CorrectBy: TypeAlias = Literal["expert", "searcher"]
 the instruction and what the failed episode has seen (:mod:`agents.expert.takeover`)."""
 ROOM = 10
 """Steps that the expert needs after a failure."""
-DRAWS = 3
+DRAWS = 6
 """Corrections of one episode, at most, where the expert takes over anywhere."""
 
 

@@ -107,7 +107,7 @@ _existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
     "--correct-after",
     type=click.Choice(("wrong", "failure", "anywhere")),
     help="With --correct: the expert takes over after the first action that did no key action; "
-    "after the first that failed since the last key action, or anywhere: after up to three "
+    "after the first that failed since the last key action, or anywhere: after up to six "
     "actions drawn at random, first among the refused ones.  [default: wrong, as in the paper]",
 )
 @click.option(
