@@ -6,6 +6,7 @@ the command would. What earlier phases make, such as a model, cannot be checked 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from functools import lru_cache
 from importlib.util import find_spec
@@ -30,9 +31,8 @@ _LIBRARIES = {"local": ("torch", "transformers"), "finetune": ("torch", "transfo
 
 def check_tasks(settings: PlaySettings, suite: str) -> None:
     """Whether a suite can be played with a plan's settings."""
-    known = _types_of(suite)
-    wanted = {task_type(name).name for name in settings.types}
-    if wanted and not wanted & known:
+    wanted = _wanted(settings)
+    if wanted and not wanted & _types_of(suite).keys():
         raise ValueError(f"{suite} has no task of the types {', '.join(sorted(wanted))}")
     stated: dict[str, Any] = {
         "width": settings.width,
@@ -43,15 +43,21 @@ def check_tasks(settings: PlaySettings, suite: str) -> None:
 
 
 @lru_cache(maxsize=8)  # most phases ask for the same
-def _types_of(suite: str) -> frozenset[str]:
-    return frozenset(task.type.name for task in load_suite(suite).tasks)
+def _types_of(suite: str) -> Counter[str]:
+    return Counter(task.type.name for task in load_suite(suite).tasks)
 
 
-def check_skip(suite: str, skip: int) -> None:
-    """Whether a suite has tasks after those that are skipped."""
-    number = len(load_suite(suite).tasks)
+def _wanted(settings: PlaySettings) -> set[str]:
+    return {task_type(name).name for name in settings.types}
+
+
+def check_skip(settings: PlaySettings, suite: str, skip: int) -> None:
+    """Whether a suite has tasks after those that are skipped, of the plan's types."""
+    wanted = _wanted(settings)
+    number = sum(many for name, many in _types_of(suite).items() if not wanted or name in wanted)
     if skip >= number:
-        raise ValueError(f"{suite} has {number} tasks; skip fewer than {skip}")
+        of_these = " of these types" if wanted else ""
+        raise ValueError(f"{suite} has {number} tasks{of_these}; skip fewer than {skip}")
 
 
 def check_recipe(collected: Collected) -> None:

@@ -64,11 +64,13 @@ class Commands:
                 names[0],
                 run,
                 *self._bench(taught.agent, self.settings.suite, taught.tasks),
+                *(("--skip", str(taught.skip)) if taught.skip else ()),
                 *("--samples", str(taught.samples), "--workers", str(self.settings.workers)),
                 *(("--faults", str(taught.faults)) if taught.faults else ()),
                 checks=(
                     partial(checks.check_tasks, self.settings, self.settings.suite),
                     partial(checks.check_agent, taught.agent),
+                    partial(checks.check_skip, self.settings, self.settings.suite, taught.skip),
                 ),
             ),
             self.phase(
@@ -155,7 +157,7 @@ class Commands:
             *_overrides(*changes),
             checks=(
                 partial(checks.check_tasks, self.settings, suite),
-                partial(checks.check_skip, suite, skip),
+                partial(checks.check_skip, self.settings, suite, skip),
                 partial(checks.check_model_play, (*self.settings.play, *changes)),
             ),
         )

@@ -39,6 +39,7 @@ class Taught(StrictSettings):
     Attributes:
         agent: as ``er-gym bench`` takes it, such as ``searcher``.
         tasks: how many tasks, spread over the suite.
+        skip: how many tasks are left out first, in the same order.
         samples: how many episodes of each.
         faults: the rate at which actions fail (:mod:`er_gym.envs.faults`). Episodes with failed
             actions are taken, too; the failed turns are not learnt from.
@@ -47,6 +48,7 @@ class Taught(StrictSettings):
 
     agent: str
     tasks: Positive
+    skip: int = Field(0, ge=0)
     samples: Positive = 1
     faults: float = Field(0.0, ge=0, le=1)
     limit: Positive | None = None

@@ -9,11 +9,12 @@ too much for it.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.data.knowledge import Knowledge, knowledge_at
-from er_gym.data.trajectory import ThoughtKind, Trajectory
+from er_gym.data.trajectory import ThoughtKind, Trajectory, Turn
 from er_gym.tasks import verbs
 
 _MOST_PLACES = 4
@@ -84,13 +85,25 @@ def note(words: NoteWords, trajectory: Trajectory, index: int) -> tuple[ThoughtK
         place
         if count == 1
         else words.times.replace("{place}", place).replace("{count}", str(count))
-        for place, count in Counter(visit.place for visit in known.visits).items()
+        for place, count in _looked(trajectory.turns[:index], known).items()
     ]
     plan = [*dict.fromkeys(known.plan)][:_MOST_PLACES]
     for text, places in ((words.looked, looked), (words.next, plan)):
         if places:
             parts.append(text.replace("{places}", ", ".join(places)))
     return kind, words.separator.join(parts)
+
+
+def _looked(before: Sequence[Turn], known: Knowledge) -> Counter[str]:
+    """How often the agent went to each place in search of what it wants, in the order of the first
+    times. A place where it was refused to go counts: a model that is small goes where it has not
+    looked, and would otherwise try the same place again."""
+    turns = {visit.turn: visit.place for visit in known.visits}
+    for number, turn in enumerate(before):
+        refused = turn.verb == verbs.NAVIGATE and not (turn.success or turn.fault)
+        if refused and turn.subgoal == known.subgoal:
+            turns.setdefault(number, turn.object_type)
+    return Counter(turns[number] for number in sorted(turns))
 
 
 def _how_far(known: Knowledge, wanted: str) -> str:

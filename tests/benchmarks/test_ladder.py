@@ -238,6 +238,10 @@ REFUSED = {
         "stages.exploration.sample.skip=10000",
         "2-exploration/sample: mini has 132 tasks; skip fewer than 10000",
     ),
+    "tasks that a teacher skips": (
+        "stages.exploration.teacher={agent: searcher, tasks: 4, skip: 500}",
+        "2-exploration/teacher: mini has 132 tasks; skip fewer than 500",
+    ),
     "instances": ("instances=all", "1-imitation/teacher: unknown instances 'all'"),
 }
 """What only a later phase would refuse, and what is said at once."""

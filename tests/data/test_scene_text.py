@@ -107,10 +107,13 @@ def test_a_note_remembers_the_goal_and_where_one_has_looked() -> None:
         ("planning", "goal pickup Egg to Sink; Egg unseen; looked Shelf; next Cabinet"),
         (
             "reflection",
-            "failed navigate to Cabinet; goal pickup Egg to Sink; Egg near; looked Shelf",
+            "failed navigate to Cabinet; goal pickup Egg to Sink; Egg near; looked Shelf, Cabinet",
         ),
-        ("verification", "goal pickup Egg to Sink; Sink unseen; looked Shelf"),
+        ("verification", "goal pickup Egg to Sink; Sink unseen; looked Shelf, Cabinet"),
     ]
+    # A fault says nothing about the place.
+    slipped = SEARCHED.model_copy(update={"fault": "dropped"})
+    assert note(TEXTS.notes, episode(FAR, slipped, END), 2)[1].endswith("looked Shelf")
 
 
 def test_a_note_counts_how_often_one_has_looked_in_a_place() -> None:
