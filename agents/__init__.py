@@ -12,7 +12,6 @@ from typing import Any
 from agents.scripted.oracle import OracleAgent
 from agents.scripted.random import RandomAgent
 from agents.scripted.searcher import SearcherAgent
-from agents.scripted.stumbler import StumblerAgent
 from agents.vlm.factory import (
     AgentFactory,
     agent_name_forms,
@@ -34,7 +33,6 @@ __all__ = [
     "OracleAgent",
     "RandomAgent",
     "SearcherAgent",
-    "StumblerAgent",
     "make_agent",
 ]
 
@@ -43,12 +41,7 @@ RL_PREFIX = "rl:"
 AGENTS: Registry[Callable[..., Agent]] = Registry(
     kind="agent",
     group="er_gym.agents",
-    own={
-        "oracle": OracleAgent,
-        "random": RandomAgent,
-        "searcher": SearcherAgent,
-        "stumbler": StumblerAgent,
-    },
+    own={"oracle": OracleAgent, "random": RandomAgent, "searcher": SearcherAgent},
     expected="an agent's class (er_gym.rollout.agent.Agent), or a function that makes an agent",
     fits=callable,
     others=f"{RL_PREFIX}RUN with a run directory of er-gym train-rl; {ZOO_PREFIX}NAME with a model "
