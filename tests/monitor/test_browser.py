@@ -70,7 +70,7 @@ def finished(page: Any) -> int:
 
 def wait_until(page: Any, enough: int) -> None:
     page.wait_for_function(
-        "enough => Number((/(\\d+) of 132/.exec(document.querySelector('#summary').innerText)"
+        "enough => Number((/(\\d+) of 132/.exec(document.querySelector('#summary')?.innerText)"
         " || [0, -1])[1]) >= enough",
         arg=enough,
         timeout=120_000,
