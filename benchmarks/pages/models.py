@@ -283,8 +283,8 @@ fail. `python -m benchmarks.pages.models` makes it from the directories of `er-g
 environment does not look at the task to choose which object a type name means, and the corrected
 scorer. Intervals are at 95 %. Each model is the one at the end of its training. What the third
 stages learn from was chosen after earlier tries had been measured with the same tasks
-([ladder.md](ladder.md) has them all). The policies of reinforcement learning are in [baselines.md](baselines.md).
-[zoo.md](zoo.md) lists the models that come with er-gym.
+([ladder.md](ladder.md) has them all). The policies of reinforcement learning are in
+[baselines.md](baselines.md). [zoo.md](zoo.md) lists the models that come with er-gym.
 
 Times are those of {machine}, with no GPU. Other programs used the machine meanwhile.
 
