@@ -17,9 +17,10 @@ CorrectAfter: TypeAlias = Literal["wrong", "failure", "anywhere"]
 no key action, as in the paper (arXiv 2503.21696); or the first ``failure`` since the last key
 action, which the environment refused. Where the same action a fourth time ended the episode and
 nothing was refused before, it is the third time. Where there is none, or it leaves fewer than
-:data:`ROOM` steps, it is the first wrong one after all. Or ``anywhere``: :data:`DRAWS` actions
-drawn at random, first among the refused ones. Each begins its own correction, so that the states of
-the failed agent are learnt from, as in DAgger (Ross et al. 2011, arXiv 1011.0686)."""
+:data:`ROOM` steps, it is the first wrong one after all. Or ``anywhere``: :data:`DRAWS` actions: the
+third time, where a fourth ended the episode; then others drawn at random, first among the refused
+ones. Each begins its own correction, so that the states of the failed agent are learnt from, as in
+DAgger (Ross et al. 2011, arXiv 1011.0686)."""
 CorrectBy: TypeAlias = Literal["expert", "searcher"]
 """Who takes over: the ``expert``, which knows where things are; or the ``searcher``, which knows
 the instruction and what the failed episode has seen (:mod:`agents.expert.takeover`)."""
@@ -58,8 +59,9 @@ def beginnings_of(episode: EpisodeRecord, after: CorrectAfter = "wrong") -> list
     places = range(min(readable, end))
     if not places:
         return [Beginning(problem="no action leaves room for a correction")]
+    third = len(steps) - 2 if episode.end_reason == REPEATED else None
     drawn = Random(episode.key).sample(places, len(places))
-    drawn.sort(key=lambda place: steps[place].success)  # stable: the refused ones come first
+    drawn.sort(key=lambda place: (place != third, steps[place].success))  # stable
     return [_until(steps, place) for place in sorted(drawn[:DRAWS])]
 
 

@@ -1,19 +1,20 @@
 """Notes: thoughts as a short memory, made from what a trajectory records of each turn.
 
-``goal pickup Apple to Fridge; Apple unseen; looked Sink, Drawer 2; next CounterTop`` says what the
-agent is after, how far it is, where it has looked (in drawers twice) and where it means to look.
-The words are a dialect's (:mod:`er_gym.data.dialects`). A small model learns such notes; prose is
-too much for it.
+``goal pickup Apple to Fridge; Apple unseen; looked Sink > Drawer 2; navigate to Drawer 2 in a row;
+next CounterTop`` says what the agent is after, how far it is, where it has looked (in drawers
+twice), how often it has just done the same, and where it means to look. The words are a dialect's
+(:mod:`er_gym.data.dialects`). A small model learns such notes; prose is too much for it.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import takewhile
 
 from pydantic import BaseModel, ConfigDict
 
-from er_gym.data.knowledge import Knowledge, knowledge_at
+from er_gym.data.knowledge import Knowledge, LastAction, knowledge_at
 from er_gym.data.trajectory import ThoughtKind, Trajectory, Turn
 from er_gym.tasks import verbs
 
@@ -31,9 +32,13 @@ class NoteWords(BaseModel):
             in the hand, within reach, in view, seen before, never seen.
         looked: where it has looked for it, ``{places}``; ``times``: how a place is named where it
             has looked more than once, with ``{place}`` and ``{count}``.
+        again: that the last ``{count}`` actions, two or more, were all ``{action}``; ``""`` where
+            notes do not count that.
         next: where it means to look, ``{places}``.
         failed: the action that failed just before, ``{action}``.
         separator: stands between the parts.
+        places_separator: stands between places. One that stands in no other list is better: a
+            small model that writes a list goes on with another that has the same words.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -47,9 +52,11 @@ class NoteWords(BaseModel):
     unseen: str
     looked: str
     times: str
+    again: str = ""
     next: str
     failed: str
     separator: str = "; "
+    places_separator: str = ", "
 
 
 def note(words: NoteWords, trajectory: Trajectory, index: int) -> tuple[ThoughtKind, str]:
@@ -87,10 +94,14 @@ def note(words: NoteWords, trajectory: Trajectory, index: int) -> tuple[ThoughtK
         else words.times.replace("{place}", place).replace("{count}", str(count))
         for place, count in _looked(trajectory.turns[:index], known).items()
     ]
-    plan = [*dict.fromkeys(known.plan)][:_MOST_PLACES]
-    for text, places in ((words.looked, looked), (words.next, plan)):
-        if places:
-            parts.append(text.replace("{places}", ", ".join(places)))
+    if looked:
+        parts.append(words.looked.replace("{places}", words.places_separator.join(looked)))
+    count = _in_a_row(known.actions)
+    if words.again and count > 1:
+        again = words.again.replace("{action}", str(known.actions[-1].action))
+        parts.append(again.replace("{count}", str(count)))
+    if plan := [*dict.fromkeys(known.plan)][:_MOST_PLACES]:
+        parts.append(words.next.replace("{places}", words.places_separator.join(plan)))
     return kind, words.separator.join(parts)
 
 
@@ -104,6 +115,12 @@ def _looked(before: Sequence[Turn], known: Knowledge) -> Counter[str]:
         if refused and turn.subgoal == known.subgoal:
             turns.setdefault(number, turn.object_type)
     return Counter(turns[number] for number in sorted(turns))
+
+
+def _in_a_row(actions: Sequence[LastAction]) -> int:
+    """How many of the last actions were the same, done or not. The environment counts them, too: it
+    ends the episode at the fourth."""
+    return sum(1 for _ in takewhile(lambda each: each.action == actions[-1].action, actions[::-1]))
 
 
 def _how_far(known: Knowledge, wanted: str) -> str:

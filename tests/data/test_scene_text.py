@@ -103,13 +103,13 @@ def test_a_note_remembers_the_goal_and_where_one_has_looked() -> None:
     assert TEXTS.notes is not None
     whole = episode(FAR, SEARCHED, NEAR, END)
     assert [note(TEXTS.notes, whole, index) for index in range(4)] == [
-        ("planning", "goal pickup Egg to Sink; Egg unseen; next Shelf, Cabinet"),
+        ("planning", "goal pickup Egg to Sink; Egg unseen; next Shelf > Cabinet"),
         ("planning", "goal pickup Egg to Sink; Egg unseen; looked Shelf; next Cabinet"),
         (
             "reflection",
-            "failed navigate to Cabinet; goal pickup Egg to Sink; Egg near; looked Shelf, Cabinet",
+            "failed navigate to Cabinet; goal pickup Egg to Sink; Egg near; looked Shelf > Cabinet",
         ),
-        ("verification", "goal pickup Egg to Sink; Sink unseen; looked Shelf, Cabinet"),
+        ("verification", "goal pickup Egg to Sink; Sink unseen; looked Shelf > Cabinet"),
     ]
     # A fault says nothing about the place.
     slipped = SEARCHED.model_copy(update={"fault": "dropped"})
@@ -120,7 +120,21 @@ def test_a_note_counts_how_often_one_has_looked_in_a_place() -> None:
     assert TEXTS.notes is not None
     other = FAR.model_copy(update={"object_type": "Cabinet"})
     whole = episode(FAR, other, FAR, NEAR)
-    assert note(TEXTS.notes, whole, 3)[1].endswith("; Egg near; looked Shelf 2, Cabinet")
+    assert note(TEXTS.notes, whole, 3)[1].endswith("; Egg near; looked Shelf 2 > Cabinet")
+
+
+def test_a_note_counts_how_often_one_has_just_done_the_same() -> None:
+    """Whatever came of it: the environment ends an episode at the fourth time."""
+    assert TEXTS.notes is not None
+    refused = FAR.model_copy(update={"success": False})
+    whole = episode(FAR, FAR, refused, SEARCHED, NEAR)
+    told = [note(TEXTS.notes, whole, index)[1] for index in range(5)]
+    assert told[1].endswith("; looked Shelf; next Shelf > Cabinet")
+    assert told[2].endswith("; looked Shelf 2; navigate to Shelf 2 in a row; next Shelf > Cabinet")
+    assert told[3].endswith("; looked Shelf 3; navigate to Shelf 3 in a row; next Cabinet")
+    assert "in a row" not in told[4]
+    without = TEXTS.notes.model_copy(update={"again": ""})
+    assert "in a row" not in note(without, whole, 2)[1]
 
 
 def test_a_model_that_decided_itself_keeps_its_own_notes() -> None:

@@ -142,6 +142,10 @@ def test_somebody_can_take_over_anywhere() -> None:
     many = failed(*walk, *["!pickup Egg", "navigate to Bed"] * DRAWS, max_steps=40)
     begun = beginnings_of(many, "anywhere")  # the refused ones come first
     assert [len(each.actions) for each in begun] == [6 + 2 * number for number in range(DRAWS)]
+    for number in range(20):  # and the last one at which the fourth of a row could be avoided
+        row = [*walk, *["!open Fridge", "pickup Egg"] * 4, *["navigate to Bed"] * 4]
+        stuck = failed(*row, max_steps=60, end_reason="repeated action", task_id=f"task-{number}")
+        assert [len(each.actions) for each in beginnings_of(stuck, "anywhere")][-1] == len(row) - 1
     for episode, problem in (
         (failed("error", "navigate to Sink"), "no action leaves room"),
         (failed("navigate to Sink", max_steps=10), "no action leaves room"),
