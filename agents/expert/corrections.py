@@ -61,7 +61,7 @@ def beginnings_of(episode: EpisodeRecord, after: CorrectAfter = "wrong") -> list
         return [Beginning(problem="no action leaves room for a correction")]
     third = len(steps) - 2 if episode.end_reason == REPEATED else None
     drawn = Random(episode.key).sample(places, len(places))
-    drawn.sort(key=lambda place: (place != third, steps[place].success))  # stable
+    drawn.sort(key=lambda place: (place != third, steps[place].success))  # else as drawn
     return [_until(steps, place) for place in sorted(drawn[:DRAWS])]
 
 

@@ -115,9 +115,9 @@ def test_failures_of_earlier_stages_are_corrected_too(tmp_path: Path) -> None:
 def test_the_third_stage_learns_from_faults_and_from_what_is_new_to_the_model(
     tmp_path: Path,
 ) -> None:
-    settings = load_ladder("er-tiny-text", ["stages.reflection.teacher.faults=0.1"])
+    settings = load_ladder("er-tiny-text", ["stages.reflection.teacher.faults=0.2"])
     plan = {phase.name: phase.command for phase in plan_of(settings, tmp_path).phases}
-    assert option(plan["3-reflection/teacher"], "--faults") == ["0.1"]
+    assert option(plan["3-reflection/teacher"], "--faults") == ["0.2"]
     assert option(plan["3-reflection/sample"], "--faults") == ["0.1"]
     assert "--keep-failed" in plan["3-reflection/taught"]
     assert "--keep-failed" not in plan["2-exploration/taught"]
