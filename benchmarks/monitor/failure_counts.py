@@ -28,7 +28,7 @@ class FailureCounts:
         Args:
             run: their directory.
             rows: its episodes.
-            seconds: no episode is begun later.
+            seconds: no second episode is begun later.
         """
         until = time.monotonic() + seconds
         failed = [row for row in rows.values() if row.outcome in ("failure", "crashed")]
@@ -40,9 +40,9 @@ class FailureCounts:
             ended = row.ended or 0.0
             if row.key in self._found and self._found[row.key][0] == ended:
                 continue
+            self._found[row.key] = ended, _failure(run, row)
             if time.monotonic() > until:
                 return
-            self._found[row.key] = ended, _failure(run, row)
 
     @property
     def done(self) -> int:
