@@ -192,8 +192,10 @@ class _Ladder:
             # No stage has told it how to converse.
             sees = () if self.settings.pictures else ("sees=text",)
             play = [f"prompts.dialect={self.settings.dialect}", *sees, *play]
+        samples = evaluation.fault_samples if faults and evaluation.fault_samples > 1 else None
+        suite, limit = evaluation.suite, evaluation.limit
         return self.make.bench_model(
-            out, out, model, evaluation.suite, evaluation.limit, *play, faults=faults
+            out, out, model, suite, limit, *play, faults=faults, samples=samples
         )
 
     def _control(self, name: Control, model: str) -> Phase:

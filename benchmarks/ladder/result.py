@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from agents.finetune.settings import STAGES
 from benchmarks.ladder.paper_rungs import PAPER
 from benchmarks.ladder.phases import Rung, rungs
 from benchmarks.ladder.settings import CONTROLS, LadderSettings
@@ -41,6 +42,8 @@ class RungResult:
         change: with faults, the difference in success to the same rung without them, paired over
             tasks; None without.
         spared: how much smaller a loss that is than the rung's before; None for the first.
+        more_repeats: the difference in repeated exploration to the first stage measured with as
+            many faults, paired over tasks; None for that stage, the base and the controls.
     """
 
     rung: Rung
@@ -51,6 +54,7 @@ class RungResult:
     gain: Estimate | None
     change: Estimate | None
     spared: Estimate | None
+    more_repeats: Estimate | None
 
 
 def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
@@ -61,6 +65,7 @@ def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
     """
     found: list[RungResult] = []
     before: dict[float, Sequence[Score]] = {}
+    first_stages: dict[float, Sequence[Score]] = {}
     plain: dict[str, Sequence[Score]] = {}
     pairs: dict[float, tuple[Sequence[Score], Sequence[Score]]] = {}
     for rung in rungs(settings):
@@ -72,6 +77,13 @@ def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
         if not scores:
             continue
         last = before.get(rung.faults)
+        more_repeats = None
+        if rung.name in STAGES:
+            if rung.faults in first_stages:
+                first = first_stages[rung.faults]
+                more_repeats = paired_difference(first, scores, "repeat_rate")
+            else:
+                first_stages[rung.faults] = scores
         change = spared = None
         if not rung.faults:
             plain[rung.name] = scores
@@ -91,6 +103,7 @@ def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
                 gain=None if last is None else paired_difference(last, scores),
                 change=change,
                 spared=spared,
+                more_repeats=more_repeats,
             )
         )
         if rung.name not in CONTROLS:
@@ -145,6 +158,13 @@ def result_tables(results: Sequence[RungResult]) -> list[Table]:
             "spared: how much smaller the loss is than that of the rung before",
         ),
     )
+    repeats = Table(
+        title="Repeated exploration, in %",
+        head=("rung", "faults", "repeated", "more", "95 %"),
+        rows=tuple(_repeats_row(each) for each in results if each.more_repeats is not None),
+        text_columns=1,
+        notes=("more: than after the first stage measured with as many faults, paired over tasks",),
+    )
     return [
         Table(
             title="The ladder, in %",
@@ -160,7 +180,7 @@ def result_tables(results: Sequence[RungResult]) -> list[Table]:
             ),
             may_turn=True,
         ),
-        *([with_faults] if with_faults.rows else []),
+        *(table for table in (with_faults, repeats) if table.rows),
         by_length,
     ]
 
@@ -190,6 +210,15 @@ def _faults_row(result: RungResult) -> tuple[str, ...]:
         *signed(result.change),
         *signed(result.spared),
         percent(result.summary["repeat_rate"].mean, 1),
+    )
+
+
+def _repeats_row(result: RungResult) -> tuple[str, ...]:
+    return (
+        result.rung.name,
+        f"{100 * result.rung.faults:g}",
+        percent(result.summary["repeat_rate"].mean, 1),
+        *signed(result.more_repeats),
     )
 
 
@@ -238,6 +267,7 @@ def _json(result: RungResult) -> dict[str, Any]:
                 ("gain", result.gain),
                 ("change", result.change),
                 ("spared", result.spared),
+                ("more_repeats", result.more_repeats),
             )
         },
         "tokens": result.tokens,

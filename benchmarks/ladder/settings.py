@@ -119,6 +119,8 @@ class Evaluation(StrictSettings):
         suite: whose rooms the training did not see.
         limit: how many tasks, spread over the suite; None for all.
         faults: fault rates of further evaluations, after the stages from the second on.
+        fault_samples: how often each task is played with faults. Other actions go wrong each time,
+            so more samples tell more exactly what faults cost.
         base: whether the model at the foot is measured, too.
         controls: who else plays the same tasks, at the end.
         set: overrides of the agent's settings.
@@ -127,6 +129,7 @@ class Evaluation(StrictSettings):
     suite: str = "er-1k"
     limit: Positive | None = None
     faults: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
+    fault_samples: Positive = 1
     base: bool = True
     controls: tuple[Control, ...] = ()
     set: tuple[str, ...] = ()

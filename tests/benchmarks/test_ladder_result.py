@@ -1,0 +1,103 @@
+"""What a ladder's tables say of faults and of repeated exploration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from statistics import mean
+
+import pytest
+from click.testing import CliRunner
+
+from benchmarks.cli.main import cli
+from benchmarks.ladder.phases import plan_of, rungs
+from benchmarks.ladder.result import RungResult, read_results, result_tables
+from benchmarks.ladder.settings import LadderSettings, load_ladder
+from benchmarks.scoring.report import load_run
+from benchmarks.scoring.scorers import CORRECTED
+
+RATE = 0.3
+PLAYERS = {"imitation": "random", "exploration": "searcher", "reflection": "oracle"}
+"""Agents that play where the stages' models would."""
+
+
+@pytest.fixture(scope="module")
+def settings() -> LadderSettings:
+    return load_ladder("tiny-text", [f"evaluation.faults=[{RATE}]", "evaluation.fault_samples=3"])
+
+
+@pytest.fixture(scope="module")
+def root(settings: LadderSettings, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A ladder's directory with real runs of few tasks."""
+    root = tmp_path_factory.mktemp("ladder")
+    for rung in rungs(settings):
+        if rung.name not in PLAYERS:
+            continue
+        command = ["bench", "--suite", "mini", "--limit", "11", "--spread"]
+        command += ["--agent", PLAYERS[rung.name], "--out", str(root / rung.run)]
+        if rung.faults:
+            command += ["--faults", str(RATE), "--samples", str(settings.evaluation.fault_samples)]
+        played = CliRunner().invoke(cli, command)
+        assert played.exit_code == 0, played.output
+    return root
+
+
+@pytest.fixture(scope="module")
+def results(settings: LadderSettings, root: Path) -> dict[tuple[str, float], RungResult]:
+    return {(each.rung.name, each.rung.faults): each for each in read_results(settings, root)}
+
+
+def by_task(root: Path, result: RungResult, metric: str) -> Mapping[str, float]:
+    scores = load_run(root / result.rung.run).scores[CORRECTED.name]
+    tasks = {each.task_id for each in scores}
+    return {
+        task: mean(float(getattr(each, metric)) for each in scores if each.task_id == task)
+        for task in tasks
+    }
+
+
+def test_only_faults_are_played_several_times(settings: LadderSettings, tmp_path: Path) -> None:
+    plan = {phase.name: phase.command for phase in plan_of(settings, tmp_path).phases}
+    assert "--samples" not in plan["evaluations/3-reflection"]
+    faulty = plan[f"evaluations/3-reflection-faults-{RATE}"]
+    assert ("--samples", "3") in [*pairwise(faulty)]
+
+
+def test_what_faults_cost_is_paired_over_tasks(
+    root: Path, results: Mapping[tuple[str, float], RungResult]
+) -> None:
+    losses = {}
+    for name in ("exploration", "reflection"):
+        without, faulty = results[name, 0.0], results[name, RATE]
+        assert faulty.summary.n == 33
+        before, after = by_task(root, without, "success"), by_task(root, faulty, "success")
+        losses[name] = mean(after[task] - before[task] for task in before)
+        assert faulty.change is not None
+        assert faulty.change.mean == pytest.approx(losses[name])
+    assert results["exploration", RATE].spared is None
+    spared = results["reflection", RATE].spared
+    assert spared is not None
+    assert spared.mean == pytest.approx(losses["reflection"] - losses["exploration"])
+    assert spared.low < spared.mean < spared.high
+    (table,) = (each for each in result_tables([*results.values()]) if "faults" in each.title)
+    assert [row[0] for row in table.rows] == ["exploration", "reflection"]
+
+
+def test_repeated_exploration_is_compared_with_the_first_stage(
+    root: Path, results: Mapping[tuple[str, float], RungResult]
+) -> None:
+    first = by_task(root, results["imitation", 0.0], "repeat_rate")
+    for name in ("exploration", "reflection"):
+        told = results[name, 0.0]
+        now = by_task(root, told, "repeat_rate")
+        assert told.more_repeats is not None
+        assert told.more_repeats.mean == pytest.approx(mean(now[t] - first[t] for t in first))
+    assert results["imitation", 0.0].more_repeats is None
+    assert results["exploration", RATE].more_repeats is None
+    (table,) = (each for each in result_tables([*results.values()]) if "Repeated" in each.title)
+    assert [row[:2] for row in table.rows] == [
+        ("exploration", "0"),
+        ("reflection", "0"),
+        ("reflection", f"{100 * RATE:g}"),
+    ]
