@@ -79,11 +79,9 @@ def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
         last = before.get(rung.faults)
         more_repeats = None
         if rung.name in STAGES:
-            if rung.faults in first_stages:
-                first = first_stages[rung.faults]
+            first = first_stages.setdefault(rung.faults, scores)
+            if first is not scores:
                 more_repeats = paired_difference(first, scores, "repeat_rate")
-            else:
-                first_stages[rung.faults] = scores
         change = spared = None
         if not rung.faults:
             plain[rung.name] = scores

@@ -28,7 +28,7 @@ class FailureCounts:
         Args:
             run: their directory.
             rows: its episodes.
-            seconds: no second episode is begun later.
+            seconds: no episode is begun later, but one is always read.
         """
         until = time.monotonic() + seconds
         failed = [row for row in rows.values() if row.outcome in ("failure", "crashed")]
