@@ -177,6 +177,31 @@ def test_a_person_plays_a_whole_task_to_success(page, serve, runs, tmp_path):
     )
 
 
+def test_news_that_are_none_do_not_take_the_focus_between_two_keys(page, serve, tmp_path):
+    """The page asks for itself when it opens; the answer comes after the first of two keys."""
+    held: list[Any] = []
+
+    def hold(route: Any) -> None:
+        if route.request.resource_type == "fetch" and route.request.method == "GET":
+            held.append(route)
+        else:
+            route.continue_()
+
+    page.goto(f"{serve(tmp_path, play=tmp_path / 'played').address}/play?suite=mini")
+    page.route(re.compile(r"/play/[^/?]+$"), hold)
+    page.click("button.main")
+    page.wait_for_selector("button[data-verb=e]")
+    page.wait_for_timeout(300)
+    assert held
+    page.keyboard.press("e")
+    for each in held:
+        with page.expect_event("requestfinished"):
+            each.continue_()
+    page.wait_for_timeout(300)
+    page.keyboard.press("Enter")
+    page.wait_for_selector("p.result.bad")
+
+
 def test_it_fits_a_telephone_in_the_dark_and_in_chinese(browser, serve, runs):
     context = browser.new_context(
         viewport={"width": 360, "height": 740}, color_scheme="dark", locale="zh-CN"

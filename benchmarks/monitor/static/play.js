@@ -6,14 +6,17 @@ if (board()) {
   const address = "/play/" + board().dataset.session;
   let sending = false, again = false;
 
-  const take = async (text) => {
+  // `news` that are none replace nothing: the focus would be lost between two keys.
+  const take = async (text, news) => {
     const page = new DOMParser().parseFromString(text, "text/html");
     if (!page.getElementById("play")) { location.reload(); return; }
     const fresh = document.importNode(page.getElementById("play"), true);
+    const newer = () => Number(fresh.dataset.version) - Number(board().dataset.version);
+    if (news && newer() <= 0) return;
     // The old pictures stay until the new ones are there.
     const pictures = [...fresh.querySelectorAll("img")].map((one) => one.decode());
     await Promise.race([Promise.allSettled(pictures), new Promise((done) => setTimeout(done, 2000))]);
-    if (Number(fresh.dataset.version) < Number(board().dataset.version)) return;
+    if (newer() < 0 || (news && newer() === 0)) return;
     // What was opened, and the focus, stay where they are.
     const open = new Set([...board().querySelectorAll(".deeds details[open]")].map((one) => one.closest("li").value));
     const pressed = document.activeElement && document.activeElement.dataset.press;
@@ -28,7 +31,7 @@ if (board()) {
     try {
       const answer = await fetch(address, { headers: { Accept: "text/html" } });
       const text = await answer.text();
-      if (sending) again = true; else await take(text);
+      if (sending) again = true; else await take(text, true);
     } catch (error) {
       // The server is away; the stream below says when it is back.
     }
@@ -42,7 +45,7 @@ if (board()) {
     try {
       const answer = await fetch(form.getAttribute("action"), { method: "POST", body: fields });
       const text = await answer.text();
-      if ((answer.headers.get("content-type") || "").startsWith("text/html")) await take(text); else location.reload();
+      if ((answer.headers.get("content-type") || "").startsWith("text/html")) await take(text, false); else location.reload();
     } catch (error) {
       delete board().dataset.busy;
     } finally {
