@@ -42,8 +42,10 @@ class RungResult:
         change: with faults, the difference in success to the same rung without them, paired over
             tasks; None without.
         spared: how much smaller a loss that is than the rung's before; None for the first.
-        more_repeats: the difference in repeated exploration to the first stage measured with as
-            many faults, paired over tasks; None for that stage, the base and the controls.
+        more_repeats: the difference in :func:`~benchmarks.scoring.metrics.repeat_rate` to the first
+            stage measured with as many faults, paired over tasks; None for that stage, the base and
+            the controls.
+        more_revisits: the same of :func:`~benchmarks.scoring.metrics.revisit_rate`.
     """
 
     rung: Rung
@@ -55,6 +57,7 @@ class RungResult:
     change: Estimate | None
     spared: Estimate | None
     more_repeats: Estimate | None
+    more_revisits: Estimate | None
 
 
 def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
@@ -77,11 +80,12 @@ def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
         if not scores:
             continue
         last = before.get(rung.faults)
-        more_repeats = None
+        more_repeats = more_revisits = None
         if rung.name in STAGES:
             first = first_stages.setdefault(rung.faults, scores)
             if first is not scores:
                 more_repeats = paired_difference(first, scores, "repeat_rate")
+                more_revisits = paired_difference(first, scores, "revisit_rate")
         change = spared = None
         if not rung.faults:
             plain[rung.name] = scores
@@ -102,6 +106,7 @@ def read_results(settings: LadderSettings, root: Path) -> list[RungResult]:
                 change=change,
                 spared=spared,
                 more_repeats=more_repeats,
+                more_revisits=more_revisits,
             )
         )
         if rung.name not in CONTROLS:
@@ -158,10 +163,14 @@ def result_tables(results: Sequence[RungResult]) -> list[Table]:
     )
     repeats = Table(
         title="Repeated exploration, in %",
-        head=("rung", "faults", "repeated", "more", "95 %"),
+        head=("rung", "faults", "repeated", "more", "95 %", "revisited", "more", "95 %"),
         rows=tuple(_repeats_row(each) for each in results if each.more_repeats is not None),
         text_columns=1,
-        notes=("more: than after the first stage measured with as many faults, paired over tasks",),
+        notes=(
+            "repeated: the share of navigations to a type visited before; revisited: to an object "
+            "visited before, so that another cabinet is new",
+            "more: than after the first stage measured with as many faults, paired over tasks",
+        ),
     )
     return [
         Table(
@@ -217,6 +226,8 @@ def _repeats_row(result: RungResult) -> tuple[str, ...]:
         f"{100 * result.rung.faults:g}",
         percent(result.summary["repeat_rate"].mean, 1),
         *signed(result.more_repeats),
+        percent(result.summary["revisit_rate"].mean, 1),
+        *signed(result.more_revisits),
     )
 
 
@@ -266,6 +277,7 @@ def _json(result: RungResult) -> dict[str, Any]:
                 ("change", result.change),
                 ("spared", result.spared),
                 ("more_repeats", result.more_repeats),
+                ("more_revisits", result.more_revisits),
             )
         },
         "tokens": result.tokens,

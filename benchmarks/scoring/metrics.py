@@ -18,7 +18,7 @@ from benchmarks.scoring.samples import effective_number, most_samples, variance_
 from benchmarks.scoring.scorers import JUDGED_BY_NAME, Scorer, Tally
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.types import task_type
-from er_gym.tasks.verbs import END
+from er_gym.tasks.verbs import END, NAVIGATE
 
 _Z = 1.959963984540054  # the 97.5 % point of the normal distribution
 
@@ -55,8 +55,22 @@ def ordered_completeness(episode: EpisodeRecord, counted: Tally) -> float:
 
 def repeat_rate(counted: Tally) -> float:
     """The share of navigations, failed ones too, that name a type navigated to before."""
-    targets = counted.navigated_to
-    return (len(targets) - len(set(targets))) / len(targets) if targets else 0.0
+    return _share_repeated(counted.navigated_to)
+
+
+def revisit_rate(episode: EpisodeRecord) -> float:
+    """The share of navigations that lead to an object navigated to before.
+
+    Where the environment goes on to the next cabinet, :func:`repeat_rate` counts a second
+    ``navigate to Cabinet`` and this does not. A navigation that was refused leads to no object: it
+    counts by its type.
+    """
+    moves = (step for step in episode.steps if step.verb == NAVIGATE)
+    return _share_repeated([move.object_id or move.object_type for move in moves])
+
+
+def _share_repeated(visited: Sequence[str]) -> float:
+    return (len(visited) - len(set(visited))) / len(visited) if visited else 0.0
 
 
 def steps_saved(episode: EpisodeRecord) -> float:
@@ -108,6 +122,7 @@ class Score:
     completeness: float
     ordered_completeness: float
     repeat_rate: float
+    revisit_rate: float
     steps_saved: float
     key_action_precision: float
     missing: tuple[str, ...]
@@ -120,6 +135,7 @@ METRICS = (
     "completeness",
     "ordered_completeness",
     "repeat_rate",
+    "revisit_rate",
     "steps_saved",
     "key_action_precision",
 )
@@ -141,6 +157,7 @@ def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
         completeness=completeness(counted),
         ordered_completeness=ordered_completeness(episode, counted),
         repeat_rate=repeat_rate(counted),
+        revisit_rate=revisit_rate(episode),
         steps_saved=steps_saved(episode),
         key_action_precision=key_action_precision(episode, counted),
         missing=tuple(missing.elements()),

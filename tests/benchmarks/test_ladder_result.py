@@ -87,12 +87,16 @@ def test_what_faults_cost_is_paired_over_tasks(
 def test_repeated_exploration_is_compared_with_the_first_stage(
     root: Path, results: Mapping[tuple[str, float], RungResult]
 ) -> None:
-    first = by_task(root, results["imitation", 0.0], "repeat_rate")
     for name in ("exploration", "reflection"):
         told = results[name, 0.0]
-        now = by_task(root, told, "repeat_rate")
-        assert told.more_repeats is not None
-        assert told.more_repeats.mean == pytest.approx(mean(now[t] - first[t] for t in first))
+        for metric, more in (
+            ("repeat_rate", told.more_repeats),
+            ("revisit_rate", told.more_revisits),
+        ):
+            first = by_task(root, results["imitation", 0.0], metric)
+            now = by_task(root, told, metric)
+            assert more is not None
+            assert more.mean == pytest.approx(mean(now[t] - first[t] for t in first))
     assert results["imitation", 0.0].more_repeats is None
     assert results["exploration", RATE].more_repeats is None
     (table,) = (each for each in result_tables([*results.values()]) if "Repeated" in each.title)

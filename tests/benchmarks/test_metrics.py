@@ -39,6 +39,7 @@ def test_a_perfect_episode(episode, scorer):
         completeness=1.0,
         ordered_completeness=1.0,
         repeat_rate=0.0,
+        revisit_rate=0.0,
         steps_saved=24 / 30,
         key_action_precision=1.0,
         missing=(),
@@ -61,6 +62,24 @@ def test_a_detour_costs_efficiency_and_repeats(episode):
     assert scored.repeat_rate == pytest.approx(2 / 5)  # a failed navigation repeats too
     assert scored.steps_saved == pytest.approx((30 - 12) / 30)
     assert scored.key_action_precision == pytest.approx(5 / 11)
+
+
+def test_the_next_cabinet_repeats_a_type_but_revisits_nothing(episode, step):
+    def cabinet(place: str) -> object:
+        return step("navigate to Cabinet").model_copy(update={"object_id": f"Cabinet|{place}"})
+
+    played = (
+        cabinet("left"),
+        cabinet("right"),
+        cabinet("left"),
+        "!navigate to Safe",
+        "!navigate to Safe",
+        "end",
+    )
+    for scorer in SCORERS.values():
+        scored = score_episode(episode(TRANSPORT, played), scorer)
+        assert scored.repeat_rate == pytest.approx(3 / 5)
+        assert scored.revisit_rate == pytest.approx(2 / 5)  # the left one and the refused Safe
 
 
 def test_failed_steps_score_nothing(episode):
@@ -147,7 +166,7 @@ def test_nothing_was_played(episode):
     crashed = episode(TRANSPORT, (), error="ValueError: no").model_copy(update={"steps": []})
     scored = score_episode(crashed, CORRECTED)
     numbers = [getattr(scored, name) for name in METRICS]
-    assert numbers == [False, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+    assert numbers == [False, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 
 
 SEARCH = ("navigate to CounterTop", "end")

@@ -13,7 +13,7 @@ def scores(*successes: bool) -> list[Score]:
         Score(
             task_id=f"task{number}", task_type="single_search", group="Search", success=success,
             search_efficiency=0.0, completeness=0.0, ordered_completeness=0.0, repeat_rate=0.0,
-            steps_saved=0.0, key_action_precision=0.0, missing=(),
+            revisit_rate=0.0, steps_saved=0.0, key_action_precision=0.0, missing=(),
         )
         for number, success in enumerate(successes)
     ]  # fmt: skip
