@@ -35,6 +35,8 @@ def root(settings: LadderSettings, tmp_path_factory: pytest.TempPathFactory) -> 
         if rung.name not in PLAYERS:
             continue
         command = ["bench", "--suite", "mini", "--limit", "11", "--spread"]
+        # In explore the next cabinet is another object, so that repeats and revisits differ.
+        command += ["--instances", "explore"]
         command += ["--agent", PLAYERS[rung.name], "--out", str(root / rung.run)]
         if rung.faults:
             command += ["--faults", str(RATE), "--samples", str(settings.evaluation.fault_samples)]

@@ -64,7 +64,7 @@ def test_a_detour_costs_efficiency_and_repeats(episode):
     assert scored.key_action_precision == pytest.approx(5 / 11)
 
 
-def test_the_next_cabinet_repeats_a_type_but_revisits_nothing(episode, step):
+def test_the_next_cabinet_repeats_a_type_but_is_no_revisit(episode, step):
     def cabinet(place: str) -> object:
         return step("navigate to Cabinet").model_copy(update={"object_id": f"Cabinet|{place}"})
 

@@ -6,17 +6,17 @@ if (board()) {
   const address = "/play/" + board().dataset.session;
   let sending = false, again = false;
 
-  // `news` that are none replace nothing: the focus would be lost between two keys.
+  // What the page asked for by itself (news) must be newer: else the focus is lost between two keys.
   const take = async (text, news) => {
     const page = new DOMParser().parseFromString(text, "text/html");
     if (!page.getElementById("play")) { location.reload(); return; }
     const fresh = document.importNode(page.getElementById("play"), true);
-    const newer = () => Number(fresh.dataset.version) - Number(board().dataset.version);
-    if (news && newer() <= 0) return;
+    const stale = () => Number(fresh.dataset.version) - Number(board().dataset.version) < (news ? 1 : 0);
+    if (stale()) return;
     // The old pictures stay until the new ones are there.
     const pictures = [...fresh.querySelectorAll("img")].map((one) => one.decode());
     await Promise.race([Promise.allSettled(pictures), new Promise((done) => setTimeout(done, 2000))]);
-    if (newer() < 0 || (news && newer() === 0)) return;
+    if (stale()) return;
     // What was opened, and the focus, stay where they are.
     const open = new Set([...board().querySelectorAll(".deeds details[open]")].map((one) => one.closest("li").value));
     const pressed = document.activeElement && document.activeElement.dataset.press;
