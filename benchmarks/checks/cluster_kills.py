@@ -2,18 +2,17 @@
 
     python -m benchmarks.checks.cluster_kills [--suite er-1k --agent searcher --kills 10]
 
-Workers and raylets are killed by SIGKILL at random moments; a killed node is replaced. The run must
-have every episode once, none crashed, and each the same but for times as a run in processes of this
-machine. With ``--head``, the head is killed in the end, and the same command must finish the run on
-a new cluster.
+Workers and raylets are killed by SIGKILL after random numbers of episodes; a killed node is
+replaced. The run must have every episode once, none crashed, and each the same but for times as a
+run in processes of this machine. With ``--head``, the head is killed in the end, and the same
+command must finish the run on a new cluster. A run that ends before all are killed says so.
 """
 
 from __future__ import annotations
 
 import json
-import os
+import math
 import random
-import signal
 import subprocess
 import sys
 import tempfile
@@ -23,7 +22,7 @@ from typing import Any
 
 import click
 
-from benchmarks.checks.ray_nodes import RayNodes, ray_nodes
+from benchmarks.checks.ray_nodes import RayNodes, kill, ray_nodes
 
 _TIMES = ("seconds",)
 
@@ -34,7 +33,7 @@ _TIMES = ("seconds",)
 @click.option("--limit", type=int)
 @click.option("--samples", default=1, show_default=True)
 @click.option("--kills", default=10, show_default=True)
-@click.option("--every", default=6.0, show_default=True, help="Seconds between kills, about.")
+@click.option("--every", default=30, show_default=True, help="Episodes between kills, about.")
 @click.option("--head", is_flag=True, help="Kill the head too, and finish on a new cluster.")
 @click.option("--seed", default=0, show_default=True)
 def main(
@@ -43,7 +42,7 @@ def main(
     limit: int | None,
     samples: int,
     kills: int,
-    every: float,
+    every: int,
     head: bool,
     seed: int,
 ) -> None:
@@ -62,7 +61,10 @@ def main(
             with ray_nodes(2) as nodes:
                 _er_gym(_on(play, folder / "there", nodes))
         there = time.perf_counter() - start
-        print(f"local processes {here:.1f} s, three nodes with kills {there:.1f} s: {killed}")
+        print(
+            f"local processes {here:.1f} s, three nodes with kills {there:.1f} s: {killed} "
+            f"killed of {kills}"
+        )
         _compare(folder / "here", folder / "there")
 
 
@@ -80,41 +82,66 @@ def play_and_kill(
     out: Path,
     nodes: RayNodes,
     kills: int,
-    every: float,
+    every: int,
     head: bool = False,
     seed: int = 0,
 ) -> dict[str, int]:
     """Run a command, and kill processes that work for it; returns how many of each kind.
+
+    What is killed depends on how far the run is, not on the clock: a short run on a fast machine
+    meets as many kills as one on a slow machine.
 
     Args:
         play: the command's arguments.
         out: its run directory.
         nodes: the cluster.
         kills: how many processes.
-        every: seconds between two of them, about.
+        every: episodes between two of them, about.
         head: whether the head is killed after these.
         seed: of what is killed and when.
     """
     draw = random.Random(seed)
+    plan = [
+        (math.ceil(draw.uniform(0.5, 1.5) * every), draw.choices(("workers", "nodes"), (7, 3))[0])
+        for _ in range(kills)
+    ]
     killed = {"workers": 0, "nodes": 0}
     command = [sys.executable, "-m", "benchmarks.cli", *_on(play, out, nodes)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
-        while process.poll() is None and sum(killed.values()) < kills:
-            time.sleep(draw.uniform(0.5, 1.5) * every)
+        for more, kind in plan:
+            if not _played(process, out, more):
+                break
             workers = nodes.workers()
-            if workers and draw.random() < 0.7:
-                os.kill(draw.choice(workers), signal.SIGKILL)
-                killed["workers"] += 1
-            elif workers:
+            if not workers:
+                continue
+            if kind == "workers":
+                kill(draw.choice(workers))
+            else:
                 nodes.kill_node()
                 nodes.add()
-                killed["nodes"] += 1
-        if head and process.poll() is None:
+            killed[kind] += 1
+        if head and process.poll() is not None:
+            print("the run ended before the head was killed; give a smaller --every")
+        elif head:
             nodes.kill_head()
             print(f"head killed; the command ended with {process.wait()}")
         elif process.wait():
             raise SystemExit(f"the command ended with {process.returncode}")
     return killed
+
+
+def _played(process: subprocess.Popen[bytes], out: Path, more: int) -> bool:
+    """Wait until a run has some more episodes; False if its command ended before."""
+
+    def episodes() -> int:
+        return sum(1 for _ in (out / "episodes").glob("*.json"))
+
+    enough = episodes() + more
+    while episodes() < enough:
+        if process.poll() is not None:
+            return False
+        time.sleep(0.02)
+    return True
 
 
 def _compare(here: Path, there: Path) -> None:

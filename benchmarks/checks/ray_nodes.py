@@ -42,12 +42,12 @@ class RayNodes:
 
     def kill_node(self) -> None:
         """Kill the raylet of a node that is not the head, by SIGKILL."""
-        _kill(self._others.pop(0).all_processes["raylet"][0].process.pid)
+        kill(self._others.pop(0).all_processes["raylet"][0].process.pid)
 
     def kill_head(self) -> None:
         """Kill the node that knows all others, its server and its raylet, by SIGKILL."""
         for name in ("gcs_server", "raylet"):
-            _kill(self.cluster.head_node.all_processes[name][0].process.pid)
+            kill(self.cluster.head_node.all_processes[name][0].process.pid)
 
     def workers(self) -> list[int]:
         """The processes that work for er-gym now."""
@@ -90,7 +90,8 @@ def ray_nodes(count: int, cpus: float = 1) -> Iterator[RayNodes]:
             os.environ.pop(name, None)
 
 
-def _kill(process: int) -> None:
+def kill(process: int) -> None:
+    """Kill a process by SIGKILL; nothing happens if it has ended."""
     with contextlib.suppress(ProcessLookupError):
         os.kill(process, signal.SIGKILL)
 
