@@ -7,6 +7,7 @@ and chat format, and for a model with vision Qwen's image processor.
 
 from __future__ import annotations
 
+import filecmp
 import json
 import shutil
 import tempfile
@@ -67,17 +68,19 @@ def make_model(
         architecture: what is made.
         texts: what the tokenizer is learnt from, such as the conversations of a collection. They
             are read once, and only if the vocabulary has more than the bytes.
-        directory: must not exist; it appears when it is whole.
+        directory: appears when it is whole. One that holds this very model is left as it is, so
+            that a command that was interrupted just after it can be given again.
         seed: of the weights.
 
     Returns:
         ``directory``.
 
     Raises:
-        ValueError: the directory exists, or transformers does not accept the architecture.
+        ValueError: the directory exists and holds anything else, or transformers does not accept
+            the architecture.
     """
-    if directory.exists():
-        raise ValueError(f"{directory} exists; give the model another directory, or remove it")
+    if directory.exists() and not (directory / transformers.CONFIG_NAME).is_file():
+        raise _taken(directory)
     tokenizer = make_tokenizer(texts, architecture.vocabulary)
     config = _config(architecture, tokenizer)
     with torch.random.fork_rng(devices=[]):
@@ -104,8 +107,26 @@ def make_model(
         if architecture.sees:
             text = json.dumps(_image_processor(config), indent=2) + "\n"
             (made / "preprocessor_config.json").write_text(text, encoding="utf-8")
-        shutil.move(made, directory)
+        if not directory.exists():
+            shutil.move(made, directory)
+        elif not _same_files(made, directory):
+            raise _taken(directory)
     return directory
+
+
+def _same_files(one: Path, other: Path) -> bool:
+    """Whether two folders have the same files, with the same contents."""
+    names = sorted(file.name for file in one.iterdir())
+    if names != sorted(file.name for file in other.iterdir()):
+        return False
+    _, different, unreadable = filecmp.cmpfiles(one, other, names, shallow=False)
+    return not different and not unreadable
+
+
+def _taken(directory: Path) -> ValueError:
+    return ValueError(
+        f"{directory} exists and does not hold this model; give another directory, or remove it"
+    )
 
 
 def make_tokenizer(texts: Iterable[str], vocabulary: int) -> transformers.PreTrainedTokenizerFast:

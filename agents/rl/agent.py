@@ -14,7 +14,7 @@ from agents.rl.greedy import GreedyPolicy
 from agents.rl.policy_file import CONFIG, policy_file, untrusted_model
 from agents.rl.policy_observation import Obs, PolicyObservation
 from er_gym.envs.actions import ACTIONS, Action
-from er_gym.rollout.agent import Decision
+from er_gym.rollout.agent import Decision, check_observation
 from er_gym.tasks.task import Task
 
 
@@ -44,7 +44,12 @@ class RLAgent:
         self.obs_mode: str = config.env.obs_mode
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """Begin an episode."""
+        """Begin an episode.
+
+        Raises:
+            ValueError: the environment does not give the observations of ``obs_mode``.
+        """
+        check_observation(self, obs)
         self._instruction: str | None = task.instruction
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:

@@ -26,7 +26,7 @@ from agents.vlm.settings import AgentSettings
 from er_gym.data.dialects import shows_anew
 from er_gym.data.scene_text import Perceived
 from er_gym.envs.actions import NO_ACTION, Action, applies
-from er_gym.rollout.agent import Decision
+from er_gym.rollout.agent import Decision, check_observation
 from er_gym.rollout.records import PERSON, By, EpisodeRecord
 from er_gym.rollout.run_directory import CONVERSATIONS, PICTURES
 from er_gym.tasks import verbs
@@ -70,7 +70,12 @@ class VLMAgent:
     # -- the agent's protocol --------------------------------------------------------------------
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """Begin an episode."""
+        """Begin an episode.
+
+        Raises:
+            ValueError: the environment does not give the observations of ``obs_mode``.
+        """
+        check_observation(self, obs)
         self._task = task
         system = self._prompts.system(
             decide=self._settings.decide, sees=self._settings.sees, task=task.instruction

@@ -70,6 +70,21 @@ class Agent(Protocol):
         """Choose an action; ``obs`` and ``info`` are what the last reset or step returned."""
 
 
+def check_observation(agent: Agent, obs: Mapping[str, Any]) -> None:
+    """Check that an observation has what an agent needs.
+
+    Raises:
+        ValueError: it lacks a kind of observation that ``agent.obs_mode`` names.
+    """
+    lacking = [name for name in agent.obs_mode.split("+") if name not in obs]
+    if lacking:
+        raise ValueError(
+            f"{type(agent).__name__} needs the observation {' and '.join(map(repr, lacking))}, and "
+            f"the environment gives {', '.join(map(repr, obs)) or 'none'}; make it with "
+            f"obs_mode={agent.obs_mode!r}, or with obs_mode=agent.obs_mode"
+        )
+
+
 @runtime_checkable
 class CanBeOverruled(Protocol):
     """An agent that plays on after a step that somebody else decided in its place."""

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from er_gym.rollout.processes import CONTEXT, Terminated, end_processes, start_process
 
@@ -154,21 +154,34 @@ def run_jobs(
 
 
 def _serve(connection: Connection, make: Callable[[], Callable[[Job], Result]]) -> None:
-    """Run the worker process: do the jobs from the pipe until it is closed."""
+    """Run the worker process: do the jobs from the pipe until it is closed.
+
+    The parent may close it at any moment, on Ctrl-C for example, and leave a result unread.
+    """
     try:
         do = make()
     except Terminated:
         raise
     except (Exception, SystemExit) as error:  # the parent raises it
-        connection.send(_SetupFailed(f"{type(error).__name__}: {error}"))
+        _send(connection, _SetupFailed(f"{type(error).__name__}: {error}"))
         return
     try:
         while True:
             try:
                 job = connection.recv()
-            except EOFError:
+            except (EOFError, ConnectionResetError):
                 return
-            connection.send(do(job))
+            if not _send(connection, do(job)):
+                return
     finally:
         with contextlib.suppress(Exception):
             getattr(do, "close", lambda: None)()
+
+
+def _send(connection: Connection, answer: Any) -> bool:
+    """Send an answer; False if the parent has closed the pipe."""
+    try:
+        connection.send(answer)
+    except (BrokenPipeError, ConnectionResetError):
+        return False
+    return True

@@ -11,10 +11,11 @@ import sys
 import time
 from functools import partial
 from pathlib import Path
+from threading import Timer
 
 import pytest
 
-from er_gym.rollout.worker_pool import LostJob, WorkerSetupError, run_jobs
+from er_gym.rollout.worker_pool import LostJob, WorkerSetupError, _serve, run_jobs
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
@@ -55,6 +56,33 @@ def test_a_job_that_always_kills_is_given_up(jobs, tmp_path):
     assert results.pop(3) == LostJob(tries=3, exitcode=-signal.SIGKILL)
     assert results == {job: job for job in (0, 1, 2, 4, 5, 6, 7)}
     assert len(list(tmp_path.glob("3-*"))) == 3
+
+
+@pytest.mark.parametrize("when", ["at work", "with a result that nobody has read", "set up"])
+def test_a_worker_whose_parent_hangs_up_ends_without_an_error(when):
+    """On Ctrl-C the parent closes the pipe; a traceback of the worker would be on the terminal."""
+    ours, theirs = multiprocessing.Pipe()
+    closed = []
+
+    class Job:
+        def __init__(self):
+            if when == "set up":
+                ours.close()
+                raise OSError("no engine")
+
+        def __call__(self, job):
+            if when == "at work":
+                ours.close()
+            else:
+                Timer(0.1, ours.close).start()
+            return job
+
+        def close(self):
+            closed.append(True)
+
+    ours.send("job")
+    _serve(theirs, Job)
+    assert closed == ([] if when == "set up" else [True])
 
 
 def test_a_worker_that_cannot_be_set_up_ends_it(jobs):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shlex
 import subprocess
 import sys
@@ -136,6 +137,33 @@ def test_a_policy_plays_at_once(name: str) -> None:
         obs, _, ended, cut, info = env.step(action)
         if ended or cut:
             break
+    env.close()
+
+
+def test_the_pages_program_plays(repository: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("torch", "transformers"):
+        pytest.importorskip(name, reason="needs the extra local")
+    page = (repository / "docs" / "zoo.md").read_text()
+    (program,) = re.findall(r"```python\n(.*?)```", page, re.S)
+    exec(program, {})
+    *steps, end = capsys.readouterr().out.splitlines()
+    assert sum(" -> " in line for line in steps) > 2
+    assert end in ("success: True", "success: False")
+
+
+@pytest.mark.parametrize("kind", ["policy", "language model"])
+def test_an_environment_with_other_observations_is_refused(kind: str) -> None:
+    for name in ("torch", "transformers"):
+        pytest.importorskip(name, reason="needs the extras rl and local")
+    from agents import make_agent
+
+    name = next(each.name for each in MODELS if each.card.kind == kind)
+    agent = make_agent(f"zoo:{name}")
+    env = EmbodiedEnv("mini", obs_mode="depth", width=64, height=36)
+    obs, info = env.reset(seed=0)
+    wanted = f"needs the observation '{agent.obs_mode}', and the environment gives 'depth'"
+    with pytest.raises(ValueError, match=re.escape(wanted)):
+        agent.reset(env.task, obs, info)
     env.close()
 
 
