@@ -81,7 +81,12 @@ def end_with_parent() -> None:
 
 
 def _exit_cleanly(signum: int, frame: object) -> NoReturn:
-    """Handle a signal by an exception, so that everything is closed first."""
+    """Handle a signal by an exception, so that everything is closed first.
+
+    A second signal must not interrupt the closing. SIGTERM often comes twice: to all processes of a
+    group, and from the parent.
+    """
+    signal.signal(signum, lambda *_: None)
     raise Terminated(128 + signum)
 
 

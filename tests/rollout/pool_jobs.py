@@ -28,7 +28,7 @@ class Fragile:
 
 
 class Slow:
-    """Says that it began, then takes a minute."""
+    """Says that it began, then takes a minute; and closes slowly, as an engine may."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -39,6 +39,7 @@ class Slow:
         return job
 
     def close(self) -> None:
+        time.sleep(0.2)
         (self.folder / f"closed-{os.getpid()}").touch()
 
 
