@@ -120,13 +120,14 @@ def play_and_kill(
                 nodes.kill_node()
                 nodes.add()
             killed[kind] += 1
-        if head and process.poll() is not None:
-            print("the run ended before the head was killed; give a smaller --every")
-        elif head:
+        if head and process.poll() is None:
             nodes.kill_head()
             print(f"head killed; the command ended with {process.wait()}")
-        elif process.wait():
+            return killed
+        if process.wait():
             raise SystemExit(f"the command ended with {process.returncode}")
+        if head:
+            print("the run ended before the head was killed; give a smaller --every")
     return killed
 
 

@@ -86,7 +86,7 @@ def _exit_cleanly(signum: int, frame: object) -> NoReturn:
     A second signal must not interrupt the closing. SIGTERM often comes twice: to all processes of a
     group, and from the parent.
     """
-    signal.signal(signum, lambda *_: None)
+    signal.signal(signum, lambda *_: None)  # programs started meanwhile would inherit SIG_IGN
     raise Terminated(128 + signum)
 
 
