@@ -160,13 +160,10 @@ def _bears_there(thought: Thought, mention: Mention, clause: Clause, direction: 
 
 def denied(thought: Thought) -> Iterator[Refusal]:
     """Claims not to see what is in view."""
-    for clause in thought.clauses:
-        if clause.guessed or clause.past:
-            continue
-        for match in _matches(clause, thought.phrases.denied):
-            for mention in clause.named(match, "x"):
-                if mention.types <= thought.known.in_view:
-                    yield Refusal("unseen", f"{name_of(mention)} is in view; do not say it is not.")
+    for clause, match in _denials(thought, thought.phrases.denied):
+        for mention in clause.named(match, "xs"):
+            if mention.types <= thought.known.in_view:
+                yield Refusal("unseen", f"{name_of(mention)} is in view; do not say it is not.")
 
 
 def count(thought: Thought) -> Iterator[Refusal]:
@@ -208,16 +205,15 @@ def hand(thought: Thought) -> Iterator[Refusal]:
     """Says that it holds what it does not, or that its hand is empty when it is not."""
     phrases, held = thought.phrases, thought.known.held
     truth = f"the agent holds {held}" if held else "the hand is empty"
+    for clause, match in _denials(thought, phrases.not_held):
+        for mention in _subjects(clause, match, phrases):
+            if mention.types <= thought.held:
+                yield Refusal("held", f"Do not deny it: {truth}.")
     for clause in thought.clauses:
         if clause.guessed or clause.past:
             continue
         if held and not clause.intended and phrases.empty_hand.search(clause.text):
             yield Refusal("held", f"The hand is not empty: {truth}.")
-        lost = _matches(clause, phrases.not_held)
-        for match in lost:
-            for mention in _subjects(clause, match, phrases):
-                if mention.types <= thought.held:
-                    yield Refusal("held", f"Do not deny it: {truth}.")
         for match in _matches(clause, phrases.held):
             senses = (phrases.negation, phrases.intention, phrases.goal)
             if any(clause.says_before(sense, match.end()) for sense in senses):
@@ -234,6 +230,19 @@ def _matches(clause: Clause, phrases: Iterable[re.Pattern[str]]) -> list[re.Matc
     if MARK not in clause.text:
         return []
     return [match for phrase in phrases for match in phrase.finditer(clause.text)]
+
+
+def _denials(
+    thought: Thought, phrases: Iterable[re.Pattern[str]]
+) -> Iterator[tuple[Clause, re.Match[str]]]:
+    """What is denied as a fact. "Not the mug or the apple" denies both, and guesses nothing."""
+    for clause in thought.clauses:
+        if clause.asks or clause.conditional or clause.usual or clause.past:
+            continue
+        for match in _matches(clause, phrases):
+            rest = f"{clause.text[: match.start()]} {clause.text[match.end() :]}"
+            if not thought.phrases.hedge.search(rest):
+                yield clause, match
 
 
 def _wanted_before(clause: Clause, match: re.Match[str], phrases: Phrases) -> bool:

@@ -31,7 +31,7 @@ class Phrases:
             wanted, what is usual, what was, what the agent is going to do.
         seen: claims to see ``xs``.
         located: claims that ``xs`` are somewhere.
-        denied: claims not to see ``x``.
+        denied: claims not to see any of ``xs``.
         on: claims that ``xs`` lie in or on ``y``.
         out_of: means to take ``xs`` out of ``y``.
         placing: before ``xs``: it is being put there.
@@ -42,7 +42,7 @@ class Phrases:
         states: claims about ``x``, with the groups ``open``, ``closed``, ``on``, ``off`` and
             ``no`` (not so).
         it_states: the same of "it".
-        held, not_held: claims to hold ``xs``, or not to.
+        held, not_held: claims to hold ``xs``, or to hold none of them.
         empty_hand: claims that the hand is empty.
         did: claims to have done something to ``x``, by verb; ``searched`` is one.
         failed, succeeded: claims that the last action did so.

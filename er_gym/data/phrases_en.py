@@ -23,7 +23,7 @@ _NO = (
 )
 _D = rf"(?:(?!(?:{_NO}) )[a-z0-9'’-]+ ){{0,4}}"
 """Articles and adjectives before a name."""
-_JOINT = r"(?:,? and,? |,? or |, |,? as well as |,? together with |,? along with | & |/)"
+_JOINT = r"(?:,? and,? |,? n?or |, |,? as well as |,? together with |,? along with | & |/)"
 _XS = rf"(?P<xs>{MARK}(?:{_JOINT}{_D}{MARK})*)"
 _X, _Y = f"(?P<x>{MARK})", f"(?P<y>{MARK})"
 _ON = r"(?:right |just )?(?:on top of|on|in|inside of|inside|atop|upon|within)"
@@ -156,9 +156,9 @@ PHRASES = Phrases(
     denied=(
         re.compile(
             r"\b(?:i (?:can ?not|can't|do not|don't) (?:yet |currently )?see|there (?:is|are) no|no sign of|see no|there isn't|there aren't)"
-            rf"(?: any| an?| the)? {_D}{_X}(?= *(?:$|[.,!]|in sight|in view|yet\b|anywhere|at all|from here))"
+            rf"(?: any| an?| the)? {_D}{_XS}(?= *(?:$|[.,!]|in sight|in view|yet\b|anywhere|at all|from here))"
         ),
-        re.compile(rf"{_X} (?:is|are) (?:not (?:in (?:sight|view)|visible)|nowhere (?:to be seen|in sight))"),
+        re.compile(rf"{_XS} (?:is|are) (?:not (?:in (?:sight|view)|visible)|nowhere (?:to be seen|in sight))"),
     ),
     on=(
         re.compile(rf"{_XS},?(?: (?:which|that))?(?: (?:{_HOW}|{_LIES}))* {_ON} {_D}{_Y}(?! (?:in front|that i))"),
@@ -236,9 +236,11 @@ PHRASES = Phrases(
     ),
     not_held=(
         re.compile(
-            rf"(?:\bnot|n't|no longer)(?: yet| currently)? (?:holding|hold|carrying|carry|have) {_D}(?P<xs>{MARK})(?= *(?:$|[.,!]|yet|now|any|in my hand))"
+            rf"(?:\bnot|n't|no longer)(?: yet| currently)? (?:holding|hold|carrying|carry|have) {_D}{_XS}(?= *(?:$|[.,!]|yet|now|any|in my hand))"
         ),
-        re.compile(rf"(?P<xs>{MARK}) (?:is|are)(?: not|n't| no longer)(?: yet| currently)? in my (?:hands?|grip|gripper)"),
+        re.compile(rf"{_XS} (?:is|are)(?: not|n't| no longer)(?: yet| currently)? in my (?:hands?|grip|gripper)"),
+        re.compile(rf"\b(?:holding|hold|carrying|carry|have) neither {_D}{_XS}"),
+        re.compile(rf"\bneither {_D}{_XS} (?:is|are)(?: yet| currently)? in my (?:hands?|grip|gripper)"),
     ),
     empty_hand=re.compile(
         r"\b(?:my|both(?: of my)?|the) (?:hands?|gripper|arms?) (?:is|are|'s)(?: now| still| currently| again| both| completely| otherwise)? (?:empty|free)\b"

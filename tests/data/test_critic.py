@@ -8,12 +8,14 @@ from dataclasses import replace
 import pytest
 from planted_lies import Planted, honest, planted
 from played_turns import knowledge
+from support import in_one_test
 
 from er_gym.data.critic import CHECKS, check
 from er_gym.data.form import words
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.trajectory import SeenObject, Subgoal, ThoughtRecord
 from er_gym.envs.actions import Action
+from er_gym.tasks import verbs
 
 LIMIT = 200
 """The most words of the thoughts here."""
@@ -136,6 +138,93 @@ def test_what_is_true_in_another_way_stands(text: str) -> None:
 )
 def test_a_lie_between_the_lines_is_found(text: str, code: str) -> None:
     assert code in codes(text, scene())
+
+
+@in_one_test(
+    "text",
+    [
+        "I am not holding the egg or the apple.",
+        "I'm not holding the apple or the egg.",
+        "I am no longer holding the egg, the potato or the apple.",
+        "I do not have the egg, or the apple, in my hand.",
+        "I hold neither the egg nor the apple.",
+        "Neither the apple nor the egg is in my hand.",
+        "The apple and the egg are not in my hand.",
+        "The egg and the apple are not in my hand.",
+        "我没有拿着鸡蛋或苹果。",
+        "鸡蛋和苹果都不在我手里。",
+        "我手里没有苹果和鸡蛋。",
+    ],
+)
+def test_a_denial_of_two_things_denies_both(text: str) -> None:
+    """One of the two is in the hand; with the other in the hand the denial is as false."""
+    language = "en" if text.isascii() else "zh"
+    for held in ("Apple", "Egg"):
+        assert codes(text, scene(language=language, held=held)) == {"held"}
+    assert codes(text, scene(language=language, held="")) == set()
+
+
+@in_one_test(
+    "text",
+    [
+        "I cannot see the egg or the fridge from here.",
+        "There is no fridge or egg in sight.",
+        "The fridge and the egg are not in view.",
+        "看不到鸡蛋和冰箱。",
+    ],
+)
+def test_what_is_in_view_is_not_denied_beside_what_is_not(text: str) -> None:
+    language = "en" if text.isascii() else "zh"
+    assert "unseen" in codes(text, scene(language=language))
+    assert codes(text, scene(language=language, view=[], decision=Action("observe"))) == set()
+
+
+def test_a_denial_that_is_only_guessed_stands() -> None:
+    known = scene(held="Apple")
+    for text in (
+        "If I am not holding the mug or the apple, I have to look for them.",
+        "Perhaps I am not holding the mug or the apple.",
+        "Am I not holding the mug or the apple?",
+    ):
+        assert codes(text, known) == set()
+
+
+ANNOUNCED = {
+    "open": ("open the fridge", {verbs.OPEN, verbs.NAVIGATE, verbs.TOGGLE}),
+    "close": ("close the fridge", {verbs.CLOSE, verbs.NAVIGATE, verbs.TOGGLE}),
+    "toggle": ("switch on the fridge", {verbs.TOGGLE, verbs.NAVIGATE}),
+    "slice": ("slice the fridge", {verbs.SLICE, verbs.NAVIGATE}),
+    "put": ("put it in the fridge", {verbs.PUT, verbs.NAVIGATE, verbs.OPEN}),
+    "take": ("pick up the fridge", {verbs.PICKUP, verbs.NAVIGATE, verbs.OPEN}),
+    "go": ("go to the fridge", {verbs.NAVIGATE, verbs.OPEN, verbs.PICKUP, verbs.TOGGLE}),
+    "check": ("check the fridge", {verbs.NAVIGATE, verbs.OPEN}),
+    "look around": ("look around", {verbs.OBSERVE}),
+    "end": ("end the task", {verbs.END}),
+    "forward": ("take a step forward", {verbs.MOVE_FORWARD, verbs.NAVIGATE}),
+}
+"""What a thought decides on, and the verbs of actions that are it, or that lead to it."""
+
+
+@in_one_test("act", ANNOUNCED)
+def test_what_is_announced_is_done_or_led_to(act: str) -> None:
+    said, fitting = ANNOUNCED[act]
+    stands = {
+        verb.name
+        for verb in verbs.OWN
+        if "decision"
+        not in codes(
+            f"I will {said} now.",
+            scene(decision=Action(verb.name, "" if verb.alone else "Fridge"), purpose="use"),
+        )
+    }
+    assert stands == fitting
+
+
+def test_what_is_announced_is_done_to_that_thing() -> None:
+    known = scene(decision=Action(verbs.NAVIGATE, "StoveBurner"))
+    for said, _ in ANNOUNCED.values():
+        if "fridge" in said:
+            assert "decision" in codes(f"I will {said} now.", known)
 
 
 def test_after_observe_sides_are_those_of_all_views() -> None:

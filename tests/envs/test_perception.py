@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import in_one_test
 
 from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS
@@ -181,6 +182,64 @@ def test_memory_is_of_what_was_seen_last() -> None:
         memory.look(perception_of(*entries))
         assert type_names(memory.is_open) == type_names(memory.is_on) == ("Cabinet",) * remembered
     assert type_names(memory.seen) == ("Apple", "Cabinet")
+
+
+@in_one_test(
+    "row",
+    [  # what the mug lies in or on, innermost first; which of it is not seen; what the view says
+        ((), (), ""),
+        (("Shelf|1", "Cabinet|1"), (), "Shelf"),
+        (("Shelf|1", "Cabinet|1"), ("Shelf|1",), "Cabinet"),
+        (("Shelf|1", "Cabinet|1"), ("Cabinet|1",), "Shelf"),
+        (("Shelf|1", "Cabinet|1"), ("Shelf|1", "Cabinet|1"), ""),
+        (("Shelf|1",), ("Shelf|1",), ""),
+        (("Floor|1",), (), ""),
+        (("Floor|1", "Shelf|1"), (), "Shelf"),
+    ],
+)
+def test_a_view_tells_the_innermost_holder_that_is_seen(
+    row: tuple[tuple[str, ...], tuple[str, ...], str],
+) -> None:
+    holders, unseen, expected = row
+    perception = perception_of(
+        make_entry("Mug|1", parentReceptacles=list(holders)),
+        *(make_entry(each, visible=each not in unseen, receptacle=True) for each in holders),
+    )
+    (mug,) = (each for each in perception.object_views if each.object_type == "Mug")
+    assert mug.on == expected
+
+
+@in_one_test(
+    "row",
+    [  # metres to the east and to the north; degrees to the right; metres; the side
+        ((0.0, 2.0), 0.0, 2.0, "ahead"),
+        ((2.0, 0.0), 90.0, 2.0, "right"),
+        ((-3.0, 0.0), -90.0, 3.0, "left"),
+        ((3.0, 4.0), 36.87, 5.0, "right"),
+        ((0.4, 2.0), 11.31, 2.0396, "ahead"),
+        ((-0.4, 2.0), -11.31, 2.0396, "ahead"),
+        ((-0.5, 2.0), -14.036, 2.0616, "left"),
+    ],
+)
+def test_a_view_tells_where_an_object_is(
+    row: tuple[tuple[float, float], float, float, str],
+) -> None:
+    (x, z), bearing, distance, side = row
+    (view,) = perception_of(make_entry("Mug|1", centre=(x, 5.0, z))).object_views
+    assert (view.bearing, view.distance, view.side) == (bearing, distance, side)
+
+
+def test_views_are_of_what_is_seen_and_not_held_the_nearest_first() -> None:
+    perception = perception_of(
+        make_entry("Mug|1", centre=(3.0, 0.0, 0.0)),
+        make_entry("Mug|2", centre=(1.0, 0.0, 0.0), visible=False),
+        make_entry("Egg|1", centre=(1.0, 0.0, 0.0), isPickedUp=True),
+        make_entry("Floor|1"),
+        make_entry("Fridge|1", centre=(2.0, 0.0, 0.0), openable=True, toggleable=True, isOpen=True),
+    )
+    views = perception.object_views
+    assert [view.object_id for view in views] == ["Fridge|1", "Mug|1"]
+    assert [(view.is_open, view.is_toggled) for view in views] == [(True, False), (None, None)]
 
 
 # -- random play -----------------------------------------------------------------------------------

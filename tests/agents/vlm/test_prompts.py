@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from support import in_one_test
 
 from agents.vlm.chat import Picture
 from agents.vlm.prompt_set import (
@@ -24,8 +25,10 @@ from agents.vlm.prompt_set import (
 )
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import Prompts
+from agents.vlm.templates import _meaning
 from er_gym.tasks import verbs
 from er_gym.tasks.suites import config_directory
+from er_gym.tasks.verbs import Verb, Words
 
 BUNDLED = [
     {"profile": file.parents[1].name, "language": file.parent.name}
@@ -305,6 +308,31 @@ def test_actions_that_do_not_fit(mine: Path, text: str, message: str) -> None:
     with pytest.raises(ValueError, match=message) as caught:
         written(mine, "actions.yaml", text)
     assert "\n" not in str(caught.value)
+
+
+@in_one_test(
+    "row",
+    [  # the languages that have words, and what the prompts say in English and in Chinese
+        ({"en": "Rub it clean.", "zh": "把它擦干净。"}, "Rub it clean.", "把它擦干净。"),
+        ({"en": "Rub it clean."}, "Rub it clean.", "Rub it clean."),
+        ({"zh": "把它擦干净。"}, "clean an object.", "把它擦干净。"),
+        ({"en": "Rub it clean.", "zh": ""}, "Rub it clean.", "Rub it clean."),
+        ({"en": "", "zh": "把它擦干净。"}, "clean an object.", "把它擦干净。"),
+        ({"fr": "Le nettoyer."}, "clean an object.", "clean an object."),
+        ({}, "clean an object.", "clean an object."),
+    ],
+)
+def test_an_added_verb_is_explained_in_the_prompts_language_or_in_english(
+    row: tuple[dict[str, str], str, str],
+) -> None:
+    stated, *expected = row
+    words = {language: Words(meaning=meaning) for language, meaning in stated.items()}
+    verb = Verb(name="clean", object_property="dirtyable", words=words)
+    assert [_meaning(verb, language) for language in ("en", "zh")] == expected
+    alone = Verb(name="wait", alone=True, words=words)
+    assert [_meaning(alone, language) for language in ("en", "zh")] == [
+        each.replace("clean an object", "wait") for each in expected
+    ]
 
 
 def test_a_template_that_is_missing(mine: Path) -> None:
