@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.checks.doc_blocks.blocks import PYTHON, blocks
+
 RUN_EACH = """
 import runpy
 runpy.run_module("household.play")
@@ -55,10 +57,14 @@ def page(repository: Path) -> str:
 
 def test_the_files_of_the_walk_throughs_work(page: str, repository: Path, tmp_path: Path) -> None:
     (tmp_path / "household").mkdir()
-    blocks = re.findall(r"```python\n# (household/\w+\.py)\n(.*?)```", page, re.S)
-    assert len(blocks) == page.count("```python")
-    for name, text in blocks:
-        (tmp_path / name).write_text(text)
+    files = {
+        block.file: block.text
+        for block in blocks(repository)
+        if block.page == "docs/extending.md" and block.language in PYTHON
+    }
+    assert None not in files
+    for name, text in files.items():
+        (tmp_path / str(name)).write_text(text, encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-c", RUN_EACH],
         env={

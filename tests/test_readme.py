@@ -1,4 +1,4 @@
-"""The README's examples give the output that it shows."""
+"""What the pages name is there. Their blocks are run by tests/benchmarks/test_doc_blocks.py."""
 
 from __future__ import annotations
 
@@ -6,22 +6,13 @@ import importlib.util
 import pkgutil
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import click
 
+from benchmarks.checks.doc_blocks.blocks import SHELL, Part, blocks, pages
 from benchmarks.cli.main import cli
 from er_gym.sim.actions import ACTIONS
-
-
-def test_the_python_example_runs(repository: Path) -> None:
-    (example,) = re.findall(r"```python\n(.*?)```", (repository / "README.md").read_text(), re.S)
-    done = subprocess.run([sys.executable, "-c", example], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("Task: ")
-    assert " -> " in done.stdout
 
 
 def test_every_picture_and_page_is_there(repository: Path) -> None:
@@ -35,42 +26,40 @@ def test_the_list_of_actions_is_complete(repository: Path) -> None:
     assert set(re.findall(r"\w+", page)) == {*ACTIONS, "Reset"}
 
 
-def commands(page: str) -> list[str]:
-    """What follows ``er-gym`` in the shell examples of a page."""
-    blocks = re.findall(r"```(?:sh|bash)\n(.*?)```", page.replace("\\\n", " "), re.S)
-    lines = [line.partition(" #")[0] for block in blocks for line in block.splitlines()]
+def commands(part: Part) -> list[str]:
+    """What follows ``er-gym`` in a part of a shell block."""
+    lines = [line.partition(" #")[0] for line in part.text.splitlines()]
     found = [line.partition("er-gym ")[2] for line in lines if re.search(r"(^|[ /])er-gym ", line)]
     return [re.split(r" [|>&;]", command)[0] for command in found]
 
 
-def pages(repository: Path) -> list[Path]:
-    return [
-        repository / "README.md",
-        repository / "CONTRIBUTING.md",
-        *repository.glob("docs/*.md"),
-    ]
-
-
 def test_commands_and_their_options_exist(repository: Path) -> None:
     found = [
-        (page.name, command) for page in pages(repository) for command in commands(page.read_text())
+        (part.place, command)
+        for block in blocks(repository)
+        if block.language in SHELL
+        for part in block.parts
+        for command in commands(part)
     ]
     assert len(found) > 50
-    for page, command in found:
+    for place, command in found:
         context, parsed, rest = click.Context(cli, info_name="er-gym"), cli, shlex.split(command)
         while isinstance(parsed, click.Group):
             if parsed.invoke_without_command and (not rest or rest[0].startswith("-")):
                 break
             _, parsed, rest = parsed.resolve_command(context, rest)
-            assert parsed is not None, f"{page}: er-gym {command}"
+            assert parsed is not None, f"{place}: er-gym {command}"
             context = click.Context(parsed, parent=context)
         parsed.make_parser(context).parse_args(rest)  # raises what a user would be told
 
 
 def test_files_and_modules_exist(repository: Path) -> None:
     """Every path and every dotted name that a page has in backticks or runs with ``python -m``."""
-    text = {page.name: page.read_text() for page in pages(repository)}
-    groups = re.findall(r"\| `(er_gym\.\w+)` \|", text["extending.md"])  # of entry points
+    text = {
+        str(page.relative_to(repository)): page.read_text(encoding="utf-8")
+        for page in pages(repository)
+    }
+    groups = re.findall(r"\| `(er_gym\.\w+)` \|", text["docs/extending.md"])  # of entry points
     files = [
         (page, found)
         for page, words in text.items()

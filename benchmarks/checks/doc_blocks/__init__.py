@@ -1,0 +1,1 @@
+"""Runs the blocks of the documentation: see ``__main__``."""
