@@ -87,7 +87,8 @@ def test_an_added_shape_is_drawn(seen: Any) -> None:
 def test_the_command_lists_added_types_and_says_what_is_wrong_with_one() -> None:
     listed = run(["-m", "benchmarks.cli", "envs"], **ADDED)
     assert listed.stdout.splitlines()[-1].split() == [
-        *("Household-Open-v0", "Manipulate:", "Opening,", "24", "steps")
+        *("Household-Open-v0", "Manipulate:", "Opening,", "24", "steps;"),
+        *("single_open,", "household_open"),
     ]
     wrong = run(["-m", "benchmarks.cli", "envs"], ER_GYM_TASK_TYPES="household_tasks:CLOSE")
     assert wrong.returncode == 2

@@ -13,7 +13,7 @@ from agents import configs
 from agents.expert.explorer import Strength
 from agents.expert.kinds import MODES
 from er_gym.envs.faults import fault_rates
-from er_gym.tasks.types import BY_NAME
+from er_gym.tasks.types import shares_by_name
 
 DEFAULT = "paper"
 ANOMALY, EXPLORED, CORRECTED = "anomaly", "explored", "corrected"
@@ -60,9 +60,7 @@ class Part(BaseModel):
     @field_validator("types")
     @classmethod
     def _known_types(cls, types: dict[str, int]) -> dict[str, int]:
-        unknown = sorted(types.keys() - BY_NAME.keys())
-        if unknown:
-            raise ValueError(f"unknown task type {unknown[0]!r}; there are: {', '.join(BY_NAME)}")
+        types = shares_by_name(types)
         if not any(types.values()):
             raise ValueError(f"{types} asks for nothing; let at least one number be above 0")
         return types

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from agents import configs
 from er_gym.envs.object_selection import EXPLORE
-from er_gym.tasks.types import BY_NAME
+from er_gym.tasks.types import canonical_names
 
 _WHAT = "training run"
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -25,13 +25,6 @@ Rate = Annotated[float, Field(gt=0)]
 
 class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-def _known_types(types: tuple[str, ...]) -> tuple[str, ...]:
-    for name in types:
-        if name not in BY_NAME:
-            raise ValueError(f"unknown type {name!r}; choose of: {', '.join(BY_NAME)}")
-    return types
 
 
 class EnvConfig(_Model):
@@ -73,7 +66,7 @@ class EnvConfig(_Model):
     shaping: float = Field(0.0, ge=0)
     max_steps: Positive | None = None
 
-    _types = field_validator("types")(_known_types)
+    _types = field_validator("types")(canonical_names)
 
 
 class VecEnvConfig(_Model):
@@ -103,7 +96,7 @@ class Phase(_Model):
     until: Positive
     types: tuple[str, ...] = Field(min_length=1)
 
-    _types = field_validator("types")(_known_types)
+    _types = field_validator("types")(canonical_names)
 
 
 class Practice(_Model):

@@ -19,7 +19,7 @@ from er_gym.envs.embodied_env import EmbodiedEnv, verification_env
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
 from er_gym.envs.wrappers import KeyActionShaping
 from er_gym.tasks.task import Task
-from er_gym.tasks.types import TaskType, task_type
+from er_gym.tasks.types import TaskType, types_named
 
 _TRAINING_ONLY = ("step_penalty", "illegal_penalty", "success_bonus", "shaping")
 """The fields that change the reward."""
@@ -72,9 +72,9 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         """Draw tasks of these types from the next episode on.
 
         Raises:
-            ValueError: a name is not a task type.
+            ValueError: a name is not one of a task type or of a group.
         """
-        self._types: tuple[TaskType | None, ...] = tuple(map(task_type, types)) or (None,)
+        self._types: tuple[TaskType | None, ...] = types_named(types) or (None,)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

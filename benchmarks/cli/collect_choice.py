@@ -54,9 +54,9 @@ def _given(path: Path | None) -> Path:
 
 def chosen_tasks(suite: Suite, types: Sequence[str], scenes: Sequence[str]) -> Suite:
     """The suite with only the tasks that were asked for."""
-    from er_gym.tasks.types import task_type
+    from er_gym.tasks.types import canonical_names
 
-    wanted = {task_type(name).name for name in types}
+    wanted = set(canonical_names(types))
     there = {task.scene for task in suite.tasks}
     unknown = [scene for scene in scenes if scene not in there]
     if unknown:

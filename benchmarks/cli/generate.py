@@ -142,7 +142,7 @@ def _order(
     from er_gym.tasks.splits import SCENES
     from er_gym.tasks.suite_spec import SuiteSpec
     from er_gym.tasks.suites import suite_config, suite_file, suite_home
-    from er_gym.tasks.types import task_type
+    from er_gym.tasks.types import canonical_names
 
     told = {name: value for name, value in given.items() if value is not None}
     config = None if suite is None else suite_config(suite)
@@ -166,7 +166,7 @@ def _order(
     if "scenes" in told and told["scenes"] not in SCENES:
         told["scenes"] = tuple(split(told["scenes"]))
     if "types" in told:
-        told["types"] = tuple(task_type(name).name for name in split(told["types"]))
+        told["types"] = canonical_names(split(told["types"]))
     seed = seed if seed is not None else config.seed if config else 0
     parts += ["--seed", str(seed), *(["--paraphraser", paraphraser] if paraphraser else [])]
     plain = config is not None and not told

@@ -34,7 +34,7 @@ from benchmarks.cli.player import player
 from benchmarks.cli.render import play, render
 from benchmarks.cli.serve import match_server, serve
 from benchmarks.cli.tasks import tasks
-from benchmarks.cli.terminal import echo, stdout, use_any_encoding
+from benchmarks.cli.terminal import echo, stdout, terminal, use_any_encoding
 from benchmarks.cli.train import train_rl
 from benchmarks.cli.ui import ui
 from benchmarks.cli.zoo import zoo
@@ -188,12 +188,27 @@ def suites() -> None:
 
 @cli.command()
 def envs() -> None:
-    """List the registered environments, one for each task type."""
-    from er_gym.tasks.types import BY_NAME
+    """List the registered environments, one for each task type.
+
+    Wherever a type is asked for, each of its names will do: its id, the title and the name that
+    stand behind it here, or the group for all of its types. Upper and lower case, hyphens,
+    underscores and spaces make no difference.
+    """
+    from er_gym.tasks.types import BY_NAME, GROUPS, short_name
 
     widest = max(len(kind.env_id) for kind in BY_NAME.values())
     for kind in BY_NAME.values():
-        echo(f"{kind.env_id:{widest}}  {kind.group}: {kind.title}, {kind.max_steps} steps")
+        names = dict.fromkeys((kind.name, short_name(kind)))
+        echo(
+            f"{kind.env_id:{widest}}  {kind.group}: {kind.title}, {kind.max_steps} steps; "
+            f"{', '.join(names)}"
+        )
+    terminal(stderr=True).print(
+        f"As a type, give any of these names, or a group: {', '.join(GROUPS)}. "
+        "Case, hyphens and underscores do not matter.",
+        style="dim",
+        soft_wrap=True,
+    )
 
 
 if __name__ == "__main__":

@@ -100,7 +100,7 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
     from er_gym.tasks.difficulty import Difficulty
     from er_gym.tasks.errors import summarise_set_aside
     from er_gym.tasks.resolve import resolve_tasks
-    from er_gym.tasks.types import BY_NAME, task_type
+    from er_gym.tasks.types import BY_NAME, types_named
 
     with bad_input():
         found = _suite(suite)
@@ -115,7 +115,7 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
                 raise BadInput(f"no task {unknown[0]!r} in {suite}; ids are such as {some}")
             chosen = [known[i] for i in ids]
         else:
-            kinds = [task_type(name) for name in split(types)] or list(BY_NAME.values())
+            kinds = types_named(split(types)) or tuple(BY_NAME.values())
             by_kind = [[task for task in every if task.type is kind] for kind in kinds]
             chosen = [task for of_kind in by_kind for task in of_kind[:limit]]
         fitted = resolve_tasks(chosen)

@@ -23,7 +23,7 @@ from benchmarks.plan.settings import Collected, PlaySettings
 from er_gym.data.dialects import load_dialect
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks.suites import load_suite
-from er_gym.tasks.types import task_type
+from er_gym.tasks.types import canonical_names
 
 _LIBRARIES = {"local": ("torch", "transformers"), "finetune": ("torch", "transformers", "peft")}
 """Of each extra, what a plan cannot do without."""
@@ -48,7 +48,7 @@ def _types_of(suite: str) -> Counter[str]:
 
 
 def _wanted(settings: PlaySettings) -> set[str]:
-    return {task_type(name).name for name in settings.types}
+    return set(canonical_names(settings.types))
 
 
 def check_skip(settings: PlaySettings, suite: str, skip: int) -> None:

@@ -26,8 +26,7 @@ from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.reset_options import checked_options
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.tasks.task import AgentPose, Task
-from er_gym.tasks.types import TaskType
-from er_gym.tasks.types import task_type as look_up_type
+from er_gym.tasks.types import types_named
 from er_gym.thor import BACKENDS, RENDER_DEVICES, check_size, make_controller
 
 _NOT_BEGUN, _CLOSED = "no episode has begun", "the environment is closed"
@@ -117,7 +116,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
       ``"mini"``); the path of a task file; ``"generate"``, an endless stream of tasks in the
       training rooms, each generated and verified when it is drawn; or an
       :class:`~er_gym.envs.sources.EpisodeSource`.
-    - ``task_type``: draw tasks of this type only.
+    - ``task_type``: draw tasks of this type only, or of these: any name of a type or of a group, or
+      a list of names (:func:`er_gym.tasks.types.types_named`). Each type is as likely as another.
     - ``backend``: ``"embedded"`` or ``"unity"`` (:func:`er_gym.thor.make_controller`).
     - ``width``, ``height``: pixels, at most 4096 each; ``field_of_view``: degrees,
       vertical; ``grid_size`` and ``visibility_distance``: metres.
@@ -144,7 +144,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self,
         episode_source: Source = "mini",
         *,
-        task_type: str | None = None,
+        task_type: str | Sequence[str] | None = None,
         obs_mode: str = "rgb+text",
         backend: str = "embedded",
         width: int = 800,
@@ -190,9 +190,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         illegal_penalty = number("illegal_penalty", illegal_penalty, 0)
         max_steps = None if max_steps is None else whole_number("max_steps", max_steps, 1)
         self.set_faults(faults)
-        self._task_type: TaskType | None = None
-        if task_type is not None:
-            self._task_type = look_up_type(task_type)
+        names = task_type if isinstance(task_type, list | tuple) else [task_type]
+        self._task_types = types_named(each for each in names if each is not None)
         self._obs = parse_obs_mode(obs_mode)
         sensors = sensors_of(self._obs.values())
         if annotate and sensors:
@@ -436,11 +435,24 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         elif self._generates and self._generator is None:  # close() has closed it
             source = self._source = self._resolve_source(GENERATE)
         if task is None:
-            return source.draw(self.np_random, self._task_type, scene)
+            return self._draw(source, scene)
         wanted = source.find(task) if isinstance(task, str) else task
         if scene not in (None, wanted.scene):
             raise ValueError(f"task {wanted.id} plays in {wanted.scene}, not in {scene}")
         return wanted
+
+    def _draw(self, source: EpisodeSource, scene: str | None) -> Task:
+        """Draw a task of one of the types; a type that the source lacks is passed over."""
+        kinds = self._task_types
+        if len(kinds) < 2:
+            return source.draw(self.np_random, kinds[0] if kinds else None, scene)
+        first, *others = self.np_random.permutation(len(kinds)).tolist()
+        for other in others:
+            try:
+                return source.draw(self.np_random, kinds[first], scene)
+            except ValueError:
+                first = other
+        return source.draw(self.np_random, kinds[first], scene)
 
 
 def verification_env() -> EmbodiedEnv:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from er_gym.tasks.errors import SetAsideTask, summarise_set_aside
 from er_gym.tasks.task import Task
-from er_gym.tasks.types import task_type
+from er_gym.tasks.types import canonical_names
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def select(
         ValueError: the suite has no task of a given id, or all that were named are set aside; or a
             type is unknown, or no task is of the types; or ``skip`` leaves none.
     """
-    wanted, kinds = set(task_ids), {task_type(name).name for name in types}
+    wanted, kinds = set(task_ids), set(canonical_names(types))
     aside = [one for one in set_aside if one.task in wanted]
     unknown = wanted.difference((task.id for task in tasks), (one.task for one in aside))
     if aside and len(aside) == len(wanted):

@@ -14,7 +14,7 @@ from er_gym.tasks import verbs
 from er_gym.tasks.errors import SetAsideTask, TaskFileError
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
-from er_gym.tasks.types import BY_NAME, TaskType
+from er_gym.tasks.types import TaskType, task_type
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -53,11 +53,10 @@ def validated(model: type[Model], data: object, where: str) -> Model:
 
 def known_type(name: str, where: str) -> TaskType:
     """The task type of a name; for an unknown one a :class:`TaskFileError` lists the known."""
-    if name not in BY_NAME:
-        raise TaskFileError(
-            f"{where} has unknown tasktype {name!r}; choose one of: {', '.join(BY_NAME)}"
-        )
-    return BY_NAME[name]
+    try:
+        return task_type(name)
+    except ValueError as error:
+        raise TaskFileError(f"{where}: {error}") from None
 
 
 def known_scene(name: str, where: str) -> str:

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from er_gym.tasks.difficulty import Difficulty
 from er_gym.tasks.splits import SCENES
-from er_gym.tasks.types import BY_NAME
+from er_gym.tasks.types import canonical_names
 from er_gym.thor import SCENE_NAMES
 
 Span = tuple[float, float | None]
@@ -59,10 +59,7 @@ class SuiteSpec(BaseModel):
     @field_validator("types")
     @classmethod
     def _known_types(cls, types: tuple[str, ...]) -> tuple[str, ...]:
-        for name in types:
-            if name not in BY_NAME:
-                raise ValueError(f"unknown type {name!r}; choose one of: {', '.join(BY_NAME)}")
-        return types
+        return canonical_names(types)
 
     @field_validator("hidden_depth", "distractors", "distance")
     @classmethod

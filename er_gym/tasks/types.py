@@ -10,8 +10,10 @@ environment variable ``ER_GYM_TASK_TYPES`` or by entry points in the group ``er_
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import lru_cache
 from typing import Protocol
 
 from er_gym.plugins import PluginError, added
@@ -110,6 +112,7 @@ def register(row: TaskType) -> TaskType:
     if problem:
         raise PluginError(f"task type {row.name!r}: {problem}")
     BY_NAME[row.name] = BY_ENV_ID[row.env_id] = row
+    _by_key.cache_clear()
     for tell in _listeners:
         tell(row)
     return row
@@ -137,7 +140,7 @@ def _problem(row: TaskType) -> str:
     if not _ENV_ID.fullmatch(row.env_id):
         return f"env_id is {row.env_id!r}; give one such as 'My-Task-v0'"
     for name in (row.name, row.env_id):
-        if name in BY_NAME or name in BY_ENV_ID:
+        if any(key in _by_key() for key in _keys(name)):
             return f"{name!r} is the name of another type; choose another"
     if row.group not in GROUPS:
         return f"group is {row.group!r}; choose one of: {', '.join(GROUPS)}"
@@ -149,13 +152,128 @@ def _problem(row: TaskType) -> str:
     return ""
 
 
+# -- names -----------------------------------------------------------------------------------------
+
+_GROUP_WORDS = {MANIPULATE: ("Manipulation",), TRANSPORT: ("Transportation",)}
+"""What people also call a group."""
+_VERSION = re.compile(r"-v\d+$")
+_LONGEST = 80
+_WORD = re.compile(r"[^\W_]+")
+_HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
+
+
+def short_name(row: TaskType) -> str:
+    """A type's environment id without what all of them have, in lower case: ``long_range``."""
+    bare = _VERSION.sub("", row.env_id.removeprefix("ER-"))
+    return "_".join(_WORD.findall(_HUMP.sub(" ", bare))).lower()
+
+
 def task_type(name: str) -> TaskType:
-    """Look up a task type by the paper's name or by its environment id.
+    """Look up a task type by any of its names (:func:`types_named`).
 
     Raises:
-        ValueError: there is no such type; the message lists the known types.
+        ValueError: there is no such type, and the message lists the known types; or the name is
+            that of a group.
     """
     found = BY_NAME.get(name) or BY_ENV_ID.get(name) if isinstance(name, str) else None
-    if found is None:
-        raise ValueError(f"unknown task type {name!r}; choose one of: {', '.join(BY_NAME)}")
+    if found is not None:
+        return found
+    several = _types_of(name)
+    if len(several) > 1:
+        raise ValueError(
+            f"{name!r} names a group of {len(several)} types; give one of: "
+            f"{', '.join(each.name for each in several)}"
+        )
+    return several[0]
+
+
+def types_named(names: Iterable[str]) -> tuple[TaskType, ...]:
+    """The types that some names mean, each once, in the order of the names.
+
+    A name is the paper's in its task files (``single_search``), the title in its text, the
+    environment id with or without ``ER-`` and ``-v0`` (``LongRange``, ``long_range``), or that of a
+    group, which stands for its types. Upper and lower case, hyphens, underscores, spaces and a
+    plural make no difference.
+
+    Raises:
+        ValueError: there is no such type or group; the message lists the known ones.
+    """
+    return tuple(dict.fromkeys(row for name in names for row in _types_of(name)))
+
+
+def canonical_names(names: Iterable[str]) -> tuple[str, ...]:
+    """The names in the paper's task files of what :func:`types_named` finds."""
+    return tuple(row.name for row in types_named(names))
+
+
+def shares_by_name(shares: Mapping[str, int]) -> dict[str, int]:
+    """Whole numbers by type, where the keys are any names.
+
+    The number of a group is dealt out evenly to its types, the first ones getting what is over.
+
+    Raises:
+        ValueError: a name is unknown, or two name the same type.
+    """
+    found: dict[str, int] = {}
+    for name, number in shares.items():
+        rows = _types_of(name)
+        for place, row in enumerate(rows):
+            if row.name in found:
+                raise ValueError(f"{name!r} names {row.name}, which has a number already")
+            found[row.name] = number // len(rows) + (place < number % len(rows))
     return found
+
+
+def _types_of(name: object) -> tuple[TaskType, ...]:
+    keys = _keys(name) if isinstance(name, str) else ()
+    found = next((_by_key()[key] for key in keys if key in _by_key()), None)
+    if found is None:
+        raise ValueError(_unknown(name))
+    return found
+
+
+def _unknown(name: object) -> str:
+    spelled = {
+        key: row.name for row in BY_NAME.values() for each in _names_of(row) for key in _keys(each)
+    }
+    spelled |= {key: group for group in GROUPS for key in _keys(group)}
+    near = get_close_matches(_keys(str(name))[0][:_LONGEST], spelled, n=5)
+    meant = list(dict.fromkeys(spelled[each] for each in near))[:3]
+    hint = f" (did you mean {' or '.join(meant)}?)" if meant else ""
+    return (
+        f"unknown task type {name!r:.80}{hint}; choose one of: {', '.join(BY_NAME)}; or a group: "
+        f"{', '.join(GROUPS)}"
+    )
+
+
+def _names_of(row: TaskType) -> tuple[str, ...]:
+    bare = _VERSION.sub("", row.env_id)
+    return row.name, row.env_id, row.title, row.env_id.removeprefix("ER-"), bare, short_name(row)
+
+
+@lru_cache(maxsize=1)
+def _by_key() -> dict[str, tuple[TaskType, ...]]:
+    """The types that each name means, by what is left of a name if spelling does not matter."""
+    names: dict[str, tuple[TaskType, ...]] = {}
+    # No two types share the first two names; of types that share another, the first one has it.
+    for own in (slice(2), slice(2, None)):
+        for row in BY_NAME.values():
+            for key in (key for each in _names_of(row)[own] for key in _keys(each)):
+                names.setdefault(key, (row,))
+    for group in GROUPS:
+        rows = tuple(row for row in BY_NAME.values() if row.group == group)
+        for word in (group, *_GROUP_WORDS.get(group, ())):
+            names |= dict.fromkeys(_keys(word), rows)
+    return names
+
+
+def _keys(name: str) -> tuple[str, str]:
+    """A name without what may be spelled differently, as it is and with its words in singular."""
+    words = _WORD.findall(_HUMP.sub(" ", name).lower())
+    return "".join(words), "".join(map(_singular, words))
+
+
+def _singular(word: str) -> str:
+    if word.endswith("ies"):
+        return f"{word[:-3]}y"
+    return word[:-1] if word.endswith("s") and not word.endswith("ss") else word

@@ -92,7 +92,7 @@ def test_verify_plays_what_can_be_played(er_gym: Command, mixed: Path) -> None:
         ["mixed", "set aside", aside[1].split(": ")[2]],
         ["mixed", "set aside", "ghost"],
     ]
-    assert "unknown tasktype 'dance'" in aside[0]
+    assert "unknown task type 'dance'" in aside[0]
     assert "the task in line 7 has the id" in aside[1]
     assert "no object 'Egg|+09.00|+09.00|+09.00'" in aside[2]
     assert len(re.findall(r", 0\.03 m off, is used instead \(", err)) == 1

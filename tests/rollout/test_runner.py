@@ -122,7 +122,7 @@ def test_types_are_chosen(tasks):
     mixed = [*tasks[:3], other]
     assert select(mixed, types=["single_search"]) == [other]
     assert select(mixed, types=["ER-SinglePickup-v0"], limit=2) == tasks[:2]
-    with pytest.raises(ValueError, match="unknown task type 'single'; choose one of"):
+    with pytest.raises(ValueError, match=r"unknown task type 'single'.*; choose one of"):
         select(mixed, types=["single"])
     with pytest.raises(ValueError, match=r"long-range .*; there are single_pickup, single_search"):
         select(mixed, types=["ER-LongRange-v0"])

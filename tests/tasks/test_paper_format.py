@@ -263,7 +263,7 @@ WRONG = {
     ),
     "wrong field": ([paper_task(scene=7)], "wrong field 'scene': input should be a valid string"),
     "long wrong field": ([paper_task(target_objects={"a": "b" * 500})], "…"),
-    "task type": ([paper_task(tasktype="dance")], "unknown tasktype 'dance'; choose one of: "),
+    "task type": ([paper_task(tasktype="dance")], "unknown task type 'dance'; choose one of: "),
     "scene": ([paper_task(scene="FloorPlan31")], "unknown scene 'FloorPlan31'; choose one "),
     "verb": ([with_action(action="hop")], "unknown action 'hop'; choose one of: navigate to"),
     "same identity": (
@@ -285,7 +285,7 @@ WRONG = {
         with_own(layout_poses={"Mug_1": [1, 2, 3]}), "lacks field 'er_gym.layout_poses.Mug_1[3]'",
     ),
     "own: id": (with_own(id="a/b"), "the task id 'a/b', which cannot be a file name"),
-    "own: type": (with_own(type="dance"), "unknown tasktype 'dance'; choose one of: "),
+    "own: type": (with_own(type="dance"), "unknown task type 'dance'; choose one of: "),
     "own: scene": (with_own(scene="Home"), "unknown scene 'Home'; choose one of FloorPlan1-30"),
     "bad identity": ([paper_task(identity="../x")], "cannot be a file name"),
 }  # fmt: skip

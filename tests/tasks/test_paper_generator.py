@@ -217,7 +217,7 @@ WRONG: dict[str, tuple[object, str]] = {
         [generated(metadatapath="{scene}/metadata.json")],
         "task 1 names no scene: neither its metadatapath '{scene}/metadata.json' nor its folder",
     ),
-    "task type": ([generated(tasktype="dance")], "unknown tasktype 'dance'; choose one of: "),
+    "task type": ([generated(tasktype="dance")], "unknown task type 'dance'; choose one of: "),
     "own": ([generated(er_gym={"gaol": []})], "task 1 has a wrong field 'er_gym.gaol'"),
     "same id": ([generated(er_gym={"id": "a"})] * 2, "task 2 has the id 'a', as task 1 has"),
 }

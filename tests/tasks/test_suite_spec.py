@@ -49,7 +49,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "a set among rooms": ({"total": 1, "scenes": ["training"]}, "unknown scene 'training'"),
     "a type that is none": (
         {"total": 1, "types": ["single_search", "dance"]},
-        "unknown type 'dance'; choose one of: single_search, ",
+        "unknown task type 'dance'; choose one of: single_search, ",
     ),
     "layouts": ({"total": 1, "layouts": -1}, "greater than or equal to 0"),
     "none of a layout": ({"total": 1, "per_layout": 0}, "greater than 0"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -19,7 +20,7 @@ from er_gym.tasks.generate.words import in_or_on_the, pronoun, verb_to_be, with_
 from er_gym.tasks.goal import Condition, unmet_conditions
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
-from er_gym.tasks.types import BY_NAME
+from er_gym.tasks.types import BY_NAME, canonical_names, task_type
 from er_gym.thor import accepts as thor_accepts
 
 AMBIGUOUS = "the words fit several objects, which ask for different actions"
@@ -70,11 +71,15 @@ class Generator:
         """Yield the candidate tasks, rule by rule; the same for the same arguments.
 
         Args:
-            types: names of task types; all types if it is empty.
+            types: names of task types or groups; all types if it is empty.
+
+        Raises:
+            ValueError: there is no such type.
         """
         made: set[str] = set()
+        wanted = canonical_names(types)
         for rule in self.rules:
-            if not types or rule.type in types:
+            if not wanted or rule.type in wanted:
                 for choice in rule.choices(self.scene_graph):
                     task = self._candidate(rule, choice)
                     if isinstance(task, str):
@@ -87,7 +92,8 @@ class Generator:
         """The task of a type about given objects, even if the rules would not choose these.
 
         Args:
-            type_name: a name in :data:`~er_gym.tasks.types.TASK_TYPES`; not the long-range type.
+            type_name: a name of a type (:func:`~er_gym.tasks.types.task_type`); not the long-range
+                type.
             object_ids: the objects and their targets, in the order of the instruction: one id for a
                 search, a pickup or a toggle, two for a transfer, four for two transfers.
 
@@ -95,6 +101,8 @@ class Generator:
             ValueError: the type cannot be requested, the scene lacks an object, or the number of
                 objects is wrong.
         """
+        with suppress(ValueError):  # told below, with the types that can be requested
+            type_name = task_type(type_name).name
         rule = next((rule for rule in self.rules if rule.type == type_name and not rule.slug), None)
         if rule is None:
             known = ", ".join(rule.type for rule in self.rules if not rule.slug)
