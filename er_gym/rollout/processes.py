@@ -12,6 +12,7 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -35,7 +36,7 @@ def start_process(target: Callable[..., None], *args: Any) -> SpawnProcess:
     this process ends, in any way.
     """
     process = CONTEXT.Process(target=_run, args=(target, args), daemon=True)
-    with _interrupts_blocked():
+    with _interrupts_blocked(), _inheritable_stderr():
         process.start()
     return process
 
@@ -64,6 +65,30 @@ def _interrupts_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         if is_main:
             signal.signal(signal.SIGINT, handler)
+
+
+@contextlib.contextmanager
+def _inheritable_stderr() -> Iterator[None]:
+    """Let ``sys.stderr`` be a file that another process can inherit, as multiprocessing expects.
+
+    A display that takes the whole terminal, such as Inspect's, replaces it by an object whose
+    descriptor is -1. multiprocessing would pass that on to its helper process, and fail.
+    """
+    shown = sys.stderr
+    if not _has_descriptor(shown):
+        sys.stderr = sys.__stderr__ if _has_descriptor(sys.__stderr__) else None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        sys.stderr = shown
+
+
+def _has_descriptor(stream: Any) -> bool:
+    try:
+        os.fstat(stream.fileno())
+    except Exception:  # of any kind: the stream may be anybody's
+        return False
+    return True
 
 
 def _run(target: Callable[..., None], args: tuple[Any, ...]) -> None:

@@ -16,6 +16,7 @@ from threading import Timer
 import pytest
 
 from er_gym.rollout.worker_pool import LostJob, WorkerSetupError, _serve, run_jobs
+from support import in_one_test, run_python
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
@@ -31,6 +32,27 @@ def jobs(monkeypatch):
 def test_every_job_is_done_once(jobs):
     results = list(run_jobs(jobs.Squarer, range(20), workers=3))
     assert sorted(results) == [(job, job * job) for job in range(20)]
+
+
+@in_one_test("stderr", ["Display()", "Closed()"])
+def test_workers_start_while_a_display_has_the_terminal(stderr):
+    program = f"""
+import io, sys
+sys.path.insert(0, {str(HERE)!r})
+from pool_jobs import Squarer
+from er_gym.rollout.worker_pool import run_jobs
+
+class Display(io.StringIO):
+    fileno = lambda self: -1  # as Textual's, on which Inspect's display is built
+
+class Closed(io.StringIO):
+    fileno = lambda self: 999
+
+if __name__ == "__main__":
+    sys.stderr = shown = {stderr}
+    print(list(run_jobs(Squarer, [3], workers=1)), sys.stderr is shown)
+"""
+    assert run_python(program).stdout.strip() == "[(3, 9)] True"
 
 
 def test_no_jobs_start_no_process(jobs):
