@@ -21,6 +21,7 @@ from agents.vlm.factory import (
 )
 from agents.zoo.index import PREFIX as ZOO_PREFIX
 from agents.zoo.index import resolved
+from er_gym.activity import begin_import
 from er_gym.plugins import PluginError, Registry, reason
 from er_gym.rollout.agent import Agent, Decision, MakeAgent
 from er_gym.tasks.task import Task
@@ -127,6 +128,7 @@ def _model_agents(name: str) -> AgentFactory:
 
 
 def _rl_agent(name: str, path: str, trust: bool) -> Agent:
+    begin_import("PyTorch", "torch")
     try:
         from agents.rl.agent import RLAgent  # late: torch
     except ImportError as error:

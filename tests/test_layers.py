@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-_BASE = {"er_gym.writing", "er_gym.locking", "er_gym.plugins"}
+_BASE = {"er_gym.activity", "er_gym.writing", "er_gym.locking", "er_gym.plugins"}
 _TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
 _ROLLOUT = {*_ENVS, "er_gym", "er_gym.rollout"}
@@ -19,6 +19,7 @@ _COMMAND = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.cli"}
 _SCRIPTS = {*_COMMAND, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "benchmarks.pages"}
 ALLOWED = {
     "er_gym.plugins": {"er_gym.plugins"},
+    "er_gym.activity": set(),
     "er_gym.writing": set(),
     "er_gym.locking": _BASE,
     "er_gym.sim": {*_BASE, "er_gym.sim"},

@@ -30,6 +30,7 @@ from agents.finetune.run_files import (
     move_into_place,
     whole_folder,
 )
+from er_gym.activity import begin
 
 TRAINED = "trained.safetensors"
 """The weights that learn, in a checkpoint."""
@@ -224,6 +225,7 @@ class TrainingLog(transformers.TrainerCallback):
         # from there has the same means as one that was never interrupted.
         if control.should_save:
             control.should_log = True
+        begin(f"training: update {state.global_step:,} of {state.max_steps:,}")
 
     def on_log(self, args: Any, state: Any, control: Any, logs: Any = None, **more: Any) -> None:
         if "loss" not in logs:

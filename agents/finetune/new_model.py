@@ -21,6 +21,7 @@ from tokenizers import Regex, Tokenizer, decoders, models, pre_tokenizers, train
 
 from agents.finetune.architecture import BYTES, Architecture
 from agents.finetune.libraries import quiet_libraries
+from er_gym.activity import begin
 
 PAD, BEGIN, END = "<|endoftext|>", "<|im_start|>", "<|im_end|>"
 FEEDBACK = "<|feedback|>"
@@ -81,7 +82,9 @@ def make_model(
     """
     if directory.exists() and not (directory / transformers.CONFIG_NAME).is_file():
         raise _taken(directory)
+    begin("learning the tokenizer from the conversations")
     tokenizer = make_tokenizer(texts, architecture.vocabulary)
+    begin("making the weights")
     config = _config(architecture, tokenizer)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
@@ -96,6 +99,7 @@ def make_model(
     model.generation_config = transformers.GenerationConfig(
         eos_token_id=ends, pad_token_id=ends[1], do_sample=False
     )
+    begin(f"writing {directory}")
     directory.parent.mkdir(parents=True, exist_ok=True)
     with (
         quiet_libraries(),

@@ -48,6 +48,7 @@ from agents.finetune.tokens import EncodedChat, Encoder, check_lengths
 from agents.vlm.clients.adapters import adapter_chain, with_adapter
 from agents.vlm.clients.checkpoint import one_line
 from agents.vlm.tuned_model import recorded_pictures
+from er_gym.activity import begin
 from er_gym.locking import exclusive_use
 
 _EYES = {"vision": r"model\.visual\.(?!.*merger)", "projector": r"model\.visual\..*merger"}
@@ -106,8 +107,10 @@ def train(
         KeyboardInterrupt: Ctrl-C; what was learnt since the last checkpoint is lost.
     """
     # -- files alone: what is wrong with them is said before anything is written or loaded --
+    begin(f"reading the model {model}")
     files = open_model(model)
     check_stage(files, settings.after)
+    begin("reading the conversations")
     samples = open_samples(data, settings.data)
     check_prompts(files, samples.prompts)
     manifest = Manifest(
@@ -152,6 +155,7 @@ def _train(
     say: Callable[[str], None],
 ) -> Result:
     # -- tokens: all conversations, whole --
+    begin(f"turning {len(samples.chats):,} conversations into tokens")
     tokenizer = files.tokenizer
     feedback = needs_feedback(samples.chats)
     is_new = feedback and FEEDBACK not in tokenizer.get_vocab()
@@ -192,6 +196,7 @@ def _train(
         )
     say(f"memory, estimated: {needed}")
 
+    begin("loading the weights")
     # -- the model: its weights, the token <|feedback|>, and what learns --
     set_seed(settings.training.seed)
     # FSDP keeps weights as they are loaded; DeepSpeed keeps a copy in float32 itself. Without an
@@ -243,10 +248,12 @@ def _train(
         trainer.add_callback(TrainingLog(run, trainer, done, report))
     if last is not None:
         say(f"continues after update {done:,}")
+    begin("training")
     with fast_arithmetic():
         trainer.train(resume_from_checkpoint=str(last) if last else None)
 
     # -- the result --
+    begin("writing the model")
     loss = run.metrics()[-1]["loss"] if first else 0.0
     record = StageRecord(
         stage=settings.stage,

@@ -43,6 +43,7 @@ from agents.rl.policy_file import CONFIG, LEARNERS, MODEL, SB3_MODEL, untrusted_
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.vec_env import WorkerVecEnv
 from agents.rl.warm_start import WARM_START, warm_start
+from er_gym.activity import begin
 from er_gym.envs.actions import ACTIONS
 from er_gym.locking import exclusive_use
 from er_gym.writing import YAML_MARK, is_ours, make_folder, write_atomic
@@ -113,6 +114,7 @@ def _train(
     trust: bool,
     more: tuple[BaseCallback, ...],
 ) -> BaseAlgorithm:
+    begin("reading the last checkpoint")
     model = load_last_checkpoint(run, trust)
     if model is not None and not (run / MODEL).exists():
         save(model, run)  # from now on the run needs no trust
@@ -122,12 +124,14 @@ def _train(
     spec = ALGORITHMS[config.algorithm.name]
     # A continued run plays different episodes than at its start.
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
+    begin(f"starting {config.vec.envs} environments in {config.vec.workers} workers")
     env = make_vec_env(config, config.env, seed)
     checkpoints = Checkpoints(run, config.checkpoint_every)
     callbacks = [checkpoints, TorchThreads(config.threads), SuccessByType(), *more]
     held_out = None
     try:
         if config.evaluation is not None:
+            begin("starting the environments of evaluation")
             held_out = _held_out(config, config.evaluation)
             callbacks.append(held_out)
         if config.curriculum:
@@ -136,11 +140,13 @@ def _train(
             callbacks.append(curriculum)
         if show_progress:
             callbacks.append(ProgressBarCallback())
+        begin("making the network")
         logger = _logger(config, run, steps)  # its clock runs during the warm start, too
         if model is None:
             model = spec.make(config, config.algorithm, env)
             if config.warm_start is not None:
                 assert isinstance(model, MaskablePPO)  # as the configuration has checked
+                begin(f"cloning {config.warm_start.teacher}")
                 with fast_arithmetic():
                     warm_start(model, config, config.warm_start, run, seed, show_progress)
                 save(model, run)
@@ -150,6 +156,7 @@ def _train(
             model.set_env(env)
             set_random_seed(seed)
         model.set_logger(logger)
+        begin("loading the rooms")
         try:
             with fast_arithmetic():
                 model.learn(
@@ -161,9 +168,11 @@ def _train(
             if checkpoints.steps:
                 checkpoints.save()
         if held_out is not None:
+            begin("evaluating")
             held_out.evaluate()
         model.logger.close()
     finally:
+        begin("ending the workers")
         env.close()
         if held_out is not None:
             held_out.eval_env.close()

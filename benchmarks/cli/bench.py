@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import (
     CRASHED,
     INTERRUPTED,
@@ -157,7 +158,9 @@ def bench(
     console = terminal(stderr=True)
     with bad_input(BackendError):
         part = Shard.parse(shard) if shard is not None else None
+        doing("reading the suite")
         asked = _load_suite(suite, tasks_file, poses, protocol)
+        doing("preparing the agent")
         vlm_run = _vlm_run(agent, vlm_options)
         if trust and not agent.startswith(RL_PREFIX):
             raise BadInput(f"--trust is for trained policies, {RL_PREFIX}RUN, not for {agent}")
@@ -235,6 +238,7 @@ def bench(
         why = str(error) if isinstance(error, CannotGoOn) else "interrupted"
         print_problem(f"{why}: {_left_in(out, chosen, samples)}")
         return STOPPED if isinstance(error, CannotGoOn) else INTERRUPTED
+    doing("computing the table")
     print_tables(tables([load_run(out)], scorer=scorer), stdout())
     if bill:
         console.print(str(bill))

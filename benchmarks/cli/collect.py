@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from benchmarks.cli.activity import doing
 from benchmarks.cli.collect_expert import ExpertOptions, ExpertRun, with_expert_options
 from benchmarks.cli.collect_select import Selection, SelectOptions, with_select_options
 from benchmarks.cli.errors import (
@@ -173,6 +174,7 @@ def collect(
 
     console = terminal(stderr=True)
     with bad_input():
+        doing("reading the recipe and the tasks")
         selection = Selection.of(
             select_options,
             recipe,
@@ -227,6 +229,7 @@ def collect(
             | ({"correct_after": correct_after} if correct_after not in (None, "wrong") else {})
             | ({"correct_by": correct_by} if correct_by == "searcher" else {}),
         )
+        doing("reading the episodes" if selection or correct else "planning the trajectories")
         if selection is not None:
             screening, strata = selection.strata(settings.tasks, limit, seed, allow_empty)
             left_out: dict[str, int] = {}

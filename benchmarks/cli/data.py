@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from benchmarks.cli.activity import doing
 from benchmarks.cli.data_export import export
 from benchmarks.cli.data_frames import frames
 from benchmarks.cli.data_import import import_
@@ -65,6 +66,7 @@ def stats(collection: Path, layout: str, plots: Path | None, force: bool) -> Non
         else:
             print_tables(statistics_tables(found), stdout())
         if plots is not None:
+            doing("drawing the charts")
             from benchmarks.scoring.data_charts import draw_statistics
 
             for file in draw_statistics(found, plots, force=force):
@@ -109,6 +111,7 @@ def verify(
     with bad_input():
         opened = _opened(collection)
         tasks = _tasks(opened, tasks_file, suite)
+        doing(f"counting the trajectories of {collection}")
         number = sum(1 for _ in islice(lines_of(opened), limit))
         opened.parts()
         if not number:
@@ -191,6 +194,7 @@ def show(
 def _opened(path: Path) -> Collection:
     from er_gym.data.collection import Collection
 
+    doing(f"reading {path}")
     return Collection.open(path)
 
 
@@ -223,6 +227,7 @@ def _tasks(
     from er_gym.tasks.suites import load_suite, suite_from_file, suite_registry
 
     told = collection.manifest
+    doing(f"reading the tasks of {tasks_file or suite_name or told.suite}")
     if tasks_file is not None and suite_name is not None:
         raise BadInput("give --suite or --tasks-file, not both")
     if SOURCE in told.settings:

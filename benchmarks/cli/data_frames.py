@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import Place, given_size, seed_option, size_options, workers_option
 from benchmarks.cli.terminal import echo, terminal
@@ -88,6 +89,7 @@ def _plan(
     from er_gym.envs.embodied_env import EmbodiedEnv
     from er_gym.tasks.suites import load_suite
 
+    doing(f"reading the suite {name}")
     suite = chosen_tasks(load_suite(name), (), named("--scenes", scenes))
     env = {
         "backend": "embedded",
@@ -102,6 +104,7 @@ def _plan(
     if env["backend"] != "embedded":
         raise BadInput(f"the suite {name} plays on {env['backend']}; frames need the embedded one")
     EmbodiedEnv((), **env)  # so that bad arguments are found before any worker starts
+    doing("collecting its rooms")
     rooms = rooms_of(suite.tasks)
     manifest = FramesManifest(
         suite=suite.name,

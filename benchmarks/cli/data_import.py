@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import bad_input, print_problem
 from benchmarks.cli.options import Place
 from benchmarks.cli.terminal import echo, terminal
@@ -48,6 +49,7 @@ def import_(
     from er_gym.data.sharegpt_import import import_sharegpt
 
     with bad_input():
+        doing(f"reading {file}")
         opened = open_sharegpt(
             file, dataset=dataset, pictures=pictures, decisions=True, leave_out=leave_out
         )

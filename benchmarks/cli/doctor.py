@@ -15,6 +15,9 @@ from benchmarks.cli.terminal import echo
 if TYPE_CHECKING:
     from benchmarks.cli.doctor_checks import Check
 
+_WIDEST = 23
+"""Characters of a part's name: of ``platform=CloudRendering``."""
+
 
 @click.command()
 @click.option("--ray", is_flag=True, help="Check a Ray cluster instead, node by node.")
@@ -49,10 +52,11 @@ def doctor(ray: bool, ray_address: str | None, shared_dir: Path | None) -> int:
 
 
 def _show(checks: Iterable[Check]) -> int:
-    checks = list(checks)
-    widest = max(len(check.part) for check in checks)
+    """Print each check as soon as it is made."""
+    works = True
     for check in checks:
         mark = "ok" if check.works else "--"
         fix = f"; {check.fix}" if check.fix else ""
-        echo(f"{mark}  {check.part:{widest}}  {check.detail}{fix}")
-    return 0 if all(check.works for check in checks if check.required) else 1
+        echo(f"{mark}  {check.part:{_WIDEST}}  {check.detail}{fix}")
+        works = works and (check.works or not check.required)
+    return 0 if works else 1

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import er_gym
+from benchmarks.cli.activity import doing
 from benchmarks.cli.extras import claimants, extras, installed_version, state_of
 from er_gym.thor import SCENE_NAMES, make_controller, thor_executable
 from er_gym.thor.places import GpuMapping, Release
@@ -42,17 +43,13 @@ class Check:
     required: bool = False
 
 
-def run_checks() -> list[Check]:
-    """Check every part, the most important first."""
-    return [
-        *_engine(),
-        _player(),
-        *_programs(),
-        _unity(),
-        _gpu(),
-        *_packages(),
-        *_extras(),
-    ]
+def run_checks() -> Iterator[Check]:
+    """Check every part, the most important first; each is made when it is asked for."""
+    for what, checks in _PARTS.items():
+        doing(f"checking {what}")
+        for check in checks():
+            yield check
+            doing(f"checking {what}")
 
 
 def _engine() -> Iterator[Check]:
@@ -85,8 +82,8 @@ def _frame(controller: Any) -> str:
     return f"{width}×{height} in {1000 * took:.0f} ms, on the CPU"
 
 
-def _player() -> Check:
-    return _check("player", _launch)
+def _player() -> Iterator[Check]:
+    yield _check("player", _launch)
 
 
 def _launch() -> str:
@@ -163,7 +160,7 @@ def version_of_client() -> str:
     return f"ai2thor {there}{known}, commit_id {COMMIT_ID[:7]}"
 
 
-def _unity() -> Check:
+def _unity() -> Iterator[Check]:
     """Whether AI2-THOR's own build is installed and can start."""
     cloud, desktop = Release("CloudRendering"), Release("Linux64")
     display, vulkan = "DISPLAY" in os.environ, find_library("vulkan") is not None
@@ -183,14 +180,15 @@ def _unity() -> Check:
         fixes.append("AI2-THOR's client downloads the build at first use, from the network")
     if not vulkan and not display:
         fixes.append("apt install libvulkan1 with a GPU's driver, or start an X server with GLX")
-    return Check("Unity build", works, ", ".join(found), "; ".join(fixes) if not works else "")
+    yield Check("Unity build", works, ", ".join(found), "; ".join(fixes) if not works else "")
 
 
-def _gpu() -> Check:
+def _gpu() -> Iterator[Check]:
     program = shutil.which("nvidia-smi")
     if program is None:
-        return Check("GPU", False, "no NVIDIA driver", "only learning and local models use one")
-    return _check("GPU", lambda: _gpu_names(program))
+        yield Check("GPU", False, "no NVIDIA driver", "only learning and local models use one")
+    else:
+        yield _check("GPU", lambda: _gpu_names(program))
 
 
 def _gpu_names(program: str) -> str:
@@ -249,3 +247,15 @@ def _check(part: str, act: Callable[[], str], *, required: bool = False) -> Chec
 
 def _as_line(error: Exception) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+_PARTS: dict[str, Callable[[], Iterator[Check]]] = {
+    "the engine": _engine,
+    "the player": _player,
+    "AI2-THOR's client": _programs,
+    "Unity": _unity,
+    "the GPU": _gpu,
+    "the packages": _packages,
+    "the extras": _extras,
+}
+"""What is checked, and how."""

@@ -115,7 +115,7 @@ def closure(
             continue
         done.add((name, of))
         wanted_by = f"{PROJECT}[{of}]" if name == PROJECT else name
-        for requirement in map(Requirement, requires(name)):
+        for requirement in map(_parsed, requires(name)):
             if _applies(requirement, of, with_core=name != PROJECT):
                 yield wanted_by, requirement
                 required = canonicalize_name(requirement.name)
@@ -144,7 +144,7 @@ def _unsupported(extra: str, requires: Requires) -> Iterator[str]:
     for _, requirement in closure(extra, requires):
         if canonicalize_name(requirement.name) == PROJECT:
             own |= requirement.extras
-    for requirement in map(Requirement, requires(PROJECT)):
+    for requirement in map(_parsed, requires(PROJECT)):
         marker = requirement.marker
         if marker is None:
             continue
@@ -154,6 +154,9 @@ def _unsupported(extra: str, requires: Requires) -> Iterator[str]:
             if for_it and not marker.evaluate({"extra": each}) and not marker.evaluate(older):
                 yield f"{requirement.name} (for {str(marker).partition(' and extra == ')[0]})"
                 break
+
+
+_parsed = cache(Requirement)  # every extra has requirements of others
 
 
 @cache
@@ -167,5 +170,8 @@ def installed_version(name: str) -> str | None:
 
 def claimants(package: str) -> list[str]:
     """The other distributions that install a top-level package of this name."""
-    names = {canonicalize_name(each) for each in packages_distributions().get(package, ())}
+    names = {canonicalize_name(each) for each in _distributions().get(package, ())}
     return sorted(names - {PROJECT})
+
+
+_distributions = cache(packages_distributions)  # reads what every distribution has installed

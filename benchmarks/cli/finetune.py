@@ -83,6 +83,7 @@ def finetune(
     from the last checkpoint. `er-gym bench --agent hf:RUN/model` plays with the result.
     """
     from agents.finetune.settings import load_settings
+    from er_gym.activity import begin_import
 
     with bad_input():
         settings = load_settings(config, overrides)
@@ -91,6 +92,7 @@ def finetune(
         return 0
     if gpus is not None or copy:
         raise BadInput("--gpus and --copy are for --print; leave them out")
+    begin_import("PyTorch, transformers and peft", "torch", "transformers", "peft")
     try:
         from agents.finetune import train as training
     except ImportError as error:
@@ -135,6 +137,9 @@ def _print_run(
     copy: bool,
 ) -> None:
     """Write the files of another program's run, and name them."""
+    from er_gym.activity import begin_import
+
+    begin_import("PyTorch and transformers", "torch", "transformers")
     from agents.finetune.printing import write_files
 
     if len(data) > 1:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
 from benchmarks.cli.options import MOST_SEED, Span, force_option, split
@@ -89,7 +90,9 @@ def generate(
         if not chosen:
             raise click.ClickException(f"no task could be generated: {_drop_reasons(made)}")
         if paraphrase:
+            doing("asking for other wordings")
             chosen = tuple(_paraphrased(task, paraphrase) for task in chosen)
+        doing(f"writing {order.out}")
         _write(order, chosen, force)
     except (WorkerSetupError, RuntimeError) as error:
         raise click.ClickException(f"{error}; what is done is in {parts}") from error
@@ -103,6 +106,7 @@ def generate(
         )
         return INTERRUPTED
     remove_parts(parts)
+    doing("counting the tasks")
     print_counts(chosen, made.dropped)
     echo(f"{len(chosen)} tasks of {verified} verified: {order.out}")
     echo(f"sha256 of the tasks {jsonl_format.digest(chosen)}; card: {order.card}")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import Words, agent_config_option, overrides_option, seed_option
 from benchmarks.cli.terminal import echo
@@ -57,6 +58,9 @@ def inspect(
     `inspect view` then shows every conversation with its pictures. For all that Inspect can do:
     `inspect eval benchmarks/inspect_task.py@er_gym`.
     """
+    from er_gym.activity import begin_import
+
+    begin_import("Inspect", "inspect_ai")
     try:
         from inspect_ai import eval as evaluate
         from inspect_ai._util.error import PrerequisiteError  # a key or a package is missing
@@ -68,7 +72,9 @@ def inspect(
             f"{error.name} is not installed, and Inspect needs it: pip install 'er-gym[inspect]'"
         ) from error
     with bad_input():
+        doing("reading the suite")
         asked = er_gym(suite, limit, agent_config, overrides, seed)
+        doing("")  # Inspect's display follows
         try:
             logs = evaluate(
                 asked,

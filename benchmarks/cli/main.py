@@ -14,6 +14,7 @@ from typing import NoReturn
 import click
 
 from benchmarks.cli.ablate import ablate
+from benchmarks.cli.activity import doing, new_modules, saying_what_it_does
 from benchmarks.cli.bench import bench
 from benchmarks.cli.collect import collect
 from benchmarks.cli.data import data
@@ -47,7 +48,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
     """Run the command and exit: 0; 2 for bad input; others as in ``benchmarks.cli.errors``."""
     use_any_encoding()
     try:
-        with interrupted_by_sigterm():
+        with interrupted_by_sigterm(), saying_what_it_does():
             code = cli.main(args=args, prog_name="er-gym", standalone_mode=False)
     except click.UsageError as error:
         help_command = f"{error.ctx.command_path if error.ctx else 'er-gym'} --help"
@@ -87,6 +88,8 @@ def cli(context: click.Context, version: bool) -> None:
         context.exit()
     if context.invoked_subcommand is None:
         echo(context.get_help())
+    else:
+        doing(f"{context.invoked_subcommand}: loading er-gym", new_modules())
 
 
 cli.add_command(bench)
@@ -142,8 +145,12 @@ def report(
                 f"{name} does not go with --format {layout}, which lacks it; choose "
                 f"{', '.join(fitting)}"
             )
+    loaded = []
     with bad_input():
-        loaded = [reports.load_run(path) for path in runs]
+        for path in runs:
+            doing(f"reading the episodes of {path}")
+            loaded.append(reports.load_run(path))
+    doing("computing the tables")
     if layout == "json":
         echo(reports.as_json(loaded))
     elif layout == "csv":
@@ -173,6 +180,7 @@ def suites() -> None:
     from er_gym.tasks.types import GROUPS
 
     for name in suite_registry().names():
+        doing(f"reading the suite {name}")
         if name in suite_names() and not suite_file(name).exists():
             echo(
                 f"{name}: not made yet (er-gym tasks generate --suite {name}); "

@@ -56,10 +56,12 @@ def new_model(
     the conversations of collections and frames.
     """
     from agents.finetune.architecture import load_architecture
+    from er_gym.activity import begin_import
 
     with bad_input():
         made = load_architecture(architecture, overrides)
         texts = _texts(collections, dialect)
+    begin_import("PyTorch and transformers", "torch", "transformers")
     try:
         from agents.finetune.new_model import make_model
     except ImportError as error:

@@ -5,13 +5,34 @@ from __future__ import annotations
 import time
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-from rich.progress import Progress as Bar
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.progress import Progress as RichProgress
 
+from benchmarks.cli.activity import doing
+from benchmarks.cli.live_line import LINE
 from er_gym.rollout.events import Cost, EpisodeEnded, Event
 
 _LINES = 10
 """The number of lines that a whole run prints without a terminal."""
+
+
+class Bar(RichProgress):
+    """Bars in place of the line that says what the command is doing."""
+
+    def start(self) -> None:
+        LINE.hold()
+        super().start()
+
+    def stop(self) -> None:
+        super().stop()
+        LINE.release()
+        doing("finishing")
 
 
 def bar(console: Console) -> Bar:
@@ -21,6 +42,8 @@ def bar(console: Console) -> Bar:
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("{task.fields[status]}", markup=False),
+        TimeElapsedColumn(),
+        TextColumn("left"),
         TimeRemainingColumn(),
         console=console,
         disable=not console.is_terminal,

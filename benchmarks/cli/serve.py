@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import Finite, agent_config_option, overrides_option
-from benchmarks.cli.terminal import echo, terminal
+from benchmarks.cli.terminal import echo, plain
 
 if TYPE_CHECKING:
     from agents.vlm.serving import Command
@@ -121,6 +122,7 @@ def serve(
         return 0
     if directory.is_dir() and whole != str(directory):
         echo(f"merging the adapter {directory} into {whole}", err=True)
+        doing("merging")
         with bad_input():
             merge(directory)
     return run_server(command, patience=patience, verbose=verbose)
@@ -147,6 +149,7 @@ def match_server(port: int, agent_config: str | None, overrides: tuple[str, ...]
 
     with bad_input():
         settings = load_settings(agent_config, overrides)
+        doing("loading the matcher")
         serve_matches(Matcher(settings.matching), port)
     return 0
 
@@ -192,20 +195,19 @@ def run_server(command: Command, *, patience: float, verbose: bool = False) -> i
 
 def _wait(server: ServerProcess, command: Command, patience: float, verbose: bool) -> float:
     """Wait until the server is ready; show its progress where there is a terminal."""
-    from rich.text import Text
+    latest = ""
 
-    console = terminal(stderr=True)
-    if verbose or not console.is_terminal:
+    def hear(since: float, last: str) -> None:
+        nonlocal latest
+        latest = plain(last)
+
+    if verbose or not sys.stderr.isatty():
         echo(f"starting {command.engine} for {command.name}", err=True)
-        return server.wait_until_ready(command.ready_url, patience)
-    with console.status(f"starting {command.engine}") as line:
-        return server.wait_until_ready(
-            command.ready_url,
-            patience,
-            lambda since, last: line.update(
-                Text(f"{command.engine}, {since:.0f} s: {last}"[: console.width - 4])
-            ),
-        )
+    if not verbose:
+        doing(f"starting {command.engine} for {command.name}", lambda: latest)
+    seconds = server.wait_until_ready(command.ready_url, patience, hear)
+    doing("")
+    return seconds
 
 
 def _how_to_play(command: Command) -> str:

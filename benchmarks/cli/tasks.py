@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import BadInput, bad_input, report_set_aside
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
 from benchmarks.cli.generate import generate
@@ -155,6 +156,7 @@ def stats(suite: str, out: Path | None, force: bool) -> None:
         if out is not None:
             from benchmarks.scoring.charts import draw_charts
 
+            doing("drawing the charts")
             for file in draw_charts(found.tasks, out, found.name, force=force):
                 echo(file)
 
@@ -183,6 +185,7 @@ def convert(suite: str, out: Path, force: bool) -> None:
         if aside and not found:
             raise BadInput(f"{suite}: no task can be read: {summarise_set_aside(aside)}")
         report_set_aside(suite, aside)
+        doing(f"writing {out}")
         if out.name.endswith((".jsonl", ".jsonl.gz")):
             jsonl_format.write_tasks(out, found, force=force)
         elif out.suffix == ".json":
@@ -202,4 +205,5 @@ def _suite(name: str) -> Suite:
     from er_gym.tasks.suites import load_suite, suite_from_file, suite_names
 
     path = Path(name)
+    doing(f"reading the tasks of {name}")
     return load_suite(name) if name in suite_names() or not path.exists() else suite_from_file(path)

@@ -36,11 +36,13 @@ def train_rl(
     suite with the trained policy.
     """
     from agents.rl.config import config_file, load_config
+    from er_gym.activity import begin_import
 
     with bad_input():
         file = config_file(config)
         wanted = load_config(file, overrides, {} if seed is None else {"seed": seed})
     run = out or Path("runs") / "rl" / f"{file.stem}-{wanted.seed}"
+    begin_import("PyTorch and Stable-Baselines3", "torch", "stable_baselines3", "sb3_contrib")
     try:
         from agents.rl import train as training
     except ImportError as error:

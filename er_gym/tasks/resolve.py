@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from math import dist, inf
 from typing import Any
 
+from er_gym.activity import begin
 from er_gym.tasks.arrangement import Arrangement, set_up_scene
 from er_gym.tasks.errors import SetAsideTask, Substitution, TaskFileError
 from er_gym.tasks.task import Task, type_of_id
@@ -88,9 +89,10 @@ def resolve_tasks(
         BackendError: the backend cannot be started.
         ValueError: there is no such backend.
     """
+    tasks = list(tasks)
     fitted, substitutions, notes, set_aside = [], [], [], []
     with make_controller(backend, headless=True) as controller:
-        scenes = _Scenes(controller)
+        scenes = _Scenes(controller, len({task.scene for task in tasks}))
         for task in tasks:
             try:
                 task, renamed = _with_known_names(task, scenes.names(task.scene))
@@ -109,14 +111,15 @@ def resolve_tasks(
 class _Scenes:
     """The objects of scenes and of their arrangements, each asked of the backend once."""
 
-    def __init__(self, controller: Any) -> None:
-        self._controller = controller
+    def __init__(self, controller: Any, count: int) -> None:
+        self._controller, self._count = controller, count
         self._recorded: dict[str, list[dict[str, Any]]] = {}
         self._arranged: dict[tuple[str, str], dict[str, Position]] = {}
 
     def recorded(self, scene: str) -> list[dict[str, Any]]:
         """The object metadata of a scene as recorded."""
         if scene not in self._recorded:
+            begin(f"fitting the tasks to their rooms: {len(self._recorded) + 1} of {self._count}")
             self._recorded[scene] = set_up_scene(self._controller, scene, Arrangement()).metadata[
                 "objects"
             ]

@@ -14,9 +14,9 @@ from pathlib import Path
 from threading import Timer
 
 import pytest
+from support import in_one_test, run_python
 
 from er_gym.rollout.worker_pool import LostJob, WorkerSetupError, _serve, run_jobs
-from support import in_one_test, run_python
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent

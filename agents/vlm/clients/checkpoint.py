@@ -16,6 +16,7 @@ from transformers.processing_utils import ProcessorMixin
 from agents.vlm.clients.adapters import ADAPTER, adapter_chain, with_adapter
 from agents.vlm.settings import AgentSettings, Local
 from agents.vlm.tuned_model import model_directory
+from er_gym.activity import begin
 
 _MODEL_FILES = {".json", ".jinja", ".txt", ".model", ".safetensors", ".bin"}
 _LONGEST_WORDS = 300  # characters of a library's, in an error
@@ -55,6 +56,7 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
         ValueError: the model or adapter does not exist, is broken, or does not fit the settings.
     """
     path = model_directory(path)
+    begin(f"loading the weights of {path}")
     local, sees = settings.local, settings.sees == "pictures"
     is_here = Path(path).is_dir()
     if not is_here and (path.startswith(("/", ".", "~")) or path.count("/") > 1):

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from agents.vlm.tuned_model import agent_file
 from agents.zoo.index import resolved
+from er_gym.activity import begin_import
 from er_gym.plugins import PluginError, Registry, is_dotted
 
 if TYPE_CHECKING:
@@ -77,6 +78,7 @@ def _local(
         from agents.vlm.clients.model_actors import ModelActors
 
         return ModelActors(path, settings, supervisor)
+    begin_import("PyTorch and transformers", "torch", "transformers")
     from agents.vlm.clients.local import LocalClient
 
     return LocalClient(path, settings, supervisor)

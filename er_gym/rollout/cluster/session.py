@@ -17,6 +17,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from er_gym.activity import begin, begin_import
 from er_gym.rollout.cluster.settings import RaySettings
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ def ray_machines(
     """
     environment = {} if settings.address else LOCAL_ENVIRONMENT
     with _environment(environment), contextlib.ExitStack() as stack:
+        begin_import("Ray", "ray")
         try:
             import ray
         except ImportError as error:
@@ -69,6 +71,7 @@ def ray_machines(
         from er_gym.rollout.cluster.machines import RayMachines
 
         if not ray.is_initialized():
+            begin(f"joining the cluster {settings.address}" if settings.address else "starting Ray")
             if settings.address:
                 with same_signals():
                     _join(settings.address, modules)

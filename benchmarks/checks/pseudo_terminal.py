@@ -1,0 +1,202 @@
+"""Runs a command in a pseudo-terminal, or without one, and says when it printed what."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import pty
+import re
+import selectors
+import signal
+import struct
+import subprocess
+import termios
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+ROWS, COLUMNS = 40, 100
+_ESCAPES = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\)|[@-Z\\-_=>78])")
+_GRACE = 20.0
+"""Seconds that a command has to end after a signal."""
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a command printed at once.
+
+    Attributes:
+        at: seconds after its start.
+        stream: ``out`` or ``err``; a terminal shows both as ``out``.
+        text: with the terminal's control codes.
+    """
+
+    at: float
+    stream: str
+    text: str
+
+    @property
+    def shown(self) -> str:
+        """The text without control codes and space: what a reader sees."""
+        return "".join(_ESCAPES.sub("", self.text).split())
+
+
+@dataclass
+class TerminalRun:
+    """A command that has been run.
+
+    Attributes:
+        code: of its end; below 0 the signal that ended it.
+        seconds: from its start to its end, or until it said what was waited for.
+        said: all that it printed, in order.
+        late: whether it had to be ended, since it took longer than allowed.
+    """
+
+    code: int = 0
+    seconds: float = 0.0
+    said: list[Said] = field(default_factory=list)
+    late: bool = False
+
+    def text(self, stream: str = "") -> str:
+        """All text of a stream, or of both, without control codes."""
+        told = (each.text for each in self.said if stream in ("", each.stream))
+        return _ESCAPES.sub("", "".join(told)).replace("\r\n", "\n")
+
+    @property
+    def news(self) -> list[float]:
+        """When something was printed that differs from what was printed before."""
+        times: list[float] = []
+        before = ""
+        for each in self.said:
+            if each.shown and each.shown != before:
+                times.append(each.at)
+                before = each.shown
+        return times
+
+    @property
+    def first(self) -> float:
+        """Seconds until the first word; those of the whole run, if there was none."""
+        return self.news[0] if self.news else self.seconds
+
+    @property
+    def silence(self) -> float:
+        """The longest time without news after the first word, seconds."""
+        times = [at for at in self.news if at < self.seconds] + [self.seconds]
+        return max((after - before for before, after in pairwise(times)), default=0.0)
+
+
+def run(
+    argv: Sequence[str],
+    *,
+    cwd: Path,
+    terminal: bool = True,
+    environment: Mapping[str, str] | None = None,
+    until: str = "",
+    keys: str = "",
+    seconds: float = 300.0,
+) -> TerminalRun:
+    """Run a command to its end.
+
+    Args:
+        argv: the command.
+        cwd: where.
+        terminal: whether its input and output are a pseudo-terminal; without one, the input is
+            empty and the outputs are pipes.
+        environment: variables beside this process's.
+        until: a regular expression; once the output has it, Ctrl-C is sent. For servers.
+        keys: what is typed at once.
+        seconds: after these it is killed.
+    """
+    variables = {**os.environ, "TERM": "xterm-256color", **(environment or {})}
+    for name in ("COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR"):
+        variables.pop(name, None)
+    start = time.monotonic()
+    process, streams = _start(argv, cwd, variables, keys, terminal)
+    done = TerminalRun()
+    wanted = re.compile(until) if until else None
+    try:
+        with selectors.DefaultSelector() as selector:
+            for descriptor, name in streams.items():
+                selector.register(descriptor, selectors.EVENT_READ, name)
+            interrupted = 0.0
+            while selector.get_map():
+                since = time.monotonic() - start
+                if since > (interrupted + _GRACE if interrupted else seconds):
+                    done.late = True
+                    break
+                for key, _ in selector.select(timeout=0.5):
+                    data = _read(key.fd)
+                    if not data:
+                        selector.unregister(key.fd)
+                        continue
+                    text = data.decode(errors="replace")
+                    done.said.append(Said(time.monotonic() - start, key.data, text))
+                if wanted and not interrupted and wanted.search(done.text()):
+                    done.seconds = interrupted = time.monotonic() - start
+                    _end(process, signal.SIGINT)
+    finally:
+        if process.poll() is None and not done.late:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(_GRACE)
+        if process.poll() is None:
+            done.late = True
+        _end(process, signal.SIGKILL)
+        done.code = process.wait()
+        for descriptor in streams:
+            os.close(descriptor)
+    done.seconds = done.seconds or time.monotonic() - start
+    return done
+
+
+def _start(
+    argv: Sequence[str], cwd: Path, variables: Mapping[str, str], keys: str, terminal: bool
+) -> tuple[subprocess.Popen[bytes], dict[int, str]]:
+    """The process, and what to read its outputs from."""
+    made: Callable[..., subprocess.Popen[bytes]] = subprocess.Popen
+    if not terminal:
+        out, theirs_out = os.pipe()
+        err, theirs_err = os.pipe()
+        process = made(
+            argv,
+            cwd=cwd,
+            env=variables,
+            stdin=subprocess.DEVNULL,
+            stdout=theirs_out,
+            stderr=theirs_err,
+            start_new_session=True,
+        )
+        os.close(theirs_out)
+        os.close(theirs_err)
+        return process, {out: "out", err: "err"}
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(ours, termios.TIOCSWINSZ, struct.pack("HHHH", ROWS, COLUMNS, 0, 0))
+    process = made(
+        argv,
+        cwd=cwd,
+        env=variables,
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+    )
+    os.close(theirs)
+    if keys:
+        os.write(ours, keys.encode())
+    return process, {ours: "out"}
+
+
+def _read(descriptor: int) -> bytes:
+    try:
+        return os.read(descriptor, 1 << 16)
+    except OSError:  # the terminal's other side is closed
+        return b""
+
+
+def _end(process: subprocess.Popen[bytes], number: int) -> None:
+    """Send a signal to the command and all that it started."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, number)
