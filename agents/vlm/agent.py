@@ -26,6 +26,7 @@ from agents.vlm.settings import AgentSettings
 from er_gym.data.dialects import shows_anew
 from er_gym.data.scene_text import Perceived
 from er_gym.envs.actions import NO_ACTION, Action, applies
+from er_gym.envs.observations import text_without_task
 from er_gym.rollout.agent import Decision, check_observation
 from er_gym.rollout.records import PERSON, By, EpisodeRecord
 from er_gym.rollout.run_directory import CONVERSATIONS, PICTURES
@@ -147,7 +148,7 @@ class VLMAgent:
             task=self._task.instruction,
             decide=self._settings.decide,
             sees=self._settings.sees,
-            scene_text=obs.get("text", ""),
+            scene_text=text_without_task(obs.get("text", ""), self._task.instruction),
             now=now,
             before=before,
             steps=info["steps"],

@@ -28,7 +28,7 @@ class TurnContext:
     Attributes:
         task: the task's instruction.
         decide, sees: see :class:`~agents.vlm.settings.AgentSettings`.
-        scene_text: the environment's ``text`` observation, for ``sees="text"``.
+        scene_text: the environment's ``text`` observation without the task, for ``sees="text"``.
         now: what the agent perceives, and ``before``: what it perceived before its last action;
             for dialects without pictures.
         steps: how many steps were taken so far; ``max_steps``: the episode's step limit, 0 if

@@ -86,11 +86,16 @@ def _variables(given: TurnContext | LastAction) -> dict[str, Any]:
     return {name: value for name, value in vars(given).items() if name not in _FOR_DIALECTS}
 
 
+def profile_names() -> tuple[str, ...]:
+    """er-gym's own profiles."""
+    found = config_directory("prompts").glob("*/*/system.jinja")
+    return tuple(sorted({file.parents[1].name for file in found}))
+
+
 def directory_of(profile: str, language: str) -> Path:
     """The directory of a profile's templates in a language."""
-    bundled = config_directory("prompts")
-    profiles = sorted({file.parents[1].name for file in bundled.glob("*/*/system.jinja")})
-    root = bundled / profile if profile in profiles else Path(profile)
+    profiles = profile_names()
+    root = config_directory("prompts") / profile if profile in profiles else Path(profile)
     languages = sorted(file.parent.name for file in root.glob("*/system.jinja"))
     if not languages:
         raise ValueError(

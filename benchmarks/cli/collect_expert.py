@@ -140,7 +140,7 @@ class ExpertRun:
         from agents.expert.writers.prompts import load_writer_prompts
         from agents.vlm.factory import comparable_settings
 
-        own = load_writer_prompts(self.language).digest
+        own = load_writer_prompts(self.language, self._profile).digest
         options = self.options
         stated: dict[str, Any] = {"name": self.run.name, "decisions": options.decisions or "plan"}
         if options.decides:
@@ -160,6 +160,18 @@ class ExpertRun:
         }
 
     @property
+    def _profile(self) -> str:
+        """The prompts of a model that writes thoughts. One that decides is told those of an agent,
+        and er-gym's own hint.
+        """
+        from agents.expert.writers.prompts import OWN_PROFILE
+        from agents.vlm.settings import Prompts
+
+        stated = self.run.settings.prompts.profile
+        own = self.options.decides or stated == Prompts().profile
+        return OWN_PROFILE if own else stated
+
+    @property
     def env(self) -> Mapping[str, Any]:
         """The environment's arguments that the settings ask for."""
         return {name: value for name, value in self.run.env.items() if name != "obs_mode"}
@@ -177,7 +189,7 @@ class ExpertRun:
         from agents.expert.writers.prompts import load_writer_prompts
         from er_gym.rollout.agent import CannotGoOn
 
-        prompts, options = load_writer_prompts(self.language), self.options
+        prompts, options = load_writer_prompts(self.language, self._profile), self.options
         opens = self.run.factory if options.decides else self.run.session
         with bad_input(CannotGoOn):  # no key, no such model
             asked: Any = opens(directory)

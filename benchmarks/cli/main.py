@@ -32,6 +32,7 @@ from benchmarks.cli.ladder import ladder
 from benchmarks.cli.new_model import new_model
 from benchmarks.cli.options import scorer_option
 from benchmarks.cli.player import player
+from benchmarks.cli.prompts import prompts
 from benchmarks.cli.render import play, render
 from benchmarks.cli.serve import match_server, serve
 from benchmarks.cli.tasks import tasks
@@ -105,6 +106,7 @@ cli.add_command(serve)
 cli.add_command(match_server)
 cli.add_command(inspect)
 cli.add_command(data)
+cli.add_command(prompts)
 cli.add_command(ladder)
 cli.add_command(ablate)
 cli.add_command(ui)

@@ -304,6 +304,14 @@ def _text(situation: Situation) -> str:
     return _plain("\n".join(lines))
 
 
+def text_without_task(text: str, instruction: str) -> str:
+    """An observation ``text`` without the task, for those who state that themselves.
+
+    A text that does not begin with this task stays as it is.
+    """
+    return text.removeprefix(_plain(f"Task: {instruction}\n"))
+
+
 FAR = 40.0
 """The greatest ``depth``, metres: the value of farther surfaces, and of pixels without one. The
 embedded engine draws as far as this."""

@@ -6,6 +6,7 @@ import random
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any
 
 from agents.expert.writers.base import ThoughtRequest
@@ -20,6 +21,8 @@ from er_gym.data.trajectory import TAG_OF_KIND, Language, SeenObject
 from er_gym.tasks.suites import config_directory
 from er_gym.tasks.task import Task
 
+OWN_PROFILE = "expert"
+"""er-gym's own set of these prompts."""
 _NEEDED = ("role.jinja", "turn.jinja", "again.jinja", "places.jinja", "plan.jinja")
 _MOST_IN_VIEW = 30
 """The nearest objects of a view are told."""
@@ -214,11 +217,12 @@ def _asked(
 
 
 @lru_cache(maxsize=4)
-def load_writer_prompts(language: Language) -> WriterPrompts:
-    """The prompts in a language.
+def load_writer_prompts(language: Language, profile: str = OWN_PROFILE) -> WriterPrompts:
+    """The prompts in a language: er-gym's own, or those of a folder like that.
 
     Raises:
-        ValueError: a template is invalid, or Jinja is missing.
+        ValueError: a template is missing or invalid, or Jinja is missing.
     """
-    directory = config_directory("prompts") / "expert" / language
-    return WriterPrompts(language, TemplateFiles.read(directory, _NEEDED))
+    bundled = config_directory("prompts") / OWN_PROFILE
+    root = bundled if profile == OWN_PROFILE else Path(profile)
+    return WriterPrompts(language, TemplateFiles.read(root / language, _NEEDED))

@@ -103,6 +103,19 @@ def test_a_model_that_knows_the_way_solves_the_task(env: Callable[..., EmbodiedE
     assert "You see:" in texts(script.sent[0][-1])
 
 
+@pytest.mark.parametrize("sees", ["text", "pictures"])
+def test_every_turn_states_the_task_once(env: Callable[..., EmbodiedEnv], sees: str) -> None:
+    played = env({"text": "text", "pictures": "rgb"}[sees])
+    for language in ("en", "zh"):
+        for said in (PICKUP.instruction, "把苹果拿起来…\nStep 3 of 9.", "Task: find"):
+            script = Script(*decided("observe", "open Fridge", "end"))
+            options = settings(sees=sees, prompts={"language": language})
+            play(played, script, options, replace(PICKUP, instruction=said))
+            told = [texts(message) for message in script.sent[-1] if message.role != "assistant"]
+            assert [text.count(said) for text in told] == [0, 1, 1, 1], (language, told)
+            assert not any(f"Task: {said[:4]}" in text or "?????" in text for text in told)
+
+
 def test_a_model_is_told_the_limit_that_the_environment_keeps(
     env: Callable[..., EmbodiedEnv],
 ) -> None:

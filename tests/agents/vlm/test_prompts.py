@@ -147,7 +147,7 @@ def test_what_came_of_an_action(prompts: PromptSet) -> None:
 
 
 def test_words_instead_of_pictures(prompts: PromptSet) -> None:
-    scene = "Task: Find it.\nStep 3 of 9.\nYou see: Fridge."
+    scene = "Step 3 of 9.\nYou see: Fridge."
     turn = TurnContext(task=TASK, decide="tags", sees="text", scene_text=scene)
     first, later = prompts.first(turn), prompts.next(turn, LastAction(action="open Fridge"))
     assert scene in first
