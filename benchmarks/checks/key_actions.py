@@ -1,6 +1,6 @@
 """Compare the generator's key actions with the paper's, task by task.
 
-``python -m benchmarks.checks.key_actions ../shared/data/paper_tasks_dev.json`` asks the generator
+``python -m benchmarks.checks.key_actions FILE`` asks the generator
 for a task of the same scene and type about the same objects as each task of the file, and compares
 verbs and object types in order. Long-range tasks, which follow no rule, are left out. It also
 counts the tasks that the generator enumerates by itself.

@@ -164,8 +164,11 @@ def stats(suite: str, out: Path | None, force: bool) -> None:
 @tasks.command()
 @click.argument("suite", metavar="SUITE|FILE|FOLDER")
 @click.argument("out", metavar="FILE|FOLDER", type=Place(path_type=Path))
+@click.option(
+    "--task-ids", multiple=True, metavar="ID,…", help="Convert these tasks; may be repeated."
+)
 @force_option
-def convert(suite: str, out: Path, force: bool) -> None:
+def convert(suite: str, out: Path, task_ids: tuple[str, ...], force: bool) -> None:
     """Convert tasks to another format without loss.
 
     If a task cannot be read, the command names it and converts the others.
@@ -175,13 +178,15 @@ def convert(suite: str, out: Path, force: bool) -> None:
     as a whole. The paper's files do not say who wrote them, so an existing one is replaced only
     with --force.
     """
+    from er_gym.rollout.selection import select
     from er_gym.tasks import jsonl_format, paper_format
     from er_gym.tasks.errors import summarise_set_aside
     from er_gym.tasks.paper_generator import read_generated, write_generator_tasks
 
     with bad_input():
         read = read_generated(suite) if Path(suite).is_dir() else _suite(suite)
-        found, aside = list(read.tasks), read.set_aside
+        aside = read.set_aside
+        found = select(read.tasks, task_ids=split(*task_ids), set_aside=aside)
         if aside and not found:
             raise BadInput(f"{suite}: no task can be read: {summarise_set_aside(aside)}")
         report_set_aside(suite, aside)

@@ -368,6 +368,30 @@ def test_tasks_are_converted_without_loss(er_gym: Command, tmp_path: Path) -> No
     assert {task.id: task for task in read_tasks("3.jsonl")} == by_id
 
 
+def test_some_tasks_are_converted(er_gym: Command) -> None:
+    first, second, third = (task.id for task in load_suite("mini").tasks[:3])
+    chosen = ("--task-ids", f"{third},\n{first}", "--task-ids", second)
+    assert er_gym("tasks", "convert", "mini", "some.jsonl", *chosen)[:2] == (
+        0,
+        "3 tasks: some.jsonl\n",
+    )
+    assert [task.id for task in read_tasks("some.jsonl")] == [first, second, third]
+    code, _, err = er_gym("tasks", "convert", "mini", "none.json", "--task-ids", "nowhere")
+    assert (code, Path("none.json").exists()) == (2, False)
+    assert "no task with the id 'nowhere'" in err
+
+
+def test_the_paper_tasks_of_the_figures_can_be_taken_from_its_file(
+    er_gym: Command, repository: Path, shared_data: Path
+) -> None:
+    """As docs/tasks.md says; the file of the paper has more tasks than ours."""
+    ids = (repository / "docs" / "paper-tasks.txt").read_text(encoding="utf-8")
+    theirs = shared_data / "paper_tasks_dev.json"
+    code, out, err = er_gym("tasks", "convert", theirs, "tasks.json", "--task-ids", ids)
+    assert (code, out) == (0, "272 tasks: tasks.json\n"), err
+    assert suite_from_file("tasks.json").tasks == suite_from_file(theirs).tasks
+
+
 def test_files_of_others_are_replaced_with_force_only(er_gym: Command, tmp_path: Path) -> None:
     """Also those that nobody named, such as the card beside the task file."""
     mine = tmp_path / "notes.md"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -95,7 +96,7 @@ def _script(parts: Sequence[Part]) -> str:
     """A program for bash that says, of the command that fails, where it stands."""
     lines = ["set -eo pipefail", f"trap 'echo {_AT}$at >&2' ERR"]
     for part in parts:
-        lines += [f"at={part.place}", part.text]
+        lines += [f"at={shlex.quote(part.place)}", part.text]
     return "\n".join(lines)
 
 

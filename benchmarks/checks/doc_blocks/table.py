@@ -70,6 +70,11 @@ NEVER: Mapping[str, tuple[str, ...]] = {
     "needs the paper's program or its task files": (
         "docs/agents.md: python -m benchmarks.checks.paper_agreement",
         "docs/tasks.md: python -m benchmarks.checks.key_actions",
+        "docs/tasks.md: git clone",
+        "docs/tasks.md: cp embodied_reasoner",
+        "docs/tasks.md: er-gym tasks verify test_809.json",
+        "docs/tasks.md: er-gym tasks convert test_809.json",
+        "docs/tasks.md: er-gym bench --tasks-file",
     ),
     "needs a GPU": ("docs/serving.md: CUDA_VISIBLE_DEVICES",),
     "needs a cluster": (
@@ -120,7 +125,7 @@ SLOW: Mapping[str, tuple[str, ...]] = {
         "docs/extending.md: ER_GYM_VERBS",
         "docs/faults.md: er-gym bench --suite mini --agent searcher",
         "docs/faults.md: for rate",
-        "docs/tasks.md: er-gym tasks verify",
+        "docs/tasks.md: er-gym tasks verify er-1k",
         "docs/tasks.md: er-gym tasks generate",
         "docs/zoo.md: er-gym bench",
         "er_gym/tasks/data/er-1k.md: er-gym tasks generate",
