@@ -36,7 +36,9 @@ from er_gym.data.dialects import load_dialect
 from er_gym.data.frame_chat import Question, questions, words_for_frames
 from er_gym.data.frames import Frame, FrameSet
 from er_gym.data.scene_text import FrameWords, SceneWords
+from er_gym.tasks.reading import read_bytes
 from er_gym.thor.objects import TYPES
+from er_gym.writing import inside
 
 _SIGHT = {"seeing": False, "blind": True}
 _KNOWN = frozenset(TYPES)
@@ -96,7 +98,7 @@ class Examiner:
 
     def _picture(self, frame: Frame, blind: bool) -> Picture:
         record = frame.pictures[0]
-        data = (self._frames.path / record.path).read_bytes()
+        data = read_bytes(inside(self._frames.path, record.path))
         form = Path(record.path).suffix.removeprefix(".")
         picture = Picture(data, f"image/{form}", record.width, record.height)
         if not blind:

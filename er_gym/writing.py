@@ -27,11 +27,12 @@ import io
 import os
 import re
 import secrets
+import shutil
 import stat
 import zlib
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from pathlib import Path, PurePath, PureWindowsPath
+from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,6 +48,8 @@ PICTURE_MARK: Mapping[str, str] = {"Software": "er-gym"}
 _LONGEST_NAME = 200
 """The number of bytes of the file's name in a draft's name; file systems allow 255 in all."""
 _LONGEST_STEM = 120
+_LONGEST_PART = 255
+"""The number of bytes of a name between two separators, on most file systems."""
 _HEAD = 4096
 """The number of bytes at the beginning of a file in which its mark is looked for."""
 _COMMENT = b"Written by er-gym"
@@ -60,6 +63,82 @@ class CannotWrite(OSError):
 
 class ForeignFile(ValueError):
     """er-gym did not write the file at the path, so it does not replace it; nothing is changed."""
+
+
+class OutsideFolder(ValueError):
+    """A name leads out of the folder that it belongs into; nothing was read or written."""
+
+
+def inside(folder: Path, name: str | PurePath, *, links: bool = True) -> Path:
+    """The path in a folder that a name stands for.
+
+    Every name from a file that anyone may have written becomes a path here, or by
+    :func:`file_stem`: neither an absolute name nor one with ``..`` gets through, whichever of
+    ``/`` and ``\\`` is between its parts.
+
+    Args:
+        folder: which.
+        name: relative to it.
+        links: whether links in the folder may lead out of it. If not, the answer has none.
+
+    Raises:
+        OutsideFolder: the name leads out of the folder, or no file can have it.
+    """
+    told = f"{str(name)!r:.200}"
+    # Windows' rules take both separators, and drives.
+    parts = PureWindowsPath(name)
+    longest = max((len(os.fsencode(part)) for part in parts.parts), default=0)
+    leads_out = parts.anchor or ".." in parts.parts or not parts.parts
+    if leads_out or "\0" in str(name) or longest > _LONGEST_PART:
+        raise OutsideFolder(
+            f"{told} is no name of a file in {folder}: give a relative path without '..', of at "
+            f"most {_LONGEST_PART} bytes a part"
+        )
+    if links:
+        return folder / name
+    top, found = os.path.realpath(folder), os.path.realpath(folder / name)
+    if os.path.commonpath((top, found)) != top:
+        raise OutsideFolder(
+            f"{told} is a link that leads out of {folder}; put the file itself there"
+        )
+    return Path(found)
+
+
+def place_file(source: Path, to: Path, *, copy: bool) -> bool:
+    """Put a file of the user's into an output: a hard link to it where there can be one, or a copy.
+
+    Links are resolved first: a relative one would lead elsewhere from its new place. Nothing may be
+    at the new place. It is never written into: it may be a hard link to another file of the user's.
+
+    Args:
+        source: a regular file, or a link to one.
+        to: its new place; the folder must exist.
+        copy: whether it is copied in any case.
+
+    Returns:
+        Whether it is a hard link.
+
+    Raises:
+        CannotWrite: something is there already, or the disk is full, for example.
+    """
+    try:
+        real = os.path.realpath(source, strict=True)
+        if not copy:
+            try:
+                os.link(real, to)
+            except FileExistsError:
+                raise
+            except OSError:  # another file system, one without links, or another user's file
+                pass
+            else:
+                return True
+        with open(real, "rb") as given, open(to, "xb") as made:
+            shutil.copyfileobj(given, made)
+        return False
+    except FileExistsError as error:
+        raise CannotWrite(f"{to}: cannot be written: a file is there already") from error
+    except OSError as error:
+        raise CannotWrite(f"{to}: cannot be written: {error.strerror}: {source}") from error
 
 
 def writable(text: str) -> str:
@@ -114,6 +193,53 @@ def write_atomic(path: Path, data: str | bytes, *, mode: int | None = None) -> N
             raise
     except OSError as error:
         raise CannotWrite(f"{path}: cannot be written: {_reason(error, path)}") from error
+
+
+def write_new(path: Path, data: bytes) -> None:
+    """Write one of many files: as :func:`write_atomic`, but that a power cut may lose it.
+
+    Raises:
+        CannotWrite: as :func:`write_atomic`.
+    """
+    draft = path.with_name(f"{path.name}.{secrets.token_hex(8)}.tmp")
+    try:
+        with open(draft, "xb") as file:
+            file.write(data)
+        os.replace(draft, path)
+    except OSError as error:
+        raise CannotWrite(f"{path}: cannot be written: {_reason(error, path)}") from error
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def replaced(path: Path, *, errors: str = "strict") -> Iterator[IO[str]]:
+    """Write a text file line by line, completely or not at all: ``with replaced(path) as file``.
+
+    It is written beside its place, under a name that nothing has, and moved there at the end.
+
+    Args:
+        path: the file; its folder must exist. An existing file or link is replaced.
+        errors: what becomes of what UTF-8 cannot hold, as ``open`` takes it.
+
+    Raises:
+        CannotWrite: as :func:`write_atomic`.
+    """
+    name = os.fsdecode(os.fsencode(path.name)[:_LONGEST_NAME])
+    draft = path.with_name(f".{name}.{secrets.token_hex(8)}.tmp")
+    try:
+        with open(draft, "x", encoding="utf-8", errors=errors, newline="\n") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(draft, path)
+    except OSError as error:
+        # An error that names another file is one of the block's own.
+        if isinstance(error, CannotWrite) or error.filename not in (None, str(draft)):
+            raise
+        raise CannotWrite(f"{path}: cannot be written: {_reason(error, path)}") from error
+    finally:
+        draft.unlink(missing_ok=True)
 
 
 def write_output(path: str | Path, data: str | bytes, *, force: bool = False) -> None:

@@ -19,6 +19,7 @@ from er_gym.data.frames import FrameSet, is_frame_set
 from er_gym.data.sharegpt_files import open_sharegpt
 from er_gym.data.trajectory import PictureRecord
 from er_gym.tasks.splits import EVALUATION_SCENES
+from er_gym.writing import inside
 
 
 @dataclass(frozen=True)
@@ -49,12 +50,14 @@ class Samples:
 
 @dataclass(frozen=True)
 class _Source:
-    """The conversations of one place; the paths of their pictures are relative to ``folder``."""
+    """The conversations of one place; the paths of their pictures are relative to ``folder``, and
+    lead out of it only where they may be ``anywhere``."""
 
     chats: tuple[Chat, ...]
     folder: Path
     prompts: Mapping[str, str]
     recorded: Mapping[str, Any] = field(default_factory=dict)
+    anywhere: bool = False
 
 
 def open_samples(paths: Sequence[Path], settings: DataSettings) -> Samples:
@@ -83,11 +86,11 @@ def open_samples(paths: Sequence[Path], settings: DataSettings) -> Samples:
                 f"{_told(first.prompts)}; set data.dialect and data.language, or train with one "
                 "after the other"
             )
-    every = [(chat, source.folder) for source in sources.values() for chat in source.chats]
+    every = [(chat, source) for source in sources.values() for chat in source.chats]
     every = [*drawn(every, settings.limit)]
     found = every
     if settings.mask == "turns":
-        found = [(chat, folder) for chat, folder in every if any(chat.train)]
+        found = [(chat, source) for chat, source in every if any(chat.train)]
     names = ", ".join(map(str, paths))
     if not found:
         raise ValueError(
@@ -95,7 +98,7 @@ def open_samples(paths: Sequence[Path], settings: DataSettings) -> Samples:
             "other data or other data.parts"
         )
     digest = _digest(chat for chat, _ in found)
-    chats = tuple(_with_paths(chat, folder.resolve()) for chat, folder in found)
+    chats = tuple(_with_paths(chat, source) for chat, source in found)
     _check_pictures(chats)
     return Samples(chats, digest, first.prompts, first.recorded, len(every) - len(found))
 
@@ -116,7 +119,7 @@ def _opened(path: Path, settings: DataSettings) -> _Source:
         )
     file = open_sharegpt(path)
     chats = tuple(file)
-    return _Source(chats, file.folder, {"dataset": str(file.path.resolve())})
+    return _Source(chats, file.folder, {"dataset": str(file.path.resolve())}, anywhere=True)
 
 
 def _of_collection(collection: Collection, settings: DataSettings) -> _Source:
@@ -169,14 +172,18 @@ def _digest(chats: Iterable[Chat]) -> str:
     return told.hexdigest()
 
 
-def _with_paths(chat: Chat, folder: Path) -> Chat:
+def _with_paths(chat: Chat, source: _Source) -> Chat:
     """The conversation with absolute paths of its pictures."""
+    folder = source.folder.resolve()
+
+    def path_of(picture: PictureRecord) -> Path:
+        return folder / picture.path if source.anywhere else inside(folder, picture.path)
 
     def placed(turn: ChatTurn) -> ChatTurn:
         if not turn.pictures:
             return turn
         parts = (
-            part.model_copy(update={"path": str(folder / part.path)})
+            part.model_copy(update={"path": str(path_of(part))})
             if isinstance(part, PictureRecord)
             else part
             for part in turn.parts

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from io import BytesIO
 from math import ceil, floor, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from agents.vlm.chat import Picture
 from agents.vlm.settings import Pictures
-from er_gym.data.pictures import encode_picture
+from er_gym.data.pictures import encode_picture, open_picture
 
 FACTOR = 28
 """Qwen2-VL and Qwen2.5-VL divide a picture into squares of this side, in pixels: one token each."""
@@ -90,5 +88,4 @@ def within_bounds(picture: Picture, settings: Pictures) -> Picture:
     """A picture, encoded anew if it has too many or too few pixels for the settings."""
     if fitted(picture.width, picture.height, settings) == (picture.width, picture.height):
         return picture
-    with Image.open(BytesIO(picture.data)) as image:
-        return encode(np.asarray(image.convert("RGB")), settings)
+    return encode(np.asarray(open_picture(picture.data)), settings)

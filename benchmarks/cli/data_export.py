@@ -127,5 +127,7 @@ def _lines(summary: ExportSummary, out: Path) -> list[str]:
         f"{summary.trained_turns:,} are to be learnt; {summary.pictures:,} pictures"
         + (f" ({summary.linked:,} hard links)" if summary.linked else ""),
     ]
+    if summary.outside.count:
+        lines.append(str(summary.outside))
     lines += [f"left out: {count:,} trajectories: {why}" for why, count in summary.left_out.items()]
     return lines

@@ -46,7 +46,7 @@ def import_(
     """
     from benchmarks.cli.progress import bar
     from er_gym.data.sharegpt_files import open_sharegpt
-    from er_gym.data.sharegpt_import import import_sharegpt
+    from er_gym.data.sharegpt_import import LEFT_OUT, import_sharegpt
 
     with bad_input():
         doing(f"reading {file}")
@@ -54,7 +54,7 @@ def import_(
             file, dataset=dataset, pictures=pictures, decisions=True, leave_out=leave_out
         )
         first, *problems = opened.report.lines()
-        for line in problems:
+        for line in (*opened.places.lines(), *problems):
             print_problem(line)
         with bar(terminal(stderr=True)) as shown:
             task = shown.add_task("import", total=None, status="")
@@ -69,5 +69,9 @@ def import_(
         f"{out}: {summary.trajectories:,} trajectories ({parts}), {summary.turns:,} turns, of "
         f"which {summary.trained_turns:,} are to be learnt; {summary.pictures:,} pictures"
     )
+    if summary.outside.count:
+        echo(str(summary.outside))
+    if summary.left_out:
+        echo(f"{summary.left_out:,} samples are left out; {out / LEFT_OUT} names each, and why")
     if summary.without_scene:
         echo(f"{summary.without_scene:,} trajectories do not say in which room they were played")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from er_gym.rollout.judgement import judged_by_step
 from er_gym.rollout.records import EpisodeRecord, StepRecord
 from er_gym.rollout.run_directory import CONVERSATIONS, PICTURES, RunDirectory
 from er_gym.tasks.verbs import INIT
-from er_gym.writing import file_stem
+from er_gym.writing import file_stem, inside
 
 _MOST_BYTES = 64 * 2**20
 """A larger conversation is not read."""
@@ -122,12 +121,10 @@ def file_inside(root: Path, folder: str, path: str) -> Path | None:
         path: relative to ``root``; it comes from a file that anyone may have written.
     """
     try:
-        top = os.path.realpath(root)
-        within, found = os.path.realpath(root / folder), os.path.realpath(root / path)
-    except (ValueError, OSError):  # no file can have this name
+        within, found = (inside(root, each, links=False) for each in (folder, path))
+    except (ValueError, OSError):
         return None
-    inside = found.startswith(within + os.sep) and within.startswith(top + os.sep)
-    return Path(found) if inside and os.path.isfile(found) else None
+    return found if found.is_relative_to(within) and found.is_file() else None
 
 
 def _conversation(run: Path, key: str) -> tuple[ConversationRecord | None, str]:

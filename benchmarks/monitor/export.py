@@ -18,9 +18,11 @@ import base64
 import hashlib
 import json
 import os
+import secrets
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from dataclasses import replace as changed
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -43,7 +45,7 @@ from benchmarks.monitor.site import Site
 from benchmarks.monitor.world import CannotReplay, Worlds
 from er_gym.data.pictures import encode_picture
 from er_gym.rollout.run_directory import RunDirectory
-from er_gym.writing import MARKDOWN_MARK, CannotWrite, make_folder, write_atomic
+from er_gym.writing import MARKDOWN_MARK, CannotWrite, make_folder, replaced, write_atomic
 
 INDEX, EPISODES, PICTURES = "index.html", "episodes", "pictures"
 USUAL_EPISODES = 20
@@ -256,10 +258,10 @@ class _Maker:
         except CannotReplay:
             return episode, []
         steps: list[StepView] = [
-            replace(step, pictures=(step.number - 1,) if 0 < step.number <= len(records) else ())
+            changed(step, pictures=(step.number - 1,) if 0 < step.number <= len(records) else ())
             for step in episode.steps
         ]
-        return replace(episode, steps=steps, pictures=records), contents
+        return changed(episode, steps=steps, pictures=records), contents
 
     def _map(self, episode: EpisodeView) -> str:
         try:
@@ -272,31 +274,24 @@ class _Maker:
 def _write_file(maker: _Maker, tell: Callable[[int, int], None]) -> None:
     """One file. Its episodes are written one by one, so memory does not grow with their number."""
     out = Path(os.path.realpath(maker.wanted.out))
-    draft = out.with_name(f".{out.name}.draft")
-    try:
-        with draft.open("w", encoding="utf-8", errors="replace", newline="\n") as file:
-            page = maker.list_page()
-            head, tail = _shell(maker.wanted.language, page.title, "data:")
-            file.write(f'{head}<div id="page">{page.body}</div>\n')
-            for number, key in enumerate(maker.keys, 1):
-                one = maker.episode_page(key, _as_data)
-                title = one.title.replace('"', "&quot;")
-                file.write(f'<template data-episode="{number}" data-title="{title}">')
-                file.write(f"{one.body}</template>\n")
-                tell(number, len(maker.keys))
-            file.write(tail)
-            file.flush()
-            os.fsync(file.fileno())
-        draft.replace(out)
-    finally:
-        draft.unlink(missing_ok=True)
+    with replaced(out, errors="replace") as file:
+        page = maker.list_page()
+        head, tail = _shell(maker.wanted.language, page.title, "data:")
+        file.write(f'{head}<div id="page">{page.body}</div>\n')
+        for number, key in enumerate(maker.keys, 1):
+            one = maker.episode_page(key, _as_data)
+            title = one.title.replace('"', "&quot;")
+            file.write(f'<template data-episode="{number}" data-title="{title}">')
+            file.write(f"{one.body}</template>\n")
+            tell(number, len(maker.keys))
+        file.write(tail)
 
 
 def _write_folder(maker: _Maker, tell: Callable[[int, int], None]) -> None:
     """A folder, made beside its place and moved there."""
     out = maker.wanted.out
-    draft, old = out.with_name(f".{out.name}.draft"), out.with_name(f".{out.name}.old")
-    shutil.rmtree(draft, ignore_errors=True)
+    unique = f".{out.name}.{secrets.token_hex(4)}"
+    draft, old = out.with_name(f"{unique}.draft"), out.with_name(f"{unique}.old")
     try:
         for folder in (draft / EPISODES, draft / PICTURES):
             make_folder(folder)
@@ -313,7 +308,6 @@ def _write_folder(maker: _Maker, tell: Callable[[int, int], None]) -> None:
             tell(number, len(maker.keys))
         _write_page(draft / INDEX, language, maker.list_page())
         if out.exists():
-            shutil.rmtree(old, ignore_errors=True)
             out.rename(old)
         draft.rename(out)
         shutil.rmtree(old, ignore_errors=True)

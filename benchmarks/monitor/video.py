@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import secrets
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from benchmarks.monitor.episode_view import EpisodeView, StepView, picture_file,
 from benchmarks.monitor.formats import visible
 from benchmarks.monitor.world import CannotReplay, Worlds
 from er_gym.data.fonts import Font, NoFont, font_for
+from er_gym.data.pictures import UnusablePicture, open_picture
 from er_gym.data.strips import fold
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.tasks.verbs import INIT
@@ -106,7 +108,7 @@ def write_mp4(frames: Sequence[Frame], path: Path) -> None:
     """
     import imageio_ffmpeg
 
-    draft = path.with_name(f".{path.stem}.draft.mp4")
+    draft = path.with_name(f".{path.stem}.{secrets.token_hex(8)}.draft.mp4")
     try:
         writer: Any = imageio_ffmpeg.write_frames(
             str(draft), frames[0].picture.size, fps=_FPS, macro_block_size=2, quality=8
@@ -133,8 +135,8 @@ def _own(run: Path, episode: EpisodeView, steps: Sequence[StepView]) -> Iterator
 
 def _opened(file: Path | None) -> Image.Image | None:
     try:
-        return Image.open(file).convert("RGB") if file else None
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
+        return open_picture(file) if file else None
+    except UnusablePicture:
         return None
 
 

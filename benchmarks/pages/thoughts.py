@@ -14,6 +14,7 @@ import click
 from PIL import Image
 
 from er_gym.data.collection import Collection
+from er_gym.data.pictures import open_picture
 from er_gym.data.trajectory import THOUGHT_KINDS, ThoughtRecord, Trajectory, Turn
 
 _ROOT = Path(__file__).resolve().parents[2]
@@ -36,10 +37,8 @@ def main(collection: Path, seed: int) -> None:
     rows = ["| Picture | Task, thought, action |", "| --- | --- |"]
     for number, (trajectory, turn, thought) in enumerate(drawn, 1):
         name = f"{number:02}.jpg"
-        with Image.open(found.path / turn.pictures[-1].path) as picture:
-            picture.convert("RGB").resize(_SIZE, Image.Resampling.LANCZOS).save(
-                _PICTURES / name, quality=80
-            )
+        picture = open_picture(found.path / turn.pictures[-1].path)
+        picture.resize(_SIZE, Image.Resampling.LANCZOS).save(_PICTURES / name, quality=80)
         text = (
             f"*{trajectory.instruction}* **{thought.kind}**: {thought.text} "
             f"`{turn.action}`".replace("|", "\\|")

@@ -15,7 +15,6 @@ taken, in the order of the parts, and is replaced as a whole.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
@@ -27,7 +26,7 @@ from er_gym.locking import LOCK, check_unused
 from er_gym.rollout.run_directory import EPISODES, RunDirectory, RunDirectoryError
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.reading import read_bytes, read_text
-from er_gym.writing import CannotWrite, file_stem, make_folder, write_atomic
+from er_gym.writing import file_stem, inside, make_folder, replaced, write_atomic
 
 MANIFEST = "collection.json"
 TRAJECTORIES = "trajectories.jsonl"
@@ -142,7 +141,7 @@ class Collection:
         Raises:
             CollectionError: it is not there, or it is damaged.
         """
-        file = self.part_path(part) / PLAYED / f"{file_stem(trajectory_id)}.json"
+        file = inside(self.path / PARTS, part) / PLAYED / f"{file_stem(trajectory_id)}.json"
         try:
             return Trajectory.model_validate_json(read_bytes(file))
         except (TaskFileError, ValidationError) as error:
@@ -151,7 +150,7 @@ class Collection:
     def has_pictures(self, trajectory: Trajectory) -> bool:
         """Whether all pictures of a trajectory are there."""
         pictures = (picture for turn in trajectory.turns for picture in turn.pictures)
-        return all((self.path / picture.path).is_file() for picture in pictures)
+        return all(inside(self.path, picture.path).is_file() for picture in pictures)
 
     def write(self, trajectories: Iterable[Trajectory]) -> int:
         """Replace ``trajectories.jsonl`` as a whole, and return how many lines it has.
@@ -161,22 +160,11 @@ class Collection:
         Raises:
             CannotWrite: the disk is full, for example; the old file is unchanged.
         """
-        draft = self.path / f".{TRAJECTORIES}.draft"
         count = 0
-        try:
-            with draft.open("w", encoding="utf-8", newline="\n") as file:
-                for trajectory in trajectories:
-                    file.write(trajectory.model_dump_json() + "\n")
-                    count += 1
-                file.flush()
-                os.fsync(file.fileno())
-            draft.replace(self.path / TRAJECTORIES)
-        except OSError as error:
-            raise CannotWrite(
-                f"{self.path / TRAJECTORIES}: cannot be written: {error.strerror}"
-            ) from error
-        finally:
-            draft.unlink(missing_ok=True)
+        with replaced(self.path / TRAJECTORIES) as file:
+            for trajectory in trajectories:
+                file.write(trajectory.model_dump_json() + "\n")
+                count += 1
         return count
 
     def trajectories(self) -> Iterator[Trajectory]:

@@ -29,7 +29,7 @@ from er_gym.tasks import verbs
 from er_gym.tasks.arrangement import Arrangement, set_up_scene
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.thor import make_controller
-from er_gym.writing import make_folder
+from er_gym.writing import make_folder, write_new
 
 VISIT = 16
 """Frames of a visit. To set a room up takes as long as some of them."""
@@ -270,9 +270,8 @@ class _Tour:
         stem = number if direction == _AHEAD else f"{number}-{direction}"
         path = f"{PICTURES}/{visit}/{stem}.{camera.form}"
         make_folder(camera.path / PICTURES / visit)
-        (camera.path / path).write_bytes(
-            encode_picture(rgb, form=camera.form, quality=camera.quality)
-        )
+        data = encode_picture(rgb, form=camera.form, quality=camera.quality)
+        write_new(camera.path / path, data)
         height, width, _ = rgb.shape
         return PictureRecord(path=path, direction=direction, width=width, height=height)
 

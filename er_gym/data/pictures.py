@@ -1,7 +1,16 @@
-"""Picture files: equal pixels and options give equal bytes."""
+"""Picture files: equal pixels and options give equal bytes.
+
+Every picture of a file is opened here (:func:`open_picture`, :func:`picture_size`): only those of
+the formats that are meant, since some of Pillow's others start programs or fail in ways of their
+own, and only up to a number of pixels, which is looked up before any is decoded.
+"""
 
 from __future__ import annotations
 
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -9,6 +18,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, JpegImagePlugin
+
+from er_gym.tasks.errors import TaskFileError
+from er_gym.tasks.reading import open_file
+
+FORMATS = ("JPEG", "PNG", "WEBP", "GIF", "BMP")
+"""The formats that are read, by Pillow's names."""
+MOST_PIXELS = 1 << 26
+"""The most pixels of a picture that is read: 8192 × 8192, 200 MB as RGB."""
+
+
+class UnusablePicture(ValueError):
+    """A picture cannot be read; the message names it, and says why in one line."""
 
 
 def encode_picture(
@@ -38,14 +59,15 @@ def encode_alike(rgb: NDArray[np.uint8], like: bytes) -> bytes:
             answer is equal to it.
 
     Raises:
-        OSError: the other file is no picture.
+        UnusablePicture: the other file is no picture.
     """
-    with Image.open(BytesIO(like)) as other:
+    with _opened(like, "the picture") as other:
         options: dict[str, Any] = {}
         if isinstance(other, JpegImagePlugin.JpegImageFile):
             options["qtables"] = other.quantization
             options["subsampling"] = JpegImagePlugin.get_sampling(other)
-        return _file(rgb, other.size, str(other.format).lower(), options)
+        size, form = other.size, str(other.format).lower()
+    return _file(rgb, size, form, options)
 
 
 def difference(recorded: bytes, rgb: NDArray[np.uint8]) -> str:
@@ -56,30 +78,81 @@ def difference(recorded: bytes, rgb: NDArray[np.uint8]) -> str:
     """
     try:
         again = encode_alike(rgb, recorded)
-    except (OSError, ValueError):
+        if again == recorded:
+            return ""
+        # Two steps: a difference of bytes may wrap around.
+        apart = np.abs(_pixels(recorded).astype(np.int16) - _pixels(again))
+    except ValueError:
         return "is no whole picture"
-    if again == recorded:
-        return ""
-    # Two steps: a difference of bytes may wrap around.
-    apart = np.abs(_pixels(recorded).astype(np.int16) - _pixels(again))
     wrong = int(apart.any(axis=2).sum())
     if not wrong:
         return ""
     return f"differs in {wrong:,} of {apart[..., 0].size:,} pixels, by up to {int(apart.max())}"
 
 
-def open_picture(path: Path) -> Image.Image:
-    """A picture file, read as a whole.
+def open_picture(source: Path | bytes) -> Image.Image:
+    """A picture, read as a whole, as RGB.
+
+    Args:
+        source: a file, or its bytes.
 
     Raises:
-        ValueError: it is not there, or it is no picture.
+        UnusablePicture: it is not there, is no picture of one of :data:`FORMATS`, has more than
+            :data:`MOST_PIXELS`, or is damaged.
     """
+    with _opened(source, _name(source)) as picture:
+        return picture.convert("RGB")
+
+
+def picture_size(source: Path | bytes) -> tuple[int, int]:
+    """The width and height of a picture, pixels; only the beginning of its file is read.
+
+    Raises:
+        UnusablePicture: as :func:`open_picture`; damage further on is not noticed.
+    """
+    with _opened(source, _name(source)) as picture:
+        return picture.size
+
+
+@contextmanager
+def _opened(source: Path | bytes, name: str) -> Iterator[Image.Image]:
+    """A picture whose pixels are not decoded yet; what goes wrong later is told, too."""
     try:
-        with Image.open(path) as picture:
-            return picture.convert("RGB")
-    except (OSError, ValueError, SyntaxError) as error:  # Pillow raises SyntaxError for odd PNGs
-        why = getattr(error, "strerror", None) or "it is no picture"
-        raise ValueError(f"{path} cannot be shown: {why}") from error
+        with BytesIO(source) if isinstance(source, bytes) else open_file(source) as file:
+            with warnings.catch_warnings():
+                # Pillow's own bound is larger than ours, and has no word on what to do.
+                warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+                picture = Image.open(file, formats=FORMATS)
+            with picture:
+                width, height = picture.size
+                if width * height > MOST_PIXELS:
+                    raise _too_large(name, f"{width:,} × {height:,} = {width * height:,}")
+                yield picture
+    except UnusablePicture:
+        raise
+    except Image.DecompressionBombError as error:
+        many = re.search(r"\d+", str(error))
+        raise _too_large(name, f"{int(many[0]):,}" if many else "far too many") from None
+    except TaskFileError as error:
+        raise UnusablePicture(f"{error} (it should be a picture)") from None
+    except Image.UnidentifiedImageError:
+        raise UnusablePicture(
+            f"{name}: no picture of a format that er-gym reads: {', '.join(FORMATS)}"
+        ) from None
+    except Exception as error:  # Pillow's readers fail on broken files in many ways
+        why = getattr(error, "strerror", None) or " ".join(str(error).split())
+        raise UnusablePicture(f"{name}: a damaged picture: {why or type(error).__name__}") from None
+
+
+def _too_large(name: str, pixels: str) -> UnusablePicture:
+    return UnusablePicture(
+        f"{name}: a picture of {pixels} pixels; er-gym reads at most {MOST_PIXELS:,}; make it "
+        "smaller"
+    )
+
+
+def _name(source: Path | bytes) -> str:
+    return "the picture" if isinstance(source, bytes) else str(source)
 
 
 def _file(
@@ -94,5 +167,4 @@ def _file(
 
 
 def _pixels(data: bytes) -> NDArray[np.uint8]:
-    with Image.open(BytesIO(data)) as picture:
-        return np.asarray(picture.convert("RGB"))
+    return np.asarray(open_picture(data))

@@ -14,8 +14,9 @@ from er_gym.data.trajectory import SeenObject, Trajectory, Turn
 from er_gym.envs.actions import NO_ACTION
 from er_gym.rollout.play import Playable
 from er_gym.rollout.records import ERROR
+from er_gym.tasks.reading import read_bytes
 from er_gym.tasks.task import Task
-from er_gym.writing import writable
+from er_gym.writing import inside, writable
 
 _AHEAD = "ahead"
 _LONGEST = 120
@@ -94,9 +95,9 @@ def _pictured(
             yield f"picture {picture.path}: there is no view {picture.direction!r} at this turn"
             continue
         try:
-            recorded = (folder / picture.path).read_bytes()
-        except OSError as error:
-            yield f"picture {picture.path} cannot be read: {error.strerror}"
+            recorded = read_bytes(inside(folder, picture.path))
+        except ValueError as error:
+            yield f"picture {picture.path} cannot be read: {error}"
             continue
         if problem := difference(recorded, frame):
             yield f"picture {picture.path} {problem}"

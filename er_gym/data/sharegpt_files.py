@@ -13,16 +13,24 @@ from __future__ import annotations
 import re
 from array import array
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from PIL import Image, UnidentifiedImageError
-
-from er_gym.data.chat import IMAGE, Chat, ChatTurn, Part, Role
+from er_gym.data.chat import IMAGE, Chat, ChatTurn, Part
 from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
 from er_gym.data.json_items import JsonItems, json_items
-from er_gym.data.sharegpt_report import HARMLESS, Problems, Report, Sample, report_of
+from er_gym.data.pictures import UnusablePicture, picture_size
+from er_gym.data.sharegpt_columns import OLDER, Columns, guessed_columns, sample_of
+from er_gym.data.sharegpt_pictures import PicturePlaces, find_pictures
+from er_gym.data.sharegpt_report import (
+    HARMLESS,
+    Problems,
+    Report,
+    Sample,
+    problems_of,
+    report_of,
+)
 from er_gym.data.trajectory import PictureRecord
 from er_gym.tasks.reading import parse_json, read_text
 
@@ -30,34 +38,14 @@ INFO = "dataset_info.json"
 _TURNS = "_turns"
 """The end of a dataset's name in er-gym's own export whose samples teach their last turn alone."""
 _IMAGE = re.compile(f"({re.escape(IMAGE)})")
+_LOOKED_AT = 20
+"""Samples, and pictures, by which it is found out where the pictures are."""
 
 
 class ShareGptError(ValueError):
     """A file cannot be used; the message says why and what to do, in one line."""
 
 
-@dataclass(frozen=True)
-class Columns:
-    """What the parts of a sample are called; the defaults are those of messages as OpenAI has them.
-
-    Attributes:
-        messages, images, system: keys of a sample; ``""`` for none.
-        role, content: keys of a message.
-        user, assistant, system_role: values of ``role``.
-    """
-
-    messages: str = "messages"
-    images: str = "images"
-    system: str = ""
-    role: str = "role"
-    content: str = "content"
-    user: str = "user"
-    assistant: str = "assistant"
-    system_role: str = "system"
-
-
-OLDER = Columns("conversations", "images", "system", "from", "value", "human", "gpt", "system")
-"""The columns of the first ShareGPT files, and LLaMA-Factory's defaults."""
 _COLUMNS = {"messages": "messages", "images": "images", "system": "system"}
 _TAGS = {
     "role_tag": "role",
@@ -78,21 +66,23 @@ class ShareGptFile:
         path: the file.
         folder: what the paths of pictures are relative to.
         columns: what its parts are called.
+        places: where its pictures are.
         report: what is in it, and what is wrong with it.
     """
 
     def __init__(
         self,
         items: JsonItems,
-        folder: Path,
+        places: PicturePlaces,
         columns: Columns,
         last_turn_only: bool,
         report: Report,
         chosen: array[int],
     ) -> None:
         self.path = items.path
-        self.folder = folder
+        self.folder = places.folder
         self.columns = columns
+        self.places = places
         self.report = report
         self._items = items
         self._last_turn_only = last_turn_only
@@ -105,7 +95,7 @@ class ShareGptFile:
         return (self[index] for index in range(len(self)))
 
     def __getitem__(self, index: int) -> Chat:
-        """A conversation; the sizes of its pictures are read from their files.
+        """A conversation.
 
         Raises:
             ShareGptError: a picture cannot be read.
@@ -123,11 +113,25 @@ class ShareGptFile:
             replace(turn, train=next(learnt)) if turn.role == "assistant" else turn
             for turn in turns
         ]
-        return Chat(sample.id or f"{self.path.stem}-{place:05}", tuple(turns))
+        return Chat(self._id(sample, place), tuple(turns))
 
-    def explicit_id(self, index: int) -> bool:
-        """Whether the file itself names a conversation."""
-        return bool(sample_of(self._items[self._chosen[index]], self.columns).id)
+    def ids(self) -> Iterator[str]:
+        """The id of each conversation, in order."""
+        for place in self._chosen:
+            yield self._id(sample_of(self._items[place], self.columns), place)
+
+    def left_out(self) -> Iterator[dict[str, Any]]:
+        """Of each sample that has problems: its number in the file, its id, and all problems."""
+        chosen = {*self._chosen}
+        for index in range(len(self._items)):
+            if index not in chosen:
+                sample = sample_of(self._items[index], self.columns)
+                why = problems_of(sample, self.places)
+                if not self.report.harmless.issuperset(why):
+                    yield {"item": index, "id": sample.id, "why": why}
+
+    def _id(self, sample: Sample, place: int) -> str:
+        return sample.id or f"{self.path.stem}-{place:05}"
 
     def _flags(self, sample: Sample) -> list[bool]:
         count = sum(role == "assistant" for role in sample.roles)
@@ -145,13 +149,11 @@ class ShareGptFile:
         return tuple(parts)
 
     def _picture(self, path: str, place: int) -> PictureRecord:
+        path = self.places.path_of(path)
         try:
-            with Image.open(self.folder / path) as image:
-                width, height = image.size
-        except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
-            raise ShareGptError(
-                f"{self._items.place(place)}: the picture {path!r:.200} cannot be read: {error}"
-            ) from error
+            width, height = picture_size(self.folder / path)
+        except UnusablePicture as error:
+            raise ShareGptError(f"{self._items.place(place)}: {error}") from error
         return PictureRecord(path=path, width=width, height=height)
 
 
@@ -170,8 +172,9 @@ def open_sharegpt(
     Args:
         path: the file; or ``dataset_info.json``, or a folder that has it.
         dataset: the entry of ``dataset_info.json``; needed only if it has several.
-        pictures: what the paths of pictures are relative to; by default the file's folder, or the
-            folder above if the first picture is there.
+        pictures: what the paths of pictures are relative to; by default the file's folder, or one
+            above or below it where the first pictures are
+            (:mod:`er_gym.data.sharegpt_pictures`).
         feedback: True for the samples that have ``<|feedback|>`` (in the paper's file: those of the
             third stage), False for the others, None for all.
         last_turn_only: whether each sample teaches its last turn alone; by default if the file's
@@ -188,12 +191,12 @@ def open_sharegpt(
     file, columns = _file_and_columns(path, dataset)
     items = json_items(file)
     columns = columns or _guessed(items)
-    folder = pictures or _folder(file, items, columns)
+    places = find_pictures(file, _first_pictures(items, columns), pictures)
     problems = Problems(harmless=frozenset() if decisions else HARMLESS)
     chosen = array("Q")
     for index in range(len(items)):
         sample = sample_of(items[index], columns)
-        sound = problems.look(index, sample, folder)
+        sound = problems.look(index, sample, places)
         if (sound or not leave_out) and (feedback is None or feedback == sample.has_feedback):
             chosen.append(index)
     report = report_of(items, problems)
@@ -206,57 +209,7 @@ def open_sharegpt(
             f"{report.in_one_line()}"
         )
     only_last = file.stem.endswith(_TURNS) if last_turn_only is None else last_turn_only
-    return ShareGptFile(items, folder, columns, only_last, report, chosen)
-
-
-# -- a sample --------------------------------------------------------------------------------------
-
-
-def sample_of(item: object, columns: Columns) -> Sample:
-    """A sample by the names of its columns; :attr:`Sample.wrong` says what is wrong with it."""
-    if not isinstance(item, dict):
-        return Sample(wrong=f"a {type(item).__name__}, not an object")
-    messages = item.get(columns.messages)
-    if not isinstance(messages, list) or not messages:
-        return Sample(wrong=f"no list {columns.messages!r}; it has {', '.join(item)[:100] or '-'}")
-    name = item.get("id")
-    images = item.get(columns.images) or [] if columns.images else []
-    found = [images] if isinstance(images, str) else images
-    if not isinstance(found, list) or not all(isinstance(each, str) for each in found):
-        return Sample(wrong=f"{columns.images!r} is no list of paths")
-    roles: list[Role] = []
-    texts: list[str] = []
-    system = item.get(columns.system) if columns.system else ""
-    if isinstance(system, str) and system:
-        roles.append("system")
-        texts.append(system)
-    known: dict[object, Role] = {
-        columns.user: "user",
-        columns.assistant: "assistant",
-        columns.system_role: "system",
-    }
-    flags: list[bool] = []
-    for number, message in enumerate(messages):
-        if not isinstance(message, dict):
-            return Sample(wrong=f"message {number} is no object")
-        role, text = known.get(message.get(columns.role)), message.get(columns.content)
-        if role is None:
-            told = repr(message.get(columns.role))[:60]
-            return Sample(wrong=f"message {number} has the unknown {columns.role} {told}")
-        if not isinstance(text, str):
-            return Sample(wrong=f"message {number} has no text {columns.content!r}")
-        roles.append(role)
-        texts.append(text)
-        if role == "assistant":
-            flags.append(message.get("loss") not in (False, 0))
-    told_flags = any("loss" in message for message in messages)
-    return Sample(
-        id=str(name) if isinstance(name, str | int) else "",
-        roles=tuple(roles),
-        texts=tuple(texts),
-        images=tuple(found),
-        train=tuple(flags) if told_flags else (),
-    )
+    return ShareGptFile(items, places, columns, only_last, report, chosen)
 
 
 # -- which file, which columns ---------------------------------------------------------------------
@@ -300,35 +253,43 @@ def _entry(file: Path, name: str, entry: Any) -> tuple[Path, Columns]:
             f"{file}: the dataset {name!r:.80} has the formatting {kind!r:.40}; er-gym reads "
             "sharegpt"
         )
-    columns = replace(OLDER, images="", system="")
+    told: dict[str, Any] = {"images": (), "system": "", "told_by": file.name}
     for table, names in (("columns", _COLUMNS), ("tags", _TAGS)):
-        for key, value in (entry.get(table) or {}).items():
-            if key in names:
-                columns = replace(columns, **{names[key]: str(value)})
-    return file.parent / entry["file_name"], columns
+        given = entry.get(table)
+        if not isinstance(given, Mapping | None):
+            raise ShareGptError(
+                f"{file}: the {table} of the dataset {name!r:.80} are {given!r:.60}; give an object"
+            )
+        for key, value in (given or {}).items():
+            if key in names and value is not None:
+                if not isinstance(value, str):
+                    raise ShareGptError(
+                        f"{file}: {table}.{key} of the dataset {name!r:.80} is {value!r:.60}; give "
+                        "a name"
+                    )
+                told[names[key]] = (value,) if key == "images" else value
+    return file.parent / entry["file_name"], replace(OLDER, **told)
 
 
 def _guessed(items: JsonItems) -> Columns:
     """The columns by the first sample."""
     first = items[0]
-    for columns in (Columns(), OLDER):
-        messages = first.get(columns.messages) if isinstance(first, dict) else None
-        head = messages[0] if isinstance(messages, list) and messages else None
-        if isinstance(head, Mapping) and columns.role in head and columns.content in head:
-            return columns
-    has = ", ".join(first)[:100] if isinstance(first, dict) else type(first).__name__
-    raise ShareGptError(
-        f"{items.path} has neither messages with role and content nor conversations with from and "
-        f"value; its first item has: {has or '-'}; put a {INFO} beside it that names its columns"
+    columns = guessed_columns(first)
+    if columns is None:
+        has = ", ".join(first)[:100] if isinstance(first, dict) else type(first).__name__
+        raise ShareGptError(
+            f"{items.path} has neither messages with role and content nor conversations with from "
+            f"and value; its first item has: {has or '-'}; put a {INFO} beside it that names its "
+            "columns"
+        )
+    return columns
+
+
+def _first_pictures(items: JsonItems, columns: Columns) -> list[str]:
+    """The paths of pictures by which it is found out where they are."""
+    paths = (
+        path
+        for index in range(min(len(items), _LOOKED_AT))
+        for path in sample_of(items[index], columns).images
     )
-
-
-def _folder(file: Path, items: JsonItems, columns: Columns) -> Path:
-    """What the paths of pictures are relative to: where the first one is found."""
-    own = file.parent
-    for index in range(min(len(items), 20)):
-        for image in sample_of(items[index], columns).images:
-            for folder in (own, own.parent):
-                if (folder / image).is_file():
-                    return folder
-    return own
+    return list(dict.fromkeys(paths))[:_LOOKED_AT]

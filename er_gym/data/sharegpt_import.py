@@ -8,6 +8,7 @@ its trajectories cannot be replayed.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import re
 import secrets
@@ -19,6 +20,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import er_gym
+from er_gym.data.album import Album, Outside, picture_name
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import Collection, CollectionManifest
 from er_gym.data.exports.paper_reader import PURPOSE
@@ -28,13 +30,15 @@ from er_gym.data.sharegpt_report import decision
 from er_gym.data.trajectory import Language, PictureRecord, Trajectory, Turn
 from er_gym.tasks import verbs
 from er_gym.tasks.types import BY_NAME
-from er_gym.writing import file_stem, make_folder
+from er_gym.writing import file_stem, make_folder, replaced
 
 SOURCE = "imported"
 """The name of the suite of imported collections, and the key of their settings."""
 PLAIN, FEEDBACK = "plain", "feedback"
 """The parts: trajectories without and with ``<|feedback|>``; in the paper's file the latter are
 those of the third stage."""
+LEFT_OUT = "left_out.jsonl"
+"""The file of an imported collection that names each sample that was left out, and why."""
 _AROUND = ("right", "behind", "left")
 _ROOM = re.compile(r"FloorPlan\d+(?!\d)")
 _KIND = re.compile(r"_([abc])(?:/|\Z)")
@@ -55,6 +59,9 @@ class ImportSummary:
         parts: part to the number of trajectories.
         turns, trained_turns, pictures: of the trajectories.
         without_scene: how many name no room.
+        left_out: how many samples had problems; the collection's :data:`LEFT_OUT` names each.
+        outside: how many pictures lie outside the folder that their paths are relative to, links
+            resolved, and where the first of them does.
     """
 
     samples: int
@@ -64,6 +71,8 @@ class ImportSummary:
     trained_turns: int
     pictures: int
     without_scene: int
+    left_out: int
+    outside: Outside
 
 
 def import_sharegpt(
@@ -76,7 +85,7 @@ def import_sharegpt(
     """Write the conversations of a file as a collection.
 
     Everything is written to a folder beside ``out``, which is renamed when it is complete. Memory
-    does not grow with the file, but for the ids.
+    does not grow with the file, but for the ids. Nothing outside ``out`` is opened for writing.
 
     Args:
         file: opened with ``decisions=True``, so that every reply ends in a known action.
@@ -86,6 +95,7 @@ def import_sharegpt(
 
     Raises:
         ImportFailed: ``out`` is not empty.
+        ShareGptError: a picture cannot be read.
         OSError: something cannot be written.
     """
     if os.path.lexists(out) and not (out.is_dir() and not any(out.iterdir())):
@@ -93,9 +103,11 @@ def import_sharegpt(
     make_folder(out.parent)
     draft = out.parent / f".{out.name}.{secrets.token_hex(4)}.draft"
     counts: Counter[str] = Counter()
+    album = Album(draft, copy=copy)
     try:
         collection = Collection.create(draft, _manifest(file))
-        collection.write(_trajectories(file, draft, copy, counts, progress))
+        collection.write(_trajectories(file, album, counts, progress))
+        left_out = _write_left_out(file, draft)
         if out.is_dir():
             out.rmdir()
         draft.rename(out)
@@ -109,6 +121,8 @@ def import_sharegpt(
         trained_turns=counts["trained"],
         pictures=counts["pictures"],
         without_scene=counts["without scene"],
+        left_out=left_out,
+        outside=album.outside,
     )
 
 
@@ -203,15 +217,12 @@ def _task_type(where: str) -> str:
 
 
 def _trajectories(
-    file: ShareGptFile, out: Path, copy: bool, counts: Counter[str], progress: Progress
+    file: ShareGptFile, album: Album, counts: Counter[str], progress: Progress
 ) -> Iterator[Trajectory]:
-    ids: Counter[str] = Counter()
+    names = _Names(file)
     for chat in _whole(file, progress):
-        ids[chat.id] += 1
-        trajectory = trajectory_of(chat)
-        if ids[chat.id] > 1:
-            trajectory = trajectory.model_copy(update={"id": f"{chat.id}-{ids[chat.id]}"})
-        trajectory = _with_pictures(trajectory, file.folder, out, copy)
+        trajectory = trajectory_of(chat).model_copy(update={"id": names.of(chat.id)})
+        trajectory = _with_pictures(trajectory, file.folder, album)
         counts["trajectories"] += 1
         counts[trajectory.part] += 1
         counts["turns"] += len(trajectory.turns)
@@ -249,31 +260,58 @@ def _continues(chat: Chat, last: Chat) -> bool:
     return all((one.role, one.parts) == (other.role, other.parts) for one, other in pairs)
 
 
-def _with_pictures(trajectory: Trajectory, folder: Path, out: Path, copy: bool) -> Trajectory:
+class _Names:
+    """Ids that no two trajectories share, not even as file names: those of the file where it names
+    each once; ``x-2`` and so on where it has several ``x``, unless it has an ``x-2`` of its own."""
+
+    def __init__(self, file: ShareGptFile) -> None:
+        self._file = file
+        self._given: set[str] = set()
+        self._theirs: set[str] | None = None
+        """The ids of the file, as file names; read when two are first the same."""
+
+    def of(self, name: str) -> str:
+        """The id of the next trajectory of this name."""
+        found, number = name, 1
+        while file_stem(found) in self._given or (number > 1 and file_stem(found) in self._taken):
+            number += 1
+            found = f"{name}-{number}"
+        self._given.add(file_stem(found))
+        return found
+
+    @property
+    def _taken(self) -> set[str]:
+        if self._theirs is None:
+            self._theirs = {file_stem(each) for each in self._file.ids()}
+        return self._theirs
+
+
+def _with_pictures(trajectory: Trajectory, folder: Path, album: Album) -> Trajectory:
     number = 0
     turns: list[Turn] = []
     under = PurePosixPath("pictures", file_stem(trajectory.id))
     for turn in trajectory.turns:
         pictures: list[PictureRecord] = []
         for picture in turn.pictures:
-            path = under / f"{number:03}{PurePosixPath(picture.path).suffix}"
-            _place(folder / picture.path, out / path, copy)
+            path = under / picture_name(f"{number:03}", picture)
+            album.place(folder / picture.path, path, within=folder)
             pictures.append(picture.model_copy(update={"path": str(path)}))
             number += 1
         turns.append(turn.model_copy(update={"pictures": pictures}))
     return trajectory.model_copy(update={"turns": turns})
 
 
-def _place(source: Path, to: Path, copy: bool) -> None:
-    to.parent.mkdir(parents=True, exist_ok=True)
-    if not copy:
-        try:
-            os.link(source, to)
-        except OSError:  # another file system, or one without links
-            pass
-        else:
-            return
-    shutil.copyfile(source, to)
+def _write_left_out(file: ShareGptFile, out: Path) -> int:
+    """Name each sample that is left out, and why; returns how many there are."""
+    count = 0
+    if not file.report.unsound:
+        return 0
+    with replaced(out / LEFT_OUT) as lines:
+        lines.write(json.dumps({"format": "er-gym/left-out/1", "file": file.path.name}) + "\n")
+        for each in file.left_out():
+            lines.write(json.dumps(each, ensure_ascii=False) + "\n")
+            count += 1
+    return count
 
 
 def _manifest(file: ShareGptFile) -> CollectionManifest:

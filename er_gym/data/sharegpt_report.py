@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections import Counter
 from collections.abc import Mapping
@@ -14,10 +13,18 @@ from er_gym.data.chat import IMAGE, Role
 from er_gym.data.exports.paper import DECISION
 from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
 from er_gym.data.json_items import JsonItems
+from er_gym.data.pictures import UnusablePicture, picture_size
+from er_gym.data.sharegpt_pictures import PicturePlaces
 from er_gym.envs.actions import Action, parse
 
 ProblemKind: TypeAlias = Literal[
-    "layout", "order", "empty reply", "placeholders", "missing picture", "no decision"
+    "layout",
+    "order",
+    "empty reply",
+    "placeholders",
+    "missing picture",
+    "unusable picture",
+    "no decision",
 ]
 TOLD: Mapping[ProblemKind, str] = {
     "layout": "are laid out otherwise",
@@ -25,6 +32,7 @@ TOLD: Mapping[ProblemKind, str] = {
     "empty reply": "have an empty reply",
     "placeholders": f"have another number of {IMAGE} than of pictures",
     "missing picture": "name a picture that is not there",
+    "unusable picture": "name a picture that cannot be read",
     "no decision": f"have a reply that does not end in a known action in <{DECISION}>",
 }
 """How each kind is told, after a number of samples."""
@@ -43,7 +51,8 @@ class Sample:
         roles, texts: of its messages, the system's included.
         images: the paths of its pictures.
         train: for each reply whether it is learnt; empty if that is not said.
-        wrong: why it cannot be read; then the rest is empty.
+        images_in: the key under which its pictures stand, or why there are none.
+        wrong: why it cannot be read; then the rest, but for the id, is empty.
     """
 
     id: str = ""
@@ -51,6 +60,7 @@ class Sample:
     texts: tuple[str, ...] = ()
     images: tuple[str, ...] = ()
     train: tuple[bool, ...] = ()
+    images_in: str = ""
     wrong: str = ""
 
     @property
@@ -121,13 +131,13 @@ class Problems:
     counts: Counter[ProblemKind] = field(default_factory=Counter)
     first: dict[ProblemKind, list[tuple[int, str]]] = field(default_factory=dict)
 
-    def look(self, index: int, sample: Sample, folder: Path) -> bool:
+    def look(self, index: int, sample: Sample, places: PicturePlaces) -> bool:
         """Note what is wrong with a sample, and say whether it can be learnt from."""
         self.samples += 1
         self.replies += sample.roles.count("assistant")
         self.pictures += len(sample.images)
         self.with_feedback += sample.has_feedback
-        found = dict(_problems(sample, folder))
+        found = problems_of(sample, places)
         for kind, why in found.items():
             self.counts[kind] += 1
             named = self.first.setdefault(kind, [])
@@ -162,10 +172,10 @@ def decision(reply: str) -> Action | None:
     return parse(found[1].strip().strip(".")) if found else None
 
 
-def _problems(sample: Sample, folder: Path) -> list[tuple[ProblemKind, str]]:
-    """What is wrong with a sample: at most one of each kind."""
+def problems_of(sample: Sample, places: PicturePlaces) -> dict[ProblemKind, str]:
+    """What is wrong with a sample: of each kind the first."""
     if sample.wrong:
-        return [("layout", sample.wrong)]
+        return {"layout": sample.wrong}
     found: list[tuple[ProblemKind, str]] = []
     first = 1 if sample.roles[0] == "system" else 0
     for number, role in enumerate(sample.roles[first:]):
@@ -178,17 +188,23 @@ def _problems(sample: Sample, folder: Path) -> list[tuple[ProblemKind, str]]:
             found.append(("order", "the last message is not the assistant's"))
     shown = 0
     for number, (role, text) in enumerate(zip(sample.roles, sample.texts, strict=True)):
-        places = text.count(IMAGE)
-        shown += places
-        if role != "user" and places:
+        count = text.count(IMAGE)
+        shown += count
+        if role != "user" and count:
             found.append(("layout", f"message {number}, of the {role}, shows a picture"))
         if role == "assistant" and not text.strip():
             found.append(("empty reply", f"message {number}"))
         elif role == "assistant" and decision(text) is None:
             found.append(("no decision", f"message {number} ends in {text[-40:]!r}"))
     if shown != len(sample.images):
-        found.append(("placeholders", f"{shown} places, {len(sample.images)} pictures"))
+        where = f" in {sample.images_in!r:.60}" if sample.images else f": {sample.images_in}"
+        found.append(("placeholders", f"{shown} places, {len(sample.images)} pictures{where}"))
     for path in sample.images:
-        if not os.path.isfile(folder / path):
-            found.append(("missing picture", f"{folder / path}"[:200]))
-    return list(reversed(found))  # so that of each kind the first is kept
+        if not places.has(path):
+            found.append(("missing picture", places.missing(path)))
+            continue
+        try:
+            picture_size(places.folder / places.path_of(path))
+        except UnusablePicture as error:
+            found.append(("unusable picture", str(error)[:300]))
+    return dict(reversed(found))

@@ -14,6 +14,7 @@ from PIL import Image, ImageDraw
 from er_gym.data.fonts import Font, font_for
 from er_gym.data.pictures import open_picture
 from er_gym.data.trajectory import THOUGHT_KINDS, PictureRecord, ThoughtKind, Trajectory, Turn
+from er_gym.writing import inside
 
 COLOURS: Mapping[ThoughtKind, str] = {
     "analysis": "#0072b2",
@@ -193,7 +194,7 @@ def _arranged(records: Sequence[PictureRecord], folder: Path) -> Image.Image | N
     their directions; None for none."""
     if not records:
         return None
-    pictures = [open_picture(folder / record.path) for record in records]
+    pictures = [open_picture(inside(folder, record.path)) for record in records]
     width = _PICTURES if len(records) == 1 else _PICTURES * 2 // 3
     scaled = [
         picture.resize(

@@ -21,7 +21,7 @@ from er_gym.plugins import Registry
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import parse_json, read_bytes
 from er_gym.thor import OBJECT_TYPES
-from er_gym.writing import CannotWrite, make_folder
+from er_gym.writing import CannotWrite, make_folder, write_atomic
 
 Ask: TypeAlias = Callable[[str], str]
 """A language model: a function from a prompt to a reply."""
@@ -214,6 +214,8 @@ def _append(cache: Path, entry: _Entry) -> None:
     """Append a line in one write, so that at most this line is incomplete if er-gym is killed."""
     make_folder(cache.parent)
     line = json.dumps(entry.model_dump()).encode() + b"\n"
+    if cache.exists() and (cache.is_symlink() or cache.stat().st_nlink > 1):
+        write_atomic(cache, cache.read_bytes())  # a file of its own: no other one grows with it
     with open(cache, "ab+", buffering=0) as file:  # O_APPEND keeps other writers' lines intact
         end = file.seek(0, os.SEEK_END)
         if end:

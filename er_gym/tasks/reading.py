@@ -50,6 +50,8 @@ _KINDS = (
     (stat.S_ISSOCK, "a socket"),
 )
 _MOST_BRACKETS = 500
+_LONGEST_PATH = 300
+"""The most characters of a path that a message names; a file may state one of any length."""
 _BRACKET = re.compile(r"[\[\]{}]")
 _INTEGER = "tag:yaml.org,2002:int"
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
@@ -72,7 +74,7 @@ def open_file(path: Path) -> BinaryIO:
     except FileNotFoundError:
         raise TaskFileError(f"{path}: no such file") from None
     except OSError as error:
-        raise TaskFileError(f"{path}: {error.strerror}") from None
+        raise TaskFileError(f"{path!s:.{_LONGEST_PATH}}: {error.strerror}") from None
     except ValueError as error:  # a path with a zero byte
         raise TaskFileError(f"{str(path)!r}: not a path: {error}") from None
     try:

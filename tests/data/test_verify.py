@@ -147,7 +147,7 @@ def test_a_changed_picture_is_found_unless_pictures_are_left_out(
     file.write_bytes(file.read_bytes()[:200])
     assert problem_of(verdicts(collection))[1] == f"turn 0: picture {first} is no whole picture"
     file.unlink()
-    assert "cannot be read: No such file" in problem_of(verdicts(collection))[1]
+    assert ": no such file" in problem_of(verdicts(collection))[1]
     assert not any(one.problems for one in verdicts(collection, pictures=False).values())
 
 

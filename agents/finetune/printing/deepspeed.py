@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from agents.finetune.printing.plan import (
 from agents.finetune.printing.sources import SourceJob
 from er_gym.data.collection import MANIFEST
 from er_gym.data.exports.ms_swift import MS_SWIFT as EXPORT
+from er_gym.writing import place_file
 
 NAME = "deepspeed"
 _SETTINGS, _MODEL = "finetune.yaml", "model"
@@ -31,8 +32,9 @@ _MODULE = ("-m", "benchmarks.cli", "finetune")
 def _write(plan: PrintPlan, folder: Path) -> Printed:
     whole = (plan.source.path / MANIFEST).is_file()
     if whole:
-        copy = shutil.copy2 if plan.copy else _linked
-        shutil.copytree(plan.source.path, folder / DATA, copy_function=copy)
+        shutil.copytree(
+            plan.source.path, folder / DATA, copy_function=partial(_placed, copy=plan.copy)
+        )
     else:  # messages with a flag for each turn, which er-gym reads
         EXPORT.write(SourceJob.of(plan.source, folder / DATA, per_turn=False, copy=plan.copy))
     training = plan.settings.training.model_copy(update={"deepspeed": ZERO3_FILE})
@@ -64,12 +66,8 @@ def _write(plan: PrintPlan, folder: Path) -> Printed:
     )
 
 
-def _linked(source: str, to: str) -> str:
-    """A hard link, or a copy where there can be none."""
-    try:
-        os.link(source, to)
-    except OSError:
-        shutil.copy2(source, to)
+def _placed(source: str, to: str, *, copy: bool) -> str:
+    place_file(Path(source), Path(to), copy=copy)
     return to
 
 

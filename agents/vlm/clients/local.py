@@ -15,12 +15,10 @@ import time
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
-from io import BytesIO
 from typing import Any
 
 import jinja2
 import torch
-from PIL import Image
 from transformers import DynamicCache
 
 from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
@@ -39,6 +37,7 @@ from agents.vlm.clients.seeded_sampling import SeededSampling
 from agents.vlm.clients.stepped_jobs import SteppedJobs
 from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
 from agents.vlm.settings import AgentSettings
+from er_gym.data.pictures import open_picture
 from er_gym.rollout.agent import CannotGoOn
 
 _THINK, _THOUGHT = "<think>", "</think>"
@@ -219,7 +218,7 @@ class LocalClient:
         least, most = self._settings.pictures.model_bounds
         try:
             seen = self._image_processor(
-                [Image.open(BytesIO(each.data)).convert("RGB") for each in pictures],
+                [open_picture(each.data) for each in pictures],
                 size={"shortest_edge": least, "longest_edge": most},
                 return_tensors="pt",
             )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -12,11 +11,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, TypeAlias
 
+from er_gym.data.album import Album, Outside, picture_name
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import Collection
 from er_gym.data.dialects import Dialect
+from er_gym.data.pictures import picture_size
 from er_gym.data.trajectory import Language, PictureRecord, Trajectory
-from er_gym.writing import file_stem
+from er_gym.writing import OutsideFolder, file_stem, inside
 
 Split: TypeAlias = Literal["train", "validation"]
 SPLITS: tuple[Split, ...] = ("train", "validation")
@@ -64,6 +65,7 @@ class ExportSummary:
         pictures: the picture files; ``shown``: the places in samples where a picture is shown,
             which are more if samples repeat the beginning of a trajectory.
         linked: how many of the files are hard links.
+        outside: of the pictures that lie outside the collection, links resolved.
     """
 
     format: str
@@ -75,6 +77,7 @@ class ExportSummary:
     pictures: int
     shown: int
     linked: int
+    outside: Outside
 
 
 Progress: TypeAlias = Callable[[int, int], None]
@@ -105,6 +108,11 @@ class ExportJob:
     left_out: Counter[str] = field(default_factory=Counter)
     samples: Counter[str] = field(default_factory=Counter)
     counts: Counter[str] = field(default_factory=Counter)
+    album: Album = field(init=False)
+    _folders: set[PurePosixPath] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.album = Album(self.folder, copy=self.options.copy)
 
     def trajectories(self) -> Iterator[tuple[Split, Trajectory]]:
         """The trajectories with their splits, one at a time."""
@@ -137,14 +145,14 @@ class ExportJob:
     def with_pictures(self, chat: Chat, under: str = "") -> Chat:
         """Put the pictures of a conversation into ``under/pictures/ID/``; their paths in the
         conversation that is returned are relative to ``under``."""
-        folder = PurePosixPath(PICTURES, file_stem(chat.id))
+        folder = self.new_folder(PurePosixPath(PICTURES), chat.id)
         number = 0
         turns: list[ChatTurn] = []
         for turn in chat.turns:
             parts = []
             for part in turn.parts:
                 if not isinstance(part, str):
-                    path = folder / f"{number:03}{PurePosixPath(part.path).suffix}"
+                    path = folder / picture_name(f"{number:03}", part)
                     self.place(part, self.folder / under / path)
                     part = part.model_copy(update={"path": str(path)})
                     number += 1
@@ -152,41 +160,58 @@ class ExportJob:
             turns.append(replace(turn, parts=tuple(parts)))
         return replace(chat, turns=tuple(turns))
 
+    def new_folder(self, parent: PurePosixPath, name: str) -> PurePosixPath:
+        """A folder of the output for a name from the collection, which no other name has."""
+        stem = file_stem(name)
+        folder, number = parent / stem, 1
+        while folder in self._folders:
+            number += 1
+            folder = parent / f"{stem}-{number}"
+        self._folders.add(folder)
+        return folder
+
     def place(self, picture: PictureRecord, to: Path) -> None:
         """Link a picture of the collection to a file of the output, or copy it.
 
         Raises:
             ExportError: the collection lacks the picture.
-            OSError: it cannot be written.
+            OutsideFolder: the file would not be in the output.
+            UnusablePicture: it is no picture.
+            OSError: it cannot be written, or is there already.
         """
-        to.parent.mkdir(parents=True, exist_ok=True)
-        source = self.source(picture)
-        self.counts["pictures"] += 1
-        if not self.options.copy:
-            try:
-                os.link(source, to)
-            except OSError:  # another file system, or one without links
-                pass
-            else:
-                self.counts["linked"] += 1
-                return
-        shutil.copyfile(source, to)
+        try:
+            path = to.relative_to(self.folder)
+        except ValueError:
+            raise OutsideFolder(f"{to} is not in the output {self.folder}") from None
+        self.album.place(self.source(picture), PurePosixPath(path), self.collection.path)
 
     def embedded(self, chat: Chat) -> list[dict[str, Any]]:
-        """The pictures of a conversation as ``datasets`` keeps them in a file, bytes and name."""
+        """The pictures of a conversation as ``datasets`` keeps them in a file, bytes and name.
+
+        Raises:
+            ExportError: the collection lacks one.
+            UnusablePicture: one is no picture.
+        """
         files = [self.source(picture) for picture in chat.pictures]
-        self.counts["pictures"] += len(files)
+        for file in files:
+            picture_size(file)
+            self.album.look(file, self.collection.path)
+        self.album.pictures += len(files)
         return [{"bytes": file.read_bytes(), "path": file.name} for file in files]
 
     def source(self, picture: PictureRecord) -> Path:
         """The file of a picture in the collection.
 
         Raises:
-            ExportError: it is not there.
+            ExportError: it is not there, or its path leads out of the collection.
         """
-        path = PurePosixPath(picture.path)
-        file = self.collection.path / path
-        if path.is_absolute() or ".." in path.parts or not file.is_file():
+        try:
+            file = inside(self.collection.path, picture.path)
+        except OutsideFolder as error:
+            raise ExportError(
+                f"a trajectory names a picture outside the collection: {error}"
+            ) from None
+        if not file.is_file():
             raise ExportError(
                 f"the collection {self.collection.path} lacks the picture {picture.path!r} that a "
                 "trajectory names; copy a collection with its folder parts, or collect again"
@@ -238,7 +263,7 @@ class RowFile:
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = path.open("w", encoding="utf-8", newline="\n")
+        self._file = path.open("x", encoding="utf-8", newline="\n")
 
     def add(self, row: Mapping[str, Any]) -> None:
         """Write a row."""

@@ -102,9 +102,10 @@ def export(
             samples=dict(job.samples),
             turns=job.counts["turns"],
             trained_turns=job.counts["trained_turns"],
-            pictures=job.counts["pictures"],
+            pictures=job.album.pictures,
             shown=job.counts["shown"],
-            linked=job.counts["linked"],
+            linked=job.album.linked,
+            outside=job.album.outside,
         )
         write_atomic(draft / "README.md", _readme(row, summary, options, collection))
         write_atomic(draft / MANIFEST, _manifest(summary, options, held_out, collection))
@@ -196,9 +197,11 @@ def _manifest(
     held_out: frozenset[str],
     collection: Collection,
 ) -> str:
+    told = asdict(summary)
+    del told["outside"]  # it names places of this machine
     content = {
         "format": "er-gym/export/1",
-        "summary": asdict(summary),
+        "summary": told,
         "dialect": options.dialect,
         "language": options.language,
         "per_turn": options.per_turn,

@@ -10,8 +10,9 @@
 engine does not write the final ``end``, and neither does this one where the task is done. A picture
 is named after its turn, from 0, and the object of the action before. ``1_left_90_observe``,
 ``1_right_90_observe`` and ``1_left_180_observe`` are what is seen to the left, right and behind
-after ``observe``; ``2_ID_verify`` is shown at turn 3, after a step taken to check. A turn after an
-action that was not done has no picture. :mod:`er_gym.data.exports.paper_reader` reads such folders.
+after ``observe``; ``1_more_2`` is one more picture of turn 1. ``2_ID_verify`` is shown at turn 3,
+after a step taken to check. A turn after an action that was not done has no picture.
+:mod:`er_gym.data.exports.paper_reader` reads such folders.
 
 The layout has no place for results, feedback, faults, views, plans, and whether a turn is learnt.
 """
@@ -19,23 +20,28 @@ The layout has no place for results, feedback, faults, views, plans, and whether
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from pathlib import PurePosixPath
 from typing import Any
 
+from er_gym.data.album import picture_name
 from er_gym.data.dialects import plain
 from er_gym.data.exports.base import ExportFormat, ExportJob
 from er_gym.data.trajectory import TAG_OF_KIND, PictureRecord, Trajectory, Turn
 from er_gym.rollout.records import KeyActionRecord
 from er_gym.tasks import verbs
 from er_gym.tasks.room_kinds import room_kind
-from er_gym.writing import write_atomic
+from er_gym.writing import file_stem, write_atomic
 
 DECISION = "DecisionMaking"
-INIT, OBSERVE, VERIFY = "init_observe", "observe", "verify"
+INIT, OBSERVE, VERIFY, MORE = "init_observe", "observe", "verify", "more"
 ANGLES = {"left": "left_90", "right": "right_90", "behind": "left_180"}
 """How the views after ``observe`` are named: by the turn of the body."""
 FLAG_OF_REASON = {"step limit": "too many round"}
+_NOT_IN_IDS = re.compile(r"[^\w|+.,() -]")
+_LONGEST_ID = 120
+"""AI2-THOR's ids are shorter; file systems allow 255 bytes of a name."""
 FAILED = "error end"
 """The flags of an episode that was not a success; others have ``""``."""
 
@@ -43,22 +49,31 @@ FAILED = "error end"
 def _write(job: ExportJob) -> None:
     numbers: Counter[tuple[str, str]] = Counter()
     for split, trajectory in job.trajectories():
+        try:
+            room_kind(trajectory.scene)
+        except ValueError:
+            job.leave_out("its scene is no room of iTHOR")
+            continue
         job.take(trajectory)
         kind = trajectory.task_type.replace(" ", "_")
         key = (trajectory.scene, kind)
-        name = f"{trajectory.scene}_{kind}_{numbers[key]}_{trajectory.kind}"
-        folder = PurePosixPath(split, f"data_{kind}", name)
+        name = file_stem(f"{trajectory.scene}_{kind}_{numbers[key]}_{trajectory.kind}")
+        folder = job.new_folder(PurePosixPath(split, file_stem(f"data_{kind}")), name)
         images: list[str] = []
+        stems: set[str] = set()
         for index, turn in enumerate(trajectory.turns):
             for picture in turn.pictures:
                 stem = _picture_name(trajectory.turns, index, picture)
-                path = folder / f"{stem}{PurePosixPath(picture.path).suffix}"
+                if stem in stems:
+                    stem = f"{index}_{MORE}_{len(stems)}"
+                stems.add(stem)
+                path = folder / picture_name(stem, picture)
                 job.place(picture, job.folder / path)
                 images.append(str(path.relative_to(split)))
         item = _item(trajectory, numbers[key], images)
         text = json.dumps([item], indent=4, ensure_ascii=False) + "\n"
         (job.folder / folder).mkdir(parents=True, exist_ok=True)
-        write_atomic(job.folder / folder / f"{name}.json", text)
+        write_atomic(job.folder / folder / f"{folder.name}.json", text)
         numbers[key] += 1
         job.add(split, len(images))
 
@@ -125,7 +140,7 @@ def _picture_name(turns: list[Turn], index: int, picture: PictureRecord) -> str:
 
 def _part(name: str) -> str:
     """An object's id as a part of a file's name."""
-    return name.replace("/", "_")
+    return _NOT_IN_IDS.sub("_", name)[:_LONGEST_ID]
 
 
 PAPER = ExportFormat(

@@ -11,10 +11,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from PIL import Image
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.data.exports.paper import ANGLES, DECISION, INIT, OBSERVE, VERIFY
+from er_gym.data.pictures import picture_size
 from er_gym.data.trajectory import (
     TAG_OF_KIND,
     PictureRecord,
@@ -150,8 +150,7 @@ def _pictures(images: Sequence[str], file: Path, root: Path) -> list[_Shown]:
         if found is None or not picture.is_file():
             raise TaskFileError(f"{file}: the picture {path!r} is not there, or has no number")
         number, rest = int(found[1]), found[2]
-        with Image.open(picture) as image:
-            width, height = image.size
+        width, height = picture_size(picture)
         record = PictureRecord(
             path=str(PurePosixPath(picture.relative_to(root))),
             direction=_DIRECTION.get(rest, "ahead"),

@@ -284,7 +284,7 @@ def test_nothing_is_left_where_an_export_fails(
     (other.path / "parts").symlink_to(collection.path / "parts")
     other.write([*trajectories[:3], broken])
     for format in ("sharegpt", "ms-swift", "trl", "trl-turns", "paper"):
-        with pytest.raises(ExportError, match=r"lacks the picture '../no'"):
+        with pytest.raises(ExportError, match=r"outside the collection: '../no'"):
             export(other, format, tmp_path / "out")
         assert sorted(path.name for path in tmp_path.iterdir()) == ["other"]
 
