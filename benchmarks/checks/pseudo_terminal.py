@@ -15,7 +15,6 @@ import termios
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 
 ROWS, COLUMNS = 40, 100
@@ -66,26 +65,27 @@ class TerminalRun:
         return _ESCAPES.sub("", "".join(told)).replace("\r\n", "\n")
 
     @property
-    def news(self) -> list[float]:
-        """When something was printed that differs from what was printed before."""
-        times: list[float] = []
-        before = ""
-        for each in self.said:
-            if each.shown and each.shown != before:
-                times.append(each.at)
-                before = each.shown
-        return times
+    def news(self) -> list[Said]:
+        """What differs from what was printed before."""
+        shown = [each for each in self.said if each.shown]
+        return [
+            each
+            for before, each in zip(["", *(one.shown for one in shown)], shown, strict=False)
+            if each.shown != before
+        ]
 
     @property
     def first(self) -> float:
         """Seconds until the first word; those of the whole run, if there was none."""
-        return self.news[0] if self.news else self.seconds
+        return self.news[0].at if self.news else self.seconds
 
     @property
-    def silence(self) -> float:
-        """The longest time without news after the first word, seconds."""
-        times = [at for at in self.news if at < self.seconds] + [self.seconds]
-        return max((after - before for before, after in pairwise(times)), default=0.0)
+    def silence(self) -> tuple[float, str]:
+        """The longest time without news after the first word, seconds, and what it followed."""
+        told = [(each.at, each.shown) for each in self.news if each.at < self.seconds]
+        ends = [at for at, _ in told[1:]] + [self.seconds]
+        gaps = ((end - at, text) for (at, text), end in zip(told, ends, strict=True))
+        return max(gaps, default=(0.0, ""))
 
 
 def run(
@@ -184,7 +184,10 @@ def _start(
         preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
     )
     os.close(theirs)
-    if keys:
+    if keys:  # not shown, so that what the command says comes first
+        settings = termios.tcgetattr(ours)
+        settings[3] &= ~termios.ECHO
+        termios.tcsetattr(ours, termios.TCSANOW, settings)
         os.write(ours, keys.encode())
     return process, {ours: "out"}
 

@@ -36,6 +36,9 @@ class Line:
         self._stream: TextIO = sys.stderr
         self._ended: threading.Event | None = None
         self._holders = 0
+        # Kept for good: print() of Python 3.10-3.12 holds no reference to the stream that it writes
+        # to, and it is in the midst of it when the line ends.
+        self._printing: list[_Printing] = []
 
     def show(self, what: str, count: Callable[[], str] | None) -> None:
         """Show this from now on, until :meth:`end`.
@@ -50,8 +53,8 @@ class Line:
             self._what, self._count, self._since = what, count, time.monotonic()
             if self._ended is None:
                 self._stream = sys.stderr
-                sys.stdout = _Printing(sys.stdout, self.end)
-                sys.stderr = _Printing(sys.stderr, self._erase)
+                sys.stdout = self._before(sys.stdout, self.end)
+                sys.stderr = self._before(sys.stderr, self._erase)
                 self._ended = threading.Event()
                 threading.Thread(target=self._follow, args=(self._ended,), daemon=True).start()
 
@@ -77,6 +80,16 @@ class Line:
         """The other display has ended."""
         with self._lock:
             self._holders = max(0, self._holders - 1)
+
+    def _before(self, stream: Any, make_way: Callable[[], None]) -> Any:
+        """The stream with which others print meanwhile."""
+        if isinstance(stream, _Printing):
+            return stream
+        for each in self._printing:
+            if each.behind is stream and each.make_way == make_way:
+                return each
+        self._printing.append(_Printing(stream, make_way))
+        return self._printing[-1]
 
     def _follow(self, ended: threading.Event) -> None:
         wait = _DELAY
@@ -110,14 +123,14 @@ class _Printing:
     """A stream before whose output the line is erased."""
 
     def __init__(self, behind: Any, make_way: Callable[[], None]) -> None:
-        self.behind, self._make_way = behind, make_way
+        self.behind, self.make_way = behind, make_way
 
     def write(self, text: str) -> int:
-        self._make_way()
+        self.make_way()
         return int(self.behind.write(text))
 
     def writelines(self, lines: Any) -> None:
-        self._make_way()
+        self.make_way()
         self.behind.writelines(lines)
 
     def __iter__(self) -> Iterator[str]:

@@ -91,7 +91,7 @@ ROWS = (
     Row("data-export", _SHAREGPT, ("collect",)),
     Row("data-import", "data import sharegpt/train.json --out imported", ("data-export",)),
     Row("data-show", "data show made --trajectory FIRST", ("collect",)),
-    Row("data-frames", "data frames --suite train --frames 12 --out frames"),
+    Row("data-frames", "data frames --suite train --frames 12 --out views"),
     Row("new-model", "new-model tiny-text --data made --out model", ("collect",)),
     Row(
         "finetune",
@@ -171,9 +171,8 @@ def _server() -> Iterator[str]:
     default=Path(sys.executable),
     help="The Python beside whose er-gym is run.  [default: this one]",
 )
-@click.option("--show", is_flag=True, help="Print all that was said, and when.")
 @click.option("--out", type=Output(), help="Also write the figures into this file, as JSON.")
-def main(names: tuple[str, ...], repo: Path, python: Path, show: bool, out: Path | None) -> None:
+def main(names: tuple[str, ...], repo: Path, python: Path, out: Path | None) -> None:
     """Measure commands, all by default, and print a table; exit code 1 if one says too little."""
     figures: dict[str, dict[str, float]] = {}
     short = 0
@@ -183,23 +182,23 @@ def main(names: tuple[str, ...], repo: Path, python: Path, show: bool, out: Path
         for row in in_order(names):
             done = measure(row, work, python.absolute(), repo.resolve(), server)
             failed = done.late or done.code not in row.code
-            bad = failed or done.first > FIRST or done.silence > WITHIN
+            silence, followed = done.silence
+            bad = failed or done.first > FIRST or silence > WITHIN
             short += bad and (not names or row.name in names)
             print(
-                f"{row.name:16} {done.first:10.2f} {done.silence:8.2f} {done.seconds:7.2f}"
+                f"{row.name:16} {done.first:10.2f} {silence:8.2f} {done.seconds:7.2f}"
                 f"{'  too long' if bad else ''}{f'  exit code {done.code}' if failed else ''}",
                 flush=True,
             )
             figures[row.name] = {
                 "first": done.first,
-                "silence": done.silence,
+                "silence": silence,
                 "seconds": done.seconds,
             }
             if failed:
                 print(done.text()[-3000:])
-            if show:
-                for each in done.said:
-                    print(f"{each.at:9.2f}  {each.text!r}")
+            elif silence > WITHIN:
+                print(f"    {silence:.2f} s after {followed[-80:]!r}")
     print(f"{short} of {len(figures)} say nothing for too long")
     if out is not None:
         write_figures(out, figures)

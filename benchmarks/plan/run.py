@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from benchmarks.plan.phase import Phase
 from benchmarks.plan.settings import FREE, PlaySettings
 from er_gym import __version__
+from er_gym.activity import begin
 from er_gym.locking import Locked, check_unused, exclusive_use
 from er_gym.rollout.processes import CONTEXT, GRACE_SECONDS, end_with_parent
 from er_gym.tasks.reading import read_text
@@ -144,7 +145,9 @@ def check_phases(phases: Iterable[Phase]) -> None:
     Raises:
         PlanError: the command of one would refuse it.
     """
-    for phase in phases:
+    phases = list(phases)
+    for number, phase in enumerate(phases, 1):
+        begin(f"checking what the phases are given: {number} of {len(phases)}")
         for check in phase.checks:
             try:
                 check()

@@ -76,7 +76,7 @@ def _inheritable_stderr() -> Iterator[None]:
     """
     shown = sys.stderr
     if not _has_descriptor(shown):
-        sys.stderr = sys.__stderr__ if _has_descriptor(sys.__stderr__) else None  # type: ignore[assignment]
+        sys.stderr = sys.__stderr__ if _has_descriptor(sys.__stderr__) else None
     try:
         yield
     finally:

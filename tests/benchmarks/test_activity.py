@@ -72,6 +72,17 @@ def test_a_message_takes_the_lines_place_and_a_result_ends_it(on_screen):
     assert sys.stderr is screen
 
 
+def test_print_ends_the_line_too(on_screen):
+    screen = on_screen()
+    for number in range(20):  # Python's print() would use a stream that is gone
+        doing("reading")
+        draw()
+        print("result", number)
+    assert screen.shown[1:] == [
+        text for number in range(20) for text in ("reading ...", f"result {number}\n")
+    ]
+
+
 def test_a_long_line_is_cut_and_the_seconds_are_counted(on_screen, monkeypatch):
     screen = on_screen()
     monkeypatch.setattr(live_line, "_columns", lambda stream: 20)
