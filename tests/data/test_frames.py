@@ -8,7 +8,9 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
@@ -19,7 +21,7 @@ from benchmarks.cli.main import cli
 from er_gym import EmbodiedEnv
 from er_gym.data import frame_camera
 from er_gym.data.dialects import load_dialect
-from er_gym.data.frame_chat import frame_chat
+from er_gym.data.frame_chat import frame_chat, words_for_frames
 from er_gym.data.frames import FRAMES, Frame, FrameSet
 from er_gym.data.pictures import encode_picture
 from er_gym.data.trajectory import PictureRecord, SeenObject
@@ -167,6 +169,16 @@ def test_the_answers_are_true_and_in_the_words_of_the_scene() -> None:
     assert len(beginnings) > 2
     with pytest.raises(ValueError, match="'tags' has no words for frames; choose sight"):
         frame_chat(load_dialect("tags"), FRAME)
+
+
+@pytest.mark.parametrize("change", [{"frames": None}, {"scene": None}, {"scene_by": "user"}])
+def test_frames_need_words_for_pictures(change: dict[str, Any]) -> None:
+    sight = load_dialect("sight")
+    words, scene = words_for_frames(sight, "en")
+    assert (words.where, scene.view) == ("where {thing}", "see {things}")
+    texts = {"en": sight.texts["en"].model_copy(update=change)}
+    with pytest.raises(ValueError, match="'sight' has no words for frames"):
+        words_for_frames(replace(sight, texts=texts), "en")
 
 
 def test_rooms_that_are_kept_for_evaluation_are_not_learnt_from(drawn: Path) -> None:

@@ -11,6 +11,7 @@ from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.observations import (
     FEATURES,
     GOAL_VERBS,
+    OBSERVATIONS,
     SCALARS,
     STATE_LAYOUT,
     goal,
@@ -173,3 +174,21 @@ def test_a_new_episode_begins_with_nothing_remembered(state_env: EmbodiedEnv) ->
 
 def test_the_layout_names_every_entry_once() -> None:
     assert len(STATE_LAYOUT) == len(set(STATE_LAYOUT)) == len(SCALARS) + len(FEATURES) * 124
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high", "shape", "dtype"),
+    [
+        ("rgb", 0, 255, (64, 96, 3), "uint8"),
+        ("depth", 0, 40, (64, 96), "float32"),
+        ("objects", -1, 1, (124, 6), "float32"),
+        ("state", -1, 1, (len(STATE_LAYOUT),), "float32"),
+    ],
+)
+def test_the_bounds_of_spaces(
+    name: str, low: float, high: float, shape: tuple[int, ...], dtype: str
+) -> None:
+    space = OBSERVATIONS.get(name).space(96, 64)
+    assert (space.low.min(), space.low.max()) == (low, low)
+    assert (space.high.min(), space.high.max()) == (high, high)
+    assert (space.shape, space.dtype) == (shape, np.dtype(dtype))

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import hypot, sqrt
+from typing import Any
 
-from support import in_one_test
+import pytest
+from support import in_one_test, make_task
 
+from er_gym.envs import paper_approach
+from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.paper_approach import (
     _FACING,
     ObjectSnapshot,
@@ -15,6 +19,7 @@ from er_gym.envs.paper_approach import (
     _for_facing_north,
     _heading,
 )
+from er_gym.tasks.task import AgentPose
 
 LITTLE, MIDDLING, LARGE = (0.1, 0.3), (0.5, 0.8), (3.0, 2.0)
 """Volumes and faces, m³ and m²."""
@@ -141,6 +146,24 @@ def test_of_both_sides_of_what_faces_north_the_nearer(
     places += [(0.0, -behind)] if behind else []
     found, rotation = _for_facing_north(facing(0), at(*places), None, LITTLE)
     assert (found and round(found["z"] - Z, 6), rotation) == (expected, turned)
+
+
+def test_a_place_that_is_refused_is_not_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = EmbodiedEnv([], obs_mode="state", protocol="paper")
+    task = make_task("single_pickup", navigable_objects=("CounterTop",))
+    env.reset(options={"task": task})
+    tried: list[AgentPose] = []
+    go = paper_approach.teleport
+
+    def refuses(controller: Any, pose: AgentPose) -> bool:
+        tried.append(pose)
+        return len(tried) > 3 and go(controller, pose)
+
+    monkeypatch.setattr(paper_approach, "teleport", refuses)
+    assert env.step("navigate to CounterTop")[4]["action_success"]
+    assert len({(pose.x, pose.z) for pose in tried}) == len(tried) == 4
+    assert (env.agent_pose.x, env.agent_pose.z) == (tried[-1].x, tried[-1].z)
+    env.close()
 
 
 def test_of_two_directions_equally_near_the_first_counts() -> None:

@@ -184,6 +184,13 @@ def test_a_view_tells_where_an_object_is(
     assert (view.bearing, view.distance, view.side) == (bearing, distance, side)
 
 
+def test_the_hand_holds_any_object_the_first_of_the_scene_too() -> None:
+    held = make_entry("Egg|1", isPickedUp=True)
+    mug = make_entry("Mug|1")
+    assert perception_of(held, mug).held_name == perception_of(mug, held).held_name == "Egg"
+    assert perception_of(mug).held_name == ""
+
+
 def test_views_are_of_what_is_seen_and_not_held_the_nearest_first() -> None:
     perception = perception_of(
         make_entry("Mug|1", centre=(3.0, 0.0, 0.0)),

@@ -64,6 +64,17 @@ def test_what_can_be_reached_is_asked_for_once_in_a_process() -> None:
     assert next(first.nearest_to(0.0, 0.0)) == [[1.0, 0.9, 2.0]]
 
 
+def test_all_positions_come_in_batches_the_nearest_first() -> None:
+    places = [{"x": x / 4, "y": 0.9, "z": z / 4} for x in range(9) for z in range(11)]
+    batches = list(skills.Reachable(places[::-1]).nearest_to(1.0, 1.0))
+    flat = [place for batch in batches for place in batch]
+    away = [round(hypot(x - 1.0, z - 1.0), 6) for x, _, z in flat]
+    assert away == sorted(away)
+    assert sorted(flat) == [[each[axis] for axis in "xyz"] for each in places]
+    assert len(batches) > 2
+    assert {len(batch) for batch in batches[:-1]} == {len(batches[0])}
+
+
 @pytest.mark.parametrize(
     ("verb", "object_type", "request_"),
     [

@@ -64,6 +64,14 @@ def test_every_user_turn_tells_what_came_of_the_last_action(trajectories: list[T
     assert seen == {(shown, language) for shown in (0, 1, 3) for language in ("en", "zh")}
 
 
+def test_actions_are_listed_as_the_language_lists_things(trajectories: list[Trajectory]) -> None:
+    dialect, separators = load_dialect("paper"), {"en": ", ", "zh": "、"}
+    for trajectory in trajectories:
+        listed = separators[trajectory.language].join(("move forward", "end"))
+        assert f"{listed}\n" in told(dialect.chat(trajectory), "user")[0]
+    assert {each.language for each in trajectories} == {*separators}
+
+
 def test_after_observe_the_views_come_right_behind_left(trajectories: list[Trajectory]) -> None:
     trajectory = next(each for each in trajectories if each.turns[0].verb == verbs.OBSERVE)
     ahead = trajectory.turns[0].pictures
