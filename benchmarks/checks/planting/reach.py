@@ -1,0 +1,212 @@
+"""A scratch copy of the checkout, its tests, and which of them run which lines."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from benchmarks.checks.planting.faults import Fault
+
+_DURATION = re.compile(r"^\s*([\d.]+)s (?:call|setup|teardown)\s+(\S.*)$", re.MULTILINE)
+_RESULT = re.compile(r"^(\S+::.+?) (?:PASSED|SKIPPED|XFAIL)\b", re.MULTILINE)
+_FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
+_WAIT = 12
+"""The limit on the wall clock, in limits on the processor's time."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came of some tests.
+
+    Attributes:
+        passed: whether all passed. failed: the first one that did not, ``""`` if none is named.
+        late: whether the tests were ended at their limit. output: what pytest said.
+    """
+
+    passed: bool
+    failed: str
+    late: bool
+    output: str
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Which tests of a folder run which lines of a package.
+
+    Attributes:
+        tests: by file and line, the tests that run it, and ``""`` for what no test runs by itself:
+            an import, or another process.
+        seconds: by test, how long it took.
+    """
+
+    tests: Mapping[str, Mapping[int, frozenset[str]]]
+    seconds: Mapping[str, float] = field(repr=False)
+
+    def stages(self, fault: Fault) -> Iterator[list[str]]:
+        """The tests that can notice a fault: those that run its lines, then, where it may also show
+        in others, the rest of them."""
+        lines = self.tests.get(fault.file, {})
+        found = frozenset[str]().union(*(lines.get(line, frozenset()) for line in fault.lines))
+        first = {each.rpartition("|")[0] for each in found} - {""}
+        if fault.at_import and found:
+            of_file = frozenset[str]().union(*lines.values())
+            first |= {each.rpartition("|")[0] for each in of_file} - {""}
+        if first:
+            yield self._in_order(first)
+        # What a fixture, an import or another process ran may be used by other tests, too.
+        shared = {each.partition("::")[0] for each in found if each.endswith("|setup")}
+        rest = {
+            each
+            for each in self.seconds
+            if each not in first and ("" in found or each.partition("::")[0] in shared)
+        }
+        if rest:
+            yield self._in_order(rest)
+
+    def _in_order(self, tests: set[str]) -> list[str]:
+        """Tests of a file together, for the sake of its fixtures; the quickest files first."""
+        took: defaultdict[str, float] = defaultdict(float)
+        for test in tests:
+            took[test.partition("::")[0]] += self.seconds.get(test, 0.0)
+        rank = {test: index for index, test in enumerate(self.seconds)}
+        files = {file: index for index, file in enumerate(sorted(took, key=lambda one: took[one]))}
+        return sorted(
+            tests, key=lambda test: (files[test.partition("::")[0]], rank.get(test, len(rank)))
+        )
+
+
+@contextlib.contextmanager
+def scratch_copy(root: Path) -> Iterator[Path]:
+    """A copy of a checkout's files, with the shared data beside it; removed afterwards."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=root,
+        capture_output=True,
+        check=True,
+    ).stdout.decode()
+    with tempfile.TemporaryDirectory(prefix="er-gym-faults-") as folder:
+        copy = Path(folder) / "checkout"
+        for name in filter(None, listed.split("\0")):
+            if (root / name).is_file():
+                (copy / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(root / name, copy / name)
+        shared = root.parent / "shared"
+        if shared.is_dir():
+            (copy.parent / "shared").symlink_to(shared.resolve())
+        yield copy
+
+
+@contextlib.contextmanager
+def planted(checkout: Path, fault: Fault) -> Iterator[None]:
+    """The copy of the checkout has the fault."""
+    path = checkout / fault.file
+    source = path.read_bytes()
+    for compiled in (path.parent / "__pycache__").glob(f"{path.stem}.*.pyc"):
+        compiled.unlink()
+    path.write_bytes(fault.planted(source))
+    try:
+        yield
+    finally:
+        path.write_bytes(source)
+
+
+def run_tests(checkout: Path, tests: Sequence[str], seconds: float, *more: str) -> Run:
+    """Run tests in a copy of a checkout.
+
+    Args:
+        seconds: the limit on the processor's time of each process. It does not depend on the load
+            of the machine; the limit on the wall clock is a dozen times as long.
+    """
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 5))
+
+    with tempfile.TemporaryDirectory() as folder:
+        listed = Path(folder) / "tests"
+        listed.write_text("\n".join(tests), encoding="utf-8")
+        command = [sys.executable, "-m", "pytest", "-n0", "-rfE", "-p", "no:cacheprovider"]
+        process = subprocess.Popen(
+            [*command, "--tb=line", f"--basetemp={folder}/tmp", *more, f"@{listed}"],
+            cwd=checkout,
+            env={**os.environ, "PYTHONPATH": str(checkout), "PYTHONDONTWRITEBYTECODE": "1"},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            start_new_session=True,
+            preexec_fn=limited,
+        )
+        try:
+            output, _ = process.communicate(timeout=_WAIT * seconds)
+        except subprocess.TimeoutExpired:
+            output = ""
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+    code = process.returncode
+    late = code in (-signal.SIGXCPU, -signal.SIGKILL)
+    failed = _FAILED.search(output)
+    return Run(code == 0, failed[1] if failed else "", late, output)
+
+
+def failing_of(checkout: Path, tests: Sequence[str]) -> set[str]:
+    """Those of some tests that fail in a copy of a checkout."""
+    return {*_FAILED.findall(run_tests(checkout, tests, 3600.0).output)}
+
+
+def reach_of(checkout: Path, package: str, files: Sequence[str], kept: Path) -> Reach:
+    """Run some files or folders of tests once; note the lines of a package that each test runs.
+
+    Args:
+        kept: the folder that keeps what was found for the next time.
+
+    Raises:
+        RuntimeError: tests fail that should pass.
+    """
+    from coverage import CoverageData
+
+    name = f"{package.replace('/', '-')}-{_digest(checkout, package, *files)[:12]}"
+    data, said = kept / f"{name}.coverage", kept / f"{name}.txt"
+    if not (data.is_file() and said.is_file()):
+        kept.mkdir(parents=True, exist_ok=True)
+        (checkout / ".coverage").unlink(missing_ok=True)
+        options = [f"--cov={package}", "--cov-context=test", "--cov-report=", "--durations=0", "-v"]
+        run = run_tests(checkout, files, 3600.0, *options, "--durations-min=0", "-v")
+        if not run.passed:
+            raise RuntimeError(f"tests of {package} fail without a fault:\n{run.output[-2000:]}")
+        shutil.copy(checkout / ".coverage", data)
+        said.write_text(run.output, encoding="utf-8")
+    output = said.read_text(encoding="utf-8")
+    seconds = dict.fromkeys(_RESULT.findall(output), 0.0)
+    for took, test in _DURATION.findall(output):
+        seconds[test] = seconds.get(test, 0.0) + float(took)
+    found = CoverageData(str(data))
+    found.read()
+    tests: dict[str, dict[int, frozenset[str]]] = {}
+    for file in found.measured_files():
+        inside = file.partition("/checkout/")[2]
+        lines = found.contexts_by_lineno(file)
+        tests[inside] = {line: frozenset(contexts) for line, contexts in lines.items()}
+    return Reach(tests, seconds)
+
+
+def _digest(checkout: Path, *places: str) -> str:
+    found = hashlib.sha256()
+    for place in places:
+        inside = sorted((checkout / place).rglob("*.py"))
+        for path in inside or [checkout / place]:
+            found.update(path.relative_to(checkout).as_posix().encode() + path.read_bytes())
+    return found.hexdigest()
