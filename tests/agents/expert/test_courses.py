@@ -117,6 +117,25 @@ def test_kinds_a_and_c_search_plausible_wrong_places_first(searches: list[Played
     assert number > 40
 
 
+def test_plans_name_each_place_once_and_shrink(searches: list[Played]) -> None:
+    """A plan begins with where the agent goes; what it has searched is planned no more."""
+    shrunk = 0
+    for each in searches:
+        before: dict[Subgoal, tuple[str, ...]] = {}
+        for intent in each.intents:
+            if intent.purpose != "search":
+                continue
+            place, *rest = intent.plan
+            assert place == intent.action.object_type
+            assert len({*intent.plan}) == len(intent.plan)
+            if earlier := before.get(intent.subgoal):
+                shrunk += 1
+                assert {*rest} <= {*earlier[1:]}
+                assert earlier[0] not in intent.plan
+            before[intent.subgoal] = intent.plan
+    assert shrunk > 20
+
+
 def test_a_wrong_container_is_opened_and_closed_again(searches: list[Played]) -> None:
     looks = [
         (one, two)
