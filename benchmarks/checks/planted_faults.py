@@ -26,7 +26,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import click
@@ -48,7 +48,7 @@ from er_gym.tasks.reading import read_text
 ROOT = Path(__file__).resolve().parents[2]
 _ENOUGH = 0.9
 """The share of faults that the tests of each package must notice."""
-_LIMIT, _SLACK = 30.0, 10
+_LIMIT, _SLACK = 60.0, 10
 """The limit of a run of tests: seconds of the processor's time, and for each second that the tests
 took without a fault so many more."""
 _NOTICED, _LATE, _SURVIVED, _UNREACHED, _SAME, _UNSURE = (
@@ -63,6 +63,11 @@ _RESULTS = (_NOTICED, _LATE, _SURVIVED, _UNREACHED, _SAME, _UNSURE)
 @click.option("--faults", "count", default=60, show_default=True, help="in all packages together")
 @click.option("--one", "identity", help="show the fault of this id, and try it alone")
 @click.option("--again", is_flag=True, help="try once more what survived")
+@click.option(
+    "--by",
+    multiple=True,
+    help="with --again: files of tests, such as new ones, that are tried instead of all",
+)
 @click.option("--list", "only_list", is_flag=True, help="list the faults, and plant none")
 @click.option(
     "--work",
@@ -77,6 +82,7 @@ def main(
     count: int,
     identity: str | None,
     again: bool,
+    by: tuple[str, ...],
     only_list: bool,
     work: Path,
 ) -> None:
@@ -103,7 +109,7 @@ def main(
                 click.echo(f"{fault}\n{fault.diff((ROOT / fault.file).read_bytes())}\n")
     if only_list:
         return
-    results = _try_all(picked, work, fresh=identity is not None, again=again)
+    results = _try_all(picked, work, fresh=identity is not None, again=again, by=by)
     click.echo(table(picked, results))
     counts = Counter(results[each.id] for faults in picked.values() for each in faults)
     noticed = counts[_NOTICED] + counts[_LATE]
@@ -111,7 +117,12 @@ def main(
 
 
 def _try_all(
-    picked: Mapping[str, Sequence[Fault]], work: Path, *, fresh: bool, again: bool
+    picked: Mapping[str, Sequence[Fault]],
+    work: Path,
+    *,
+    fresh: bool,
+    again: bool,
+    by: Sequence[str],
 ) -> dict[str, str]:
     file = work / "results.json"
     work.mkdir(parents=True, exist_ok=True)
@@ -125,11 +136,13 @@ def _try_all(
                 if fault.id not in EQUIVALENT
                 and (fresh or results.get(fault.id, {}).get("result") not in done)
             ]
-            if left:
+            reach = Reach({}, {})
+            if left and not by:
                 click.echo(f"{package}: which tests run which lines", err=True)
                 reach = reach_of(checkout, package, tests_of(checkout, package), work)
             for fault in left:
-                result, test = _try(checkout, reach, fault)
+                stages = [list(by)] if by else reach.stages(fault)
+                result, test = _try(checkout, stages, reach, fault)
                 results[fault.id] = {"result": result, "test": test}
                 write_figures(file, results)
                 click.echo(f"{result:9} {fault}  {test}")
@@ -153,10 +166,12 @@ def _kept(file: Path) -> dict[str, dict[str, str]]:
     return kept
 
 
-def _try(checkout: Path, reach: Reach, fault: Fault) -> tuple[str, str]:
+def _try(
+    checkout: Path, stages: Iterable[Sequence[str]], reach: Reach, fault: Fault
+) -> tuple[str, str]:
     """The result of a fault, and the test that noticed it."""
     reached = False
-    for tests in reach.stages(fault):
+    for tests in stages:
         reached = True
         limit = _LIMIT + _SLACK * sum(reach.seconds.get(test, 0.0) for test in tests)
         with planted(checkout, fault):

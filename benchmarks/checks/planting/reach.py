@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
 import os
 import re
 import resource
@@ -19,9 +20,15 @@ from pathlib import Path
 
 from benchmarks.checks.planting.faults import Fault
 
-_DURATION = re.compile(r"^\s*([\d.]+)s (?:call|setup|teardown)\s+(\S.*)$", re.MULTILINE)
-_RESULT = re.compile(r"^(\S+::.+?) (?:PASSED|SKIPPED|XFAIL)\b", re.MULTILINE)
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
+_ROOT = Path(__file__).resolve().parents[3]
+_SETTINGS = """
+[run]
+source = {package}
+data_file = {data}
+parallel = true
+patch = subprocess
+"""
 _WAIT = 12
 """The limit on the wall clock, in limits on the processor's time."""
 
@@ -122,7 +129,9 @@ def planted(checkout: Path, fault: Fault) -> Iterator[None]:
         path.write_bytes(source)
 
 
-def run_tests(checkout: Path, tests: Sequence[str], seconds: float, *more: str) -> Run:
+def run_tests(
+    checkout: Path, tests: Sequence[str], seconds: float, *more: str, **environment: str
+) -> Run:
     """Run tests in a copy of a checkout.
 
     Args:
@@ -140,7 +149,12 @@ def run_tests(checkout: Path, tests: Sequence[str], seconds: float, *more: str) 
         process = subprocess.Popen(
             [*command, "--tb=line", f"--basetemp={folder}/tmp", *more, f"@{listed}"],
             cwd=checkout,
-            env={**os.environ, "PYTHONPATH": str(checkout), "PYTHONDONTWRITEBYTECODE": "1"},
+            env={
+                **os.environ,
+                "PYTHONPATH": f"{checkout}{os.pathsep}{_ROOT}",
+                "PYTHONDONTWRITEBYTECODE": "1",
+                **environment,
+            },
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -178,21 +192,18 @@ def reach_of(checkout: Path, package: str, files: Sequence[str], kept: Path) -> 
     """
     from coverage import CoverageData
 
-    name = f"{package.replace('/', '-')}-{_digest(checkout, package, *files)[:12]}"
-    data, said = kept / f"{name}.coverage", kept / f"{name}.txt"
-    if not (data.is_file() and said.is_file()):
-        kept.mkdir(parents=True, exist_ok=True)
-        (checkout / ".coverage").unlink(missing_ok=True)
-        options = [f"--cov={package}", "--cov-context=test", "--cov-report=", "--durations=0", "-v"]
-        run = run_tests(checkout, files, 3600.0, *options, "--durations-min=0", "-v")
+    folder = kept / f"{package.replace('/', '-')}-{_digest(checkout, package, *files)[:12]}"
+    data, times = folder / "lines.coverage", folder / "seconds.json"
+    if not times.is_file():
+        folder.mkdir(parents=True, exist_ok=True)
+        settings = _SETTINGS.format(package=checkout / package, data=data)
+        (folder / "coverage.ini").write_text(settings, encoding="utf-8")
+        plugin = ["-p", "benchmarks.checks.planting.watching"]
+        run = run_tests(checkout, files, 3600.0, *plugin, ER_GYM_WATCHED=str(folder))
         if not run.passed:
+            times.unlink(missing_ok=True)
             raise RuntimeError(f"tests of {package} fail without a fault:\n{run.output[-2000:]}")
-        shutil.copy(checkout / ".coverage", data)
-        said.write_text(run.output, encoding="utf-8")
-    output = said.read_text(encoding="utf-8")
-    seconds = dict.fromkeys(_RESULT.findall(output), 0.0)
-    for took, test in _DURATION.findall(output):
-        seconds[test] = seconds.get(test, 0.0) + float(took)
+    seconds: dict[str, float] = json.loads(times.read_text(encoding="utf-8"))
     found = CoverageData(str(data))
     found.read()
     tests: dict[str, dict[int, frozenset[str]]] = {}
