@@ -143,7 +143,7 @@ def run_tests(
         resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 5))
 
     with tempfile.TemporaryDirectory() as folder:
-        listed = Path(folder) / "tests"
+        listed = Path(folder) / "wanted"
         listed.write_text("\n".join(tests), encoding="utf-8")
         command = [sys.executable, "-m", "pytest", "-n0", "-rfE", "-p", "no:cacheprovider"]
         process = subprocess.Popen(
