@@ -38,14 +38,16 @@ def doing(what: str, count: Count | None = None) -> None:
 def saying_what_it_does() -> Iterator[None]:
     """Within, what lower layers tell is shown; the line is gone at the end, in any case."""
     log, heard = logging.getLogger(_HEARD), _Heard()
-    level = log.level
+    level, propagates = log.level, log.propagate
     log.addHandler(heard)
     log.setLevel(logging.INFO)
+    log.propagate = False  # packages such as minari give the root logger a handler of their own
     try:
         yield
     finally:
         log.removeHandler(heard)
         log.setLevel(level)
+        log.propagate = propagates
         LINE.end()
 
 

@@ -136,6 +136,14 @@ def test_without_a_terminal_only_imports_are_told(term, capsys, monkeypatch):
     assert capsys.readouterr() == ("", "loading PyTorch\n")
 
 
+def test_what_is_told_is_not_logged_again_by_a_package_that_configures_logging(caplog):
+    """As minari does when it is imported; pytest's own handler is one of the root logger."""
+    with saying_what_it_does():
+        begin("starting")
+    assert caplog.records == []
+    assert LOG.propagate
+
+
 def test_of_several_processes_of_a_training_one_draws(on_screen, monkeypatch):
     on_screen()
     monkeypatch.setenv("LOCAL_RANK", "1")
