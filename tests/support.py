@@ -61,10 +61,12 @@ def in_one_test(
     return decorate
 
 
-def run_python(program: str, **environment: str) -> subprocess.CompletedProcess[str]:
+def run_python(
+    program: str, *arguments: str, **environment: str
+) -> subprocess.CompletedProcess[str]:
     """Run a program in another process, in the checkout, with more environment variables."""
     return subprocess.run(
-        [sys.executable, "-c", program],
+        [sys.executable, "-c", program, *arguments],
         cwd=ROOT,
         env={**os.environ, **environment},
         capture_output=True,

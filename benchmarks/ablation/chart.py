@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.ablation.result import RowResult
 from benchmarks.ablation.settings import Study
-from benchmarks.scoring.drawing import GRID, MUTED, canvas, note
+from benchmarks.scoring.drawing import GRID, MUTED, canvas, note, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 _LINE, _SEED = "#2470ad", "#9fc0dd"
 
 
+@own_style()
 def draw_study(study: Study, results: Sequence[RowResult]) -> Figure:
     """Draw success in % over the study's numbers: a line with 95 % intervals, and a dot for each
     seed.
@@ -22,6 +23,9 @@ def draw_study(study: Study, results: Sequence[RowResult]) -> Figure:
     Args:
         study: has a number for each row.
         results: of its rows; at least one.
+
+    Raises:
+        ImportError: matplotlib is not installed.
     """
     figure, axes = canvas(8.5, 4.6, study.title)
     number_of = dict(zip(study.rows, study.numbers, strict=True))

@@ -54,7 +54,7 @@ def _show(settings: AblationSettings, out: Path, results: dict[str, list[RowResu
     """Print the tables, and write them and the pictures."""
     from benchmarks.ablation.result import as_json, study_table
     from benchmarks.scoring.tables import as_markdown, print_tables
-    from er_gym.writing import write_atomic, write_figure
+    from er_gym.writing import write_atomic
 
     if not results:
         echo(f"no model has been measured yet: {out}")
@@ -67,11 +67,12 @@ def _show(settings: AblationSettings, out: Path, results: dict[str, list[RowResu
     drawn = {name: rows for name, rows in results.items() if settings.studies[name].numbers}
     try:
         from benchmarks.ablation.chart import draw_study
+        from benchmarks.scoring.drawing import write_chart
 
         for name, rows in drawn.items():
             files.append(out / f"{name}.png")
-            write_figure(files[-1], draw_study(settings.studies[name], rows), force=True)
-    except ImportError:
-        print_problem("pictures need matplotlib: pip install 'er-gym[charts]'")
+            write_chart(files[-1], draw_study(settings.studies[name], rows), force=True)
+    except ImportError as error:
+        print_problem(str(error))
         files = files[:2]
     echo(", ".join(map(str, files)))

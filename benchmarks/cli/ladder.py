@@ -53,7 +53,7 @@ def _show(settings: LadderSettings, out: Path, results: list[RungResult]) -> Non
     """Print the tables, and write them and the picture."""
     from benchmarks.ladder.result import as_json, result_tables
     from benchmarks.scoring.tables import as_markdown, print_tables
-    from er_gym.writing import write_atomic, write_figure
+    from er_gym.writing import write_atomic
 
     if not results:
         echo(f"no model has been measured yet: {out}")
@@ -64,10 +64,11 @@ def _show(settings: LadderSettings, out: Path, results: list[RungResult]) -> Non
     write_atomic(out / "result.md", as_markdown(tables))
     try:
         from benchmarks.ladder.chart import draw_ladder
+        from benchmarks.scoring.drawing import write_chart
 
         figure = draw_ladder(results, f"Success after each stage, {settings.evaluation.suite}")
-    except ImportError:
-        print_problem("pictures need matplotlib: pip install 'er-gym[charts]'")
+    except ImportError as error:
+        print_problem(str(error))
         return
-    write_figure(out / "ladder.png", figure, force=True)
+    write_chart(out / "ladder.png", figure, force=True)
     echo(f"{out / 'result.md'}, {out / 'result.json'}, {out / 'ladder.png'}")

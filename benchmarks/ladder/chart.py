@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from benchmarks.ladder.paper_rungs import PAPER
 from benchmarks.ladder.result import RungResult
 from benchmarks.ladder.settings import CONTROLS
-from benchmarks.scoring.drawing import GRID, INK, MUTED, canvas, note
+from benchmarks.scoring.drawing import GRID, INK, MUTED, canvas, note, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 _OURS, _FAULTS, _PAPER = "#2470ad", "#b5762a", "#c9c9d2"
 
 
+@own_style()
 def draw_ladder(results: Sequence[RungResult], heading: str) -> Figure:
     """Draw success in % over the rungs: bars for the paper's, a line with 95 % intervals for ours,
     and one for each rate of faults.
@@ -23,6 +24,9 @@ def draw_ladder(results: Sequence[RungResult], heading: str) -> Figure:
     Args:
         results: of the rungs, in order; at least one.
         heading: above the picture.
+
+    Raises:
+        ImportError: matplotlib is not installed.
     """
     figure, axes = canvas(8.5, 4.6, heading)
     names = list(dict.fromkeys(each.rung.name for each in results))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from benchmarks.monitor.failures import FAILURES, Failure, failure_of
 from benchmarks.monitor.world import GRID, Footprint, World, Worlds
 from benchmarks.scoring.drawing import GRID as FAINT
-from benchmarks.scoring.drawing import INK, MUTED
+from benchmarks.scoring.drawing import INK, MUTED, new_figure, own_style
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import Manifest
 
@@ -65,6 +65,7 @@ def examples(records: Sequence[EpisodeRecord]) -> list[Example]:
     return found
 
 
+@own_style()
 def draw_examples(manifest: Manifest, found: Sequence[Example]) -> Figure:
     """A map for each example: the floor, the furniture, what the task is about, and the way.
 
@@ -76,12 +77,8 @@ def draw_examples(manifest: Manifest, found: Sequence[Example]) -> Figure:
         CannotReplay: an episode cannot be played again.
         ImportError: matplotlib is not installed.
     """
-    from matplotlib.figure import Figure
-
     lines = -(-len(found) // _COLUMNS)
-    figure = Figure(
-        (_PANEL * _COLUMNS, (_PANEL + 0.3) * lines), facecolor="white", layout="constrained"
-    )
+    figure = new_figure(_PANEL * _COLUMNS, (_PANEL + 0.3) * lines)
     panels = figure.subplots(lines, _COLUMNS, squeeze=False).flat
     worlds = Worlds()
     for axes, example in zip(panels, found, strict=False):

@@ -29,12 +29,12 @@ from benchmarks.ladder.settings import CONTROLS, LadderSettings
 from benchmarks.pages.baselines import machine
 from benchmarks.pages.failure_maps import draw_examples, examples, failure_shares, in_words
 from benchmarks.plan.run import PlanRecord
-from benchmarks.scoring.drawing import GRID, INK, MUTED, canvas
+from benchmarks.scoring.drawing import GRID, INK, MUTED, canvas, own_style, write_chart
 from benchmarks.scoring.report import RunReport, load_run
 from benchmarks.scoring.splits import split_results, split_table
 from benchmarks.scoring.tables import Table, as_markdown
 from er_gym.rollout.run_directory import MANIFEST
-from er_gym.writing import MARKDOWN_MARK, check_output, write_figure, write_output
+from er_gym.writing import MARKDOWN_MARK, check_output, write_output
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -132,7 +132,7 @@ def _ladder_section(ladder: Climbed, images: Path, force: bool) -> str:
     if chosen:
         pictures[f"{name}-failures.png"] = draw_examples(last.manifest, chosen)
     for file, figure in pictures.items():
-        write_figure(images / file, figure, force=force, dpi=100)
+        write_chart(images / file, figure, force=force, dpi=100)
     lines = [
         f"## {name}",
         "",
@@ -202,6 +202,7 @@ def _minutes(seconds: float) -> str:
     return f"{seconds / 60:.1f}"
 
 
+@own_style()
 def _draw_losses(ladder: Climbed) -> Figure:
     """The loss of each fine-tuning over its updates."""
     figure, axes = canvas(8.5, 3.6, f"{ladder.name}: loss of the tokens that are learnt")
@@ -268,7 +269,7 @@ def _ablation_section(path: Path, images: Path, force: bool) -> str:
         lines.append(as_markdown([study_table(study, rows)]))
         if study.numbers:
             file = f"ablation-{name}-{key}.png"
-            write_figure(images / file, draw_study(study, rows), force=force, dpi=100)
+            write_chart(images / file, draw_study(study, rows), force=force, dpi=100)
             lines += [f"![{study.title}](images/{file})", ""]
     minutes = _minutes(sum(each.seconds for each in record.done))
     lines += [f"All of it took {minutes} minutes.", ""]

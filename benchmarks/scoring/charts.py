@@ -8,13 +8,24 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.scoring.drawing import DPI, HEAT, INK, MUTED, bars, canvas, count_axis, note
+from benchmarks.scoring.drawing import (
+    DPI,
+    HEAT,
+    INK,
+    MUTED,
+    bars,
+    canvas,
+    count_axis,
+    note,
+    own_style,
+    write_chart,
+)
 from er_gym.tasks.difficulty import length
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.suite_card import Summary, summarise
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, GROUPS
-from er_gym.writing import check_output, make_folder, write_figure
+from er_gym.writing import check_output, make_folder
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,6 +40,7 @@ _GROUPS = ("#a9d0ea", "#5ba3d0", "#2470ad", "#0b3a6b")
 _OBJECTS, _RECEPTACLES = "#2a8c82", "#b5762a"
 
 
+@own_style()
 def draw_charts(tasks: Sequence[Task], out: Path, title: str, *, force: bool = True) -> list[Path]:
     """Draw how tasks are distributed over types, objects, receptacles, lengths and rooms.
 
@@ -46,10 +58,6 @@ def draw_charts(tasks: Sequence[Task], out: Path, title: str, *, force: bool = T
         ValueError: there are no tasks.
         ForeignFile, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        raise ImportError("charts need matplotlib: pip install 'er-gym[charts]'") from error
     if not tasks:
         raise ValueError("there are no tasks to draw charts of; give at least one")
     summary = summarise(tasks)
@@ -68,7 +76,7 @@ def draw_charts(tasks: Sequence[Task], out: Path, title: str, *, force: bool = T
         check_output(path, force=force)
     for path, figure in files.items():
         # "tight" grows the page to whatever sticks out of it: no label is cut.
-        write_figure(path, figure, force=force, dpi=DPI, bbox_inches="tight", pad_inches=0.15)
+        write_chart(path, figure, force=force, dpi=DPI, bbox_inches="tight", pad_inches=0.15)
     return list(files)
 
 

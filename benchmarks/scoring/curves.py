@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from er_gym.writing import make_folder, write_figure
+from benchmarks.scoring.drawing import new_figure, own_style, write_chart
+from er_gym.writing import make_folder
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +31,7 @@ class HasCurve(Protocol):
         """Lines with ``steps`` and the logged values."""
 
 
+@own_style()
 def draw_curves(
     families: Mapping[str, Sequence[HasCurve]], out: Path, *, force: bool = True
 ) -> list[Path]:
@@ -42,14 +44,10 @@ def draw_curves(
     Raises:
         ImportError: matplotlib is not installed.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ImportError("pictures need matplotlib: pip install 'er-gym[charts]'") from error
     make_folder(out)
     made = []
     for over, scale, label in (("steps", 1e-3, "thousand steps"), ("seconds", 1 / 60, "minutes")):
-        figure = Figure((11, 4.2), facecolor="white", layout="constrained")
+        figure = new_figure(11, 4.2)
         for axes, (key, title) in zip(
             figure.subplots(1, 2, sharey=True), _PANELS.items(), strict=True
         ):
@@ -59,7 +57,7 @@ def draw_curves(
         figure.axes[0].set_ylabel("success, %", color=_MUTED)
         figure.axes[1].legend(frameon=False, labelcolor=_INK, loc="lower right")
         file = out / f"learning_{over}.png"
-        write_figure(file, figure, force=force, dpi=100)
+        write_chart(file, figure, force=force, dpi=100)
         made.append(file)
     return made
 

@@ -6,11 +6,21 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.scoring.drawing import DPI, HEAT, INK, MUTED, canvas, count_axis, note
+from benchmarks.scoring.drawing import (
+    DPI,
+    HEAT,
+    INK,
+    MUTED,
+    canvas,
+    count_axis,
+    note,
+    own_style,
+    write_chart,
+)
 from er_gym.data import paper_figures as paper
 from er_gym.data.statistics import STATES, Statistics, mean_and_most
 from er_gym.data.trajectory import THOUGHT_KINDS
-from er_gym.writing import check_output, make_folder, write_figure
+from er_gym.writing import check_output, make_folder
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,6 +31,7 @@ _PARTS = ("#0b3a6b", "#2470ad", "#5ba3d0", "#a9d0ea", "#dcebf5")
 """Shades of one hue, which every kind of eye tells apart."""
 
 
+@own_style()
 def draw_statistics(found: Statistics, out: Path, *, force: bool = True) -> list[Path]:
     """Draw the transitions, the kinds of thoughts, and the lengths of trajectories.
 
@@ -36,10 +47,6 @@ def draw_statistics(found: Statistics, out: Path, *, force: bool = True) -> list
         ImportError: matplotlib is not installed.
         ForeignFile, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        raise ImportError("charts need matplotlib: pip install 'er-gym[charts]'") from error
     figures = {
         "transitions": _transitions(found),
         "kinds": _kinds(found),
@@ -50,7 +57,7 @@ def draw_statistics(found: Statistics, out: Path, *, force: bool = True) -> list
     for path in files:
         check_output(path, force=force)
     for path, figure in files.items():
-        write_figure(path, figure, force=force, dpi=DPI, bbox_inches="tight", pad_inches=0.15)
+        write_chart(path, figure, force=force, dpi=DPI, bbox_inches="tight", pad_inches=0.15)
     return list(files)
 
 

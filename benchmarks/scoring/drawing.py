@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+from er_gym.writing import write_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,11 +21,49 @@ HEAT = ("#f7f5fa", "#54278f")
 """From few to many."""
 
 
-def canvas(width: float, height: float, heading: str) -> tuple[Figure, Axes]:
-    """A figure of its own, with one pair of axes; inches. Nothing of pyplot's state is used."""
+@contextlib.contextmanager
+def own_style() -> Iterator[None]:
+    """Draw with matplotlib's own defaults; the settings of other code are as before afterwards.
+
+    A chart opens no window, so ``MPLBACKEND`` is not for it: matplotlib refuses to be imported
+    where that names a backend that this Python lacks, as a notebook leaves it for its commands. The
+    user's ``matplotlibrc`` is not for it either: fonts, LaTeX and colours would change a chart.
+
+    Raises:
+        ImportError: matplotlib is not installed; the message says how to install it.
+    """
+    wanted = os.environ.pop("MPLBACKEND", None)
+    try:
+        import matplotlib.figure
+    except ImportError as error:
+        raise ImportError("charts need matplotlib: pip install 'er-gym[charts]'") from error
+    finally:
+        if wanted is not None:
+            os.environ["MPLBACKEND"] = wanted
+    defaults = matplotlib.rcParamsDefault
+    with matplotlib.rc_context({name: defaults[name] for name in defaults if name != "backend"}):
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of its own, inches. Nothing of pyplot's state is used."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure((width, height), facecolor="white", layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def write_chart(path: Path, figure: Figure, *, force: bool = False, **options: Any) -> None:
+    """Write a chart as :func:`~er_gym.writing.write_figure` does, in :func:`own_style`."""
+    with own_style():
+        write_figure(path, figure, force=force, **options)
+
+
+def canvas(width: float, height: float, heading: str) -> tuple[Figure, Axes]:
+    """A figure of its own with a heading and one pair of axes; inches."""
+    figure = new_figure(width, height)
     # Constrained layout leaves room for a title above the axes only if it is the figure's.
     lines = fill(heading, int(width * 9.5))
     figure.suptitle(lines, x=0.01, ha="left", fontsize=12, fontweight="bold", color=INK)

@@ -3,10 +3,11 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PIL import Image
-from support import make_task
+from support import make_task, run_python
 
 from benchmarks.scoring.charts import draw_charts
 from er_gym.tasks import load_suite
@@ -70,6 +71,54 @@ def test_no_tasks(matplotlib, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="there are no tasks to draw charts of"):
         draw_charts([], tmp_path, "none")
     assert not list(tmp_path.iterdir())
+
+
+DRAW = """
+import os, sys
+from pathlib import Path
+from benchmarks.scoring import curves, drawing
+class Run:
+    curve = [{"steps": 1, "seconds": 1, "rollout/success_rate": 0.5, "eval/success_rate": 0.5}] * 2
+def draw(out):
+    curves.draw_curves({"one": [Run()]}, out)
+    with drawing.own_style():
+        figure, _ = drawing.canvas(3, 2, "alone")
+    drawing.write_chart(out / "alone.png", figure)
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]))
+    assert "matplotlib.pyplot" not in sys.modules
+    print(os.environ["MPLBACKEND"])
+"""
+
+
+def test_no_backend_and_no_style_of_the_users_changes_a_chart(matplotlib, tmp_path: Path) -> None:
+    """As a notebook leaves the variable for a Python that lacks the notebook's packages."""
+    (tmp_path / "matplotlibrc").write_text("font.size: 30\ntext.usetex: True\n", encoding="utf-8")
+    given = {"MPLBACKEND": "module://no_such_package.backend_inline", "MATPLOTLIBRC": str(tmp_path)}
+    done = run_python(DRAW, str(tmp_path / "odd"), **given)
+    assert done.stdout.strip() == given["MPLBACKEND"]  # others read it
+    here: dict[str, Any] = {}
+    exec(DRAW, here)
+    here["draw"](tmp_path / "plain")
+    names = ["alone.png", "learning_seconds.png", "learning_steps.png"]
+    assert sorted(each.name for each in (tmp_path / "odd").iterdir()) == names
+    for name in names:
+        assert (tmp_path / "odd" / name).read_bytes() == (tmp_path / "plain" / name).read_bytes()
+
+
+def test_only_one_module_makes_figures(repository: Path) -> None:
+    modules = [
+        each
+        for folder in ("agents", "benchmarks", "er_gym")
+        for each in (repository / folder).rglob("*.py")
+    ]
+    marks = (" Figure((", "FigureCanvas", "import matplotlib.pyplot", "from matplotlib import")
+    makers = [
+        each.name
+        for each in modules
+        if any(mark in each.read_text(encoding="utf-8") for mark in marks)
+    ]
+    assert makers == ["drawing.py"]
 
 
 def test_matplotlib_is_asked_for_where_it_is_missing(
