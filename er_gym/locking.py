@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import os
 import re
 import socket
 from collections.abc import Iterator
 from pathlib import Path
 
-from er_gym.writing import ForeignFile, make_folder
+from er_gym.writing import CAREFULLY, ForeignFile, make_folder
 
 LOCK = "run.lock"
-_FLAGS = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+_FLAGS = os.O_RDWR | os.O_CREAT | CAREFULLY
 _LONGEST = 300
 _OURS = re.compile(rb"((?P<pid>[0-9]+) (?P<host>[!-~]*)\n)?")
 """The content of the file: a process and its machine; empty if a kill came before the write."""
@@ -39,8 +38,6 @@ def exclusive_use(folder: Path) -> Iterator[None]:
         ForeignFile: er-gym did not write the ``run.lock`` in the folder.
         OSError: the folder cannot be made or written to.
     """
-    # The library `filelock` neither tells who holds a lock nor removes its file; it would be ten
-    # thousand lines for the one call of flock.
     made = _make(folder)
     try:
         handle = _lock(folder)
@@ -72,6 +69,8 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _lock(folder: Path) -> int:
+    from filelock import lock_descriptor
+
     path = folder / LOCK
     while True:
         try:
@@ -81,27 +80,33 @@ def _lock(folder: Path) -> int:
             continue
         try:
             try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise Locked(
-                    f"{folder} is in use by {_holder(handle)}; wait until it ends, or choose "
-                    "another --out"
-                ) from None
+                if not lock_descriptor(handle, blocking=False):
+                    raise Locked(
+                        f"{folder} is in use by {_holder(handle)}; wait until it ends, or choose "
+                        "another --out"
+                    )
             except OSError as error:
                 if error.errno not in _NO_LOCKS:
                     raise
             if _is_at(handle, path):
-                if not _OURS.fullmatch(os.pread(handle, _LONGEST, 0)):
+                if not _OURS.fullmatch(_content(handle)):
                     raise ForeignFile(
                         f"{path} exists, and er-gym did not write it; choose another --out"
                     )
                 os.ftruncate(handle, 0)
-                os.pwrite(handle, f"{os.getpid()} {socket.gethostname()}\n".encode(), 0)
+                os.lseek(handle, 0, os.SEEK_SET)
+                os.write(handle, f"{os.getpid()} {socket.gethostname()}\n".encode())
                 return handle
         except BaseException:
             os.close(handle)
             raise
         os.close(handle)  # the holder has just removed the file; there may be another one by now
+
+
+def _content(handle: int) -> bytes:
+    """The beginning of an open file."""
+    os.lseek(handle, 0, os.SEEK_SET)
+    return os.read(handle, _LONGEST)
 
 
 def _is_at(handle: int, path: Path) -> bool:
@@ -114,7 +119,7 @@ def _is_at(handle: int, path: Path) -> bool:
 
 def _holder(handle: int) -> str:
     """The process that holds the lock, in words."""
-    told = _OURS.fullmatch(os.pread(handle, _LONGEST, 0))
+    told = _OURS.fullmatch(_content(handle))
     if told is None or not told["pid"]:
         return "another process"
     pid, host = told["pid"].decode(), told["host"].decode()

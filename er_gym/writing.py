@@ -45,6 +45,10 @@ YAML_MARK = "# Written by er-gym\n"
 PICTURE_MARK: Mapping[str, str] = {"Software": "er-gym"}
 """The text chunk of er-gym's PNG files."""
 
+CAREFULLY = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+"""Flags for opening a file whose name another program may have given to something else: no link is
+followed, no pipe is waited for, and bytes stay as they are. No system has all of them."""
+
 _LONGEST_NAME = 200
 """The number of bytes of the file's name in a draft's name; file systems allow 255 in all."""
 _LONGEST_STEM = 120
@@ -178,7 +182,7 @@ def write_atomic(path: Path, data: str | bytes, *, mode: int | None = None) -> N
         if mode is None:
             with contextlib.suppress(OSError):
                 mode = stat.S_IMODE(os.stat(path).st_mode)
-        handle = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+        handle = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | CAREFULLY, 0o666)
         try:
             with open(handle, "wb") as file:
                 file.write(content)

@@ -65,15 +65,16 @@ def run_python(
     program: str, *arguments: str, **environment: str
 ) -> subprocess.CompletedProcess[str]:
     """Run a program in another process, in the checkout, with more environment variables."""
-    return subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", program, *arguments],
         cwd=ROOT,
         env={**os.environ, **environment},
         capture_output=True,
         text=True,
         timeout=120,
-        check=True,
     )
+    assert done.returncode == 0, done.stderr
+    return done
 
 
 def lines_until_killed(program: str, path: Path, count: int) -> list[str]:

@@ -8,6 +8,8 @@ import stat
 import threading
 from pathlib import Path
 
+from er_gym.writing import CAREFULLY
+
 _CLOSED = -1
 
 
@@ -29,7 +31,7 @@ class JsonLines:
         self._read_to = 0
         self._half_written = False
         path.parent.mkdir(parents=True, exist_ok=True)
-        flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+        flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | CAREFULLY
         try:
             self._file = os.open(path, flags, 0o644)
         except OSError as error:
@@ -40,7 +42,7 @@ class JsonLines:
         if not stat.S_ISREG(state.st_mode) or state.st_nlink != 1:
             os.close(self._file)
             raise _not_ours(path)
-        if state.st_size and os.pread(self._file, 1, state.st_size - 1) != b"\n":
+        if state.st_size and _read(self._file, 1, state.st_size - 1) != b"\n":
             os.write(self._file, b"\n")  # end the line that a killed process left half-written
 
     def add(self, line: str) -> None:
@@ -63,7 +65,7 @@ class JsonLines:
             if self._file == _CLOSED:
                 return []
             size = max(0, os.fstat(self._file).st_size - self._read_to)
-            *lines, _ = os.pread(self._file, size, self._read_to).split(b"\n")
+            *lines, _ = _read(self._file, size, self._read_to).split(b"\n")
             self._read_to += sum(len(line) + 1 for line in lines)
             return lines
 
@@ -73,6 +75,12 @@ class JsonLines:
             if self._file != _CLOSED:
                 os.close(self._file)
                 self._file = _CLOSED
+
+
+def _read(file: int, size: int, start: int) -> bytes:
+    """Bytes of a file that is appended to; where it was read has no effect on that."""
+    os.lseek(file, start, os.SEEK_SET)
+    return os.read(file, size)
 
 
 def _not_ours(path: Path) -> ValueError:

@@ -58,11 +58,13 @@ def _interrupts_blocked() -> Iterator[None]:
     # Only the main thread may set handlers. Another thread blocks the signal instead; the process
     # it starts inherits the blocking, and ignores the signal before it unblocks anything.
     handler = signal.signal(signal.SIGINT, signal.SIG_IGN) if is_main else None
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    has_masks = hasattr(signal, "pthread_sigmask")
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if has_masks else None
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        if mask is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         if is_main:
             signal.signal(signal.SIGINT, handler)
 

@@ -7,7 +7,6 @@ there, sends events and receives actions.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -66,9 +65,11 @@ class Fifo:
     def __init__(self, environment: Mapping[str, str]) -> None:
         to_client, self._from_client = (environment[name] for name in self.VARIABLES)
         self._to_client = os.open(to_client, os.O_WRONLY)
-        if hasattr(fcntl, "F_SETPIPE_SZ"):  # Linux, Python 3.10
-            with contextlib.suppress(OSError):  # the user's pipes have reached their limit
-                fcntl.fcntl(self._to_client, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
+        # Only Linux can enlarge a pipe. The user's pipes may have reached their limit.
+        with contextlib.suppress(ImportError, AttributeError, OSError):
+            import fcntl
+
+            fcntl.fcntl(self._to_client, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
         self._requests: IO[bytes] | None = None
         self._pack = MetadataPacker()
 

@@ -49,6 +49,8 @@ _KINDS = (
     (stat.S_ISBLK, "a device"),
     (stat.S_ISSOCK, "a socket"),
 )
+_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+"""No system has all of them."""
 _MOST_BRACKETS = 500
 _LONGEST_PATH = 300
 """The most characters of a path that a message names; a file may state one of any length."""
@@ -67,7 +69,7 @@ def open_file(path: Path) -> BinaryIO:
     try:
         _must_be_regular(os.stat(path).st_mode, path)  # opening a device can have side effects
         # O_NONBLOCK: do not wait if a pipe has replaced the file in the meantime.
-        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        handle = os.open(path, _FLAGS)
         file = open(handle, "rb")  # noqa: SIM115  # the caller closes it
     except TaskFileError:
         raise

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import shlex
 import sys
@@ -120,11 +119,13 @@ def still_aside() -> list[Path]:
 @contextlib.contextmanager
 def _installation_lock() -> Iterator[None]:
     """Keep other installations of er-gym out meanwhile, and turn disk errors into a PlayerError."""
+    from filelock import lock_descriptor
+
     try:
         client_home().mkdir(parents=True, exist_ok=True)
         folder = os.open(client_home(), os.O_RDONLY)
         try:
-            fcntl.flock(folder, fcntl.LOCK_EX)
+            lock_descriptor(folder)
             yield
         finally:
             os.close(folder)
