@@ -40,7 +40,6 @@ cover: $(MARK)-dev
 
 test-inspect: $(MARK)-dev
 	@$(INSTALL) --editable '.[dev,inspect]'
-	@$(headless)
 	$(BIN)/python -m pytest tests/benchmarks/test_inspect_task.py $(ARGS)
 
 check: lint test
@@ -54,25 +53,14 @@ clean:
 	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache build dist
 	find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
 
-# ai2thor brings opencv-python and we ask for opencv-python-headless; both install a cv2, the last
-# one written wins, and uninstalling either takes files of both. So: that one away, ours anew.
-define headless
-if $(PIP) show --quiet opencv-python 2>/dev/null; then \
-	$(PIP) uninstall --quiet --yes opencv-python && \
-	$(INSTALL) --no-deps --force-reinstall opencv-python-headless; \
-fi
-endef
-
 $(MARK)-core: pyproject.toml constraints.txt | $(BIN)/python
 	@echo 'Installing er-gym in $(VENV), once'
 	@$(INSTALL) --editable .
-	@$(headless)
 	@touch $@
 
 $(MARK)-dev: pyproject.toml constraints.txt | $(BIN)/python
 	@echo 'Installing er-gym and what its tests need in $(VENV), once'
 	@$(INSTALL) --editable '.[dev]'
-	@$(headless)
 	@touch $(MARK)-core $@
 
 $(BIN)/python:

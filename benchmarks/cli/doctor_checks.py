@@ -232,6 +232,23 @@ def _packages() -> Iterator[Check]:
             yield Check(f"package {name}", False, detail, _APART)
         else:
             yield Check(f"package {name}", True, "er-gym's, and no other distribution's")
+    yield _opencv()
+
+
+def _opencv() -> Check:
+    """Whether one distribution at most has installed OpenCV's ``cv2``, which er-gym does not use."""
+    owners = claimants("cv2")
+    if not owners:
+        return Check("package cv2", True, "not installed, and er-gym does not need it")
+    both = ", ".join(f"{each} {installed_version(each)}" for each in owners)
+    again = f"pip uninstall --yes {' '.join(owners)} && pip install {owners[0]}"
+    if len(owners) > 1:
+        detail = f"{both}: both write the same files, and er-gym needs neither"
+        return Check("package cv2", False, detail, again)
+    spec = find_spec("cv2")
+    if spec is None or spec.origin is None:
+        return Check("package cv2", False, f"{both} has lost files of it", again)
+    return Check("package cv2", True, f"{both}, which er-gym does not need")
 
 
 _HOME = Path(er_gym.__file__).parents[1]

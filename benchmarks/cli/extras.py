@@ -169,7 +169,7 @@ def installed_version(name: str) -> str | None:
 
 
 def claimants(package: str) -> list[str]:
-    """The other distributions that install a top-level package of this name."""
+    """The distributions besides er-gym that install a top-level package of this name."""
     names = {canonicalize_name(each) for each in _distributions().get(package, ())}
     return sorted(names - {PROJECT})
 

@@ -189,7 +189,9 @@ def packages_here(*path: Path) -> dict[str, tuple[bool, bool, str]]:
 
 
 def test_another_distribution_with_a_package_of_our_name_is_found(tmp_path: Path) -> None:
-    assert all(works for works, _, _ in packages_here(ROOT).values())
+    here = packages_here(ROOT)
+    assert here["package agents"][0]
+    assert here["package benchmarks"][0]
     install_beside(tmp_path, "openai-agents", "agents")
     behind = packages_here(ROOT, tmp_path)
     works, needed, says = behind["package agents"]
@@ -197,6 +199,15 @@ def test_another_distribution_with_a_package_of_our_name_is_found(tmp_path: Path
     assert "openai-agents 1.2" in says
     assert "virtual environment" in says
     assert behind["package benchmarks"][0]
+
+
+def test_a_second_opencv_is_named(tmp_path: Path) -> None:
+    install_beside(tmp_path, "opencv-python-headless", "cv2")
+    works, needed, says = packages_here(ROOT, tmp_path)["package cv2"]
+    assert (works, needed) == (False, False)
+    assert "opencv-python " in says
+    assert "opencv-python-headless 1.2" in says
+    assert "pip uninstall --yes opencv-python opencv-python-headless && pip install" in says
 
 
 def test_another_package_in_place_of_ours_is_an_error(tmp_path: Path) -> None:
