@@ -22,6 +22,7 @@ from agents.vlm.factory import (
 from agents.zoo.index import PREFIX as ZOO_PREFIX
 from agents.zoo.index import resolved
 from er_gym.activity import begin_import
+from er_gym.extras import MissingPackage
 from er_gym.plugins import PluginError, Registry, reason
 from er_gym.rollout.agent import Agent, Decision, MakeAgent
 from er_gym.tasks.task import Task
@@ -132,7 +133,5 @@ def _rl_agent(name: str, path: str, trust: bool) -> Agent:
     try:
         from agents.rl.agent import RLAgent  # late: torch
     except ImportError as error:
-        raise ValueError(
-            f"agent {name} needs {error.name}, which is not installed: pip install 'er-gym[rl]'"
-        ) from error
+        raise MissingPackage(f"agent {name}", str(error.name), "er-gym[rl]") from error
     return RLAgent(path, trust)

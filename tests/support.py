@@ -71,7 +71,7 @@ def run_python(
         env={**os.environ, **environment},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=220,  # of a busy machine
     )
     assert done.returncode == 0, done.stderr
     return done

@@ -8,7 +8,13 @@ from pathlib import Path
 
 import pytest
 
-_BASE = {"er_gym.activity", "er_gym.writing", "er_gym.locking", "er_gym.plugins"}
+_BASE = {
+    "er_gym.activity",
+    "er_gym.extras",
+    "er_gym.locking",
+    "er_gym.plugins",
+    "er_gym.writing",
+}
 _TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
 _ROLLOUT = {*_ENVS, "er_gym", "er_gym.rollout"}
@@ -21,6 +27,7 @@ ALLOWED = {
     "er_gym.plugins": {"er_gym.plugins"},
     "er_gym.activity": set(),
     "er_gym.writing": set(),
+    "er_gym.extras": set(),
     "er_gym.locking": _BASE,
     "er_gym.sim": {*_BASE, "er_gym.sim"},
     "er_gym.thor": {*_BASE, "er_gym.sim", "er_gym.thor"},

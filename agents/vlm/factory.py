@@ -16,6 +16,7 @@ from agents.vlm.clients.registry import (
 from agents.vlm.clients.session import ModelSession
 from agents.vlm.record import without_secrets
 from agents.vlm.settings import AgentSettings
+from er_gym.extras import MissingPackage
 from er_gym.rollout.events import Cost
 
 if TYPE_CHECKING:
@@ -97,11 +98,14 @@ class AgentFactory:
         from agents.vlm.matching import Matcher
         from agents.vlm.prompts import prompts_for
 
-        resolve_client(name)  # a wrong name is told before a wrong prompt
+        kind, _ = resolve_client(name)  # a wrong name is told before a wrong prompt
         self.name, self.settings = name, settings
-        self.prompts = prompts_for(settings)
-        self._matcher = Matcher(settings.matching)
-        self._matcher.prepare()
+        try:
+            self.prompts = prompts_for(settings)
+            self._matcher = Matcher(settings.matching)
+            self._matcher.prepare()
+        except MissingPackage as error:  # its extra would not be enough for every client
+            raise MissingPackage(name, error.package, kind.install) from error
         self._session = ModelSession(name, settings, directory, budget)
         self.client, self.supervisor = self._session.client, self._session.supervisor
 

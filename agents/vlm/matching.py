@@ -22,6 +22,7 @@ from agents.vlm.settings import Matching
 from er_gym.data.names_en import MODIFIERS, NAMES_EN
 from er_gym.data.names_zh import NAMES_ZH
 from er_gym.data.shared_names import SHARED_EN, SHARED_ZH
+from er_gym.extras import MissingPackage
 from er_gym.thor import OBJECT_TYPES
 
 MatchMethod: TypeAlias = Literal["exact", "alias", "fuzzy", "meaning", "none"]
@@ -147,9 +148,7 @@ def _rapidfuzz() -> tuple[Callable[..., Any], Callable[..., Any], Callable[..., 
         from rapidfuzz import fuzz, process
         from rapidfuzz.distance import OSA
     except ImportError as error:
-        raise ValueError(
-            f"matching names needs RapidFuzz ({error}): pip install 'er-gym[vlm]'"
-        ) from error
+        raise MissingPackage("matching names", str(error.name), "er-gym[vlm]") from error
     # ratio, not WRatio: WRatio takes "Towel" for a HandTowelHolder.
     return process.extract, fuzz.ratio, OSA.distance
 

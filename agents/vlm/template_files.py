@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agents.vlm.prompt_set import IMAGE, IMAGE_MARK, without_marks
+from er_gym.extras import MissingPackage
 from er_gym.tasks.reading import read_text
 
 if TYPE_CHECKING:
@@ -106,9 +107,7 @@ def _environment(files: Mapping[str, Path], sources: Mapping[str, str]) -> Bound
 
         from agents.vlm.sandbox import BoundedEnvironment
     except ImportError as error:
-        raise ValueError(
-            f"prompts need {error.name}, which is not installed: pip install 'er-gym[vlm]'"
-        ) from error
+        raise MissingPackage("a set of prompts", str(error.name), "er-gym[vlm]") from error
 
     def source(name: str) -> tuple[str, str, None] | None:
         if name not in files:

@@ -156,7 +156,9 @@ def verify(
 
 @data.command()
 @_collection
-@click.option("--trajectory", "trajectory_id", required=True, metavar="ID", help="Which to show.")
+@click.option(
+    "--trajectory", "trajectory_id", metavar="ID", help="Which to show.  [default: list the ids]"
+)
 @click.option(
     "--out",
     type=Place(dir_okay=False, path_type=Path),
@@ -169,15 +171,24 @@ def verify(
 )
 @force_option
 def show(
-    collection: Path, trajectory_id: str, out: Path | None, font: Path | None, force: bool
+    collection: Path, trajectory_id: str | None, out: Path | None, font: Path | None, force: bool
 ) -> None:
-    """Print a trajectory turn by turn, or draw it as a strip of pictures and thoughts."""
+    """Print a trajectory turn by turn, or draw it as a strip of pictures and thoughts.
+
+    Without --trajectory: list the ids, a line each.
+    """
     from benchmarks.scoring.data_show import print_trajectory
     from er_gym.data.strips import draw_strip
     from er_gym.writing import check_output, picture_format, write_picture
 
+    if trajectory_id is None and out is not None:
+        raise BadInput("--out draws one trajectory; name it with --trajectory")
     with bad_input():
         opened = _opened(collection)
+        if trajectory_id is None:
+            for each in _ids(opened):
+                echo(each)
+            return
         trajectory = _trajectory(opened, trajectory_id)
         if out is None:
             print_trajectory(trajectory, stdout())
@@ -204,18 +215,25 @@ def _trajectory(collection: Collection, wanted: str) -> Trajectory:
 
     from er_gym.data.line_index import lines_of, trajectory_at
 
-    ids = []
     for line in lines_of(collection):
         if line.id == wanted:
             return trajectory_at(collection, line.offset)
-        ids.append(line.id)
-    if not ids:
-        raise BadInput(f"{collection.path} holds no trajectory yet; run er-gym collect again")
+    ids = _ids(collection)
     close = get_close_matches(wanted, ids, _CLOSE, cutoff=0.0) or ids[:_CLOSE]
     raise BadInput(
         f"no trajectory {wanted!r:.100} among the {len(ids):,} in {collection.path}; "
         f"close to it are: {', '.join(close)}"
     )
+
+
+def _ids(collection: Collection) -> list[str]:
+    """The ids of a collection's trajectories, in its order; BadInput if there is none."""
+    from er_gym.data.line_index import lines_of
+
+    ids = [line.id for line in lines_of(collection)]
+    if not ids:
+        raise BadInput(f"{collection.path} holds no trajectory yet; run er-gym collect again")
+    return ids
 
 
 def _tasks(

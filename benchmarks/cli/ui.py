@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import secrets
+import shutil
 import socket
+import subprocess
+import sys
 import threading
 from pathlib import Path
 from types import FrameType
@@ -18,6 +22,27 @@ from benchmarks.cli.ui_export import FileOptions, file_options, write_files
 from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
 
 _LOOPBACK = "127.0.0.1"
+_SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+"""One of these is set where xdg-open can show something."""
+
+
+def _open_browser(address: str) -> None:
+    """Open a browser where there is a screen for one. What it prints is not the command's to say;
+    the address has been printed."""
+    if sys.platform != "linux":
+        click.launch(address)
+        return
+    program = shutil.which("xdg-open")
+    if program is not None and any(map(os.environ.get, _SCREENS)):
+        nowhere = subprocess.DEVNULL
+        with contextlib.suppress(OSError):
+            subprocess.Popen(
+                [program, address],
+                stdin=nowhere,
+                stdout=nowhere,
+                stderr=nowhere,
+                start_new_session=True,
+            )
 
 
 @click.command(name="ui")
@@ -101,7 +126,7 @@ def ui(
     address += f"?token={secret}" if secret else ""
     echo(address)
     if not no_browser:
-        click.launch(address)
+        _open_browser(address)
     closing = threading.Event()
     app = make_app(roots, secret, closing, play=play, options=vlm_options)
     config = uvicorn.Config(app, log_level="error", access_log=False, timeout_graceful_shutdown=5)

@@ -24,8 +24,13 @@ def thor_executable() -> str:
         path as a shell would, so a path with spaces is quoted. If the cache cannot be written, it
         is the command that the launcher would run.
     """
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
+    return executable_in(cache / "er-gym")
+
+
+def executable_in(cache: Path) -> str:
+    """As :func:`thor_executable`, with the launcher in another folder."""
     text = launcher()
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "er-gym"
     path = cache / f"player-{sha256(text.encode()).hexdigest()[:12]}"
     try:
         with _one_writer:

@@ -82,6 +82,11 @@ def test_stats(er_gym: ErGym, path: Path, tmp_path: Path) -> None:
 
 
 def test_show(er_gym: ErGym, path: Path, tmp_path: Path) -> None:
+    code, out, _ = er_gym("data", "show", path)
+    lines = (path / "trajectories.jsonl").read_text(encoding="utf-8").splitlines()
+    assert (code, out.splitlines()) == (0, [json.loads(line)["id"] for line in lines])
+    assert SOAP in out
+    assert er_gym("data", "show", path, "--out", tmp_path / "x.png")[0] == 2
     code, out, _ = er_gym("data", "show", path, "--trajectory", SOAP)
     assert code == 0
     assert "Turn 0, search (ahead)" in out

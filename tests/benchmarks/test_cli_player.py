@@ -108,7 +108,7 @@ PROGRAMS = ["Controller(scene=…)", "platform=CloudRendering", "gpu_device=…"
 def lines(out: str) -> dict[str, str]:
     """A part's name to its whole line."""
     parts = ["embedded engine", "renderer", "player", *PROGRAMS, "Unity build", "GPU"]
-    parts += ["package agents", "package benchmarks"]
+    parts += ["package agents", "package benchmarks", "package cv2"]
     parts += [f"extra {name}" for name in extras()]
     found = {
         part: line for line in out.splitlines() for part in parts if line[4:].startswith(f"{part} ")
@@ -132,10 +132,17 @@ def the_client(monkeypatch):
     return misses
 
 
-def test_doctor_has_a_line_for_each_part(er_gym, the_client):
+def test_commands_that_only_look_leave_nothing_at_home(er_gym, home):
+    for words in (("envs",), ("zoo",), ("tasks", "show", "mini"), ("--version",)):
+        assert er_gym(*words)[0] == 0
+    assert list(home.iterdir()) == []
+
+
+def test_doctor_has_a_line_for_each_part(er_gym, the_client, home):
     the_client("all sorts of things")
     code, out, err = er_gym("doctor")
     assert (code, err) == (0, "")
+    assert list(home.iterdir()) == []  # a look at the machine changes nothing there
     line = lines(out)
     for part in ("embedded engine", "renderer", "player"):
         assert line[part].startswith("ok ")

@@ -14,7 +14,9 @@ from typing import Any
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+from support import run_python
 
+from agents.zoo.index import find_model, model_names
 from benchmarks.cli.extras import closure, installed_requires, installed_version, state_of
 
 if sys.version_info >= (3, 11):
@@ -216,3 +218,57 @@ def test_another_package_in_place_of_ours_is_an_error(tmp_path: Path) -> None:
     assert (works, needed) == (False, True)
     assert f"imports {tmp_path}" in says
     assert "openai-agents 1.2" in says
+
+
+# -- errors that name an extra ---------------------------------------------------------------------
+
+ON_A_CORE = """
+import json, sys
+from importlib.metadata import packages_distributions
+from packaging.utils import canonicalize_name
+core = set(json.loads(sys.argv[1]))
+owners = packages_distributions()
+
+class Core:
+    "Finds nothing that the core does not bring."
+    def find_spec(self, name, path=None, target=None):
+        of = {canonicalize_name(each) for each in owners.get(name.partition(".")[0], ())}
+        if of and not of & core:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Core())
+from agents import make_agent
+for name in json.loads(sys.argv[2]):
+    try:
+        make_agent(name)
+    except ValueError as error:
+        print(json.dumps(str(error)))
+"""
+
+
+def of_the_core() -> set[str]:
+    """The distributions that an installation without extras brings."""
+    found, new = (
+        {"er-gym"},
+        {canonicalize_name(Requirement(each).name) for each in PROJECT["dependencies"]},
+    )
+    while new:
+        found |= new
+        wanted = [Requirement(text) for name in new for text in installed_requires(name)]
+        new = {
+            canonicalize_name(each.name)
+            for each in wanted
+            if each.marker is None or each.marker.evaluate({"extra": ""})
+        } - found
+    return found
+
+
+def test_an_agent_names_the_extra_that_is_enough_for_it(tmp_path: Path) -> None:
+    """Not that of the first package which it happens to miss."""
+    needs = {"openai:model": "vlm", f"recorded:{tmp_path}": "vlm", f"hf:{tmp_path}": "local"}
+    needs |= {f"rl:{tmp_path}": "rl"}
+    needs |= {f"zoo:{name}": find_model(name).player.extra for name in model_names()}
+    names = json.dumps(sorted(of_the_core())), json.dumps(list(needs))
+    told = run_python(ON_A_CORE, *names).stdout.splitlines()
+    for name, message in zip(needs, map(json.loads, told), strict=True):
+        assert name in message
+        assert message.endswith(f"which is not installed: pip install 'er-gym[{needs[name]}]'")

@@ -11,7 +11,6 @@ import socket
 from pathlib import Path
 from typing import Any
 
-import pytest
 from fastapi.testclient import TestClient
 from filelock import lock_descriptor
 

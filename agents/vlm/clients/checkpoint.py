@@ -17,6 +17,7 @@ from agents.vlm.clients.adapters import ADAPTER, adapter_chain, with_adapter
 from agents.vlm.settings import AgentSettings, Local
 from agents.vlm.tuned_model import model_directory
 from er_gym.activity import begin
+from er_gym.extras import MissingPackage
 
 _MODEL_FILES = {".json", ".jinja", ".txt", ".model", ".safetensors", ".bin"}
 _LONGEST_WORDS = 300  # characters of a library's, in an error
@@ -152,7 +153,7 @@ def _end_tokens(model: Any, tokenizer: Any) -> frozenset[int]:
 
 def _adapter(directory: str) -> Path:
     if importlib.util.find_spec("peft") is None:
-        raise ValueError("local.adapter needs peft: pip install 'er-gym[local]'")
+        raise MissingPackage("local.adapter", "peft", "er-gym[local]")
     if not (Path(directory) / ADAPTER).is_file():
         raise ValueError(
             f"local.adapter {directory} is not an adapter; give a directory with {ADAPTER}"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from agents.vlm.chat import Client
 from agents.vlm.clients.registry import resolve_client
 from agents.vlm.settings import AgentSettings, Prices
+from er_gym.extras import MissingPackage
 from er_gym.rollout.events import Cost
 from er_gym.rollout.run_directory import REPLIES, SERVER_EVENTS, SPENDING
 
@@ -69,9 +70,7 @@ class ModelSession:
                 self.supervisor.log_event = self._keep
                 self.client = ReplyCache(client, directory / REPLIES)
         except ImportError as error:
-            raise ValueError(
-                f"{name} needs {error.name}, which is not installed: pip install '{kind.install}'"
-            ) from error
+            raise MissingPackage(name, str(error.name), kind.install) from error
 
     @property
     def cost(self) -> Cost | None:

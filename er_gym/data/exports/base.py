@@ -242,7 +242,8 @@ class ExportFormat:
         name: what ``--to`` takes.
         about: one line for people.
         write: writes the files of an export into its folder.
-        usage: how the library reads them, in Markdown; ``{samples}`` is filled with the counts.
+        usage: how the library reads them, in Markdown; what is between ``[[`` and ``]]`` is said
+            only where there is a split ``validation``.
         card: what README.md begins with, the metadata of a dataset card.
     """
 

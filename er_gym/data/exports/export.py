@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Mapping
@@ -165,6 +166,12 @@ def _told(counts: Mapping[str, int]) -> str:
     return "; ".join(f"{why}: {count}" for why, count in counts.items()) or "none"
 
 
+_ONLY_HELD_OUT = re.compile(r"\[\[(.*?)\]\]", re.DOTALL)
+_ALL_IN_ONE = (
+    "There is no split `validation`, since no room of these was held out: `--held-out` does that."
+)
+
+
 def _readme(
     row: ExportFormat, summary: ExportSummary, options: ExportOptions, collection: Collection
 ) -> str:
@@ -175,6 +182,9 @@ def _readme(
         if split in summary.samples
     )
     samples = ", ".join(f"{name} {count:,}" for name, count in sorted(summary.samples.items()))
+    held_out = "validation" in summary.samples
+    told = "`validation` holds the rooms that `train` does not." if held_out else _ALL_IN_ONE
+    usage = _ONLY_HELD_OUT.sub(r"\1" if held_out else "", row.usage)
     left_out = f"\nLeft out: {_told(summary.left_out)}.\n" if summary.left_out else ""
     return (
         f"{row.card.replace('{data_files}', files)}{MARKDOWN_MARK}"
@@ -186,8 +196,7 @@ def _readme(
         f"- trajectories: {summary.trajectories:,}, with {summary.turns:,} turns, of which "
         f"{summary.trained_turns:,} are to be learnt\n"
         f"- pictures: {summary.pictures:,}\n{left_out}\n"
-        "`validation` holds the rooms that `train` does not.\n\n"
-        f"## How to load it\n\n{row.usage}"
+        f"{told}\n\n## How to load it\n\n{usage}"
     )
 
 

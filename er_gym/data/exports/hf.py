@@ -95,7 +95,7 @@ configs:
 ```python
 from datasets import load_dataset
 
-dataset = load_dataset("THIS FOLDER")  # splits train, validation
+dataset = load_dataset("THIS FOLDER")  # train[[, validation]]
 ```
 
 A row is a trajectory:

@@ -190,7 +190,7 @@ import os
 os.environ["MINARI_DATASETS_PATH"] = "THIS FOLDER"
 
 import minari
-dataset = minari.load_dataset("er-gym/train-v0")  # and er-gym/validation-v0
+dataset = minari.load_dataset("er-gym/train-v0")[[  # and er-gym/validation-v0]]
 ```
 
 Observations are `{"state": …}` of `EmbodiedEnv(obs_mode="state")`, actions are indices of

@@ -25,7 +25,7 @@ MS_SWIFT = ExportFormat(
     about="ms-swift: messages with a loss flag for each turn",
     write=_write,
     usage="""\
-`--dataset train.jsonl --val_dataset validation.jsonl`, with the environment variable
+`--dataset train.jsonl[[ --val_dataset validation.jsonl]]`, with the environment variable
 `ROOT_IMAGE_DIR` set to this folder, since picture paths are relative to it. `loss` says of each
 turn of the assistant whether it is learnt; leave `--loss_scale` at its default, which heeds it.
 """,

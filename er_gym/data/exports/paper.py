@@ -156,7 +156,7 @@ for trajectory in read_paper(Path("THIS FOLDER") / "train"):
     ...
 ```
 
-`train` and `validation` hold `data_TYPE/SCENE_TYPE_NUMBER_KIND/`, each with one JSON file, a list
-of one element, and the pictures. Dialect and language do not matter here.
+`train`[[, and so `validation`,]] holds `data_TYPE/SCENE_TYPE_NUMBER_KIND/`, each with one
+JSON file, a list of one element, and the pictures. Dialect and language do not matter here.
 """,
 )

@@ -65,9 +65,10 @@ SHAREGPT = ExportFormat(
 Give this folder to LLaMA-Factory as `dataset_dir`, and the names in `dataset_info.json` as
 `dataset`. Picture paths are relative to this folder.
 
-- `er_gym_train`, `er_gym_validation`: whole trajectories; every turn of the assistant is learnt.
-- `er_gym_train_turns`, `er_gym_validation_turns`: one sample for each turn that is to be learnt;
-  train on these with `mask_history: true`, which learns the last turn of a sample alone.
+- `er_gym_train`[[, `er_gym_validation`]]: whole trajectories; every turn of the assistant is
+  learnt.
+- `er_gym_train_turns`[[, `er_gym_validation_turns`]]: one sample for each turn that is to be
+  learnt; train on these with `mask_history: true`, which learns the last turn of a sample alone.
 
 `mask_history` holds for a whole run, so do not mix the two kinds: export with `--per-turn` to have
 everything in the second. Set `cutoff_len` so that the longest sample fits, pictures included.

@@ -48,7 +48,7 @@ _LOAD = """\
 ```python
 from datasets import load_dataset
 
-dataset = load_dataset("imagefolder", data_dir="THIS FOLDER")  # splits train, validation
+dataset = load_dataset("imagefolder", data_dir="THIS FOLDER")  # train[[, validation]]
 ```
 
 """

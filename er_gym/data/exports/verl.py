@@ -47,8 +47,8 @@ VERL = ExportFormat(
     about="verl: Parquet with messages and pictures",
     write=_write,
     usage="""\
-`data.train_files` takes the files `train-*.parquet`, `data.val_files` the files
-`validation-*.parquet`; `data.messages_key=messages`, `data.image_key=images`. The pictures are
+`data.train_files` takes the files `train-*.parquet`[[, `data.val_files` the files
+`validation-*.parquet`]]; `data.messages_key=messages`, `data.image_key=images`. The pictures are
 inside the files. verl learns every turn of the assistant; turns that are not to be learnt are
 therefore part of the user's messages here, as text. Raise `data.max_length`: a picture takes
 hundreds of tokens.

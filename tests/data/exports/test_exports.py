@@ -17,6 +17,7 @@ from er_gym.data.chat import IMAGE
 from er_gym.data.collection import Collection
 from er_gym.data.exports import ExportError, ExportOptions, ExportSummary, export
 from er_gym.data.exports.base import room
+from er_gym.data.exports.export import EXPORTS, _readme
 from er_gym.data.trajectory import Trajectory
 from er_gym.tasks import verbs
 
@@ -223,6 +224,23 @@ def test_datasets_loads_pictures_and_messages(
         assert len(row["actions"]) == len(row["train"]) == len(row["rewards"])
         assert loaded["train"].features["images"].feature == datasets.Image()
         assert (out / "README.md").read_text().startswith("---\n")
+
+
+def test_the_readme_speaks_of_the_splits_that_there_are(
+    collection: Collection, tmp_path: Path
+) -> None:
+    export(collection, "trl", tmp_path / "all", ExportOptions(dialect="paper"))
+    told = (tmp_path / "all" / "README.md").read_text()
+    assert told.count("validation") == 1
+    assert "There is no split `validation`" in told
+    for row in EXPORTS.own.values():
+        for samples in ({"train": 3}, {"train": 3, "validation": 2}):
+            summary = ExportSummary(row.name, 5, {}, samples, 9, 9, 9, 9, 9)
+            text = _readme(row, summary, OPTIONS, collection)
+            assert "[[" not in text
+            assert "]]" not in text
+            loading = text.partition("## How to load it")[2]
+            assert ("validation" in loading) == ("validation" in samples), row.name
 
 
 def test_prompts_are_read_off_what_is_written(

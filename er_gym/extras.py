@@ -1,0 +1,20 @@
+"""How an error names a package that is not installed, and the extra of er-gym that brings it."""
+
+from __future__ import annotations
+
+
+class MissingPackage(ValueError):
+    """A part of er-gym needs a package that is not installed; the message says what to install.
+
+    Attributes:
+        package: the first that is missing.
+
+    Args:
+        what: the part, as the user named it; the subject of the sentence.
+        package: see there.
+        install: what brings all that this part needs, such as ``er-gym[vlm]``.
+    """
+
+    def __init__(self, what: str, package: str, install: str) -> None:
+        super().__init__(f"{what} needs {package}, which is not installed: pip install '{install}'")
+        self.package = package
