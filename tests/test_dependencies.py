@@ -78,6 +78,7 @@ USED_OTHERWISE = {
     "mypy": "a command",
     "playwright": "a test imports it where it is installed",
     "pytest-cov": "an option of pytest",
+    "pytest-timeout": "settings of pytest",
     "pytest-xdist": "an option of pytest",
     "qwen-vl-utils": "a test imports it where it is installed",
     "ruff": "a command",
