@@ -19,6 +19,8 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Python compiles what it imports; compiling all of it beforehand only takes time.
 INSTALL := $(PIP) install --quiet --no-compile --constraint constraints.txt
+# On a terminal, says for how long a quiet command has run, and how many packages there are.
+SHOWN := $(PYTHON) -m benchmarks.checks.shown
 MARK := $(VENV)/.er-gym
 
 .PHONY: bench test test-inspect cover lint check clean help
@@ -39,7 +41,7 @@ cover: $(MARK)-dev
 	$(BIN)/python -m pytest --cov --cov-report=term-missing:skip-covered $(ARGS)
 
 test-inspect: $(MARK)-dev
-	@$(INSTALL) --editable '.[dev,inspect]'
+	@$(SHOWN) 'Installing Inspect in $(VENV)' $(VENV) $(INSTALL) --editable '.[dev,inspect]'
 	$(BIN)/python -m pytest tests/benchmarks/test_inspect_task.py $(ARGS)
 
 check: lint test
@@ -54,13 +56,12 @@ clean:
 	find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
 
 $(MARK)-core: pyproject.toml constraints.txt | $(BIN)/python
-	@echo 'Installing er-gym in $(VENV), once'
-	@$(INSTALL) --editable .
+	@$(SHOWN) 'Installing er-gym in $(VENV), once' $(VENV) $(INSTALL) --editable .
 	@touch $@
 
 $(MARK)-dev: pyproject.toml constraints.txt | $(BIN)/python
-	@echo 'Installing er-gym and what its tests need in $(VENV), once'
-	@$(INSTALL) --editable '.[dev]'
+	@$(SHOWN) 'Installing er-gym and what its tests need in $(VENV), once' $(VENV) \
+	  $(INSTALL) --editable '.[dev]'
 	@touch $(MARK)-core $@
 
 $(BIN)/python:
@@ -70,4 +71,4 @@ $(BIN)/python:
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
 	  echo "$(PYTHON) cannot make virtual environments; on Debian or Ubuntu: sudo apt install python3-venv" >&2; \
 	  exit 2; }
-	@$(PYTHON) -m venv $(VENV)
+	@$(SHOWN) 'Making $(VENV)' $(VENV) $(PYTHON) -m venv $(VENV)

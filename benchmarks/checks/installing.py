@@ -1,9 +1,11 @@
 """Checks that pip can install every extra under constraints.txt, each into an empty environment.
 
-    python -m benchmarks.checks.installing [--extra rl --extra all] [--python python3.12]
+    python -m benchmarks.checks.installing [--extra rl --extra all | --wheel] [--python python3.12]
 
 pip resolves and downloads metadata, and installs nothing; it needs a package index. The test of the
-same name only reads the installed packages and is quick; this check takes some minutes.
+same name only reads the installed packages and is quick; this check takes some minutes. With
+--wheel, a wheel is built and installed instead, and its commands are tried with and without a
+terminal (:mod:`benchmarks.checks.terminals`).
 """
 
 from __future__ import annotations
@@ -17,8 +19,11 @@ from pathlib import Path
 
 import click
 
+from benchmarks.checks import terminals
 from benchmarks.cli.extras import extras
 
+_TRIED = "charts,ui,vlm"
+"""The extras of the commands that are tried."""
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -30,11 +35,16 @@ ROOT = Path(__file__).resolve().parents[2]
     show_default=True,
     help="The Python that makes the environment.",
 )
-def main(wanted: tuple[str, ...], python: str) -> None:
+@click.option("--wheel", is_flag=True, help="Build a wheel, install it, and try its commands.")
+def main(wanted: tuple[str, ...], python: str, wheel: bool) -> None:
     """Resolve each extra, and print the number of its packages or why it cannot be installed."""
     failed = []
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([python, "-m", "venv", folder], check=True)
+        if wheel:
+            tally = terminals.check(command=[str(installed(Path(folder)))], checkout=False)
+            click.echo(tally)
+            sys.exit(int(tally.short > 0))
         for extra in wanted or ("", *extras()):
             started = time.perf_counter()
             said = resolve(Path(folder) / "bin" / "python", extra)
@@ -45,6 +55,19 @@ def main(wanted: tuple[str, ...], python: str) -> None:
             result = f"{len(found[1].split())} packages" if found else said.strip()
             click.echo(f"{'ok' if found else '--'}  er-gym[{extra}]  {took:.0f} s  {result}")
     sys.exit(1 if failed else 0)
+
+
+def installed(environment: Path) -> Path:
+    """The command of a wheel that is built, and installed with what the tried commands need."""
+    pip = [str(environment / "bin" / "python"), "-m", "pip"]
+    made = environment / "wheel"
+    subprocess.run(
+        [*pip, "wheel", "--no-deps", "--wheel-dir", str(made), "."], cwd=ROOT, check=True
+    )
+    (file,) = made.glob("*.whl")
+    constrained = ["install", "--constraint", str(ROOT / "constraints.txt")]
+    subprocess.run([*pip, *constrained, f"er-gym[{_TRIED}] @ {file.as_uri()}"], check=True)
+    return environment / "bin" / "er-gym"
 
 
 def resolve(python: Path, extra: str) -> str:

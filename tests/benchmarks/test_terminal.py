@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+import sys
 from pathlib import Path
 
 import pytest
 
+from benchmarks.checks import terminals
 from benchmarks.checks.bad_files import HOSTILE
 from benchmarks.cli import main as cli
 from benchmarks.cli import terminal as terminal_module
@@ -51,3 +53,26 @@ def test_the_command_prints_through_one_function_alone():
         text = file.read_text()
         assert "click.echo" not in text, file
         assert "Console(" not in text, file
+
+
+def test_light_commands_work_with_and_without_a_terminal_anywhere(capsys):
+    tally = terminals.check(["envs"], checkout=False)
+    tally += terminals.check(["report OUT/none"], checkout=False)
+    assert tally.tried == 4
+    assert tally.short == 0, capsys.readouterr().out
+
+
+def test_what_a_terminal_check_notices(tmp_path, monkeypatch, capsys):
+    """Programs that do what it looks for."""
+    wrong = {
+        "ends wrongly": "raise SystemExit(3)",
+        "a traceback": "import sys; sys.stderr.write('Traceback (most recent call last)')",
+        "a control code": "print('\\x1b[1m')",
+        "no JSON": "print('{')",
+        "no file": "",
+    }
+    for what, program in wrong.items():
+        line = terminals.Line("", makes="out" if what == "no file" else "", json=what == "no JSON")
+        monkeypatch.setattr(terminals, "LINES", (line,))
+        command = [sys.executable, "-c", program]
+        assert terminals.check(command=command, checkout=False).short, what
