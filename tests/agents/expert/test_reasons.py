@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import random
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from support import in_one_test, make_task
 
+from agents.expert.candidates import Candidate
+from agents.expert.collect import Collector
 from agents.expert.course import Intent, View
+from agents.expert.explorer import ExplorerCourse, Strength
 from agents.expert.legs import legs_of
+from agents.expert.own_words import split_speech
 from agents.expert.replayed_intents import replayed_intent, replayed_purpose
 from agents.expert.thinker import _event
 from agents.expert.writers.facts import facts_of
 from agents.expert.writers.nouns import nouns
+from er_gym.data.collection import CollectionError
 from er_gym.data.knowledge import Knowledge, LastAction
 from er_gym.data.trajectory import SeenObject, Subgoal, Turn
 from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
+from er_gym.tasks.suites import config_directory
 
 GO = verbs.NAVIGATE
 FRIDGE, DESK = "Fridge|+00.00|+01.00|+02.00", "Desk|+00.00|+01.00|+02.00"
@@ -197,3 +207,69 @@ def test_more_than_one_are_counted() -> None:
     for uncounted in ("Bread", "Blinds"):
         one = nouns("en").counted({"o": uncounted, "count": 3}, random.Random(0))
         assert one == nouns("en").counted({"o": uncounted}, random.Random(0))
+
+
+# -- whose words, and which episodes ---------------------------------------------------------------
+
+
+def test_a_dialect_of_one_language_has_no_openers_in_another(tmp_path: Path) -> None:
+    shutil.copy(config_directory("dialects") / "paper" / "en.yaml", tmp_path)
+    said = "It is dark. Let me take a look at the scene first. A sofa."
+    assert split_speech(said, str(tmp_path), "en") == [
+        ("reasoning", "It is dark."),
+        ("analysis", "A sofa."),
+    ]
+    assert split_speech(said, str(tmp_path), "zh") == [("reasoning", said)]
+
+
+OPEN, TAKE = Action(verbs.OPEN, "Fridge"), Action(verbs.PICKUP, "Mug")
+OPENED = make_task("pickup_from_closerep_and_put", (GO, FRIDGE), ("open", FRIDGE), ("pickup", MUG))
+
+
+@in_one_test(
+    "row",
+    [  # the key actions left; what is legal; whether it can begin, with a hidden thing or another
+        (4, (OPEN,), False, True),  # what hides a thing it opens when it looks inside
+        (4, (OPEN, TAKE), True, True),
+        (4, (TAKE,), True, False),
+        (2, (TAKE,), True, True),
+        (2, (), False, False),
+    ],
+)
+def test_an_explorer_is_ready_for_the_key_action_that_it_can_do(
+    row: tuple[int, tuple[Action, ...], bool, bool],
+) -> None:
+    left, legal, *ready = row
+    found = []
+    for hidden in (True, False):
+        course = ExplorerCourse(OPENED, Strength(), random.Random(0))
+        course.view = replace(view(5), left=OPENED.key_actions[-left:], legal=legal)
+        course._legs = tuple(replace(leg, hidden=hidden) for leg in legs_of(OPENED))
+        found.append(course._ready(course._legs[0]))
+    assert found == ready
+
+
+def test_what_was_not_played_or_crashed_does_not_keep_out_what_comes_after() -> None:
+    def candidate(name: str) -> Candidate:
+        return Candidate(name, "p", "explorer", TASK, 0, "explored")
+
+    chosen = [candidate(name) for name in ("gone", "crashed", "long", "good", "gone", "better")]
+    assert {each.mode for each in chosen} == {""}
+
+    def played(part: str, name: str) -> str:
+        if name == "crashed":
+            raise CollectionError(name)
+        return name
+
+    collector = object.__new__(Collector)
+    collector._collection = SimpleNamespace(played=played)  # type: ignore[assignment]
+    collector._players = SimpleNamespace(  # type: ignore[assignment]
+        rejection=lambda name, most: f"longer than {most}" if name == "long" else ""
+    )
+    collector.summary = SimpleNamespace(rejected={})  # type: ignore[assignment]
+    taken: list[Candidate] = []
+    directory: Any = SimpleNamespace(has=lambda name: name != "gone")
+    stratum: Any = SimpleNamespace(chosen=chosen, take=taken.extend)
+    collector._take(directory, stratum, 9)
+    assert [each.id for each in taken] == ["good", "better"]
+    assert collector.summary.rejected == {"longer than 9": 1}
