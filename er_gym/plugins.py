@@ -16,6 +16,8 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
@@ -28,6 +30,25 @@ T = TypeVar("T")
 
 class PluginError(ValueError):
     """A name does not stand for a usable plugin; the message says why and what is allowed."""
+
+
+class NotImported(PluginError):
+    """A name is spelled as it should be, and what it stands for was not to be imported."""
+
+
+_IMPORTS: ContextVar[bool] = ContextVar("_IMPORTS", default=True)
+
+
+@contextmanager
+def without_imports() -> Iterator[None]:
+    """For commands that promise to run nothing: within this, dotted names raise
+    :class:`NotImported` instead of being imported. Any file could have named them, and any module
+    of that name in the working directory would be run."""
+    token = _IMPORTS.set(False)
+    try:
+        yield
+    finally:
+        _IMPORTS.reset(token)
 
 
 @dataclass(frozen=True)
@@ -143,7 +164,7 @@ def added(
     """
     for name in filter(None, map(str.strip, os.environ.get(variable, "").split(","))):
         if not (registers and _being_imported(name.partition(":")[0])):
-            yield load_dotted(name, kind, expected), f"{name} in ${variable}"
+            yield _loaded(name, kind, expected), f"{name} in ${variable}"  # the user named it
     for name, entry in sorted(entry_points(group).items()):
         if not (registers and _being_imported(entry.module)):
             yield load_entry_point(entry, kind), f"entry point {name!r} of {group}"
@@ -168,7 +189,14 @@ def load_dotted(name: str, kind: str, expected: str) -> Any:
 
     Raises:
         PluginError: the name has another form, or the module cannot be imported or lacks ``Name``.
+        NotImported: within :func:`without_imports`.
     """
+    if is_dotted(name) and not _IMPORTS.get():
+        raise NotImported(f"{kind} {name!r} was not imported")
+    return _loaded(name, kind, expected)
+
+
+def _loaded(name: str, kind: str, expected: str) -> Any:
     if not is_dotted(name):
         raise PluginError(f"{kind} {name!r} is not a package.module:Name; give {expected}")
     module_name, _, attributes = name.partition(":")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,8 +70,8 @@ def pack(run: Path, folder: Path, dtype: str) -> Packed:
         dtype: of the weights, one of :data:`DTYPES`.
 
     Raises:
-        ValueError: the run is not finished, holds no model, or holds one that is not taken; or the
-            type does not hold its weights.
+        ValueError: the run is not finished, holds no model, holds one that is not taken, or holds
+            links; or the type does not hold its weights.
     """
     kind: Kind
     if (run / MODEL).is_file() or (run / SB3_MODEL).is_file():
@@ -112,6 +113,16 @@ def new_folder(models: Path, name: str) -> Iterator[Path]:
         if (models / name).exists():
             (models / name).rename(Path(made) / "before")
         draft.rename(models / name)
+
+
+def _refuse_links(folder: Path, files: Iterable[Path]) -> None:
+    """What a link leads to may be no part of the model, and would be given away with it."""
+    for file in files:
+        if file.is_symlink():
+            raise ValueError(
+                f"{file} is a link to {os.readlink(file)}, and the zoo takes the files themselves: "
+                f"make a copy with them, cp -rL {folder} COPY, look at it, and add that"
+            )
 
 
 def check_files(folder: Path) -> None:
@@ -158,6 +169,7 @@ def _pack_policy(run: Path, folder: Path, dtype: str) -> tuple[str, tuple[str, .
             f"{run / SB3_MODEL} holds pickled objects, which the zoo does not take; "
             f"er-gym train-rl --trust writes {MODEL} beside it"
         )
+    _refuse_links(run, (run / MODEL, run / CONFIG))
     config, steps = load_config(run / CONFIG), trained_steps(run)
     if steps < config.total_steps:
         raise ValueError(
@@ -186,8 +198,11 @@ def _train_command(config: TrainConfig) -> tuple[str, ...]:
 
 def _pack_language_model(run: Path, folder: Path, dtype: str) -> str:
     source = Path(model_directory(str(run)))
+    # The user may name a link; the run may not hold one.
+    _refuse_links(source, (*([source] if source != run else ()), *sorted(source.rglob("*"))))
     _check_no_pickles(source)
     source = merge(source)  # an adapter into its model
+    _refuse_links(source, sorted(source.rglob("*")))
     if not (source / WEIGHTS).is_file():
         raise ValueError(f"{source} has no {WEIGHTS}; the zoo takes weights in one such file")
     changes: dict[str, Callable[[Any], Any]] = {"config.json": _with_dtype, HISTORY: _placeless}

@@ -15,6 +15,7 @@ from benchmarks.plan.settings import FREE, PlaySettings
 from er_gym import __version__
 from er_gym.activity import begin
 from er_gym.locking import Locked, check_unused, exclusive_use
+from er_gym.plugins import NotImported
 from er_gym.rollout.processes import CONTEXT, GRACE_SECONDS, end_with_parent
 from er_gym.tasks.reading import read_text
 from er_gym.writing import make_folder, write_atomic
@@ -139,20 +140,28 @@ def check_same(plan: Plan, record: PlanRecord, root: Path) -> None:
             )
 
 
-def check_phases(phases: Iterable[Phase]) -> None:
+def check_phases(phases: Iterable[Phase]) -> list[str]:
     """Check what phases are given, before hours are spent on those before them.
+
+    Returns:
+        What could not be checked, since nothing was to be imported
+        (:func:`er_gym.plugins.without_imports`), each once.
 
     Raises:
         PlanError: the command of one would refuse it.
     """
+    unchecked: dict[str, None] = {}
     phases = list(phases)
     for number, phase in enumerate(phases, 1):
         begin(f"checking what the phases are given: {number} of {len(phases)}")
         for check in phase.checks:
             try:
                 check()
+            except NotImported as told:
+                unchecked[str(told)] = None
             except ValueError as error:
                 raise PlanError(f"{phase.name}: {error}") from error
+    return [*unchecked]
 
 
 def run_plan(

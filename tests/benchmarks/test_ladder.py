@@ -262,6 +262,36 @@ def test_what_a_later_phase_refuses_is_refused_before_the_first(
     assert not out.exists()
 
 
+EVIL = "open('ran', 'w').close()\nclass Agent: pass\ndef suite(): pass\n"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        ("stages.imitation.teacher.agent=evil:Agent",),
+        ("suite=evil:suite",),
+        ("evaluation.suite=evil:suite",),
+        ("stages.imitation.teacher.agent=evil:Agent", "suite=evil:suite", "dialect=text"),
+    ],
+)
+def test_print_imports_nothing_that_a_file_names(
+    changes: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "evil.py").write_text(EVIL)
+    (tmp_path / "ladder.yaml").write_text(yaml.safe_dump(SMALL), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    command = ["ladder", "--config", "ladder.yaml", "--print"]
+    result = CliRunner().invoke(cli, [*command, *(f"--set={each}" for each in changes)])
+    assert result.exit_code == 0, result.output
+    assert "was not imported, since --print runs nothing" in result.output
+    assert not (tmp_path / "ran").exists()
+    assert "evil" not in sys.modules
+    # What is no such name is refused all the same.
+    told = CliRunner().invoke(cli, [*command, "--set", "suite=evil"])
+    assert told.exit_code == 2
+    assert "unknown suite 'evil'" in told.output
+
+
 def test_a_first_model_must_be_there(tmp_path: Path) -> None:
     file, out = tmp_path / "ladder.yaml", tmp_path / "x"
     model = tmp_path / "model"

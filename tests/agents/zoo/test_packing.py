@@ -109,6 +109,21 @@ def too_large_for_half(run: Path) -> None:
     save_file({**weights, "more": torch.tensor([1e6])}, run / "model" / WEIGHTS)
 
 
+def with_a_link(run: Path) -> None:
+    (run / "secret.txt").write_text("secret")
+    (run / "model" / "notes.txt").symlink_to(run / "secret.txt")
+
+
+def with_a_linked_folder(run: Path) -> None:
+    (run / "model").rename(run / "elsewhere")
+    (run / "model").symlink_to("elsewhere")
+
+
+def with_linked_words(run: Path) -> None:
+    (run / "model" / "tokenizer.json").rename(run / "tokenizer.json")
+    (run / "model" / "tokenizer.json").symlink_to("../tokenizer.json")
+
+
 def unfinished(run: Path) -> None:
     (run / "model").rename(run / ".model.draft")
 
@@ -119,6 +134,9 @@ def unfinished(run: Path) -> None:
         (without_weights, "has no model.safetensors"),
         (pickled, "holds pytorch_model.bin, which may run code"),
         (too_large_for_half, "float16 does not hold the weights more; give --dtype bfloat16"),
+        (with_a_link, r"notes\.txt is a link to .*secret\.txt, and the zoo takes the files"),
+        (with_a_linked_folder, "model is a link to elsewhere, and the zoo takes the files"),
+        (with_linked_words, r"tokenizer\.json is a link to \.\./tokenizer\.json"),
         (unfinished, "is not finished"),
     ],
 )
@@ -139,6 +157,15 @@ def test_a_policy_that_is_not_taken(tmp_path: Path) -> None:
     (tmp_path / "early" / "model.npz").rename(tmp_path / "early" / "model.zip")
     with pytest.raises(ValueError, match="holds pickled objects, which the zoo does not take"):
         pack(tmp_path / "early", tmp_path, "float16")
+    (tmp_path / "elsewhere").mkdir()
+    write_untrained_run(config, tmp_path / "elsewhere" / "run")
+    (tmp_path / "linked").mkdir()
+    for file in (tmp_path / "elsewhere" / "run").iterdir():
+        (tmp_path / "linked" / file.name).symlink_to(file)
+    with pytest.raises(
+        ValueError, match=r"is a link to .*, and the zoo takes the files themselves"
+    ):
+        pack(tmp_path / "linked", tmp_path, "float16")
     with pytest.raises(ValueError, match="holds no trained model; give a run directory"):
         pack(tmp_path, tmp_path, "float16")
 
