@@ -36,6 +36,9 @@ class NotImported(PluginError):
     """A name is spelled as it should be, and what it stands for was not to be imported."""
 
 
+NOT_FROM_HERE = "import sys; sys.path[:] = [place for place in sys.path if place]\n"
+"""The beginning of a program that ``python -c`` runs to ask another interpreter something: else it
+would import a ``json.py`` or ``ai2thor.py`` that lies in the working directory."""
 _IMPORTS: ContextVar[bool] = ContextVar("_IMPORTS", default=True)
 
 

@@ -215,3 +215,20 @@ def test_a_module_in_the_working_directory_is_found(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
     assert type(make_agent("here_only:Mine")).__name__ == "Impatient"
+
+
+def test_what_asks_an_interpreter_imports_nothing_from_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """er-gym doctor, er-gym serve --dry-run and er-gym player install ask so."""
+    from agents.vlm.serving import inspect_machine
+    from benchmarks.cli.doctor_checks import _missing_for_client
+    from er_gym.thor.hooks import hook_folders
+
+    for name in ("json", "site", "ai2thor", "torch", "vllm"):
+        (tmp_path / f"{name}.py").write_text("open('ran', 'w').close()")
+    monkeypatch.chdir(tmp_path)
+    assert "vllm" not in inspect_machine(sys.executable, {}).packages
+    assert _missing_for_client().keys() == {"Linux64", "CloudRendering"}
+    assert hook_folders(sys.executable)
+    assert not (tmp_path / "ran").exists()

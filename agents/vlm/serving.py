@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from agents.vlm.settings import Pictures
+from er_gym.plugins import NOT_FROM_HERE
 
 HOST = "127.0.0.1"
 """The only address that a server listens on, since none of the servers authenticates clients."""
@@ -266,7 +267,7 @@ def inspect_machine(python: str, environment: Mapping[str, str] = os.environ) ->
     asked = sorted(set().union(*(engine.needs for engine in ENGINES.values())))
     question = f"import importlib.util as u; print(*filter(u.find_spec, {asked!r}))"
     try:
-        has = _said([python, "-c", question])
+        has = _said([python, "-c", NOT_FROM_HERE + question])
     except (OSError, subprocess.SubprocessError) as error:
         raise ValueError(
             f"{python} does not run as a Python ({error}); give the path of one, such as "

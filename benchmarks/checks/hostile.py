@@ -1,4 +1,4 @@
-"""Tries bad command lines, terminals, failing servers and misuses of the Gymnasium interface.
+"""Tries bad command lines, terminals, strangers' files, failing servers and misuses of Gymnasium.
 
     python -m benchmarks.checks.hostile [--quick | --all]
 
@@ -43,11 +43,11 @@ def _tallies(lines: int | None) -> Iterator[Tally]:
     from benchmarks.checks import command_lines
 
     yield command_lines.check((), at_least=lines)
-    from benchmarks.checks import misuse, server_faults, terminals
+    from benchmarks.checks import foreign_files, misuse, server_faults, terminals
 
     yield terminals.check(quick=lines == _QUICK_LINES)
-
     yield misuse.check()
+    yield foreign_files.check()
     yield server_faults.check((), with_runs=lines != _QUICK_LINES)
 
 

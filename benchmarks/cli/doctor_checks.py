@@ -21,6 +21,7 @@ from typing import Any
 import er_gym
 from benchmarks.cli.activity import doing
 from benchmarks.cli.extras import claimants, extras, installed_version, state_of
+from er_gym.plugins import NOT_FROM_HERE
 from er_gym.thor import SCENE_NAMES, make_controller
 from er_gym.thor.launcher import executable_in
 from er_gym.thor.places import GpuMapping, Release
@@ -139,7 +140,7 @@ def _programs() -> Iterator[Check]:
 
 def _missing_for_client() -> dict[str, list[str]]:
     """Platform to what AI2-THOR's client misses on this machine, asked in a new process."""
-    program = [sys.executable, "-c", _ASK_THE_CLIENT]
+    program = [sys.executable, "-c", NOT_FROM_HERE + _ASK_THE_CLIENT]
     done = subprocess.run(program, capture_output=True, text=True, timeout=60, check=True)
     missing: dict[str, list[str]] = json.loads(done.stdout)
     return missing

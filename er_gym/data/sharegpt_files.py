@@ -272,10 +272,11 @@ def _entry(file: Path, name: str, entry: Any) -> tuple[Path, Columns]:
 
 
 def _guessed(items: JsonItems) -> Columns:
-    """The columns by the first sample."""
-    first = items[0]
-    columns = guessed_columns(first)
+    """The columns by the first sample that has known ones."""
+    looked_at = (items[index] for index in range(min(len(items), _LOOKED_AT)))
+    columns = next(filter(None, map(guessed_columns, looked_at)), None)
     if columns is None:
+        first = items[0]
         has = ", ".join(first)[:100] if isinstance(first, dict) else type(first).__name__
         raise ShareGptError(
             f"{items.path} has neither messages with role and content nor conversations with from "

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
+from er_gym.plugins import NOT_FROM_HERE
 from er_gym.thor import client_hook
 from er_gym.thor.places import PlayerError, client_home
 from er_gym.writing import write_atomic
@@ -35,7 +36,7 @@ def hook_folders(python: str) -> list[Path]:
     from ai2thor._builds import COMMIT_ID
 
     try:
-        command = [python, "-c", _ASK_PYTHON]
+        command = [python, "-c", NOT_FROM_HERE + _ASK_PYTHON]
         done = subprocess.run(command, capture_output=True, text=True, timeout=60)
         told = json.loads(done.stdout)
     except (OSError, ValueError, subprocess.SubprocessError) as error:
