@@ -5,19 +5,23 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import queue
 import secrets
 import shutil
 import signal
-import socket
+import subprocess
 import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from er_gym.activity import begin, begin_import
+from er_gym.extras import MissingPackage
+from er_gym.rollout.cluster.greeting import problem_at
 from er_gym.rollout.cluster.settings import RaySettings
 
 if TYPE_CHECKING:
@@ -31,7 +35,16 @@ LOCAL_ENVIRONMENT = {
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
     "RAY_USAGE_STATS_ENABLED": "0",
 }
-_CONNECT_SECONDS = 5.0
+_JOIN_ENVIRONMENT = {"RAY_BACKEND_LOG_LEVEL": "error"}
+"""Without lines of Ray's own beside er-gym's, which says the same."""
+_JOIN_SECONDS = 120.0
+"""In which Ray must have joined a cluster whose server has answered. It takes a few seconds, and
+more where this machine is busy or the code that travels has far to go."""
+_WATCH_SECONDS = 0.05
+_VITAL = ("raylet", "gcs_server")
+"""The programs without which Ray can do nothing."""
+_ENDED_BY_RAY = 3
+"""The exit code of a run that was stopped from outside; see ``benchmarks.cli.errors``."""
 _STARTS = 3
 """Ray waits no more than 30 seconds for itself, which is too little on a busy machine."""
 _PACKAGES = ("er_gym", "agents", "benchmarks")
@@ -58,16 +71,15 @@ def ray_machines(
     Raises:
         RayUnavailable: see there.
     """
-    environment = {} if settings.address else LOCAL_ENVIRONMENT
+    environment = _JOIN_ENVIRONMENT if settings.address else LOCAL_ENVIRONMENT
     with _environment(environment), contextlib.ExitStack() as stack:
+        if find_spec("ray") is None:
+            raise RayUnavailable(str(MissingPackage("a Ray cluster", "ray", "er-gym[ray]")))
+        if settings.address:  # before Ray is imported, which takes seconds
+            _check_reachable(settings.address)
         begin_import("Ray", "ray")
-        try:
-            import ray
-        except ImportError as error:
-            raise RayUnavailable(
-                f"{error.name} is not installed, and a Ray cluster needs it: "
-                "pip install 'er-gym[ray]'"
-            ) from None
+        import ray
+
         from er_gym.rollout.cluster.machines import RayMachines
 
         if not ray.is_initialized():
@@ -78,9 +90,11 @@ def ray_machines(
             else:
                 folder = stack.enter_context(_folder())
                 stack.enter_context(_environment({"RAY_AUTH_TOKEN": auth_token()}))
-                with on_loopback(), same_signals(), _own_session():
-                    _start(folder)
+                with on_loopback(), same_signals(), _own_session() as started:
+                    _start(folder, started)
             stack.callback(ray.shutdown)
+            if not settings.address:
+                stack.callback(_watch(started, folder, say).set)  # called before the shutdown
             stack.enter_context(_quiet())
         yield RayMachines(settings, say)
 
@@ -91,8 +105,8 @@ def auth_token() -> str:
     return secrets.token_hex(32)
 
 
-def _start(folder: Path) -> None:
-    """Start Ray on this machine."""
+def _start(folder: Path, started: list[subprocess.Popen[bytes]]) -> None:
+    """Start Ray on this machine; ``started`` lists its processes as they begin."""
     import ray
 
     for tries_left in reversed(range(_STARTS)):
@@ -106,11 +120,63 @@ def _start(folder: Path) -> None:
                 _temp_dir=str(folder),
             )
             return
-        except Exception as error:  # Ray raises bare exceptions, too
+        except BaseException as error:  # Ray raises bare exceptions, too
             ray.shutdown()
+            _reap(started)  # Ray has forgotten those of a start that failed half-way
+            if not isinstance(error, Exception):
+                raise
             if not tries_left:
                 reason = " ".join(str(error).split())
                 raise RayUnavailable(f"Ray cannot be started here: {reason[:300]}") from error
+
+
+def _reap(started: list[subprocess.Popen[bytes]]) -> None:
+    """End processes that this one has started, and what they have started in their sessions."""
+    for process in started:
+        if process.poll() is None:
+            own_session = os.getpgid(process.pid) == process.pid
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL) if own_session else process.kill()
+            process.wait()
+    started.clear()
+
+
+def _watch(
+    started: Sequence[subprocess.Popen[bytes]], folder: Path, say: Callable[[str], None]
+) -> threading.Event:
+    """End this process with a word once a process of the Ray that it has started has died.
+
+    Nothing can be done by that Ray any more, and Ray ends its drivers then without one. What has
+    been done is on the disk.
+
+    Returns:
+        Set it to stop watching.
+    """
+    over = threading.Event()
+    vital = {_program(each): each for each in started if _program(each) in _VITAL}
+
+    def watch() -> None:
+        while not over.wait(_WATCH_SECONDS):
+            dead = next((name for name, each in vital.items() if each.poll() is not None), None)
+            if dead is None or over.is_set():
+                continue
+            say(
+                f"the Ray that was started here has died: its {dead} ended with "
+                f"{vital[dead].returncode}; what is finished is kept; the same command continues"
+            )
+            _reap([*started])
+            shutil.rmtree(folder, ignore_errors=True)
+            os._exit(_ENDED_BY_RAY)
+
+    threading.Thread(target=watch, daemon=True).start()
+    return over
+
+
+def _program(process: subprocess.Popen[bytes]) -> str:
+    """The name of the program that a process runs."""
+    command: Any = process.args
+    first = command[0] if isinstance(command, (list, tuple)) else command
+    return os.path.basename(os.fsdecode(first))
 
 
 @contextlib.contextmanager
@@ -138,8 +204,8 @@ def same_signals() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _own_session() -> Iterator[None]:
-    """Start Ray's processes in sessions of their own.
+def _own_session() -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Start Ray's processes in sessions of their own, and list them.
 
     What ends a group of processes (``timeout``, a terminal that closes) would otherwise end them
     first, and this process would die of that before it has tidied up. They die with it all the
@@ -149,12 +215,20 @@ def _own_session() -> Iterator[None]:
 
     name = "ConsolePopen"
     before = getattr(services, name, None)
-    if before is None or sys.platform != "linux":
-        yield
+    started: list[subprocess.Popen[bytes]] = []
+    if before is None:
+        yield started
         return
-    setattr(services, name, partial(before, start_new_session=True))
+
+    def start(*args: Any, **options: Any) -> subprocess.Popen[bytes]:
+        process: subprocess.Popen[bytes] = before(*args, **options)
+        started.append(process)
+        return process
+
+    own = {"start_new_session": True} if sys.platform == "linux" else {}
+    setattr(services, name, partial(start, **own))
     try:
-        yield
+        yield started
     finally:
         setattr(services, name, before)
 
@@ -163,39 +237,71 @@ def _join(address: str, modules: Sequence[Path]) -> None:
     """Join a cluster; the code of this process travels with its workers."""
     import ray
 
-    _check_reachable(address)
     carried = [*(Path(__file__).parents[3] / name for name in _PACKAGES), *modules]
     environment: dict[str, Any] = {
         "py_modules": [str(each) for each in carried if each.exists()],
         "excludes": ["**/__pycache__"],
     }
+    join = partial(
+        ray.init,
+        address=address,
+        log_to_driver=False,
+        logging_level=logging.ERROR,
+        runtime_env=environment,
+    )
     try:
-        ray.init(
-            address=address,
-            log_to_driver=False,
-            logging_level=logging.ERROR,
-            runtime_env=environment,
-        )
+        _within(_JOIN_SECONDS, join)
     except (ConnectionError, RuntimeError, ValueError, OSError, ImportError) as error:
         reason = " ".join(str(error).split())
         raise RayUnavailable(
-            f"cannot join the Ray cluster at {address}: {reason[:300]}; give the address that "
-            "`ray status` accepts, or none to start Ray on this machine"
+            f"cannot join the Ray cluster at {address}: {reason[:300]}; {_WHICH_ADDRESS}"
         ) from None
+
+
+_WHICH_ADDRESS = "give the address that `ray status` accepts, or none to start Ray on this machine"
+
+
+def _within(seconds: float, act: Callable[[], object]) -> None:
+    """Do it in a thread, which is abandoned at the end of the time and at Ctrl-C.
+
+    Ray waits in C++, where neither a signal nor an exception reaches it.
+
+    Raises:
+        TimeoutError: the time is over.
+    """
+    ended: queue.SimpleQueue[BaseException | None] = queue.SimpleQueue()
+
+    def run() -> None:
+        try:
+            act()
+        except BaseException as error:
+            ended.put(error)
+        else:
+            ended.put(None)
+
+    threading.Thread(target=run, daemon=True).start()
+    try:
+        error = ended.get(timeout=seconds)
+    except queue.Empty:
+        raise TimeoutError(f"it has not let this machine join within {seconds:.0f} s") from None
+    if error is not None:
+        raise error
 
 
 def _check_reachable(address: str) -> None:
-    """Raise RayUnavailable if nobody listens at an address: Ray itself would wait for minutes."""
-    host, colon, port = address.removeprefix("ray://").rpartition(":")
-    if not colon or not port.isdigit():
-        return  # auto, or something that Ray refuses at once
-    try:
-        socket.create_connection((host.strip("[]"), int(port)), _CONNECT_SECONDS).close()
-    except (OSError, OverflowError) as error:
+    """Raise RayUnavailable if Ray is not at an address."""
+    if address == "auto":
+        address = os.environ.get("RAY_ADDRESS", address)
+        if address == "auto":
+            return  # Ray looks for a cluster of this machine
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdecimal():
         raise RayUnavailable(
-            f"no Ray cluster answers at {address} ({error}); give the address that `ray status` "
-            "accepts, or none to start Ray on this machine"
-        ) from None
+            f"{address} is no address of a Ray cluster: auto, HOST:PORT and ray://HOST:PORT are; "
+            f"{_WHICH_ADDRESS}"
+        )
+    if problem := problem_at(host.removeprefix("[").removesuffix("]"), int(port)):
+        raise RayUnavailable(f"no Ray cluster answers at {address} ({problem}); {_WHICH_ADDRESS}")
 
 
 @contextlib.contextmanager

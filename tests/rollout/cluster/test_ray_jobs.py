@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -163,6 +164,60 @@ with interrupted_by_sigterm(), ray_machines(RaySettings(), print) as machines:
         assert folders[-1].exists() == (ended_by == ("SIGKILL",))
     assert not any(folder.exists() for folder in folders)  # the next one has tidied up
     assert until(lambda: not any(_mentions(pid, folders[1]) for pid in _descendants(1)))
+
+
+def test_a_start_that_fails_half_way_leaves_no_process():
+    program = """
+import os
+from pathlib import Path
+from ray._private import services
+from er_gym.rollout.cluster.session import RayUnavailable, ray_machines
+from er_gym.rollout.cluster.settings import RaySettings
+
+def servers():
+    stats = [each.read_text().rpartition(")") for each in Path("/proc").glob("[0-9]*/stat")]
+    mine = [stat for stat in stats if int(stat[2].split()[1]) == os.getpid()]
+    return sum("gcs_server" in stat[0] for stat in mine)
+
+def no_raylet(*args, **kwargs):
+    print(servers())
+    raise OSError("no raylet")
+
+services.start_raylet = no_raylet
+try:
+    with ray_machines(RaySettings(), print):
+        pass
+except RayUnavailable as error:
+    print(servers(), error)
+"""
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout == "1\n1\n1\n0 Ray cannot be started here: no raylet\n"
+
+
+def test_a_run_whose_ray_dies_ends_with_a_word():
+    program = """
+import sys, time
+import ray
+from er_gym.rollout.cluster.session import ray_machines
+from er_gym.rollout.cluster.settings import RaySettings
+with ray_machines(RaySettings(), lambda line: print(line, file=sys.stderr, flush=True)) as machines:
+    node = ray._private.worker._global_node
+    print(node.all_processes["raylet"][0].process.pid, node.get_temp_dir_path(), flush=True)
+    for _ in machines.run_jobs(lambda: time.sleep, [0.01] * 10**6, workers=1):
+        print("done", flush=True)
+"""
+    command = [sys.executable, "-c", program]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, cwd=ROOT, **pipes) as process:
+        raylet, folder = process.stdout.readline().split()
+        process.stdout.readline()  # a job is done
+        os.kill(int(raylet), signal.SIGKILL)
+        _, told = process.communicate(timeout=100)
+    assert "the Ray that was started here has died: its raylet ended with -9" in told
+    assert "the same command continues" in told
+    assert process.returncode == 3
+    assert not Path(folder).exists()
 
 
 def _mentions(pid, folder):
