@@ -6,6 +6,7 @@ import io
 import sys
 
 import pytest
+from support import ROOT
 
 from benchmarks.checks.pseudo_terminal import run
 from benchmarks.cli import activity, live_line
@@ -180,3 +181,14 @@ def test_ctrl_c_leaves_one_line(tmp_path):
     assert done.code == 130
     assert done.text().rstrip().endswith("er-gym: interrupted")
     assert "Traceback" not in done.text()
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_make_shows_what_its_quiet_commands_do(tmp_path, terminal):
+    (tmp_path / "lib" / "python3.12" / "site-packages" / "one-1.0.dist-info").mkdir(parents=True)
+    shown = [sys.executable, "-m", "benchmarks.checks.shown", "Installing", str(tmp_path)]
+    well = run([*shown, "sh", "-c", "echo said"], cwd=ROOT, terminal=terminal)
+    assert well.code == 0
+    assert "said\n" in well.text("out" if terminal else "err")
+    assert ("Installing: 1 packages, " in well.text()) == terminal
+    assert run([*shown, "sh", "-c", "exit 3"], cwd=ROOT, terminal=terminal).code == 3
