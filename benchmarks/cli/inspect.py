@@ -60,8 +60,11 @@ def inspect(
     """
     from er_gym.activity import begin_import
 
-    begin_import("Inspect", "inspect_ai")
+    begin_import("Inspect", "inspect_ai", "textual")
     try:
+        # Inspect's display on a terminal; it would import this later, while nothing is said.
+        import textual.app
+        import textual.widgets  # noqa: F401
         from inspect_ai import eval as evaluate
         from inspect_ai._util.error import PrerequisiteError  # a key or a package is missing
 
@@ -74,11 +77,13 @@ def inspect(
     with bad_input():
         doing("reading the suite")
         asked = er_gym(suite, limit, agent_config, overrides, seed)
-        doing("")  # Inspect's display follows
         try:
+            doing(f"reaching {model}")
+            chosen = model_at_url(model, model_base_url)
+            doing("")  # Inspect's display follows
             logs = evaluate(
                 asked,
-                model=model_at_url(model, model_base_url),
+                model=chosen,
                 log_dir=log_dir,
                 max_samples=concurrency,
             )

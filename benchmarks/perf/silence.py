@@ -77,8 +77,8 @@ ROWS = (
     Row("report", "report oracle --by-type", ("bench",)),
     Row(
         "train-rl",
-        "train-rl --config single_search --set total_steps=2000 --set vec.workers=2 --set vec.envs=4 "
-        "--set evaluation.every=2000 --set evaluation.count=4 --out rl",
+        "train-rl --config single_search --set total_steps=512 --set vec.workers=2 "
+        "--set vec.envs=4 --set evaluation.every=512 --set evaluation.count=4 --out rl",
     ),
     Row(
         "collect",
