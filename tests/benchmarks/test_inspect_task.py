@@ -283,7 +283,7 @@ def test_no_secret_that_a_server_repeats_is_logged(status, tmp_path, monkeypatch
         ),
         (
             ["--model", "mockllm/model", "--model-base-url", "http://host/v1?a=b"],
-            "mockllm/model takes no query in --model-base-url",
+            "mockllm/model does not accept a query in --model-base-url",
         ),
         (["--model", "mockllm/model", "--set", "sees=all"], "sees"),
         (["--model", "openai/gpt-4o"], "OPENAI_API_KEY"),
