@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from er_gym import writing
 from er_gym.locking import LOCK, Locked, exclusive_use
 from er_gym.writing import (
     MARKDOWN_MARK,
@@ -210,3 +211,62 @@ def test_a_lock_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(ForeignFile, match=r"run\.lock exists"):
         exclusive_use(tmp_path).__enter__()
     assert (tmp_path / LOCK).read_text() == "my own lock\n"
+
+
+@pytest.mark.parametrize("copy", [True, False])
+def test_a_file_is_never_placed_into_one_that_is_there(copy: bool, tmp_path: Path) -> None:
+    mine, other, to = (tmp_path / name for name in ("mine", "other", "to"))
+    mine.write_text("mine")
+    other.write_text("other")
+    to.hardlink_to(mine)
+    (tmp_path / "link").symlink_to(mine)
+    for place in (to, tmp_path / "link"):
+        with pytest.raises(CannotWrite, match="cannot be written: a file is there already"):
+            writing.place_file(other, place, copy=copy)
+    assert mine.read_text() == "mine"
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "relative").symlink_to("other")
+    assert writing.place_file(tmp_path / "relative", tmp_path / "deep" / "x", copy=copy) != copy
+    assert (tmp_path / "deep" / "x").read_text() == "other"
+
+
+def test_drafts_of_others_are_not_written_into(tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / "to").hardlink_to(tmp_path / "mine")
+    with writing.replaced(tmp_path / "to") as file:
+        file.write("new")
+    assert (tmp_path / "to").read_text() == "new"
+    (tmp_path / "also").hardlink_to(tmp_path / "mine")
+    writing.write_new(tmp_path / "also", b"new")
+    assert (tmp_path / "mine").read_text() == "mine"
+    with pytest.raises(TypeError), writing.replaced(tmp_path / "to") as file:
+        file.writelines(["half", 7])  # type: ignore[list-item]
+    assert (tmp_path / "to").read_text() == "new"
+    with pytest.raises(FileNotFoundError), writing.replaced(tmp_path / "to"):
+        (tmp_path / "nowhere").read_text()  # the block's own error, not one of writing
+    assert {each.name for each in tmp_path.iterdir()} == {"mine", "to", "also"}
+
+
+def test_names_of_files_stay_in_their_folder(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "out").symlink_to(tmp_path)
+    for name in ("a", "a/b.png", "./a", "a|+1.00", "out/x"):
+        assert writing.inside(tmp_path / "in", name) == tmp_path / "in" / name
+    assert writing.inside(tmp_path / "in", "a/b", links=False) == tmp_path.resolve() / "in/a/b"
+    for name in (
+        "",
+        ".",
+        "..",
+        "../in/a",
+        "a/../b",
+        "/a",
+        "\\a",
+        "a\\..\\..\\b",
+        "C:a",
+        "a\0",
+        "x" * 256,
+    ):
+        with pytest.raises(writing.OutsideFolder, match=r"\A[^\n]+\Z"):
+            writing.inside(tmp_path / "in", name)
+    with pytest.raises(writing.OutsideFolder, match="is a link that leads out of"):
+        writing.inside(tmp_path / "in", "out/x", links=False)

@@ -244,10 +244,11 @@ def _elsewhere() -> Iterator[_Try]:
         (".\\shots\\b.png", "shots/b.png"), ("./shots/b.png", "shots/b.png"),
     ):  # fmt: skip
         yield _Try(f"the path {path}", partial(read, path, where))
-    for told in (
+    others: tuple[Any, ...] = (
         *NAMES, "https://x.example/a.png", "file:///etc/passwd", "data:image/png;base64,AA", 7,
         {"bytes": "AA"}, {}, [[]], ["a.png", "b.png"], "/etc/passwd", "\\\\server\\a.png",
-    ):  # fmt: skip
+    )  # fmt: skip
+    for told in others:
         yield _Try(f"no path {told!r:.60}", partial(unread, told))
 
 
