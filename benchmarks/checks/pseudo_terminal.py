@@ -167,6 +167,7 @@ def _start(
             stdout=theirs_out,
             stderr=theirs_err,
             start_new_session=True,
+            preexec_fn=_obey_ctrl_c,
         )
         os.close(theirs_out)
         os.close(theirs_err)
@@ -181,7 +182,7 @@ def _start(
         stdout=theirs,
         stderr=theirs,
         start_new_session=True,
-        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+        preexec_fn=_take_terminal,
     )
     os.close(theirs)
     if keys:  # not shown, so that what the command says comes first
@@ -190,6 +191,16 @@ def _start(
         termios.tcsetattr(ours, termios.TCSANOW, settings)
         os.write(ours, keys.encode())
     return process, {ours: "out"}
+
+
+def _obey_ctrl_c() -> None:
+    """A shell's background jobs ignore Ctrl-C, and so would what they start."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _take_terminal() -> None:
+    _obey_ctrl_c()
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
 
 def _read(descriptor: int) -> bytes:
