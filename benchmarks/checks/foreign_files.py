@@ -31,6 +31,7 @@ from benchmarks.checks.misuse.tries import require
 from benchmarks.checks.tally import Tally
 from er_gym.data.collection import Collection
 from er_gym.data.exports import export
+from er_gym.data.pictures import open_picture
 from er_gym.data.sharegpt_files import open_sharegpt
 from er_gym.data.sharegpt_import import import_sharegpt
 from er_gym.data.trajectory import Trajectory
@@ -140,8 +141,8 @@ def _shown(top: Path, found: Sequence[Trajectory], colours: str) -> None:
     """Each trajectory must show the picture of its colour."""
     require(len(found) == len(colours), f"{len(found)} of {len(colours)} are there")
     for each, name in zip(found, colours, strict=True):
-        with Image.open(top / "to" / "x" / each.turns[0].pictures[0].path) as picture:
-            require(picture.getpixel((0, 0)) == _COLOURS[name], f"{each.id} shows another picture")
+        picture = open_picture(top / "to" / "x" / each.turns[0].pictures[0].path)
+        require(picture.getpixel((0, 0)) == _COLOURS[name], f"{each.id} shows another picture")
 
 
 # -- imports ---------------------------------------------------------------------------------------
