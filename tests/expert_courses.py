@@ -85,7 +85,7 @@ def play(env: EmbodiedEnv, candidate: Candidate) -> Played:
     course = NotedCourse(candidate.course(seed, KINDS))
     episode = play_episode(env, SilentAgent(course), candidate.played_task, seed)
     assert not episode.error, episode.error
-    faults = [str(view.info.get("fault", "")) for _, view in course.noted[1:]]
+    faults = [str(view.info["fault"]) for _, view in course.noted[1:]]
     return Played(candidate, episode, course.noted, [*faults, ""])
 
 

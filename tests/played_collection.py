@@ -25,6 +25,7 @@ from er_gym.data.trajectory import (
 )
 from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.info import action_of, with_details
 from er_gym.envs.solver import Solver
 from er_gym.rollout.play import episode_seed
 from er_gym.rollout.records import record_episode
@@ -130,15 +131,13 @@ def _played(env: EmbodiedEnv, episode: Played, part: str, folder: Path) -> Traje
     task = episode.task
     name = f"{task.id}~a"
     seed = episode_seed(3, name)
-    obs, info = env.reset(seed=seed, options={"task": task})
+    obs, told = env.reset(seed=seed, options={"task": task})
+    info = with_details(env, told)
     solver, todo, at, over = Solver(), [*episode.first], "", False
     turns: list[Turn] = []
     while not over:
-        if info.get("fault"):
-            action = info["action"]
-        else:
-            action = todo.pop(0) if todo else solver.next(info)[0]
-        views = info.get("object_views_around", {})
+        action = action_of(info) if info["fault"] else todo.pop(0) if todo else solver.next(info)[0]
+        views = info["object_views_around"]
         before = {
             "pictures": _pictures(folder, f"{PARTS}/{part}/pictures/{name}", turns, obs, info),
             "view": [SeenObject.of(one) for one in info["object_views"]],
@@ -152,7 +151,8 @@ def _played(env: EmbodiedEnv, episode: Played, part: str, folder: Path) -> Traje
             "verb": action.verb,
             "object_type": action.object_type,
         }
-        obs, reward, terminated, truncated, info = env.step(action)
+        obs, reward, terminated, truncated, told = env.step(action)
+        info = with_details(env, told)
         over = terminated or truncated
         if info["action_success"] and action.verb == verbs.NAVIGATE:
             at = action.object_type
@@ -163,8 +163,8 @@ def _played(env: EmbodiedEnv, episode: Played, part: str, folder: Path) -> Traje
                 success=info["action_success"],
                 reward=float(reward),
                 feedback=info["feedback"],
-                fault=info.get("fault", ""),
-                train=info["action_success"] or bool(info.get("fault")),
+                fault=info["fault"],
+                train=info["action_success"] or bool(info["fault"]),
             )
         )
     record = record_episode(task, agent="expert", seed=seed, max_steps=info["max_steps"])
@@ -195,7 +195,7 @@ def _pictures(
     (folder / place).mkdir(parents=True, exist_ok=True)
     before = [one for turn in turns for one in turn.pictures]
     records: list[PictureRecord] = []
-    for direction, frame in (info.get("views") or {"ahead": obs["rgb"]}).items():
+    for direction, frame in (info["views"] or {"ahead": obs["rgb"]}).items():
         data = encode_picture(frame)
         failed = bool(turns) and not turns[-1].success and direction == "ahead"
         if failed and (folder / before[-1].path).read_bytes() == data:
@@ -208,7 +208,7 @@ def _pictures(
 
 
 def _purpose(verb: str, info: Mapping[str, Any]) -> Any:
-    if info.get("fault"):
+    if info["fault"]:
         return "retry"
     return {
         verbs.NAVIGATE: "search",

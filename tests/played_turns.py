@@ -10,6 +10,7 @@ from er_gym.data.mentions import named_in
 from er_gym.data.trajectory import Language, Purpose, SeenObject, Subgoal, Turn
 from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.info import with_details
 from er_gym.envs.solver import Solver
 from er_gym.tasks import verbs
 
@@ -33,27 +34,29 @@ def play(seeds: tuple[int, ...] = SEEDS) -> Iterator[tuple[str, list[Turn]]]:
     then the solver."""
     env = EmbodiedEnv("mini", obs_mode="objects")
     for seed in seeds:
-        _, info = env.reset(seed=seed)
+        _, told = env.reset(seed=seed)
+        info = with_details(env, told)
         turns: list[Turn] = []
         ended, at = False, ""
         actions = _actions(info)
         action = next(actions)
         while not ended:
             before = dict(info)
-            _, reward, terminated, truncated, info = env.step(action)
+            _, reward, terminated, truncated, told = env.step(action)
+            info = with_details(env, told)
             turns.append(_turn(before, at, action, float(reward), info))
             if action.verb == verbs.NAVIGATE and info["action_success"]:
                 at = action.object_type
             ended = terminated or truncated
             if not ended:
                 action = actions.send(info)
-        yield info["task"].instruction, turns
+        yield info["instruction"], turns
     env.close()
 
 
 def _actions(info: Any) -> Any:
     """The course of an episode: a generator that is sent each info."""
-    wanted = {key.actual_type for key in info["key_actions_left"] if key.object_id}
+    wanted = {key.actual_type for key in info["keys_left"] if key.object_id}
     for _ in range(2):
         gone = {each.object_type for each in info["legal"] if each.verb == verbs.NAVIGATE} - wanted
         opens = [each for each in sorted(gone) if verbs.verb_named(verbs.OPEN).takes(each)]
@@ -77,9 +80,9 @@ def _actions(info: Any) -> Any:
 
 def _thing(info: Mapping[str, Any]) -> str:
     """What the agent is after."""
-    left = info["key_actions_left"]
+    left = info["keys_left"]
     keys = [key for key in left if key.verb in (verbs.PICKUP, verbs.TOGGLE)]
-    return keys[0].actual_type if keys else next(iter(named_in(info["task"].instruction)))
+    return keys[0].actual_type if keys else next(iter(named_in(info["instruction"])))
 
 
 def _turn(info: Mapping[str, Any], at: str, action: Action, reward: float, after: Any) -> Turn:
@@ -87,7 +90,7 @@ def _turn(info: Mapping[str, Any], at: str, action: Action, reward: float, after
         view=[SeenObject.of(each) for each in info["object_views"]],
         views={
             name: [SeenObject.of(each) for each in view]
-            for name, view in info.get("object_views_around", {}).items()
+            for name, view in info["object_views_around"].items()
         },
         held=info["held"],
         navigable=list(info["navigable"]),

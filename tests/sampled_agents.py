@@ -36,6 +36,6 @@ class Wavering:
         self._plan = iter(Random(self._seed).choice(ways))
 
     def act(self, obs, info):
-        if not info.get("fault"):  # else once more
+        if not info["fault"]:  # else once more
             self._action = next(self._plan)
         return Decision(self._action)

@@ -27,7 +27,8 @@ import gymnasium
 from er_gym.sim.render.shapes import SHAPES
 
 tasks = gymnasium.make("Household-Open-v0", episode_source="generate", obs_mode="state")
-assert tasks.reset(seed=0)[1]["task"].type.title == "Opening"
+tasks.reset(seed=0)
+assert tasks.unwrapped.task.type.title == "Opening"
 tasks.close()
 seeing = EmbodiedEnv(obs_mode="household.nearest:NEAREST", width=60, height=40)
 obs, info = seeing.reset(seed=0)
@@ -43,8 +44,8 @@ env = EmbodiedEnv("household.suites:searches", obs_mode=observations)
 parrot = AgentFactory("household.clients:PARROT:observe", AgentSettings(sees="text")).agent(0)
 for agent in (make_agent("household.agents:Tidy"), parrot):
     obs, info = env.reset(seed=0)
-    assert obs in env.observation_space and info["task"].type.search
-    agent.reset(info["task"], obs, info)
+    assert obs in env.observation_space and env.task.type.search
+    agent.reset(env.task, obs, info)
     print(agent.act(obs, info).action)
 assert load_ask("household.models:ask")("?") == ""
 """

@@ -74,7 +74,7 @@ def test_an_agent_plays(name: str) -> None:
     agent = make_agent(name, seed=7)
     env = EmbodiedEnv("mini", obs_mode=agent.obs_mode)
     obs, info = env.reset(seed=0)
-    agent.reset(info["task"], obs, info)
+    agent.reset(env.task, obs, info)
     decision = agent.act(obs, info)
     assert decision.thought == "I was made with the seed 7."
     assert env.step(decision.action)[2]
@@ -89,7 +89,7 @@ def test_a_model_client_replies(name: str, tmp_path: Path) -> None:
     env = EmbodiedEnv("mini", obs_mode="text")
     obs, info = env.reset(seed=0)
     agent = speaker.agent(0)
-    agent.reset(info["task"], obs, info)
+    agent.reset(env.task, obs, info)
     assert str(agent.act(obs, info).action) == "open Fridge"
     assert "1 replies" in str(speaker.cost)
     speaker.close()
@@ -112,7 +112,7 @@ def test_an_observation_is_built(name: str) -> None:
 def test_a_suite_is_drawn_from(name: str) -> None:
     assert load_suite(name).tasks == load_suite("mini").tasks[:2]
     env = EmbodiedEnv(name, obs_mode="text")
-    drawn = {env.reset(seed=seed)[1]["task"].id for seed in range(8)}
+    drawn = {env.reset(seed=seed)[1]["task_id"] for seed in range(8)}
     assert drawn == {task.id for task in load_suite("mini").tasks[:2]}
     env.close()
 

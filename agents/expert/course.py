@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from er_gym.data.trajectory import Purpose, Subgoal
 from er_gym.envs.actions import Action
+from er_gym.envs.info import action_of, detail
 from er_gym.tasks.task import KeyAction
 
 
@@ -48,17 +49,17 @@ class View:
 
     @classmethod
     def of(cls, info: Mapping[str, Any]) -> View:
-        """Read ``info``."""
+        """Read ``info`` with its details."""
         return cls(
-            visible=frozenset(info["visible"]),
+            visible=frozenset(detail(info, "visible")),
             held=info["held"],
             navigable=info["navigable"],
             reach=frozenset(info["interactable"]),
             legal=info["legal"],
-            action=info["action"],
+            action=action_of(info),
             success=info["action_success"],
-            done=len(info["key_actions_done"]),
-            left=info["key_actions_left"],
+            done=info["key_actions_done"],
+            left=info["keys_left"],
             steps_left=info["max_steps"] - info["steps"],
             info=info,
         )

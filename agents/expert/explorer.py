@@ -142,7 +142,7 @@ class ExplorerCourse(TaskCourse):
         return views
 
     def _views(self) -> list[ObjectView]:
-        around = self.view.info.get("object_views_around", {})
+        around = self.view.info["object_views_around"]
         return [*self._ahead(), *(view for each in around.values() for view in each)]
 
     def _next_places(self, leg: Leg, tried: list[str]) -> list[str]:

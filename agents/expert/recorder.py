@@ -28,6 +28,7 @@ from er_gym.data.trajectory import (
     Turn,
     with_results,
 )
+from er_gym.envs.info import detail
 from er_gym.envs.object_view import ObjectView
 from er_gym.rollout.agent import ModelReply
 from er_gym.rollout.records import EpisodeRecord
@@ -104,13 +105,13 @@ class TrajectoryRecorder:
 
     def take_result(self, info: Mapping[str, Any]) -> None:
         """Note what came of the last action."""
-        earned = len(info["key_actions_done"]) > self._done
-        self._done = len(info["key_actions_done"])
+        earned = info["key_actions_done"] > self._done
+        self._done = info["key_actions_done"]
         if not self.turns:
             return
         last = self.turns[-1]
         done = bool(info["action_success"])
-        fault = str(info.get("fault", ""))
+        fault = str(info["fault"])
         self._faults.append(fault)
         if done and last.verb == verbs.NAVIGATE:
             self._at = last.object_type
@@ -130,10 +131,9 @@ class TrajectoryRecorder:
         self.pictures_now = tuple(picture for _, picture in pictures)
         turn = Turn(
             pictures=[self._picture_record(*each) for each in pictures],
-            view=_seen(info["object_views"]),
+            view=_seen(detail(info, "object_views")),
             views={
-                direction: _seen(views)
-                for direction, views in info.get("object_views_around", {}).items()
+                direction: _seen(views) for direction, views in info["object_views_around"].items()
             },
             held=info["held"],
             navigable=list(info["navigable"]),
@@ -219,7 +219,7 @@ class TrajectoryRecorder:
         the view as it was."""
         if self._pictures is None:
             return []
-        around: Mapping[str, NDArray[np.uint8]] = info.get("views", {})
+        around: Mapping[str, NDArray[np.uint8]] = info["views"]
         if around:
             return [(name, encode(frame, self._pictures)) for name, frame in around.items()]
         picture = encode(obs["rgb"], self._pictures)

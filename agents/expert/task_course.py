@@ -168,7 +168,7 @@ class TaskCourse:
         repeatable = bool(intent.action.object_type) and self._can_retry()
         if done and self._repeats and repeatable and self._random.random() < self._repeats:
             yield replace(intent, purpose="repeat", checked="", train=False)
-            while self.view.info.get("fault") and self._can_retry():  # perhaps it is elsewhere now
+            while self.view.info["fault"] and self._can_retry():  # perhaps it is elsewhere now
                 yield replace(intent, purpose="retry", checked="", train=True)
         return done
 

@@ -17,6 +17,7 @@ from agents.scripted.searcher import SearcherAgent, instruction
 from agents.scripted.searcher.agent import Steps
 from agents.scripted.searcher.instruction import Goal
 from er_gym.envs.actions import Action
+from er_gym.envs.info import action_of
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 from er_gym.thor.objects import TYPES
@@ -37,7 +38,7 @@ class Adviser(SearcherAgent):
 
     def advise(self, info: Mapping[str, Any]) -> Action:
         """The searcher's action after what ``info`` tells."""
-        done: Action | None = info["action"]
+        done = action_of(info)
         if done is not None:
             self._times = self._times + 1 if done == self._done else 1
             if done != self._last:

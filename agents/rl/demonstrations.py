@@ -15,6 +15,7 @@ from agents import make_agent
 from agents.rl.packed import Column, PackedRows, concatenated, packed
 from agents.rl.policy_observation import Obs
 from er_gym.envs.actions import ACTIONS, INDEX, Action, understand
+from er_gym.envs.info import with_details
 from er_gym.rollout.loop import transitions
 
 
@@ -61,8 +62,8 @@ def demonstrate(
     successes = 0
     for _ in range(episodes):
         agent = make_agent(teacher)
-        obs, info = env.reset()
-        last: Mapping[str, Any] = info
+        obs, told = env.reset()
+        last: Mapping[str, Any] = (info := with_details(env, told))
         agent.reset(info["task"], info["seen"], info)
         steps = []
         for each in transitions(env, agent, obs, info, seen="seen"):

@@ -84,7 +84,7 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
             self._rng = np.random.default_rng(seed)
         obs, info = self.env.reset(seed=seed, options=options or {"task": self._draw()})
         info["seen"] = obs
-        return self.policy_observation.reset(obs, info, info["task"].instruction), info
+        return self.policy_observation.reset(obs, info, info["instruction"]), info
 
     def step(self, action: Any) -> tuple[Obs, Any, bool, bool, dict[str, Any]]:
         """Do an action."""
@@ -132,7 +132,7 @@ class AdvisedEnv(gymnasium.Wrapper[Obs, Any, Obs, Any]):
         obs, info = self.env.reset(seed=seed, options=options)
         memory = self.env.policy_observation.subtasks
         assert memory is not None  # make_env sees to it
-        self._adviser.begin(info["task"], info, memory)
+        self._adviser.begin(self.unwrapped.task, info, memory)  # type: ignore[attr-defined]
         return self._advised(obs, info), info
 
     def step(self, action: Any) -> tuple[Obs, Any, bool, bool, dict[str, Any]]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from agents.rl.subtasks import SUBTASK_VERBS, Progress, Subtask
 from er_gym.envs.actions import INDICES, Action
+from er_gym.envs.info import action_of, names
 from er_gym.tasks import verbs
 from er_gym.thor import placement_table
 from er_gym.thor.objects import KIND_OF, TYPES
@@ -131,13 +132,13 @@ class SubtaskMemory:
         Returns:
             (len(SUBTASK_LAYOUT),) float32 from 0 to 1.
         """
-        action: Action | None = info["action"] if info["action_success"] else None
-        reach = frozenset(info["interactable"])
+        action = action_of(info) if info["action_success"] else None
+        reach = frozenset(names(info["interactable_mask"]))
         self._since += 1
         if action is not None:
             self._remember(action, info)
         if self._at is not None:
-            self._seen_at[self._at, [KIND_OF[name] for name in info["visible"]]] = True
+            self._seen_at[self._at, info["visible_mask"] > 0] = True
         self.moved_on = self.progress.update(action, info["held"], reach)
         if self.moved_on:
             self._since = self.observed = 0
@@ -157,7 +158,8 @@ class SubtaskMemory:
             self._at = kind
             self.tried[kind] += 1
             self._visits[kind] += 1
-            sight = (kind, (info["visible"], info["interactable"], info["held"]))
+            seen, reach = (info[f"{name}_mask"].tobytes() for name in ("visible", "interactable"))
+            sight = (kind, (seen, reach, info["held"]))
             self._same_sight[kind] |= sight in self._sights
             self._sights.add(sight)
         elif action.verb == verbs.OPEN:

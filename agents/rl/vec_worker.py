@@ -68,7 +68,7 @@ class WorkerEnvs:
                     "terminal_observation": obs,
                     "TimeLimit.truncated": truncated and not terminated,
                     "is_success": info["success"],
-                    "task_type": info["task"].type.name,
+                    "task_type": info["task_type"],
                     "end_reason": info["end_reason"],
                 }
                 obs, info = env.reset()

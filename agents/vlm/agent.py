@@ -26,6 +26,7 @@ from agents.vlm.settings import AgentSettings
 from er_gym.data.dialects import shows_anew
 from er_gym.data.scene_text import Perceived
 from er_gym.envs.actions import NO_ACTION, Action, applies
+from er_gym.envs.info import detail, names
 from er_gym.envs.observations import text_without_task
 from er_gym.rollout.agent import Decision, check_observation
 from er_gym.rollout.records import PERSON, By, EpisodeRecord
@@ -158,7 +159,7 @@ class VLMAgent:
             return _with_pictures(self._prompts.first(turn), self._pictures(obs, info))
         answer = {"feedback": info["feedback"], "success": bool(info["action_success"])}
         if answer["success"]:  # the paper's protocol finds something even in an unusable reply
-            answer |= {"action": str(info["action"]), "problem": ""}
+            answer |= {"action": info["action"], "problem": ""}
         last = self._rounds[-1] = self._rounds[-1].model_copy(update=answer)
         if last.problem:
             return Message("user", (self._told_problem(last.problem, info),))
@@ -191,8 +192,9 @@ class VLMAgent:
         if self._settings.sees == "text":
             return {}
         shown = {_AHEAD: obs["rgb"]}
-        views = dict(info.get("views", {}))
-        if views and self._settings.pictures.views:
+        looked = info["verb"] == verbs.OBSERVE and info["action_success"]
+        views = dict(detail(info, "views")) if looked and self._settings.pictures.views else {}
+        if views:
             wanted = self._prompts.after_observe
             shown = {1: shown, len(views): views}.get(wanted or 0, {**views, **shown})
         pictures = {name: encode(each, self._settings.pictures) for name, each in shown.items()}
@@ -229,7 +231,7 @@ class VLMAgent:
         was matched with a type."""
         if parsed.problem or parsed.verb in verbs.BARE_VERBS:
             return (None if parsed.problem else Action(parsed.verb)), parsed.problem, ""
-        at_hand = (*info["interactable"], *info["navigable"])
+        at_hand = (*names(info["interactable_mask"]), *names(info["navigable_mask"]))
         match = self._matcher.match(parsed.name, prefer=at_hand)
         if not match.object_type:
             return None, match.problem, match.how

@@ -29,6 +29,7 @@ from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.info import action_of
 from er_gym.envs.protocol import PROTOCOLS
 from er_gym.envs.solver import Solver
 from er_gym.rollout.agent import Agent, Decision
@@ -102,14 +103,14 @@ class ShuffledOracle(_SeededOracle):
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """The next step in that order."""
-        action = info["action"]
+        action = action_of(info)
         if action is not None and info["action_success"]:
             self._progress, _ = self._progress.after(
                 action.verb, action.object_type, info["object_id"]
             )
         to_come = {
-            "key_actions_left": self._progress.left,
-            "key_actions_done": self._progress.done,
+            "keys_left": self._progress.left,
+            "keys_done": self._progress.done,
         }
         return Decision(by_the_whole(self._solver.next({**info, **to_come})[0], info))
 
@@ -156,22 +157,6 @@ PLAYERS: dict[str, Callable[[int], Agent]] = {
 """By name: how to make the player, given a seed."""
 
 
-class _Watched:
-    """An environment that keeps the last ``info``."""
-
-    def __init__(self, env: EmbodiedEnv) -> None:
-        self._env = env
-        self.info: dict[str, Any] = {}
-
-    def reset(self, **arguments: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-        obs, self.info = self._env.reset(**arguments)
-        return obs, self.info
-
-    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        *rest, self.info = self._env.step(action)
-        return (*rest, self.info)  # type: ignore[return-value]
-
-
 @dataclass(frozen=True)
 class Judged:
     """An episode, judged twice.
@@ -196,8 +181,7 @@ def judge_twice(env: EmbodiedEnv, task: Task, player: str, seed: int = 0) -> Jud
         seed: of the run.
     """
     number = episode_seed(seed, task.id)
-    watched = _Watched(env)
-    played = play_episode(watched, PLAYERS[player](number), task, number)
+    played = play_episode(env, PLAYERS[player](number), task, number)
     if played.error:
         raise RuntimeError(f"{player} in {task.id}: {played.error}")
     record = EpisodeRecord.model_validate_json(played.model_dump_json())
@@ -208,11 +192,11 @@ def judge_twice(env: EmbodiedEnv, task: Task, player: str, seed: int = 0) -> Jud
 
     said = {
         "success": (record.success, score.success),
-        "left": (names(watched.info["key_actions_left"]), names(progress.left)),
-        "done": (names(watched.info["key_actions_done"]), names(progress.done)),
+        "left": (names(env.details["keys_left"]), names(progress.left)),
+        "done": (names(env.details["keys_done"]), names(progress.done)),
         "reward": (record.total_reward, sum(key.reward for key in progress.done)),
         "missing": (
-            sum(key.scored for key in watched.info["key_actions_left"]),
+            sum(key.scored for key in env.details["keys_left"]),
             len(score.missing),
         ),
     }

@@ -108,7 +108,7 @@ def play_env(scene: str, seed: int) -> Iterator[Step]:
                 problems.append(f"the reward is {reward}")
             metadata = controller.last_event.metadata
             problems.extend(stands_on_the_floor(metadata, floor))
-            yield str(info["action"]), metadata, problems
+            yield info["action"], metadata, problems
     finally:
         env.close()
 

@@ -24,6 +24,7 @@ from er_gym.data.trajectory import (
     Turn,
 )
 from er_gym.envs.actions import Action
+from er_gym.envs.info import with_details
 from er_gym.envs.solver import Solver
 from er_gym.tasks import verbs
 from er_gym.tasks.suites import load_suite
@@ -54,7 +55,8 @@ class _Player:
     def play(self, task: Task) -> list[Turn]:
         self.random = random.Random(self.seed)
         self.solver, self.at = Solver(), ""
-        _, self.info = self.env.reset(seed=self.seed, options={"task": task})
+        _, info = self.env.reset(seed=self.seed, options={"task": task})
+        self.info = with_details(self.env, info)
         wrong: list[str] = []
         target: KeyAction | None = None
         checked = False
@@ -91,7 +93,7 @@ class _Player:
     def _meaning(self, action: Action, task: Task) -> tuple[Purpose, Subgoal]:
         """Why the action is taken, and what the agent is after."""
         info, held = self.info, self.info["held"]
-        left = [key for key in info["key_actions_left"] if key.verb != verbs.END]
+        left = [key for key in info["keys_left"] if key.verb != verbs.END]
         acts = [k for k in left if k.verb not in (verbs.NAVIGATE, verbs.OPEN, verbs.CLOSE)]
         put = next((k.actual_type for k in acts if k.verb == verbs.PUT), "")
         if held:
@@ -146,7 +148,7 @@ class _Player:
         fault: str | None = None,
     ) -> bool:
         info = self.info
-        around = info.get("object_views_around", {})
+        around = info["object_views_around"]
         turn = Turn(
             view=[SeenObject.of(each) for each in info["object_views"]],
             views={way: [SeenObject.of(one) for one in view] for way, view in around.items()},
@@ -164,7 +166,8 @@ class _Player:
             result = {"success": not fault, "fault": fault, "feedback": "It failed."}
             self.turns.append(turn.model_copy(update=result))
             return False
-        _, reward, terminated, truncated, self.info = self.env.step(action)
+        _, reward, terminated, truncated, told = self.env.step(action)
+        self.info = with_details(self.env, told)
         success = self.info["action_success"]
         if success and action.verb == verbs.NAVIGATE:
             self.at = action.object_type

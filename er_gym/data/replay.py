@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from er_gym.data.pictures import difference
 from er_gym.data.trajectory import SeenObject, Trajectory, Turn
 from er_gym.envs.actions import NO_ACTION
+from er_gym.envs.info import with_details
 from er_gym.rollout.play import Playable
 from er_gym.rollout.records import ERROR
 from er_gym.tasks.reading import read_bytes
@@ -37,7 +38,8 @@ def replay(
         trajectory: what was recorded.
         folder: the collection's, to compare pictures; None to leave them out.
     """
-    obs, info = env.reset(seed=trajectory.seed, options={"task": task})
+    obs, told = env.reset(seed=trajectory.seed, options={"task": task})
+    info = with_details(env, told)
     over = False
     for index, turn in enumerate(trajectory.turns):
         if over:
@@ -47,7 +49,8 @@ def replay(
         if folder is not None:
             found += _pictured(turn, obs, info, folder)
         action = NO_ACTION if turn.verb == ERROR else turn.action
-        obs, reward, terminated, truncated, info = env.step(action)
+        obs, reward, terminated, truncated, told = env.step(action)
+        info = with_details(env, told)
         over = terminated or truncated
         found += _came_of(turn, info, float(reward))
         if found:
@@ -65,7 +68,7 @@ def _perceived(turn: Turn, info: Mapping[str, Any]) -> Iterator[str]:
     yield from _compared("view", turn.view, [SeenObject.of(one) for one in info["object_views"]])
     around = {
         name: [SeenObject.of(one) for one in views]
-        for name, views in info.get("object_views_around", {}).items()
+        for name, views in info["object_views_around"].items()
     }
     yield from _compared("views", turn.views, around)
     yield from _compared("held", turn.held, info["held"])
@@ -75,11 +78,11 @@ def _perceived(turn: Turn, info: Mapping[str, Any]) -> Iterator[str]:
 
 def _came_of(turn: Turn, info: Mapping[str, Any], reward: float) -> Iterator[str]:
     """What came of the turn's action."""
-    done = bool(info["action_success"]) and info["action"] is not None
+    done = bool(info["action_success"]) and bool(info["verb"])
     yield from _compared("success", turn.success, done)
     yield from _compared("reward", turn.reward, reward)
     yield from _compared("object_id", turn.object_id, info["object_id"])
-    yield from _compared("fault", turn.fault, info.get("fault", ""))
+    yield from _compared("fault", turn.fault, info["fault"])
     if turn.verb != ERROR:  # that feedback quotes what was said
         yield from _compared("feedback", turn.feedback, writable(info["feedback"]))
 
@@ -88,7 +91,7 @@ def _pictured(
     turn: Turn, obs: Mapping[str, Any], info: Mapping[str, Any], folder: Path
 ) -> Iterator[str]:
     """The pictures that the agent was shown before the turn's action."""
-    frames: dict[str, NDArray[np.uint8]] = {_AHEAD: obs["rgb"], **info.get("views", {})}
+    frames: dict[str, NDArray[np.uint8]] = {_AHEAD: obs["rgb"], **info["views"]}
     for picture in turn.pictures:
         frame = frames.get(picture.direction)
         if frame is None:

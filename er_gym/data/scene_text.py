@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.data.trajectory import SeenObject, Turn
+from er_gym.envs.info import detail
 
 
 @dataclass(frozen=True)
@@ -36,12 +37,12 @@ class Perceived:
 
     @classmethod
     def of(cls, info: Mapping[str, Any]) -> Perceived:
-        """What the environment's ``info`` says, with the observation ``objects``."""
+        """What an environment with the observation ``objects`` says: ``info`` with details."""
         return cls(
-            [SeenObject.of(each) for each in info["object_views"]],
+            [SeenObject.of(each) for each in detail(info, "object_views")],
             {
                 direction: [SeenObject.of(each) for each in views]
-                for direction, views in info.get("object_views_around", {}).items()
+                for direction, views in info["object_views_around"].items()
             },
             info["held"],
             list(info["navigable"]),

@@ -20,7 +20,9 @@ from er_gym.envs.arguments import flag, number, one_of, whole_number
 from er_gym.envs.episode import Episode, EpisodeSettings, ResetResult, StepResult
 from er_gym.envs.errors import ResetNeeded
 from er_gym.envs.faults import FaultPlan, Faults, fault_rates
+from er_gym.envs.info import Details
 from er_gym.envs.observations import parse_obs_mode, sensors_of
+from er_gym.envs.outer_limit import outer_step_limit
 from er_gym.envs.perception import SENSORS
 from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.reset_options import checked_options
@@ -61,7 +63,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
       clearly visible now, or if it is visible and of a type that lies in the receptacle last
       navigated to. ``slice``, which the paper does not have, needs a knife in the hand. A stove
       burner can also be toggled if the object that stands on it is in reach.
-    - ``observe`` looks right, behind and left; ``info["views"]`` has the pictures.
+    - ``observe`` looks right, behind and left; ``env.unwrapped.details["views"]`` has the pictures,
+      in an environment that draws.
     - ``end`` says that the task is done.
 
     An illegal action costs a step and changes nothing; ``info["feedback"]`` says why.
@@ -73,16 +76,22 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     - ``depth``: ``(height, width)`` float32, the distance of each pixel's surface from the camera
       along its axis, metres; :data:`er_gym.envs.observations.FAR`, 40, where there is nothing.
     - ``instance``: ``(height, width)`` int32, the number of the object at each pixel, 0 for the
-      room. ``info["instance_ids"][number]`` is its object id. The numbers are those of this step:
-      they can change when something is sliced.
+      room. ``env.unwrapped.details["instance_ids"][number]`` is its object id. The numbers are
+      those of this step: they can change when something is sliced.
+    - ``objects``: ``(T, 6)`` float32 in [-1, 1], a row for each of
+      :data:`er_gym.thor.OBJECT_TYPES`: how many of the type are in view, and where the nearest one
+      is (:data:`er_gym.envs.object_view.FEATURES`). ``env.unwrapped.details["object_views"]`` lists
+      each object in view.
     - ``state``: ``(D,)`` float32 in [-1, 1], see :data:`er_gym.envs.observations.STATE_LAYOUT`.
     - ``text``: the task, what the agent sees, holds and can do, and feedback, in words.
     - an observation of another package, by name or as ``package.module:ROW`` (docs/extending.md).
 
     ## Info
-    ``reset`` and ``step`` return an :class:`er_gym.envs.info.Info`: what is ``visible``, ``held``,
-    ``navigable``, ``interactable`` and ``legal`` now, the result of the action, the steps taken and
-    allowed, and the key actions done and left.
+    ``reset`` and ``step`` return an :class:`er_gym.envs.info.Info`: what the agent sees, holds and
+    can do now, the result of the action, the steps taken and allowed, and how many key actions are
+    done and left. It is plain data, with the same names and shapes at ``reset`` and every step.
+    ``env.unwrapped.details`` (:class:`er_gym.envs.info.Details`) has er-gym's own objects: the
+    task, the key actions, the legal actions, names in place of masks, the pictures of ``observe``.
 
     ## Rewards
     Each key action of the task is worth its reward (1) once, in any order unless the type of task
@@ -102,8 +111,10 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     ## Episode End
     The episode terminates on ``end``, on the fourth same action in a row, and on the third reply in
     a row that names no known action (such a reply costs no step). It truncates at ``max_steps``;
-    placing the agent counts as the first step. ``info["end_reason"]`` names the reason, and
-    ``info["max_steps"]`` the step limit.
+    placing the agent counts as the first step. A limit of Gymnasium's, as
+    ``gymnasium.make(…, max_episode_steps=…)`` sets it, counts the calls of ``step``; the
+    environment learns of it at ``reset``, and the lower limit holds. ``info["end_reason"]`` names
+    the reason, and ``info["max_steps"]`` the step limit.
 
     ## Copies and Threads
     ``copy.deepcopy`` and ``pickle`` keep the episode: a new copy replays the task's actions and
@@ -227,6 +238,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._episode: Episode | None = None
         self._lock = threading.RLock()
         self._no_episode = _NOT_BEGUN  # why no episode is under way; "" if one is
+        self._outer_limit: int | None = None  # of this episode, see outer_limit.py
         self._actions_taken: list[AnyAction] = []  # in this episode, for copies to replay
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = spaces.Dict(
@@ -249,7 +261,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         with self._lock:
             super().reset(seed=seed)
             task = self._choose(**checked)
-            return self._begin(task, self._faults_with(seed))
+            return self._begin(task, self._faults_with(seed), outer_step_limit(self))
 
     def set_faults(self, faults: Faults, *, seed: int | None = None) -> None:
         """Set the faults of the episodes that ``reset`` begins from now on.
@@ -287,6 +299,12 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     def task(self) -> Task:
         """The task of the episode."""
         return self._current("asking for the task").task
+
+    @property
+    def details(self) -> Details:
+        """What stands behind the last observation and ``info``: see :class:`.info.Details`."""
+        with self._lock:
+            return self._current("asking for the details").details
 
     @property
     def agent_pose(self) -> AgentPose:
@@ -351,6 +369,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                 "no_episode": self._no_episode,
                 "episode": episode and (episode.task, self._actions_taken, episode.fingerprint),
                 "faults": (self._faults, episode and episode.faults),
+                "outer_limit": self._outer_limit,
             }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -363,7 +382,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._faults, faults = state.get("faults", (self._faults, None))
         if state["episode"] is not None:
             task, actions, fingerprint = state["episode"]
-            self._begin(task, faults)
+            self._begin(task, faults, state.get("outer_limit"))
             episode = self._current("copying")
             for action in actions:
                 self._do(episode, action)
@@ -391,11 +410,12 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         own = int(self.np_random.integers(2**63)) if seed is None else seed
         return replace(self._faults, seed=(own, *self._faults.seed))
 
-    def _begin(self, task: Task, faults: FaultPlan | None) -> ResetResult:
+    def _begin(self, task: Task, faults: FaultPlan | None, replies: int | None) -> ResetResult:
         self._no_episode = _BROKEN_OFF  # until this has succeeded
         self._actions_taken = []
         controller = self._started_controller(task.scene)
-        self._episode = Episode(self._settings, task, controller, self._backend, faults)
+        self._episode = Episode(self._settings, task, controller, self._backend, faults, replies)
+        self._outer_limit = replies
         answer = self._episode.begin()
         self._no_episode = ""
         return answer

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -19,7 +18,7 @@ from er_gym.envs import skills
 from er_gym.envs.action_handler import ActionHandler, EpisodeSetup, Moment
 from er_gym.envs.actions import Action, AnyAction
 from er_gym.envs.faults import FaultPlan, FaultyActionHandler
-from er_gym.envs.info import REPEATED, Info, LegalActions
+from er_gym.envs.info import REPEATED, Details, Info, LegalActions
 from er_gym.envs.legality import KnownTypes
 from er_gym.envs.observations import MAX_REPEATS, Memory, Observation, Situation, goal_row
 from er_gym.envs.perception import Perception
@@ -78,6 +77,7 @@ class Episode:
         controller: a controller in any scene; the episode resets it to the task's scene.
         backend: the name of the controller's backend.
         faults: which actions go wrong; None for none.
+        replies: after this many calls of :meth:`step` the episode is cut; None for no such limit.
 
     Attributes:
         task: what is asked.
@@ -87,6 +87,7 @@ class Episode:
     """
 
     perception: Perception
+    _situation: Situation
 
     def __init__(
         self,
@@ -95,6 +96,7 @@ class Episode:
         controller: Any,
         backend: str,
         faults: FaultPlan | None = None,
+        replies: int | None = None,
     ) -> None:
         self.task = task
         self.end_reason = ""
@@ -107,6 +109,7 @@ class Episode:
         self._known = KnownTypes(task.navigable_objects)
         self._steps = 1
         self._step_limit = settings.max_steps or task.max_steps
+        self._replies_left = replies
         self._unknown_replies = 0
         self._goal_unmet: tuple[Condition, ...] = ()
 
@@ -125,13 +128,19 @@ class Episode:
         placed = skills.place(controller, pose)
         self._perceive(placed)
         feedback = "You look around the room."
-        info = self._info(None, "", placed.success, "", feedback)
-        return self._observation(feedback, True, info), cast(dict[str, Any], info)
+        return self._told(None, "", placed.success, "", feedback, {})
 
     @property
     def fingerprint(self) -> tuple[Any, ...]:
         """A value that differs between two courses of an episode."""
         return self.perception.pose, self._steps, self.end_reason, self._known.names
+
+    @property
+    def max_steps(self) -> int:
+        """The step limit. A limit on replies lowers it with each reply that costs no step."""
+        if self._replies_left is None:
+            return self._step_limit
+        return min(self._step_limit, self._steps + self._replies_left)
 
     def understand(self, action: AnyAction) -> tuple[Action | None, str]:
         """The action that a reply means (None if it names no action), and its text.
@@ -152,6 +161,8 @@ class Episode:
     def step(self, understood: Action | None, text: str) -> StepResult:
         """Do an action that :meth:`understand` returned."""
         self._fault = ""
+        if self._replies_left is not None:
+            self._replies_left -= 1
         if understood is None:
             return self._not_understood(text)
         self._unknown_replies = 0
@@ -179,7 +190,7 @@ class Episode:
             reward -= self._settings.illegal_penalty
         if understood.verb == verbs.END:
             self.end_reason = "end"
-        elif self._steps >= self._step_limit:
+        elif self._steps >= self._step_limit or self._replies_left == 0:
             self.end_reason = "step limit"
         feedback = refused or _feedback(understood, outcome)
         return self._reply(
@@ -214,7 +225,8 @@ class Episode:
             action.verb,
             action.object_type,
             object_id,
-            in_reach=self._available.in_reach,
+            # Only "end" asks for these names, and listing them takes time.
+            in_reach=self._available.in_reach if action.verb == verbs.END else (),
             goal_holds=not self._goal_unmet,
         )
         return reward
@@ -236,6 +248,8 @@ class Episode:
             self._memory.forget_last()
         if self._unknown_replies >= MAX_UNKNOWN:
             self.end_reason = "no known action"
+        elif self._replies_left == 0:
+            self.end_reason = "step limit"
         quoted = text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
         feedback = (
             f"{quoted!r} names no action. Say one of: {', '.join(verbs.BARE_VERBS)}; or one of "
@@ -260,32 +274,28 @@ class Episode:
         appended = self._protocol.appends_end and self.end_reason in _CUT_OFF
         if appended:
             reward += self._judge(Action(verbs.END), skills.Outcome(None, True), "")
-        info = self._info(action, text, success, object_id, feedback)
-        info["end_appended"] = appended
-        if views:
-            # Copies, since the next observation may be built from a view's frame.
-            info["views"] = {
-                name: None if view.frame is None else np.array(self.picture(view))
-                for name, view in views.items()
-            }
-        obs = self._observation(feedback, success, info, views or {})
-        return obs, reward, terminated, truncated, cast(dict[str, Any], info)
+        obs, info = self._told(action, text, success, object_id, feedback, views or {}, appended)
+        return obs, reward, terminated, truncated, info
 
     def picture(self, perception: Perception) -> NDArray[np.uint8] | None:
         """The frame, annotated with object types if the environment asks for it."""
         return perception.annotated if self._settings.annotate else perception.frame
 
-    def _observation(
+    def _told(
         self,
-        feedback: str,
+        action: Action | None,
+        text: str,
         success: bool,
-        info: Info,
-        views: Mapping[str, Perception] = MappingProxyType({}),
-    ) -> dict[str, Any]:
-        """Build the observation, and add to ``info`` what explains it."""
-        situation = Situation(
-            perception=self.perception,
-            available=self._available,
+        object_id: str,
+        feedback: str,
+        views: Mapping[str, Perception],
+        appended: bool = False,
+    ) -> ResetResult:
+        """The observation and ``info`` after ``reset`` or a step."""
+        perception, available, progress = self.perception, self._available, self._progress
+        situation = self._situation = Situation(
+            perception=perception,
+            available=available,
             memory=self._memory,
             known=self._known,
             instruction=self.task.instruction,
@@ -293,42 +303,67 @@ class Episode:
             at=self._navigated_to_kind,
             success=success,
             steps=self._steps,
-            max_steps=self._step_limit,
+            max_steps=self.max_steps,
             annotate=self._settings.annotate,
             views=views,
         )
-        for kind in self._settings.observations.values():
-            cast(dict[str, Any], info).update(kind.info(situation))
-        return {name: kind.build(situation) for name, kind in self._settings.observations.items()}
-
-    def _info(
-        self, action: Action | None, text: str, success: bool, object_id: str, feedback: str
-    ) -> Info:
-        mask = self.action_mask()
         info: Info = {
-            "task": self.task,
-            "action": action,
+            "task_id": self.task.id,
+            "task_type": self.task.type.name,
+            "instruction": self.task.instruction,
+            "action": "" if action is None else str(action),
+            "verb": "" if action is None else action.verb,
+            "object_type": "" if action is None else action.object_type,
             "action_text": text,
             "action_success": success,
             "object_id": object_id,
             "feedback": feedback,
-            "success": self._progress.success,
-            "goal_unmet": self._goal_unmet,
-            "key_actions_done": self._progress.done,
-            "key_actions_left": self._progress.left,
+            "held": perception.held_name,
+            "visible_mask": perception.visible_types.astype(np.int8),
+            "navigable_mask": self._known.types.astype(np.int8),
+            "interactable_mask": available.interactable_types.astype(np.int8),
+            "action_mask": self.action_mask(),
+            "steps": self._steps,
+            "max_steps": self.max_steps,
+            "key_actions_done": len(progress.done),
+            "key_actions_left": len(progress.left),
+            "success": progress.success,
+            "goal_unmet": "; ".join(map(str, self._goal_unmet)),
+            "end_reason": self.end_reason,
+            "end_appended": appended,
+            "fault": self._fault,
+        }
+        entries = cast(dict[str, Any], info)
+        observations = self._settings.observations
+        for kind in observations.values():
+            entries.update(kind.info(situation))
+        return {name: kind.build(situation) for name, kind in observations.items()}, entries
+
+    @property
+    def details(self) -> Details:
+        """What stands behind the last observation and ``info``; made anew each time."""
+        situation = self._situation
+        details: Details = {
+            "task": self.task,
+            "keys_done": self._progress.done,
+            "keys_left": self._progress.left,
+            "unmet": self._goal_unmet,
             "visible": self.perception.visible_names,
-            "held": self.perception.held_name,
             "navigable": self._known.names,
             "interactable": self._available.in_reach,
-            "legal": LegalActions(mask),
-            "action_mask": mask,
-            "steps": self._steps,
-            "max_steps": self._step_limit,
-            "end_reason": self.end_reason,
+            "legal": LegalActions(self.action_mask()),
+            # Copies, since an observation may be built from a view's frame.
+            "views": {
+                name: None if view.frame is None else np.array(self.picture(view))
+                for name, view in situation.views.items()
+            },
+            "object_views": (),
+            "object_views_around": {},
+            "instance_ids": (),
         }
-        if self._faulty is not None:
-            info["fault"] = self._fault
-        return info
+        for kind in self._settings.observations.values():
+            cast(dict[str, Any], details).update(kind.details(situation))
+        return details
 
 
 def _feedback(action: Action, outcome: skills.Outcome) -> str:

@@ -1,7 +1,8 @@
 """The objects in view, each with where it is: what a caption of the picture could say.
 
-The observation ``objects`` is a row of numbers for each object type; ``info["object_views"]`` has
-the same in words, one :class:`ObjectView` for each object in view.
+The observation ``objects`` is a row of numbers for each object type;
+``env.unwrapped.details["object_views"]`` has the same in words, one :class:`ObjectView` for each
+object in view.
 """
 
 from __future__ import annotations

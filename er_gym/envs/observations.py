@@ -24,6 +24,7 @@ from er_gym.envs.legality import AvailableObjects, KnownTypes
 from er_gym.envs.object_view import FEATURES as OBJECT_FEATURES
 from er_gym.envs.object_view import object_features
 from er_gym.envs.perception import SENSORS, Perception
+from er_gym.envs.text_space import TextSpace
 from er_gym.plugins import PluginError, Registry, is_dotted
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
@@ -339,10 +340,7 @@ def _instance_ids(situation: Situation) -> dict[str, Any]:
 
 def _object_views(situation: Situation) -> dict[str, Any]:
     around = {name: view.object_views for name, view in situation.views.items()}
-    return {
-        "object_views": situation.perception.object_views,
-        **({"object_views_around": around} if around else {}),
-    }
+    return {"object_views": situation.perception.object_views, "object_views_around": around}
 
 
 def _nothing_to_tell(situation: Situation) -> Mapping[str, Any]:
@@ -360,7 +358,10 @@ class Observation:
             ``"frame"`` (``situation.picture``), ``"depth"``, ``"instances"``, ``"classes"`` (each
             an attribute of ``situation.perception``). Nothing is drawn for an observation without
             sensors.
-        info: returns what the observation adds to ``info``, such as what its numbers mean.
+        info: returns what the observation adds to ``info``: the same names each time, and plain
+            values of one form (:class:`er_gym.envs.info.Info`).
+        details: returns the entries of :class:`er_gym.envs.info.Details` that explain the
+            observation, such as what its numbers mean.
 
     Raises:
         ValueError: there is no such sensor.
@@ -370,6 +371,7 @@ class Observation:
     build: Callable[[Situation], Any]
     needs: tuple[str, ...] = ()
     info: Callable[[Situation], Mapping[str, Any]] = _nothing_to_tell
+    details: Callable[[Situation], Mapping[str, Any]] = _nothing_to_tell
 
     def __post_init__(self) -> None:
         known = isinstance(self.needs, tuple) and all(
@@ -406,20 +408,20 @@ OBSERVATIONS: Registry[Observation] = Registry(
             lambda width, height: spaces.Box(0, _MOST_OBJECTS, (height, width), np.int32),
             _instance,
             needs=("instances",),
-            info=_instance_ids,
+            details=_instance_ids,
         ),
         "objects": Observation(
             lambda width, height: spaces.Box(
                 -1.0, 1.0, (len(TYPES), len(OBJECT_FEATURES)), np.float32
             ),
             lambda situation: object_features(situation.perception),
-            info=_object_views,
+            details=_object_views,
         ),
         "state": Observation(
             lambda width, height: spaces.Box(-1.0, 1.0, (len(STATE_LAYOUT),), np.float32), _state
         ),
         "text": Observation(
-            lambda width, height: spaces.Text(_TEXT_LENGTH, min_length=1, charset=_CHARACTERS),
+            lambda width, height: TextSpace(_TEXT_LENGTH, min_length=1, charset=_CHARACTERS),
             _text,
         ),
     },

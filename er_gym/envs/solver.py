@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from er_gym.envs.actions import Action
+from er_gym.envs.info import action_of, detail
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import BASIN_OF, same_type
 from er_gym.tasks.task import KeyAction, type_of_id
@@ -17,8 +18,8 @@ class Solver:
     It navigates to the object of a key action. If that is not in sight, it looks round, then goes
     from object to object until it is. If an object is out of reach, the solver goes to it, then to
     the receptacle that it lies in, then a step forward. It opens a closed receptacle before it puts
-    an object in. It knows only the key actions beforehand and reads the rest from ``info``, as any
-    agent may. One solver plays one episode.
+    an object in. It knows only the key actions beforehand and reads the rest as any agent may. One
+    solver plays one episode.
     """
 
     def __init__(self) -> None:
@@ -31,9 +32,10 @@ class Solver:
         """The next action, and the key action that it serves (None if all are done).
 
         Args:
-            info: what the last ``env.reset`` or ``env.step`` returned.
+            info: what the last ``env.reset`` or ``env.step`` returned, with details
+                (:func:`er_gym.envs.info.with_details`).
         """
-        plan = [key for key in info["key_actions_left"] if key.verb != verbs.END]
+        plan = [key for key in detail(info, "keys_left") if key.verb != verbs.END]
         if not plan:
             return Action(verbs.END), None
         key = plan[0]
@@ -47,7 +49,7 @@ class Solver:
             if name in info["navigable"]:
                 return Action(verbs.NAVIGATE, name)
             return self._explore(info)
-        stuck = info["action"] == Action(key.verb, key.actual_type) and not info["action_success"]
+        stuck = action_of(info) == Action(key.verb, key.actual_type) and not info["action_success"]
         if stuck and key.verb == verbs.OPEN and Action(verbs.TOGGLE, name) in info["legal"]:
             return Action(verbs.TOGGLE, name)  # an appliance opens only when it is off
         for candidate in (key.actual_type, BASIN_OF.get(key.actual_type, key.actual_type)):
@@ -82,7 +84,7 @@ def _nearer(key: KeyAction, name: str, info: Mapping[str, Any]) -> Iterator[Acti
     """
     if name in info["navigable"]:
         yield Action(verbs.NAVIGATE, name)
-        for holder in _holders(key, info["key_actions_done"]):
+        for holder in _holders(key, info["keys_done"]):
             holder = _name_in(holder, info["navigable"])
             if holder in info["navigable"]:
                 yield Action(verbs.NAVIGATE, holder)

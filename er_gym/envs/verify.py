@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
+from er_gym.envs.info import with_details
 from er_gym.envs.solver import Solver
 from er_gym.tasks import verbs
 from er_gym.tasks.difficulty import difficulty
@@ -98,7 +99,8 @@ class Verifier:
 
     def __call__(self, task: Task) -> Verdict:
         """Play a task."""
-        _, info = self._env.reset(seed=0, options={"task": task})
+        _, told = self._env.reset(seed=0, options={"task": task})
+        info = with_details(self._env, told)
         pose = self._env.agent_pose
         where = (pose.x, pose.z)
         if task.goal and not unmet_conditions(task.goal, self._env.objects, info["interactable"]):
@@ -107,12 +109,13 @@ class Verifier:
         earned, over = 0.0, False
         while not over:
             action, _ = solver.next(info)
-            _, reward, terminated, truncated, info = self._env.step(action)
+            _, reward, terminated, truncated, told = self._env.step(action)
+            info = with_details(self._env, told)
             earned += float(reward)
             over = terminated or truncated
         problem = ""
         if not info["success"]:
-            problem = _problem(info["end_reason"], info["action"].verb, bool(info["goal_unmet"]))
+            problem = _problem(info["end_reason"], info["verb"], bool(info["goal_unmet"]))
         elif abs(earned - task.total_reward) > 1e-6:
             problem = _REWARD
         detail = " ".join(info["feedback"].split())

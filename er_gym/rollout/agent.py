@@ -64,10 +64,15 @@ class Agent(Protocol):
     """The observations that the agent needs, as ``EmbodiedEnv(obs_mode=…)`` names them."""
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """Begin an episode; ``obs`` and ``info`` are what ``env.reset`` returned."""
+        """Begin an episode; ``obs`` and ``info`` are what ``env.reset`` returned.
+
+        er-gym's own loop adds :class:`er_gym.envs.info.Details` to ``info``
+        (:func:`er_gym.envs.info.with_details`).
+        """
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """Choose an action; ``obs`` and ``info`` are what the last reset or step returned."""
+        """Choose an action; ``obs`` and ``info`` are what the last reset or step returned, ``info``
+        with details as in :meth:`reset`."""
 
 
 def check_observation(agent: Agent, obs: Mapping[str, Any]) -> None:

@@ -110,6 +110,7 @@ class RemoteEnv:
 
     Attributes:
         lost: the exception that ended the environment, None while it can be used.
+        details: what stands behind the last ``info``: :class:`er_gym.envs.info.Details`.
 
     Raises:
         EnvLost: the process died or got stuck; from any method but ``close``.
@@ -119,6 +120,7 @@ class RemoteEnv:
         self.lost: EnvLost | None = None
         self._pool, self._worker, self._slot = pool, worker, slot
         self._task: Any = None
+        self.details: dict[str, Any] = {}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -127,15 +129,23 @@ class RemoteEnv:
         if options is None:
             raise ValueError("no task is given; state one: options={'task': TASK}")
         self._task = options["task"]
-        obs, info = self._ask("reset", seed, options)
-        return obs, {"task": self._task, **info}
+        obs, info, details = self._ask("reset", seed, options)
+        self.details = {"task": self._task, **details}
+        return obs, info
 
     def step(
         self, action: Action | str | int
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Do an action, as ``EmbodiedEnv.step`` does."""
-        obs, reward, terminated, truncated, info = self._ask("step", action)
-        return obs, reward, terminated, truncated, {"task": self._task, **info}
+        *answer, details = self._ask("step", action)
+        self.details = {"task": self._task, **details}
+        obs, reward, terminated, truncated, info = answer
+        return obs, reward, terminated, truncated, info
+
+    @property
+    def unwrapped(self) -> RemoteEnv:
+        """This environment."""
+        return self
 
     def close(self) -> None:
         """Close the environment; :meth:`EnvPool.env` makes another."""

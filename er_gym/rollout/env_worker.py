@@ -189,11 +189,14 @@ class _SlotEnv:
 
     def reset(self, seed: int | None, options: dict[str, Any]) -> Any:
         obs, info = self._made.reset(seed=seed, options=options)
-        return obs, _without_task(info)
+        return obs, info, self._details()
 
     def step(self, action: Action | str | int) -> Any:
-        *rest, info = self._made.step(action)
-        return *rest, _without_task(info)
+        return *self._made.step(action), self._details()
+
+    def _details(self) -> dict[str, Any]:
+        """The details without the task, which the caller has already."""
+        return {name: each for name, each in self._made.details.items() if name != "task"}
 
     def close(self) -> None:
         env, self._env = self._env, None
@@ -204,11 +207,6 @@ class _SlotEnv:
     def _made(self) -> EmbodiedEnv:
         assert self._env is not None, "asked before it was made"
         return self._env
-
-
-def _without_task(info: dict[str, Any]) -> dict[str, Any]:
-    """``info`` without its task, which the caller has already."""
-    return {name: value for name, value in info.items() if name != "task"}
 
 
 def _serve(pipes: Mapping[int, Connection], env: Mapping[str, Any], serving: Any) -> None:

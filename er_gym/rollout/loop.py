@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from er_gym.envs.info import with_details
 from er_gym.rollout.agent import Agent, Decision
 
 
@@ -14,6 +15,10 @@ class Steppable(Protocol):
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Do an action, as ``gymnasium.Env.step``."""
+
+    @property
+    def unwrapped(self) -> Any:
+        """What has the :class:`~er_gym.envs.info.Details` of the step as ``details``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +30,7 @@ class Transition:
         decision: what the agent decided.
         reward: what the step earned.
         terminated, truncated: as Gymnasium means them.
-        info: the environment's info after the step.
+        info: the environment's info after the step, with details.
     """
 
     before: Any
@@ -50,7 +55,7 @@ def transitions(
     Args:
         env: an environment that has been reset.
         agent: an agent that has been reset.
-        obs, info: what ``env.reset`` returned.
+        obs, info: what ``env.reset`` returned, with details.
         seen: a key of ``info``; the agent gets ``info[seen]`` in place of the observation. A
             scripted teacher thus reads text while the learner's arrays are recorded.
     """
@@ -58,6 +63,7 @@ def transitions(
     while not over:
         decision = agent.act(obs if seen is None else info[seen], info)
         before, info_before = obs, info
-        obs, reward, terminated, truncated, info = env.step(decision.action)
+        obs, reward, terminated, truncated, told = env.step(decision.action)
+        info = with_details(env, told)
         over = terminated or truncated
         yield Transition(before, info_before, decision, float(reward), terminated, truncated, info)

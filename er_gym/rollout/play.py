@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Mapping
 from typing import Any, Protocol
 
+from er_gym.envs.info import with_details
 from er_gym.rollout.agent import Agent, CannotGoOn, Decision
 from er_gym.rollout.events import EpisodeBegun, EventListener, Reply, StepDone, ignore_event
 from er_gym.rollout.loop import transitions
@@ -27,6 +28,10 @@ class Playable(Protocol):
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Do an action."""
+
+    @property
+    def unwrapped(self) -> Any:
+        """What has the :class:`~er_gym.envs.info.Details` of the step as ``details``."""
 
 
 def episode_seed(seed: int, task_id: str) -> int:
@@ -72,7 +77,8 @@ def play_episode(
     error = ""
     start = time.perf_counter()
     try:
-        obs, info = env.reset(seed=seed, options={"task": task})
+        obs, told = env.reset(seed=seed, options={"task": task})
+        info = with_details(env, told)
         steps.append(_placed(info))
         agent.reset(task, obs, info)
         emit(_begun(task, info["max_steps"]))
@@ -80,7 +86,7 @@ def play_episode(
             info = each.info
             steps.append(_stepped(info, each.reward, each.decision))
             _emit_step(emit, task.id, len(steps) - 1, each.decision, steps[-1])
-            if info.get("end_appended"):
+            if info["end_appended"]:
                 steps.append(_appended(steps[-1]))
     except (CannotGoOn, Terminated):
         raise
@@ -93,7 +99,7 @@ def play_episode(
         max_steps=info.get("max_steps", max_steps),
         steps=steps,
         success=bool(info.get("success", False)) and not error,
-        goal_unmet=[str(condition) for condition in info.get("goal_unmet", ())],
+        goal_unmet=[str(condition) for condition in info.get("unmet", ())],
         end_reason="" if error else str(info["end_reason"]),
         seconds=time.perf_counter() - start,
         error=error,
@@ -162,12 +168,11 @@ def _appended(last: StepRecord) -> StepRecord:
 
 
 def _stepped(info: Mapping[str, Any], reward: float, decision: Decision) -> StepRecord:
-    action = info["action"]
     return StepRecord(
-        verb=ERROR if action is None else action.verb,
-        object_type="" if action is None else action.object_type,
+        verb=info["verb"] or ERROR,
+        object_type=info["object_type"],
         object_id=info["object_id"],
-        success=bool(info["action_success"]) and action is not None,
+        success=bool(info["action_success"]) and bool(info["verb"]),
         feedback=_encodable(info["feedback"]),
         navigable=list(info["navigable"]),
         interactable=list(info["interactable"]),

@@ -25,6 +25,7 @@ from er_gym.data.frame_chat import frame_chat, words_for_frames
 from er_gym.data.frames import FRAMES, Frame, FrameSet
 from er_gym.data.pictures import encode_picture
 from er_gym.data.trajectory import PictureRecord, SeenObject
+from er_gym.envs.info import with_details
 from er_gym.tasks.suites import load_suite
 
 SUITE = load_suite("mini")
@@ -106,7 +107,8 @@ def test_a_frame_is_what_an_agent_sees_there(
     room = frame_camera.Room(task.scene, task.arrangement)
     first = photographer(frame_camera.Visit(0, room))[0]
     photographer.close()
-    obs, info = env.reset(options={"task": task})
+    obs, told = env.reset(options={"task": task})
+    info = with_details(env, told)
     env.close()
     picture = (tmp_path / first.pictures[0].path).read_bytes()
     assert picture == encode_picture(obs["rgb"], quality=80)

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.info import with_details
 from er_gym.tasks.task import Task
 
 
@@ -24,10 +25,10 @@ def play(env: EmbodiedEnv) -> Callable[..., list[dict[str, Any]]]:
 
     def run(task: Task, *actions: str) -> list[dict[str, Any]]:
         _, info = env.reset(seed=0, options={"task": task})
-        infos = [info]
+        infos = [with_details(env, info)]
         for action in actions:
             _, reward, ended, cut, info = env.step(action)
-            infos.append({**info, "reward": reward, "ended": ended, "cut": cut})
+            infos.append({**with_details(env, info), "reward": reward, "ended": ended, "cut": cut})
         return infos
 
     return run

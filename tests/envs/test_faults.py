@@ -16,6 +16,7 @@ from er_gym.envs.action_handler import Moment
 from er_gym.envs.actions import ACTIONS, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.faults import KIND_OF_VERB, KINDS, FaultPlan, other_places, parse_faults
+from er_gym.envs.info import action_of, with_details
 from er_gym.envs.legality import KnownTypes
 from er_gym.envs.skills import Outcome
 from er_gym.envs.solver import Solver
@@ -48,7 +49,7 @@ def steps(env: Any, task: Task, seed: int) -> list[dict[str, Any]]:
     _, info = env.reset(seed=seed, options={"task": task})
     infos, solver, over = [info], Solver(), False
     while not over:
-        action = info["action"] if info["fault"] else solver.next(info)[0]
+        action = action_of(info) if info["fault"] else solver.next(with_details(env, info))[0]
         _, reward, terminated, truncated, info = env.step(action)
         infos.append({**info, "reward": reward})
         over = terminated or truncated
@@ -56,7 +57,7 @@ def steps(env: Any, task: Task, seed: int) -> list[dict[str, Any]]:
 
 
 def course(infos: Iterable[dict[str, Any]]) -> list[tuple[str, str, str]]:
-    return [(str(info["action"]), info["fault"], info["feedback"]) for info in infos]
+    return [(info["action"], info["fault"], info["feedback"]) for info in infos]
 
 
 class Carried:
@@ -79,7 +80,7 @@ def test_a_faulty_navigation_arrives_elsewhere(envs: Callable[..., EmbodiedEnv])
     env = envs(faults={"navigate": 1})
     _, info = env.reset(seed=1, options={"task": MINI[0]})
     assert info["fault"] == ""
-    before, known = env.agent_pose, info["navigable"]
+    before, known = env.agent_pose, env.details["navigable"]
     goal = known[0]
     _, reward, _, _, info = env.step(f"navigate to {goal}")
     place = info["object_id"].split("|")[0]
@@ -103,7 +104,7 @@ def test_of_a_faulty_interaction_nothing_changes(envs: Callable[..., EmbodiedEnv
         _, info = env.reset(seed=3, options={"task": task})
         solver, over = Solver(), False
         while not over:
-            action = info["action"] if info["fault"] else solver.next(info)[0]
+            action = action_of(info) if info["fault"] else solver.next(with_details(env, info))[0]
             before, pose, done = env.objects, env.agent_pose, info["key_actions_done"]
             _, reward, terminated, truncated, info = env.step(action)
             over = terminated or truncated
@@ -228,10 +229,9 @@ def test_without_faults_nothing_changes(envs: Callable[..., EmbodiedEnv]) -> Non
     plain, none = envs(), envs(faults={"open": 0})
     for env in (plain, none):
         _, info = env.reset(seed=1)
-        assert "fault" not in info
-        assert "fault" not in env.step("observe")[4]
+        assert info["fault"] == env.step("observe")[4]["fault"] == ""
     # The generator of tasks is not asked for the seed of faults that there are not.
-    assert plain.reset()[1]["task"] == none.reset()[1]["task"]
+    assert plain.reset()[1]["task_id"] == none.reset()[1]["task_id"]
 
 
 def test_an_action_that_is_refused_or_unknown_has_no_fault(
@@ -239,7 +239,7 @@ def test_an_action_that_is_refused_or_unknown_has_no_fault(
 ) -> None:
     env = envs(faults=1)
     _, info = env.reset(seed=1, options={"task": MINI[0]})
-    for action in (f"navigate to {info['navigable'][0]}", "slice Apple", "hm", "observe"):
+    for action in (f"navigate to {env.details['navigable'][0]}", "slice Apple", "hm", "observe"):
         info = env.step(action)[4]
         assert bool(info["fault"]) == action.startswith("navigate")
 

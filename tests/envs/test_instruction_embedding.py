@@ -142,7 +142,7 @@ def test_invalid_uses_of_the_wrapper(wrapped: InstructionEmbedding) -> None:
     with pytest.raises(ValueError, match="unknown encoder 'bow'"):
         InstructionEmbedding(wrapped.env, "bow")
     other = InstructionEmbedding(Bare(gymnasium.spaces.Dict(a=box)))
-    with pytest.raises(ValueError, match=r"info has no 'task'; wrap an er-gym environment"):
+    with pytest.raises(ValueError, match=r"info has no 'instruction'; wrap an er-gym environment"):
         other.reset()
     with pytest.raises(AttributeError, match="action_masks"):
         other.action_masks()

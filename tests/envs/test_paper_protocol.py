@@ -17,6 +17,7 @@ from benchmarks.scoring.scorers import CORRECTED, PAPER
 from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS, INDEX, NO_ACTION, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.info import with_details
 from er_gym.envs.paper_action_handler import NO_OBJECT, understand_as_paper
 from er_gym.envs.paper_skills import observe
 from er_gym.envs.protocol import PROTOCOLS
@@ -46,10 +47,10 @@ def env() -> Iterator[EmbodiedEnv]:
 @pytest.fixture
 def play(env: EmbodiedEnv) -> Play:
     def run(task: Task, *actions: str) -> list[dict[str, Any]]:
-        infos = [env.reset(seed=0, options={"task": task})[1]]
+        infos = [with_details(env, env.reset(seed=0, options={"task": task})[1])]
         for action in actions:
             _, reward, ended, cut, info = env.step(action)
-            infos.append({**info, "reward": reward, "ended": ended, "cut": cut})
+            infos.append({**with_details(env, info), "reward": reward, "ended": ended, "cut": cut})
         return infos
 
     return run
@@ -90,11 +91,11 @@ def did(record: EpisodeRecord) -> list[str]:
 def test_what_names_no_object_or_makes_no_sense_costs_a_step(play: Play) -> None:
     infos = play(TAKE_APPLE, "open Bread", "navigate to Narnia", "pickup", "dance")
     assert [info["steps"] for info in infos] == [1, 2, 3, 4, 4]
-    assert [str(info["action"]) for info in infos[1:]] == [
+    assert [info["action"] for info in infos[1:]] == [
         "open Bread",
         f"navigate to {NO_OBJECT}",
         f"pickup {NO_OBJECT}",
-        "None",
+        "",
     ]
     assert not any(info["action_success"] for info in infos[1:])
 
@@ -190,7 +191,7 @@ def test_texts_are_read_as_the_papers_runner_reads_them(
 def test_indices_and_actions_are_read_by_their_text(env: EmbodiedEnv) -> None:
     env.reset(options={"task": TAKE_APPLE})
     action = Action("navigate to", "Fridge")
-    assert env.step(INDEX[action])[4]["action"] == env.step(action)[4]["action"] == action
+    assert env.step(INDEX[action])[4]["action"] == env.step(action)[4]["action"] == str(action)
     with pytest.raises(gymnasium.error.InvalidAction):
         env.step(len(ACTIONS))
 
@@ -329,7 +330,7 @@ def test_where_there_is_no_way_nothing_changes(env: EmbodiedEnv, play: Play) -> 
         info = env.step(reply)[4]
         assert not info["action_success"]
         assert env.agent_pose == pose
-        assert info["interactable"] == start["interactable"]
+        assert env.details["interactable"] == start["interactable"]
 
 
 # -- moving and looking ----------------------------------------------------------------------------

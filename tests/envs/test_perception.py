@@ -287,7 +287,7 @@ def test_columns_and_entries_are_perceived_alike(
     env, twin = EmbodiedEnv([task], obs_mode="state", instances="explore"), Twin()
     monkeypatch.setattr(skills, "perceive", twin.perceive)
     infos = list(random_play(env, 60))
-    assert {info["action"].verb for info in infos} >= {"pickup", "put in", "observe"}
+    assert {info["verb"] for info in infos} >= {"pickup", "put in", "observe"}
     assert twin.events > 60
     assert twin.held > 5
     env.close()
@@ -308,7 +308,7 @@ def test_no_event_is_kept_while_the_controller_acts(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(env, "reset", reset_apart)
     infos = list(random_play(env, 60))
-    assert {info["action"].verb for info in infos} >= {"observe", "move forward", "navigate to"}
+    assert {info["verb"] for info in infos} >= {"observe", "move forward", "navigate to"}
     assert not settled
     env.close()
 

@@ -76,18 +76,18 @@ def test_an_observation_names_the_sensors_there_are() -> None:
 
 def test_depth_and_instances_are_those_of_the_event() -> None:
     env = EmbodiedEnv(obs_mode="depth+instance", **SMALL)
-    obs, info = env.reset(seed=3)
+    obs, _ = env.reset(seed=3)
     for action in ("observe", "navigate to Fridge", "move forward"):
         event = env._controller.last_event
         assert obs in env.observation_space
         assert (obs["depth"] == event.depth_frame).all()
-        ids = np.array(info["instance_ids"])
+        ids = np.array(env.details["instance_ids"])
         in_picture = {number for number in np.unique(obs["instance"]).tolist() if number}
         assert set(ids[sorted(in_picture)]) == set(event.instance_masks)
         for object_id, mask in event.instance_masks.items():
             assert ((ids[obs["instance"]] == object_id) == mask).all()
         assert {number for number, name in enumerate(ids) if name} == in_picture
-        obs, *_, info = env.step(action)
+        obs, *_ = env.step(action)
     env.close()
 
 
@@ -100,8 +100,8 @@ def test_numbers_stay_true_when_objects_come_and_go() -> None:
             env._controller.step(action="SliceObject", objectId=entry["objectId"])
     seen: set[str] = set()
     for action in ("navigate to CounterTop", "navigate to CounterTop", "observe"):
-        obs, _, _, _, info = env.step(action)
-        ids = np.array(info["instance_ids"])
+        obs, *_ = env.step(action)
+        ids = np.array(env.details["instance_ids"])
         masks = env._controller.last_event.instance_masks
         assert set(ids[np.unique(obs["instance"])]) == {"", *masks}
         for object_id, mask in masks.items():
@@ -162,13 +162,13 @@ def test_vector_environments_stack_them() -> None:
         obs_mode="depth+instance",
         **SMALL,
     )
-    obs, info = vec.reset(seed=[5, 6])
+    obs, _ = vec.reset(seed=[5, 6])
     alone = gymnasium.make("ER-SinglePickup-v0", obs_mode="depth+instance", **SMALL)
     for k, seed in enumerate((5, 6)):
-        one, told = alone.reset(seed=seed)
+        one, _ = alone.reset(seed=seed)
         assert (obs["depth"][k] == one["depth"]).all()
         assert (obs["instance"][k] == one["instance"]).all()
-        assert info["instance_ids"][k] == told["instance_ids"]
+        assert vec.get_attr("details")[k]["instance_ids"] == alone.unwrapped.details["instance_ids"]
     assert (obs["depth"].dtype, obs["instance"].dtype) == (np.float32, np.int32)
     vec.close()
     alone.close()

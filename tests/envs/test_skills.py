@@ -115,7 +115,7 @@ def test_where_there_is_no_way_everything_stays_as_it_was(monkeypatch: pytest.Mo
     before, info = env.reset(seed=0)
     monkeypatch.setattr(skills, "_interactable_poses", lambda *arguments: [])
     monkeypatch.setattr(skills, "_can_handle", lambda *arguments: False)
-    after, _, _, _, then = env.step(f"navigate to {info['navigable'][0]}")
+    after, _, _, _, then = env.step(f"navigate to {env.details['navigable'][0]}")
     assert "no way was found" in then["feedback"]
     assert not then["action_success"]
     assert then["action_mask"].tolist() == info["action_mask"].tolist()

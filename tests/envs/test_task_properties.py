@@ -13,6 +13,7 @@ import pytest
 
 from er_gym.envs.actions import ACTIONS, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.info import names, with_details
 from er_gym.envs.solver import Solver
 from er_gym.tasks import TASK_TYPES, Task, TaskType, load_suite, verbs
 from er_gym.tasks.equivalence import BASIN_OF
@@ -46,7 +47,7 @@ def begin(env: EmbodiedEnv, task: Task) -> dict[str, Any]:
 
 
 def goal_holds(env: EmbodiedEnv, task: Task, info: Mapping[str, Any]) -> bool:
-    return not unmet_conditions(task.goal, env.objects, info["interactable"])
+    return not unmet_conditions(task.goal, env.objects, names(info["interactable_mask"]))
 
 
 def strive(env: EmbodiedEnv, task: Task, other: Task) -> list[Deed]:
@@ -58,7 +59,7 @@ def strive(env: EmbodiedEnv, task: Task, other: Task) -> list[Deed]:
     solver, progress, over = Solver(), Progress.start(Criteria.of(other)), False
     deeds: list[Deed] = []
     while not over:
-        action, key = solver.next({**info, "key_actions_left": progress.left})
+        action, key = solver.next({**with_details(env, info), "keys_left": progress.left})
         if key is None:
             break
         _, reward, ended, cut, info = env.step(action)
@@ -89,7 +90,7 @@ def test_who_does_the_key_actions_earns_all_and_succeeds(env: EmbodiedEnv, kind:
         info = begin(env, task)
         solver, earned, over = Solver(), 0.0, False
         while not over:
-            action, _ = solver.next(info)
+            action, _ = solver.next(with_details(env, info))
             _, reward, ended, cut, info = env.step(action)
             earned += float(reward)
             over = ended or cut
@@ -127,15 +128,15 @@ def test_who_stops_on_the_way_has_earned_what_was_done(env: EmbodiedEnv, kind: T
         info = begin(env, task)
         solver, deeds = Solver(), []
         for _ in range(rng.randrange(4, 20)):
-            action, key = solver.next(info)
+            action, key = solver.next(with_details(env, info))
             if key is None or rng.random() < 0.4:
                 legal = np.flatnonzero(info["action_mask"]).tolist()
                 action = rng.choice([a for k in legal if (a := ACTIONS[k]).verb != verbs.END])
-            done = len(info["key_actions_done"])
+            done = info["key_actions_done"]
             _, reward, ended, cut, info = env.step(action)
             if info["action_success"]:
                 deeds.append(Deed(action, info["object_id"], float(reward)))
-            new = info["key_actions_done"][done:]
+            new = env.details["keys_done"][done:]
             assert float(reward) == sum(key.reward for key in new), task.id
             for key in new:
                 assert info["action_success"]

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from er_gym import EmbodiedEnv
+from er_gym.envs.info import with_details
 from er_gym.envs.solver import Solver
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
@@ -62,7 +63,7 @@ def test_what_the_oracle_does_in_a_room_earns_what_it_earns_in_the_environment(
     _, info = env.reset(options={"task": task})
     solver, done, actions = Solver(), False, []
     while not done:
-        actions.append(str(solver.next(info)[0]))
+        actions.append(str(solver.next(with_details(env, info))[0]))
         *_, terminated, truncated, info = env.step(actions[-1])
         done = terminated or truncated
     assert info["success"]

@@ -14,6 +14,7 @@ import gymnasium
 import household_tasks  # before er_gym, which looks for what is added
 
 import er_gym
+from er_gym.envs.info import with_details
 from er_gym.envs.solver import Solver
 from er_gym.sim.actions import ACTIONS
 from er_gym.sim.render.shapes import SHAPES
@@ -34,14 +35,14 @@ seen: dict[str, Any] = {
 # -- a task of the type is generated, written, read and solved
 live = gymnasium.make("Household-Open-v0", episode_source="generate", obs_mode="state")
 _, info = live.reset(seed=0, options={"scene": "FloorPlan1"})
-jsonl_format.write_tasks(out / "tasks.jsonl", [info["task"]])
+jsonl_format.write_tasks(out / "tasks.jsonl", [live.unwrapped.task])
 live.close()
 env = er_gym.EmbodiedEnv(str(out / "tasks.jsonl"), task_type="single_open", obs_mode="state")
 _, info = env.reset(seed=0)
-seen["instruction"] = info["task"].instruction
+seen["instruction"] = info["instruction"]
 solver, over = Solver(), False
 while not over:
-    _, _, ended, cut, info = env.step(str(solver.next(info)[0]))
+    _, _, ended, cut, info = env.step(str(solver.next(with_details(env, info))[0]))
     over = ended or cut
 seen["solved"] = info["success"]
 env.close()

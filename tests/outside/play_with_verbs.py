@@ -18,6 +18,7 @@ from agents.vlm.parsing import parse as read
 from agents.vlm.templates import directory_of, load_templates
 from er_gym.envs.actions import ACTIONS, INDEX, parse
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.info import with_details
 from er_gym.envs.solver import Solver
 from er_gym.tasks import jsonl_format
 from er_gym.tasks.arrangement import Arrangement
@@ -57,7 +58,7 @@ for said in SCRIPT:
     obs, _, _, _, info = env.step(said)
     assert env.observation_space.contains(obs)
     legal = [str(ACTIONS[k]) for k in np.flatnonzero(info["action_mask"])]
-    seen["played"].append([str(info["action"]), info["action_success"], info["feedback"], legal])
+    seen["played"].append([info["action"], info["action_success"], info["feedback"], legal])
 env.close()
 
 # -- a task that is generated, written, read and solved
@@ -75,10 +76,10 @@ assert task.arrangement == replace(Arrangement(), dirty=task.arrangement.dirty)
 jsonl_format.write_tasks(out / "tasks.jsonl", [task])
 env = EmbodiedEnv(str(out / "tasks.jsonl"), obs_mode="state")
 obs, info = env.reset(seed=0)
-assert info["task"] == task
+assert env.task == task
 solver, over, earned = Solver(), False, []
 while not over:
-    action, _ = solver.next(info)
+    action, _ = solver.next(with_details(env, info))
     assert info["action_mask"][INDEX[action]], action
     obs, reward, ended, cut, info = env.step(str(action))
     earned.append([str(parse(str(action))), reward])

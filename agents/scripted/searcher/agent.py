@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 from agents.scripted.searcher import instruction, search_priors
 from agents.scripted.searcher.instruction import Goal, understand
 from er_gym.envs.actions import Action
+from er_gym.envs.info import LegalActions, names
 from er_gym.rollout.agent import Decision
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
@@ -46,11 +47,11 @@ class StepView:
     def of(info: Mapping[str, Any]) -> StepView:
         """Read ``info``."""
         return StepView(
-            sees=frozenset(info["visible"]),
+            sees=frozenset(names(info["visible_mask"])),
             holds=info["held"],
-            navigable=info["navigable"],
-            reach=frozenset(info["interactable"]),
-            legal=info["legal"],
+            navigable=names(info["navigable_mask"]),
+            reach=frozenset(names(info["interactable_mask"])),
+            legal=LegalActions(info["action_mask"]),
             done=info["action_success"],
             left=info["max_steps"] - info["steps"] - _RESERVE,
         )

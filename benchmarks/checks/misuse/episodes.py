@@ -127,8 +127,8 @@ def _source_copied(copied: Callable[[Any], Any]) -> None:
 # -- returned values and threads ------------------------------------------------------------------
 
 
-def _wreck(obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-    for array in (*obs.values(), info["action_mask"], *info.get("views", {}).values()):
+def _wreck(env: Any, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+    for array in (*obs.values(), *info.values(), *env.details["views"].values()):
         if isinstance(array, np.ndarray):
             array[...] = 1
 
@@ -137,10 +137,10 @@ def _wrecked(by: str) -> None:
     """Compare an environment whose results are overwritten with an untouched one."""
     one, other = (new_env(obs_mode=ALL_OBS, render_mode="rgb_array") for _ in range(2))
     (obs, info), (kept, _) = one.reset(seed=4), other.reset(seed=4)
-    names = [f"navigate to {name}" for name in info["navigable"][:4]]
+    names = [f"navigate to {name}" for name in one.details["navigable"][:4]]
     for action in ("observe", "open Fridge", *names, "open Fridge", "observe", "pickup Mug", "end"):
         if by == "answers":
-            _wreck(obs, info)
+            _wreck(one, obs, info)
         elif by == "render":
             one.render()[...] = 0  # type: ignore[index]
         elif by == "objects":

@@ -57,10 +57,10 @@ def turn_of(
 
     Args:
         task: the episode's.
-        obs, info: what the environment returned; ``obs`` has ``rgb``.
+        obs, info: what the environment returned, ``info`` with details; ``obs`` has ``rgb``.
         settings: how vision-language agents are shown pictures.
     """
-    seen = {**(info.get("views") or {}), AHEAD: obs["rgb"]}
+    seen = {**info["views"], AHEAD: obs["rgb"]}
     legal: dict[str, list[Action]] = {verb.name: [] for verb in verbs.table()}
     for action in info["legal"]:
         legal[action.verb].append(action)

@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 
 from er_gym.data.collection import Collection
 from er_gym.data.exports.base import ExportError, ExportFormat, ExportJob, needs
@@ -21,6 +22,8 @@ from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import Suite, load_suite, suite_from_file
 
 NAMESPACE = "er-gym"
+_ENV_ID = "ER-Embodied-v0"
+"""Names the environment in the data set. It is not registered: the spec says how it is made."""
 _OTHERWISE = "it turned out otherwise when played again"
 
 
@@ -30,15 +33,25 @@ class _Replays:
     Args:
         collection: what is exported.
         suite: the suite that was played.
+        source: the suite's name, or its file.
+
+    Attributes:
+        env_spec: of the environment that Minari's ``recover_environment`` makes. It draws from the
+            suite.
     """
 
-    def __init__(self, collection: Collection, suite: Suite) -> None:
+    def __init__(self, collection: Collection, suite: Suite, source: str) -> None:
         wanted = {trajectory.task_id for trajectory in collection.trajectories()}
         fitted = resolve_tasks((each for each in suite.tasks if each.id in wanted), arrange=False)
         self._tasks = {task.id: task for task in fitted.tasks}
         self._parts = collection.parts()
         self._part, self._env = "", EmbodiedEnv((), **{**suite.env, "obs_mode": "state"})
         self._suite_env = suite.env
+        self.env_spec = EnvSpec(
+            id=_ENV_ID,
+            entry_point=f"{EmbodiedEnv.__module__}:{EmbodiedEnv.__qualname__}",
+            kwargs={**suite.env, "obs_mode": "state", "episode_source": source},
+        )
         self.observation_space = self._env.observation_space
         self.action_space = self._env.action_space
 
@@ -123,7 +136,9 @@ def _write(job: ExportJob) -> None:
 
     suite = _suite(job)
     with ExitStack() as stack:
-        replays = _Replays(job.collection, suite)
+        file = job.options.tasks_file
+        source = job.collection.manifest.suite if file is None else str(file.resolve())
+        replays = _Replays(job.collection, suite, source)
         stack.callback(replays.close)
         stores: dict[str, Any] = {}
         for split, trajectory in job.trajectories():
@@ -133,12 +148,14 @@ def _write(job: ExportJob) -> None:
                 continue
             job.take(trajectory)
             if split not in stores:
-                folder = job.folder / NAMESPACE / f"{split}-v0" / "data"
+                # Minari joins a relative path with itself.
+                folder = job.folder.resolve() / NAMESPACE / f"{split}-v0" / "data"
                 folder.mkdir(parents=True)
                 stores[split] = MinariStorage.new(
                     folder,
                     observation_space=replays.observation_space,
                     action_space=replays.action_space,
+                    env_spec=replays.env_spec,
                     data_format="hdf5",
                 )
             place = stores[split].total_episodes
@@ -196,5 +213,6 @@ dataset = minari.load_dataset("er-gym/train-v0")[[  # and er-gym/validation-v0]]
 Observations are `{"state": …}` of `EmbodiedEnv(obs_mode="state")`, actions are indices of
 `er_gym.envs.actions.ACTIONS`; the names of both versions of this list are compared with the
 metadata entry `actions`. Episodes come from playing each trajectory again.
+`dataset.recover_environment()` makes the environment, with the tasks of the suite.
 """,
 )

@@ -1,4 +1,5 @@
-"""Wrappers: the instruction as a vector, a reward that tells more, and actions that go wrong.
+"""Wrappers: the instruction as a vector, a reward that tells more, actions that go wrong, and
+``info`` without words.
 
 ::
 
@@ -12,6 +13,14 @@ Nothing heavy is imported before an encoder that needs it is made.
 from er_gym.envs.wrappers.encoders import Encoder, make_encoder
 from er_gym.envs.wrappers.faults import FaultInjection
 from er_gym.envs.wrappers.instruction import InstructionEmbedding
+from er_gym.envs.wrappers.numbers_only import NumbersOnly
 from er_gym.envs.wrappers.shaping import KeyActionShaping
 
-__all__ = ["Encoder", "FaultInjection", "InstructionEmbedding", "KeyActionShaping", "make_encoder"]
+__all__ = [
+    "Encoder",
+    "FaultInjection",
+    "InstructionEmbedding",
+    "KeyActionShaping",
+    "NumbersOnly",
+    "make_encoder",
+]

@@ -58,7 +58,7 @@ class InstructionEmbedding(TaskWrapper, RecordConstructorArgs):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Begin an episode, and encode its instruction."""
         obs, info = self.env.reset(seed=seed, options=options)
-        self._embedding = make_encoder(self._encoder)(info_entry(info, "task").instruction)
+        self._embedding = make_encoder(self._encoder)(info_entry(info, "instruction"))
         return self._with_instruction(obs), info
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:

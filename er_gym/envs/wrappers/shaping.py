@@ -18,7 +18,7 @@ def potential(info: Mapping[str, Any]) -> float:
     Raises:
         ValueError: ``info`` does not come from an er-gym environment.
     """
-    left, done = (len(info_entry(info, f"key_actions_{state}")) for state in ("left", "done"))
+    left, done = (int(info_entry(info, f"key_actions_{state}")) for state in ("left", "done"))
     return -left / max(left + done, 1)
 
 
@@ -35,8 +35,8 @@ class KeyActionShaping(TaskWrapper, RecordConstructorArgs):
     **For training only, never for evaluation.** The shaped reward reveals how many key actions are
     left, which the agent is not told. Returns with and without shaping cannot be compared: a step
     that ends an episode early gets back the whole remaining potential.
-    ``info["unshaped_reward"]`` keeps the environment's own reward of each step. Evaluate in an
-    environment without this wrapper, or with ``scale=0``.
+    ``info["unshaped_reward"]`` keeps the environment's own reward of each step, 0 at ``reset``.
+    Evaluate in an environment without this wrapper, or with ``scale=0``.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], gamma: float, scale: float = 1.0) -> None:
@@ -64,7 +64,7 @@ class KeyActionShaping(TaskWrapper, RecordConstructorArgs):
         """Begin an episode."""
         obs, info = self.env.reset(seed=seed, options=options)
         self._potential = self._scale * potential(info)
-        return obs, info
+        return obs, {**info, "unshaped_reward": 0.0}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Do an action; ``info["unshaped_reward"]`` is the environment's own reward for it."""

@@ -74,7 +74,7 @@ def test_it_chooses_what_its_learner_chooses(
                 best, _ = learner.predict(seen, deterministic=True, action_masks=mask)
             assert action == int(best)
             mask[action] = 0
-        obs, _, _, _, info = room.step(f"navigate to {info['navigable'][0]}")
+        obs, _, _, _, info = room.step(f"navigate to {room.details['navigable'][0]}")
         seen = observation.observe(obs, info)
     room.close()
 

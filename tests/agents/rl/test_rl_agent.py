@@ -107,7 +107,7 @@ def test_pictures_are_made_small_and_stacked() -> None:
     first = policy_observation.reset(obs, info, MINI[0].instruction)
     assert first in policy_observation.space
     assert (first["rgb"][..., :3] == first["rgb"][..., 3:]).all()
-    action = f"navigate to {info['navigable'][0]}"
+    action = f"navigate to {env.details['navigable'][0]}"
     obs, _, _, _, info = env.step(action)
     second = policy_observation.observe(obs, info)
     assert second in policy_observation.space

@@ -14,12 +14,13 @@ from agents.rl.envs import LearningEnv, make_env
 from agents.rl.subtask_memory import SUBTASK_LAYOUT, SubtaskMemory
 from agents.rl.subtasks import FIND, Progress, Subtask, subtasks
 from er_gym.envs.actions import ACTIONS, INDEX, Action
+from er_gym.envs.info import names
 from er_gym.tasks import verbs
 
 TO_SEE = frozenset(
     {
-        *("visible", "held", "interactable", "action_mask", "action", "action_success"),
-        *("steps", "max_steps"),
+        *("visible_mask", "held", "interactable_mask", "action_mask"),
+        *("verb", "object_type", "action_success", "steps", "max_steps"),
     }
 )
 HEAT = (
@@ -100,7 +101,7 @@ def env() -> Iterator[LearningEnv]:
 def test_the_observation_needs_nothing_that_an_agent_is_not_told(env: LearningEnv) -> None:
     obs, info = env.reset(seed=3)
     assert isinstance(env.observation_space, spaces.Dict)
-    memory = SubtaskMemory(info["task"].instruction)
+    memory = SubtaskMemory(info["instruction"])
     random = np.random.default_rng(0)
     over = False
     while not over:
@@ -119,7 +120,7 @@ def test_the_observation_remembers_the_search(env: LearningEnv) -> None:
     obs, info = env.reset(seed=3)
     now = env.policy_observation.subtasks.progress.at()
     assert on(obs, f"now {now.verb}") == on(obs, f"thing:{now.thing}") == 1
-    place = next(name for name in info["navigable"] if name != now.thing)
+    place = next(name for name in names(info["navigable_mask"]) if name != now.thing)
     assert on(obs, f"tried:{place}") == 0
     once = env.step(INDEX[Action("navigate to", place)])[0]
     assert 0 < on(once, f"tried:{place}") == on(once, f"visits:{place}") < 1
@@ -133,7 +134,7 @@ def test_the_adviser_finishes_what_another_has_begun_badly(env: LearningEnv) -> 
     adviser, successes, illegal, others = Adviser(), 0, 0, 0
     for _ in range(12):
         _, info = env.reset()
-        adviser.begin(info["task"], info, env.policy_observation.subtasks)
+        adviser.begin(env.unwrapped.task, info, env.policy_observation.subtasks)
         over = False
         while not over:
             advice = INDEX[adviser.advise(info)]

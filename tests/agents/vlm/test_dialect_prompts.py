@@ -26,6 +26,7 @@ from er_gym.data.dialects import load_dialect
 from er_gym.data.pictures import encode_picture
 from er_gym.data.trajectory import Language, Subgoal, ThoughtRecord, Trajectory
 from er_gym.envs.actions import Action
+from er_gym.envs.info import action_of
 from er_gym.envs.solver import Solver
 from er_gym.rollout.agent import Decision
 from er_gym.rollout.play import play_episode
@@ -62,8 +63,8 @@ class Recorded:
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         self.recorder.take_result(info)
-        if info.get("fault"):
-            action = info["action"]
+        if info["fault"]:
+            action = action_of(info)
         else:
             action = self._todo.pop(0) if self._todo else self._solver.next(info)[0]
         goal = Subgoal(verb="pickup", thing="Mug", place="Sink")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -14,7 +15,7 @@ import minari
 
 from er_gym.data.collection import Collection
 from er_gym.data.exports import ExportError, ExportOptions, export
-from er_gym.envs.actions import ACTIONS, INDEX
+from er_gym.envs.actions import ACTIONS, INDEX, understand
 from er_gym.envs.embodied_env import EmbodiedEnv
 
 
@@ -76,3 +77,50 @@ def test_another_suite_is_said(collection: Collection, tmp_path: Path) -> None:
     other.write(collection.trajectories())
     with pytest.raises(ExportError, match=r"are not those that .* was played in"):
         export(other, "minari", tmp_path / "out")
+
+
+def test_a_relative_folder_and_the_environment_that_minari_makes_again(
+    collection: Collection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    export(collection, "minari", Path("out"))
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "out"))
+    dataset = minari.load_dataset("er-gym/train-v0")
+    env = dataset.recover_environment()
+    assert isinstance(env.unwrapped, EmbodiedEnv)
+    (episode,) = dataset.iterate_episodes([0])
+    (about,) = dataset.storage.get_episode_metadata([0])
+    assert env.observation_space == dataset.observation_space
+    obs, _ = env.reset(seed=int(about["seed"]), options={"task": str(about["task"])})
+    assert np.array_equal(obs["state"], episode.observations["state"][0])
+    obs, *_ = env.step(int(episode.actions[0]))
+    assert np.array_equal(obs["state"], episode.observations["state"][1])
+    env.close()
+
+
+def test_minari_collects_in_the_environment_with_its_info(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("jax", reason="Minari's collector needs JAX")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    env = minari.DataCollector(
+        gymnasium.make("ER-SinglePickup-v0", obs_mode="state+text"), record_infos=True
+    )
+    told = []
+    for last in ("end", "open Fridge"):  # Minari cuts the second
+        told.append([env.reset(seed=3)[1]])
+        for said in ("observe", "navigate to Fridge", last):
+            action, _ = understand(said)
+            told[-1].append(env.step(INDEX[action])[4])
+    dataset = env.create_dataset("er-gym/collected-v0", algorithm_name="by hand")
+    env.close()
+    for episode, infos in zip(minari.load_dataset("er-gym/collected-v0"), told, strict=True):
+        assert episode.infos.keys() == infos[0].keys()
+        for name, column in episode.infos.items():
+            values = [one.decode() if isinstance(one, bytes) else one for one in column]
+            assert len(values) == 4
+            for value, info in zip(values, infos, strict=True):
+                assert np.array_equal(value, info[name]), name
+    again = dataset.recover_environment()
+    assert isinstance(again.unwrapped, EmbodiedEnv)
+    again.close()
