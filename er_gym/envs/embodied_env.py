@@ -27,6 +27,7 @@ from er_gym.envs.perception import SENSORS
 from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.reset_options import checked_options
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
+from er_gym.envs.window import Window
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import types_named
 from er_gym.thor import BACKENDS, RENDER_DEVICES, check_size, make_controller
@@ -141,6 +142,10 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     - ``step_penalty``, ``illegal_penalty``: 0 or more, see Rewards.
     - ``render_device``: the device that the embedded engine draws with, the same for all
       environments of a process: ``"cpu"``, or ``"gpu"`` on a machine that has one with EGL.
+    - ``render_mode``: what :meth:`render` returns: ``"rgb_array"``, the agent's view as (height,
+      width, 3) uint8; ``"ansi"``, the room, the pose, what the agent sees and holds and the last
+      feedback, in words; ``"human"``, nothing: ``reset`` and ``step`` show a window (extra
+      ``render``).
     - ``annotate``: write the object types into the pictures, as set-of-marks prompting does.
     - ``faults``: the rate from 0 to 1 at which actions go wrong, or a rate for each kind, such as
       ``{"navigate": 0.2, "open": 0.1}`` (:mod:`er_gym.envs.faults`).
@@ -149,7 +154,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     - v0: the first version.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012  (Gymnasium's own)
+    metadata = {"render_modes": ["ansi", "human", "rgb_array"], "render_fps": 1}  # noqa: RUF012  (Gymnasium's own)
 
     def __init__(
         self,
@@ -218,6 +223,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             annotate=annotate,
         )
         self.render_mode = render_mode
+        self._window = Window("er-gym")
         self._controller_arguments: dict[str, Any] = {
             "width": width,
             "height": height,
@@ -261,7 +267,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         with self._lock:
             super().reset(seed=seed)
             task = self._choose(**checked)
-            return self._begin(task, self._faults_with(seed), outer_step_limit(self))
+            answer = self._begin(task, self._faults_with(seed), outer_step_limit(self))
+            self._show()
+            return answer
 
     def set_faults(self, faults: Faults, *, seed: int | None = None) -> None:
         """Set the faults of the episodes that ``reset`` begins from now on.
@@ -288,7 +296,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                 raise ResetNeeded(
                     f"the episode is over ({episode.end_reason}): call reset() before step()"
                 )
-            return self._do(episode, action)
+            answer = self._do(episode, action)
+            self._show()
+            return answer
 
     def action_masks(self) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
@@ -319,10 +329,14 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             # Pickling is nine times as quick as deepcopy, and metadata are plain data.
             return pickle.loads(pickle.dumps(objects))  # type: ignore[no-any-return]
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """The agent's view, (height, width, 3) uint8, with ``render_mode="rgb_array"``.
+    def render(self) -> NDArray[np.uint8] | str | None:  # type: ignore[override]
+        """What ``render_mode`` asks for; see Arguments.
 
-        The array is a copy that the caller may change.
+        An array is a copy that the caller may change.
+
+        Raises:
+            ResetNeeded: no episode has begun.
+            gymnasium.error.Error: a window cannot be opened.
         """
         with self._lock:
             episode = self._current("render()")
@@ -332,12 +346,17 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                     "make it with render_mode='rgb_array'"
                 )
                 return None
-            if episode.perception.frame is None:
-                headless, self._controller.headless = self._controller.headless, False
-                frame = self._controller.step(action="Pass").frame
-                self._controller.headless = headless
-                episode.perception = replace(episode.perception, frame=frame)
-            return np.array(episode.picture(episode.perception))
+            if self.render_mode == "ansi":
+                return episode.in_words()
+            picture = episode.drawn()
+            if self.render_mode == "human":
+                self._window.show(picture, self.metadata["render_fps"])
+                return None
+            return picture
+
+    def _show(self) -> None:
+        if self.render_mode == "human":
+            self.render()
 
     def close(self) -> None:
         """Stop the controller, and the generator if there is one; ``reset`` opens them again."""
@@ -346,6 +365,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
                 self._controller.stop()
                 self._controller = None
             self._no_episode = _CLOSED
+            self._window.close()
             live, self._generator = self._generator, None
             getattr(live, "close", lambda: None)()
 

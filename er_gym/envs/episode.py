@@ -8,7 +8,7 @@ and rewards.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -20,7 +20,7 @@ from er_gym.envs.actions import Action, AnyAction
 from er_gym.envs.faults import FaultPlan, FaultyActionHandler
 from er_gym.envs.info import REPEATED, Details, Info, LegalActions
 from er_gym.envs.legality import KnownTypes
-from er_gym.envs.observations import MAX_REPEATS, Memory, Observation, Situation, goal_row
+from er_gym.envs.observations import MAX_REPEATS, Memory, Observation, Situation, goal_row, text_of
 from er_gym.envs.perception import Perception
 from er_gym.envs.protocol import EpisodeProtocol
 from er_gym.tasks import verbs
@@ -338,6 +338,21 @@ class Episode:
         for kind in observations.values():
             entries.update(kind.info(situation))
         return {name: kind.build(situation) for name, kind in observations.items()}, entries
+
+    def drawn(self) -> NDArray[np.uint8]:
+        """The agent's view, a copy; it is drawn now if no observation needs it."""
+        if self.perception.frame is None:
+            headless, self._controller.headless = self._controller.headless, False
+            frame = self._controller.step(action="Pass").frame
+            self._controller.headless = headless
+            self.perception = replace(self.perception, frame=frame)
+        return np.array(self.picture(self.perception))
+
+    def in_words(self) -> str:
+        """Where the agent is, what it sees, holds and can do, and the last feedback."""
+        pose = self.perception.pose
+        where = f"You are in {self.task.scene}, at x {pose.x:.2f} m, z {pose.z:.2f} m"
+        return f"{where}, and look to {pose.rotation % 360:.0f}°.\n{text_of(self._situation)}"
 
     @property
     def details(self) -> Details:

@@ -292,7 +292,8 @@ def _plain(text: str) -> str:
     return _OTHER.sub("?", text.translate(_LOOKALIKES))[:_TEXT_LENGTH]
 
 
-def _text(situation: Situation) -> str:
+def text_of(situation: Situation) -> str:
+    """The observation ``text``."""
     perception = situation.perception
     lines = (
         f"Task: {situation.instruction}",
@@ -422,7 +423,7 @@ OBSERVATIONS: Registry[Observation] = Registry(
         ),
         "text": Observation(
             lambda width, height: TextSpace(_TEXT_LENGTH, min_length=1, charset=_CHARACTERS),
-            _text,
+            text_of,
         ),
     },
     expected=f"an {__name__}.Observation",

@@ -48,7 +48,8 @@ class SharedTexts(Sequence[str]):
     def __getitem__(self, place: int | slice) -> str | tuple[str, ...]:
         if isinstance(place, slice):
             return tuple(self[k] for k in range(len(self))[place])
-        return self._memory[place].tobytes().partition(b"\0")[0].decode("ascii")
+        characters: bytes = self._memory[place].tobytes()
+        return characters.partition(b"\0")[0].decode("ascii")
 
     def __deepcopy__(self, memo: Any) -> tuple[str, ...]:
         return tuple(self)
