@@ -154,7 +154,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     - v0: the first version.
     """
 
-    metadata = {"render_modes": ["ansi", "human", "rgb_array"], "render_fps": 1}  # noqa: RUF012  (Gymnasium's own)
+    metadata: dict[str, Any] = {"render_modes": ["ansi", "human", "rgb_array"], "render_fps": 1}  # noqa: RUF012  (Gymnasium's own)
 
     def __init__(
         self,
@@ -329,7 +329,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             # Pickling is nine times as quick as deepcopy, and metadata are plain data.
             return pickle.loads(pickle.dumps(objects))  # type: ignore[no-any-return]
 
-    def render(self) -> NDArray[np.uint8] | str | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | str | None:
         """What ``render_mode`` asks for; see Arguments.
 
         An array is a copy that the caller may change.

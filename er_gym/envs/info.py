@@ -171,7 +171,7 @@ def names(mask: NDArray[np.int8]) -> tuple[str, ...]:
     Args:
         mask: (T,), not 0 for each type.
     """
-    return type_names(mask)
+    return type_names(mask.astype(bool))
 
 
 def action_of(info: Mapping[str, Any]) -> Action | None:

@@ -146,7 +146,7 @@ class Blinkered:
     obs_mode = "text"
     told = frozenset(
         {
-            *("visible", "held", "navigable", "interactable", "legal", "action_mask"),
+            *("visible_mask", "navigable_mask", "interactable_mask", "action_mask", "held"),
             *("action_success", "feedback", "steps", "max_steps"),
         }
     )

@@ -7,8 +7,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import cv2
 import gymnasium
+import imageio_ffmpeg
 import numpy as np
 import pytest
 import torch
@@ -262,11 +262,9 @@ def test_what_does_not_apply_to_vectors_refuses(name: str) -> None:
 
 
 def frames_of(video: Path) -> list[Any]:
-    reader = cv2.VideoCapture(str(video))
-    frames = []
-    while (read := reader.read())[0]:
-        frames.append(read[1])
-    return frames
+    reader = imageio_ffmpeg.read_frames(str(video))
+    width, height = next(reader)["size"]
+    return [np.frombuffer(frame, np.uint8).reshape(height, width, 3) for frame in reader]
 
 
 def test_a_video_shows_every_step_of_the_episode(tmp_path: Path) -> None:
@@ -283,7 +281,7 @@ def test_a_video_shows_every_step_of_the_episode(tmp_path: Path) -> None:
     frames = frames_of(video)
     assert len(frames) == len(shown)
     for frame, picture_ in zip(frames, shown, strict=True):
-        assert np.abs(frame[..., ::-1].astype(int) - picture_).mean() < 12  # the codec loses some
+        assert np.abs(frame.astype(int) - picture_).mean() < 12  # the codec loses some
     assert np.abs(shown[0].astype(int) - shown[1]).mean() > 24
 
 
