@@ -42,7 +42,15 @@ from inspect_ai.tool import ToolFunction, ToolInfo
 from inspect_ai.util import JSONSchema
 
 from agents.vlm.agent import VLMAgent
-from agents.vlm.chat import Message, ModelError, Part, Picture, Reply, Usage
+from agents.vlm.chat import (
+    ConversationRefused,
+    Message,
+    ModelError,
+    Part,
+    Picture,
+    Reply,
+    Usage,
+)
 from agents.vlm.clients.decision_schema import REQUEST_FIELDS
 from agents.vlm.factory import load_settings
 from agents.vlm.matching import Matcher
@@ -51,6 +59,7 @@ from agents.vlm.settings import AgentSettings
 from benchmarks.inspect_secrets import without_secrets
 from benchmarks.scoring.metrics import METRICS, score_episode
 from benchmarks.scoring.scorers import CORRECTED
+from er_gym.rollout.causes import CONTEXT, count_causes
 from er_gym.rollout.env_pool import EnvPool
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
@@ -185,12 +194,12 @@ class _ReplyExchange:
 
     Attributes:
         questions: the conversation and seed of each reply that an agent waits for; None at the end.
-            answers: the replies; None if there will be no reply.
+            answers: the replies, or why this conversation gets none; None if there will be none.
     """
 
     def __init__(self) -> None:
         self.questions: SimpleQueue[tuple[Sequence[Message], int] | None] = SimpleQueue()
-        self.answers: SimpleQueue[Reply | None] = SimpleQueue()
+        self.answers: SimpleQueue[Reply | ConversationRefused | None] = SimpleQueue()
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
         """The next turn, as :class:`agents.vlm.chat.Client` has it."""
@@ -198,6 +207,8 @@ class _ReplyExchange:
         answer = self.answers.get()
         if answer is None:
             raise ModelError("Inspect has ended the sample")
+        if isinstance(answer, ConversationRefused):
+            raise answer
         return answer
 
     def close(self) -> None:
@@ -219,8 +230,8 @@ class _Conversation:
         self._known: list[tuple[Message, ChatMessage]] = []
         self._said: ChatMessageAssistant | None = None
 
-    async def reply(self, messages: Sequence[Message], seed: int) -> Reply:
-        """The model's next turn.
+    async def reply(self, messages: Sequence[Message], seed: int) -> Reply | ConversationRefused:
+        """The model's next turn, or why this conversation gets none: it is too long.
 
         Raises:
             ModelError: there is none.
@@ -234,6 +245,12 @@ class _Conversation:
         output = await self._model.generate(sent, **how)
         if not output.choices:
             raise ModelError(f"{self._model} gave no reply: {output.error or 'no choices'}")
+        if output.stop_reason == "model_length":
+            why = output.error or output.completion or "no words"
+            return ConversationRefused(
+                f"{self._model}: the conversation is too long: {' '.join(why.split())[:400]}",
+                CONTEXT,
+            )
         self._said = output.message
         self._state.messages.append(output.message)
         self._state.output = output
@@ -344,7 +361,10 @@ def episode_scores() -> Scorer:
         return Score(
             value={metric: float(getattr(result, metric)) for metric in METRICS},
             answer="; ".join(step.text for step in record.steps[1:]),
-            explanation=(record.error or f"ended by {record.end_reason}") + missing + unmet,
+            explanation=(record.error or record.gave_up or f"ended by {record.end_reason}")
+            + missing
+            + unmet,
+            metadata={"causes": [each.sentence() for each in count_causes([record])]},
         )
 
     return score

@@ -105,7 +105,7 @@ class DecidingAgent:
         recorder.think(now, thoughts)
         if decision.reply is not None:
             recorder.pay([decision.reply])
-        return Decision(decision.action, spoken(thoughts), decision.reply)
+        return Decision(decision.action, spoken(thoughts), decision.reply, causes=decision.causes)
 
     def attachments(self, episode: EpisodeRecord, stem: str) -> dict[str, bytes]:
         """The pictures and the trajectory, by path; empty if the episode crashed."""

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from agents.vlm.chat import LEFT_OUT, Client, Message, Part, Picture, Reply, model_reply
+from agents.vlm.chat import Client, ConversationRefused, Message, Picture, Reply, model_reply
+from agents.vlm.history import Limits, pictures_in, with_last_pictures
 from agents.vlm.matching import Matcher
 from agents.vlm.parsing import ParsedReply, parse
 from agents.vlm.parsing.vocabulary import DECISION
@@ -19,16 +20,20 @@ from agents.vlm.record import (
     PictureRecord,
     RoundRecord,
     ThoughtRecord,
+    TrimmedRecord,
     reply_fields,
     settings_to_record,
 )
 from agents.vlm.settings import AgentSettings
+from agents.vlm.shortcomings import causes_of
 from er_gym.data.dialects import shows_anew
 from er_gym.data.scene_text import Perceived
 from er_gym.envs.actions import NO_ACTION, Action, applies
+from er_gym.envs.actions import parse as read_action
 from er_gym.envs.info import detail, names
 from er_gym.envs.observations import text_without_task
 from er_gym.rollout.agent import Decision, check_observation
+from er_gym.rollout.causes import CONTENT, TRIMMED
 from er_gym.rollout.records import PERSON, By, EpisodeRecord
 from er_gym.rollout.run_directory import CONVERSATIONS, PICTURES
 from er_gym.tasks import verbs
@@ -41,8 +46,10 @@ _AHEAD = "ahead"
 class VLMAgent:
     """Plays episodes one after another and keeps the conversation of the last one.
 
-    Messages never change once they are sent, so that a server can reuse its prefix cache. The only
-    exception: pictures beyond ``settings.pictures.keep`` are left out.
+    Messages never change once they are sent, so that a server can reuse its prefix cache. There are
+    two exceptions. Pictures beyond ``settings.pictures.keep`` are left out. Where the conversation
+    is over a limit of the server and ``settings.trims``, so are as many of the oldest pictures and
+    words as it takes (:mod:`agents.vlm.history`), which the record states.
 
     Args:
         client: asks the model.
@@ -87,16 +94,31 @@ class VLMAgent:
         self._perceived: Perceived | None = None
         self._last_picture = b""
         self._last_action: Action | None = None
+        self._limits = Limits()
+        self._over_limit = ""  # the words of the first refusal
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """Tell the model the result of its last action, and return what it decides.
 
         Raises:
             ModelError: the model gives no reply in this episode.
+            ConversationRefused: nor would it if the episode were played again.
             CannotGoOn: no later request can succeed either.
         """
         self._messages.append(self._turn(obs, info))
-        return self._read(self._client.reply(self._history(), self._seed), info)
+        return self._read(self._reply(), info)
+
+    def _reply(self) -> Reply:
+        """The model's reply, to less of the history if the whole is refused."""
+        while True:
+            try:
+                return self._client.reply(self._history(), self._seed)
+            except ConversationRefused as refusal:
+                tighter = self._limits.tighter(self._shown(), refusal.cause)
+                if not self._settings.trims or refusal.cause == CONTENT or tighter is None:
+                    raise
+                self._limits = tighter
+                self._over_limit = self._over_limit or str(refusal)
 
     def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Somebody else decides this step. The conversation goes on as if the model had said so."""
@@ -105,10 +127,11 @@ class VLMAgent:
 
     def _read(self, reply: Reply, info: Mapping[str, Any], by: By = "") -> Decision:
         """Read a reply, and add it to the conversation."""
+        trimmed = None if by else self._trimmed()
         parsed = parse(reply.text, reply.call, self._settings.decide)
         action, problem, matched = self._resolve(parsed, info)
         self._last_action = action
-        said = "\n".join(filter(None, (reply.text, reply.call))) or "(nothing)"
+        said = _said(reply)
         self._messages.append(Message("assistant", (said,), reply.reasoning))
         thoughts = [ThoughtRecord(kind=each.kind, text=each.text) for each in parsed.thoughts]
         self._rounds.append(
@@ -121,11 +144,14 @@ class VLMAgent:
                 rules=list(parsed.rules),
                 problem=problem,
                 by=by,
+                trimmed=trimmed,
                 **reply_fields(reply),
             )
         )
+        causes = (*causes_of(reply, parsed), *(TRIMMED,) * bool(trimmed))
         thought = "\n".join(f"{each.kind}: {each.text}" for each in parsed.thoughts)
-        return Decision(action or _unreadable_action(parsed, said), thought, model_reply(reply))
+        decided = action or _unreadable_action(parsed, said)
+        return Decision(decided, thought, model_reply(reply), causes=causes)
 
     @property
     def messages(self) -> Sequence[Message]:
@@ -216,11 +242,33 @@ class VLMAgent:
 
     def _history(self) -> list[Message]:
         """The messages of the next request."""
+        messages = self._shown()
+        if self._limits == Limits():
+            return messages
+        done = {each.message: each.action for each in self._rounds if each.action}
+        form = self._settings.decide
+        return self._limits.applied(
+            messages, {place: _said(_in_form(action, form)) for place, action in done.items()}
+        )
+
+    def _shown(self) -> list[Message]:
+        """The messages as the settings have them, without regard to limits of the server."""
         messages = self._messages
         if not self._settings.reasoning.in_history:
             messages = [replace(message, reasoning="") for message in messages]
         keep = self._settings.pictures.keep
-        return messages if keep is None else _with_last_pictures(messages, keep)
+        return messages if keep is None else with_last_pictures(messages, keep)
+
+    def _trimmed(self) -> TrimmedRecord | None:
+        """What the last request left out since the server has a limit; None for nothing."""
+        if self._limits == Limits():
+            return None
+        whole, sent = self._shown(), self._history()
+        return TrimmedRecord(
+            pictures=pictures_in(whole) - pictures_in(sent),
+            messages=self._limits.shortened,
+            why=self._over_limit,
+        )
 
     # -- replies of the model --------------------------------------------------------------------
 
@@ -272,14 +320,21 @@ class VLMAgent:
             completion_tokens=sum(each.completion_tokens for each in rounds),
             cost=sum(each.cost for each in rounds),
             estimated=any(each.estimated for each in rounds),
-            error=episode.error,
+            error=episode.error or episode.gave_up,
         )
         files[f"{CONVERSATIONS}/{stem}.json"] = (record.model_dump_json(indent=1) + "\n").encode()
         return files
 
 
-def _in_form(action: Action, decide: Decide) -> Reply:
+def _said(reply: Reply) -> str:
+    """The words of a reply, as the conversation has them."""
+    return "\n".join(filter(None, (reply.text, reply.call))) or "(nothing)"
+
+
+def _in_form(action: Action | str, decide: Decide) -> Reply:
     """The reply by which a model would decide on an action, without a thought."""
+    if isinstance(action, str):
+        action = read_action(action) or Action(action)
     fields = json.dumps({"action": action.verb, "object": action.object_type})
     texts = {"tags": f"<{DECISION}>{action}</{DECISION}>", "json": fields, "tools": ""}
     return Reply(texts[decide], call=fields if decide == "tools" else "", finish="")
@@ -313,18 +368,3 @@ def _message_record(message: Message, folder: str, files: dict[str, bytes]) -> M
             PictureRecord(path=path, digest=part.digest, width=part.width, height=part.height)
         )
     return MessageRecord(role=message.role, parts=parts, reasoning=message.reasoning)
-
-
-def _with_last_pictures(messages: Sequence[Message], keep: int) -> list[Message]:
-    """The messages with the pictures of the last message and the ``keep`` pictures before it."""
-    *before, last = messages
-    left = sum(isinstance(part, Picture) for message in before for part in message.parts) - keep
-    shown = []
-    for message in before:
-        parts: list[Part] = []
-        for part in message.parts:
-            gone = isinstance(part, Picture) and left > 0
-            left -= gone
-            parts.append(LEFT_OUT if gone else part)
-        shown.append(replace(message, parts=tuple(parts)))
-    return [*shown, last]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, Protocol, TypeAlias
 
-from er_gym.rollout.agent import ModelReply
+from er_gym.rollout.agent import CannotFinish, ModelReply
 
 Role = Literal["system", "user", "assistant"]
 
@@ -37,6 +37,8 @@ class Picture:
 Part: TypeAlias = str | Picture
 LEFT_OUT = "[picture no longer shown]"
 """The text that replaces an earlier picture that is not sent again."""
+CUT_SHORT = "[words no longer shown]"
+"""The text that replaces the words of an earlier turn that is not sent again."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,7 @@ class Reply:
         usage: token counts.
         cost: US dollars, by the prices of the settings; 0 without prices.
         finish: the finish reason as the server gives it: ``stop``, ``length``, ``content_filter`` …
+        refused: whether the text is a refusal, as the server says.
         model: the model's name as the server gives it.
         seconds: how long the request took, all tries included.
         from_cache: whether the reply cache had it; an earlier request paid for it.
@@ -112,6 +115,7 @@ class Reply:
     model: str = ""
     seconds: float = 0.0
     from_cache: bool = False
+    refused: bool = False
 
 
 def model_reply(reply: Reply) -> ModelReply:
@@ -130,6 +134,11 @@ class ModelError(Exception):
     """A request failed after all tries. The episode ends; it can be played again."""
 
 
+class ConversationRefused(ModelError, CannotFinish):
+    """This conversation gets no reply, now or later, and others do: it is too long, has too many
+    pictures, or its content is refused. ``cause`` says which."""
+
+
 class Client(Protocol):
     """Asks a model for the next turn of a conversation. Many threads may call it at once."""
 
@@ -142,6 +151,7 @@ class Client(Protocol):
 
         Raises:
             ModelError: this request failed; others may succeed.
+            ConversationRefused: this conversation would get no reply later, either.
             CannotGoOn: no later request can succeed: the server refuses the key, the model does
                 not exist, or the budget is spent.
         """

@@ -42,8 +42,13 @@ _NOT_COMPARED: Mapping[str, Any] = {
 """Settings that change when and where a model answers, but not its replies. The digest stands for
 the prompts."""
 
-_ADDED = {"model_min_pixels": None, "model_max_pixels": None, "noise": False}
-"""Settings of pictures that older versions did not have, with what those did."""
+_ADDED: Sequence[tuple[str, str, Any]] = (
+    ("pictures", "model_min_pixels", None),
+    ("pictures", "model_max_pixels", None),
+    ("pictures", "noise", False),
+    ("history", "trim", None),
+)
+"""Settings that older versions did not have, with what those did."""
 
 
 def load_settings(
@@ -136,7 +141,9 @@ class AgentFactory:
 def comparable_settings(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:
     """The settings that decide an agent's replies. Two runs are comparable if these are equal."""
     kept = settings.model_dump(mode="json", exclude=dict(_NOT_COMPARED))
-    for name, before in _ADDED.items():  # so that older runs, without them, can be continued
-        if kept["pictures"][name] is before:
-            del kept["pictures"][name]
+    for group, name, before in _ADDED:  # so that older runs, without them, can be continued
+        if kept[group][name] is before:
+            del kept[group][name]
+            if not kept[group]:
+                del kept[group]
     return {**without_secrets(settings, kept), "prompts_digest": prompts_digest}

@@ -52,6 +52,20 @@ class ThoughtRecord(_Record):
     text: str
 
 
+class TrimmedRecord(_Record):
+    """What of the conversation a request left out, since the whole was over a limit of the server.
+
+    Attributes:
+        pictures: how many of the oldest pictures.
+        messages: of how many messages after the task the words, the oldest first.
+        why: what the server said of the whole.
+    """
+
+    pictures: int
+    messages: int
+    why: str
+
+
 class RoundRecord(_Record, GrownRecord):
     """A reply and its result.
 
@@ -71,9 +85,11 @@ class RoundRecord(_Record, GrownRecord):
         kept: whether the reply came from the reply cache; an earlier request paid for it.
         by: who decided in place of the model, so that no model wrote the reply; ``""`` if nobody
             did.
+        trimmed: what the request left out, since the whole conversation was over a limit of the
+            server; None for nothing.
     """
 
-    added = ("by",)
+    added = ("by", "trimmed")
 
     message: int
     thoughts: list[ThoughtRecord] = []
@@ -95,6 +111,7 @@ class RoundRecord(_Record, GrownRecord):
     model: str = ""
     kept: bool = False
     by: By = ""
+    trimmed: TrimmedRecord | None = None
 
     @property
     def usage(self) -> Usage:
@@ -120,7 +137,7 @@ class ConversationRecord(_Record):
         rounds: one for each reply.
         prompt_tokens, completion_tokens, cost: sums over all rounds, cached replies included.
         estimated: whether some of these are upper bounds.
-        error: the error that ended the episode, in one line; "" if none did.
+        error: the error or the refusal that ended the episode, in one line; "" if none did.
     """
 
     format: Literal["er-gym/conversation/1"] = "er-gym/conversation/1"

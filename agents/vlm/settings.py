@@ -136,6 +136,19 @@ class Reasoning(_Settings):
     in_history: bool = False
 
 
+class History(_Settings):
+    """What of the conversation is sent again with each turn.
+
+    Attributes:
+        trim: whether the oldest pictures, and after them the oldest words, are left out where the
+            whole conversation is over a limit of the server: the length of its context, or a number
+            of pictures. Otherwise the episode ends there. None for yes if the model is shown
+            pictures, which fill a context soon. The record of each reply says what was left out.
+    """
+
+    trim: bool | None = None
+
+
 class Matching(_Settings):
     """How a name that a model writes is matched with an object type.
 
@@ -241,10 +254,17 @@ class AgentSettings(_Settings):
     pictures: Pictures = Pictures()
     sampling: Sampling = Sampling()
     reasoning: Reasoning = Reasoning()
+    history: History = History()
     matching: Matching = Matching()
     prices: Prices = Prices()
     server: Server = Server()
     local: Local = Local()
+
+    @property
+    def trims(self) -> bool:
+        """Whether a conversation that is over a limit is shortened (``history.trim``)."""
+        trim = self.history.trim
+        return self.sees == "pictures" if trim is None else trim
 
     @property
     def obs_mode(self) -> str:

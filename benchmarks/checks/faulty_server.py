@@ -16,10 +16,13 @@ from email.utils import formatdate
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
+from benchmarks.checks.refusals import REFUSALS, Refused
+
 SAID = "<DecisionMaking>end</DecisionMaking>"
 KEY = "sk-check-0a1b2c3d4e5f6a7b"
 DELETE = object()
 _DEEP = 100_000
+_PROBE = b"Say OK."
 
 
 class Exchange(BaseHTTPRequestHandler):
@@ -133,6 +136,21 @@ _GOOD = json.dumps(completion()).encode()
 _ok = body(_GOOD)
 
 
+def refuses(refused: Refused) -> Fault:
+    """Refuses every conversation but the short one that asks whether the server is there."""
+    content = json.dumps(refused.body).encode()
+
+    def fault(exchange: Exchange) -> None:
+        if _PROBE in exchange.body:
+            with exchange.faulty.lock:
+                exchange.faulty.probed += 1
+            _ok(exchange)
+        else:
+            exchange.send(content, refused.status)
+
+    return fault
+
+
 def _reset(exchange: Exchange) -> None:
     exchange.connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     exchange.connection.close()
@@ -187,7 +205,7 @@ class Case:
 
 
 _REPLY, _NONE = frozenset({"reply"}), frozenset({"failed", "stopped"})
-_STOPPED = frozenset({"stopped"})
+_STOPPED, _FAILED = frozenset({"stopped"}), frozenset({"failed"})
 _NO_CHOICES: list[Any] = [None, [], {}, "x", 5, [None], [5], [{}]]
 _NO_CHOICES += [[{"message": None}], [{"message": "x"}]]
 _NO_WORDS: list[Any] = [5, True, {}, [], [5]]
@@ -297,6 +315,10 @@ CASES: list[Case] = [
         for status in (301, 307, 308)
         for place in ("/v1/chat/completions", "http://127.0.0.1:1/x", "file:///etc/passwd", "")
     ),
+    # refusals of one conversation: none of them stops the run
+    *(Case(f"refuses, {each.status}: {each.words[:60]}", refuses(each), _FAILED) for each in REFUSALS),
+    Case("refuses, 400: no", refuses(Refused("request", 400, "no")), _FAILED),
+    Case("refuses, 500: no", refuses(Refused("request", 500, "no")), _FAILED),
     # the key, again
     Case("repeats the key in a reply", says(choices__0__message__content=f"{SAID} {KEY}", model=KEY), _REPLY),
     Case("repeats the key in its thoughts", says(choices__0__message__reasoning=KEY, choices__0__finish_reason=KEY), _REPLY),
@@ -337,6 +359,7 @@ class FaultyServer:
         good_first: how many requests get a good answer first.
         count: the requests that came.
         accepted: the whole answers of status 2xx that were sent.
+        probed: how many of them answered a question whether the server is there.
         url: for ``server.base_url``.
     """
 
@@ -344,6 +367,7 @@ class FaultyServer:
     good_first: int = 0
     count: int = 0
     accepted: int = 0
+    probed: int = 0
     url: str = ""
     lock: threading.Lock = field(default_factory=threading.Lock)
     closing: threading.Event = field(default_factory=threading.Event)

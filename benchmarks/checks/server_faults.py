@@ -41,6 +41,7 @@ from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.run_directory import SPENDING
 
 _KEY_FROM = "ER_GYM_CHECK_KEY"
+_FAILED_TRIES = ("retry", "failed", "refused", "probe", "stopped")
 _TIMEOUT = 0.7
 _IN_TIME = 14.0  # seconds for three requests of two tries each, on a busy machine
 _AT_ONCE, _RUNS_AT_ONCE = 6, 2
@@ -151,7 +152,7 @@ def _problems(case: Case, server: FaultyServer, directory: Path) -> Iterator[str
     kept = _lines(directory / "server-events.jsonl")
     events = [ServerEvent.model_validate_json(line) for line in kept]
     failed = server.count - ends.count("reply")
-    said = sum(each.event in ("retry", "failed", "stopped") for each in events)
+    said = sum(each.event in _FAILED_TRIES for each in events)
     if said != failed:
         yield f"{failed} tries failed, and {said} were reported: {[str(each) for each in events]}"
     told += [str(each) for each in server_events]
@@ -180,7 +181,7 @@ def _wrong_reply(reply: Reply) -> Iterator[str]:
 
 def _wrong_ledger(directory: Path, server: FaultyServer, replies: int) -> Iterator[str]:
     entries = [json.loads(line) for line in _lines(directory / SPENDING)]
-    if sum(not each["rejected"] for each in entries) != replies:
+    if sum(not each["rejected"] for each in entries) != replies + server.probed:
         yield f"{replies} replies, and in the ledger: {entries}"
     if len(entries) < server.accepted:
         yield f"{server.accepted} answers were accepted and {len(entries)} are in the ledger"

@@ -42,12 +42,34 @@ class Decision:
         thought: the agent's reasoning; it goes into the episode's record, not to the environment.
         reply: the cost of the model's reply, if the agent asks a model.
         by: who decided in place of the agent; ``""`` if nobody did.
+        causes: what was amiss with the reply, by names of :data:`er_gym.rollout.causes.CAUSES`.
     """
 
     action: Action | str | int
     thought: str = ""
     reply: ModelReply | None = None
     by: By = ""
+    causes: tuple[str, ...] = ()
+
+
+class CannotFinish(Exception):
+    """The agent cannot finish this episode, and it would end in the same way if it were played
+    again: a conversation does not fit into the model's context, a filter refuses it.
+
+    The episode is over without success, its record has the cause, and the run goes on.
+
+    Args:
+        words: what happened, in one line.
+        cause: the name of the cause (:data:`er_gym.rollout.causes.CAUSES`); "" for none of these.
+    """
+
+    def __init__(self, words: str, cause: str = "") -> None:
+        super().__init__(words, cause)
+        self.cause = cause
+
+    def __str__(self) -> str:
+        """What happened."""
+        return str(self.args[0])
 
 
 class CannotGoOn(Exception):

@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 from er_gym.envs.info import with_details
-from er_gym.rollout.agent import Agent, CannotGoOn, Decision
+from er_gym.rollout.agent import Agent, CannotFinish, CannotGoOn, Decision
 from er_gym.rollout.events import EpisodeBegun, EventListener, Reply, StepDone, ignore_event
 from er_gym.rollout.loop import transitions
 from er_gym.rollout.processes import Terminated
-from er_gym.rollout.records import ERROR, EpisodeRecord, StepRecord, record_episode
+from er_gym.rollout.records import ERROR, GAVE_UP, EpisodeRecord, StepRecord, record_episode
 from er_gym.tasks.task import Task
 from er_gym.tasks.verbs import END, INIT
 
@@ -56,7 +56,8 @@ def play_episode(
 
     An exception in the agent or the environment does not leave this function. The record then holds
     the steps before it, and its ``error`` says what was raised and where. Do not use the
-    environment again after that.
+    environment again after that. An agent that raises
+    :class:`~er_gym.rollout.agent.CannotFinish` ends the episode without success; that is no error.
 
     Args:
         env: an environment in any state; it is reset to the task.
@@ -75,6 +76,7 @@ def play_episode(
     steps: list[StepRecord] = []
     info: Mapping[str, Any] = {}
     error = ""
+    gave_up: CannotFinish | None = None
     start = time.perf_counter()
     try:
         obs, told = env.reset(seed=seed, options={"task": task})
@@ -90,6 +92,8 @@ def play_episode(
                 steps.append(_appended(steps[-1]))
     except (CannotGoOn, Terminated):
         raise
+    except CannotFinish as caught:
+        gave_up = caught
     except (Exception, SystemExit) as caught:  # other people's code must not end the run
         error = one_line(caught)
     return record_episode(
@@ -98,11 +102,13 @@ def play_episode(
         seed=seed,
         max_steps=info.get("max_steps", max_steps),
         steps=steps,
-        success=bool(info.get("success", False)) and not error,
+        success=bool(info.get("success", False)) and not error and gave_up is None,
         goal_unmet=[str(condition) for condition in info.get("unmet", ())],
-        end_reason="" if error else str(info["end_reason"]),
+        end_reason="" if error else GAVE_UP if gave_up else str(info["end_reason"]),
         seconds=time.perf_counter() - start,
         error=error,
+        cause=gave_up.cause if gave_up else "",
+        gave_up=_encodable(" ".join(str(gave_up).split())) if gave_up else "",
     )
 
 
@@ -180,4 +186,5 @@ def _stepped(info: Mapping[str, Any], reward: float, decision: Decision) -> Step
         thought=_encodable(decision.thought),
         text=_encodable(info["action_text"]),
         by=decision.by,
+        causes=list(decision.causes),
     )

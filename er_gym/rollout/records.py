@@ -25,6 +25,8 @@ from er_gym.writing import writable
 
 ERROR = "error"
 """The verb recorded for a reply that named no known action."""
+GAVE_UP = "gave up"
+"""Why an episode ended that the agent could not finish."""
 
 PERSON: Final = "person"
 """Who decided a step in place of the agent."""
@@ -102,9 +104,11 @@ class StepRecord(GrownRecord):
         appended: whether the protocol took the step instead of the agent: the ``end`` that the
             paper's runner appends (:data:`er_gym.envs.protocol.PAPER`).
         by: who decided the step in place of the agent; ``""`` if nobody did.
+        causes: what was amiss with the model's reply, by names of
+            :data:`er_gym.rollout.causes.CAUSES`.
     """
 
-    added = ("by",)
+    added = ("by", "causes")
 
     verb: str
     object_type: Words = ""
@@ -118,6 +122,7 @@ class StepRecord(GrownRecord):
     text: Words = ""
     appended: bool = False
     by: By = ""
+    causes: list[str] = []
 
 
 class EpisodeRecord(GrownRecord):
@@ -136,16 +141,19 @@ class EpisodeRecord(GrownRecord):
         goal_unmet: the conditions of the task's goal that did not hold at ``end``, in words.
         search_targets: the types that the task searches for, empty if it is not a search; None in a
             record that was written before records had this field.
-        end_reason: why it ended, in the environment's words; ``""`` if it crashed.
+        end_reason: why it ended, in the environment's words; :data:`GAVE_UP` if the agent could
+            not finish it; ``""`` if it crashed.
         total_reward: the sum over the steps.
         seconds: wall-clock time.
         error: the error it crashed with, in one line; ``""`` if it did not crash.
         run: in a run directory, the digest of the run's manifest; ``""`` elsewhere, and in records
             written before this field existed.
         sample: which of the task's episodes it is, from 1.
+        cause: of an episode that the agent could not finish, the name of the cause
+            (:data:`er_gym.rollout.causes.CAUSES`), and ``gave_up`` what happened, in one line.
     """
 
-    added = ("sample",)
+    added = ("sample", "cause", "gave_up")
 
     format: Literal["er-gym/episode/1"] = "er-gym/episode/1"
     task_id: str
@@ -167,6 +175,8 @@ class EpisodeRecord(GrownRecord):
     error: Words = ""
     run: str = ""
     sample: int = Field(default=1, ge=1)
+    cause: str = ""
+    gave_up: Words = ""
 
     @property
     def key(self) -> str:
@@ -196,6 +206,8 @@ def record_episode(
     end_reason: str = "",
     seconds: float = 0.0,
     error: str = "",
+    cause: str = "",
+    gave_up: str = "",
 ) -> EpisodeRecord:
     """The record of an episode of a task.
 
@@ -230,4 +242,6 @@ def record_episode(
         total_reward=sum(step.reward for step in steps),
         seconds=seconds,
         error=error,
+        cause=cause,
+        gave_up=gave_up,
     )

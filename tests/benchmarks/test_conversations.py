@@ -144,6 +144,56 @@ def test_a_budget_stops_within_the_replies_under_way(tmp_path: Path) -> None:
     assert_whole(tmp_path, 12)
 
 
+def test_conversations_that_overflow_end_their_episodes_and_not_the_run(tmp_path: Path) -> None:
+    """Three conversations are too long for the server, later a budget ends the run: the same
+    command goes on to the end, and plays none of the three again."""
+    tasks = load_suite("mini").tasks[:8]
+    long = {each.instruction for each in tasks[:3]}
+
+    def answer(messages: list[dict[str, Any]]) -> Any:
+        said = sum(message["role"] == "assistant" for message in messages)
+        if said and any(words in str(messages) for words in long):
+            error = {"message": "maximum context length is 9 tokens", "code": 400}
+            return naughty.Raw({"error": error}, 400)
+        return short(messages)
+
+    with naughty.NaughtyServer(answer) as server:
+        more = ("--suite", "mini", "--limit", "8", "--concurrency", "1", *PRICES)
+        first = bench(server.url, tmp_path, *more, "--max-usd", "0.014")
+        assert first.return_value == 3, first.output
+        assert "the budget is spent" in first.output
+        played = [*RunDirectory.open(tmp_path).episodes()]
+        assert 3 <= len(played) < 8
+        before = server.count
+        rest = bench(server.url, tmp_path, *more)
+        assert rest.return_value == 0, rest.output
+        left = 8 - len(played)
+        assert server.count - before <= left * 3
+    episodes = [*RunDirectory.open(tmp_path).episodes()]
+    gone = {each.instruction: each for each in episodes if each.gave_up}
+    assert set(gone) == long
+    for each in gone.values():
+        assert (each.error, each.end_reason, each.cause) == ("", "gave up", "context")
+        assert "400, maximum context length is 9 tokens" in each.gave_up
+        assert len(each.steps) == 2
+    assert len(episodes) == 8
+
+
+def test_a_run_of_nothing_but_refused_conversations_ends(tmp_path: Path) -> None:
+    """Continued when only refused conversations are left, and in words that nobody knows."""
+
+    def answer(messages: list[dict[str, Any]]) -> Any:
+        if "Say OK." in str(messages[-1]):
+            return "OK"
+        return naughty.Raw({"error": {"message": "computer says no"}}, 400)
+
+    with naughty.NaughtyServer(answer) as server:
+        result = bench(server.url, tmp_path, "--limit", "7")
+    assert result.return_value == 0, result.output
+    causes = [each.cause for each in RunDirectory.open(tmp_path).episodes()]
+    assert causes == ["request"] * 7
+
+
 def test_a_key_that_is_refused_stops_the_run(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
     with naughty.NaughtyServer(script=["401"] * 50) as server:

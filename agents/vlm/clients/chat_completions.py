@@ -152,6 +152,7 @@ def reply_of(completion: Completion) -> Reply:
         reasoning="\n".join(filter(None, (said.reasoning_content or said.reasoning, thought))),
         call=(calls[0].arguments or "") if calls else "",
         finish=(choice.finish_reason or "")[:_LONGEST_WORD],
+        refused=bool(said.refusal) and not said.content,
     )
 
 

@@ -21,7 +21,7 @@ import jinja2
 import torch
 from transformers import DynamicCache
 
-from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
+from agents.vlm.chat import ConversationRefused, Message, Picture, Reply, Usage
 from agents.vlm.clients.batching import CLOSED, Batcher, JobThread
 from agents.vlm.clients.checkpoint import load, one_line
 from agents.vlm.clients.kept_turns import (
@@ -39,6 +39,7 @@ from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.data.pictures import open_picture
 from er_gym.rollout.agent import CannotGoOn
+from er_gym.rollout.causes import CONTEXT, REQUEST
 
 _THINK, _THOUGHT = "<think>", "</think>"
 _SHORT = 32  # tokens
@@ -119,8 +120,8 @@ class LocalClient:
         the sampling; without ``settings.seed`` each reply is sampled anew.
 
         Raises:
-            ModelError: the conversation is too long for the model or for the memory, or a picture
-                cannot be read.
+            ModelError: the conversation is too long for the memory.
+            ConversationRefused: it is too long for the model, or a picture cannot be read.
             CannotGoOn: the model's chat template does not take such conversations, the device
                 fails, or :meth:`close` has been called.
         """
@@ -158,9 +159,10 @@ class LocalClient:
         ids, places = self._with_image_tokens(self._ids(text), grids)
         most = self._settings.sampling.max_tokens
         if len(ids) + most > self._context_length:
-            raise ModelError(
+            raise ConversationRefused(
                 f"the conversation has {len(ids)} tokens, which with sampling.max_tokens {most} is "
-                f"more than the {self._context_length} of {self._name}; lower pictures.keep"
+                f"more than the {self._context_length} of {self._name}; lower pictures.keep",
+                CONTEXT,
             )
         reused = kept.usable(ids, digests, places) if kept else 0
         new = [each for each, place in zip(pictures, places, strict=True) if place >= reused]
@@ -223,7 +225,9 @@ class LocalClient:
                 return_tensors="pt",
             )
         except (OSError, ValueError) as error:
-            raise ModelError(f"a picture cannot be processed: {one_line(error)}") from None
+            raise ConversationRefused(
+                f"a picture cannot be processed: {one_line(error)}", REQUEST
+            ) from None
         return seen["pixel_values"], seen["image_grid_thw"]
 
     def _with_image_tokens(
@@ -235,10 +239,11 @@ class LocalClient:
         if grids is not None:
             counts = (grids.prod(dim=1) // self._image_processor.merge_size**2).tolist()
         if ids.count(self._image_token) != len(counts):
-            raise ModelError(
+            raise ConversationRefused(
                 f"the conversation has {len(counts)} pictures and "
                 f"{ids.count(self._image_token)} places for them; "
-                "no words of it may be the model's own marks"
+                "no words of it may be the model's own marks",
+                REQUEST,
             )
         found: list[int] = []
         places: list[int] = []

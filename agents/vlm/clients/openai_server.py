@@ -10,12 +10,13 @@ import random
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import httpx2
 import openai
 
-from agents.vlm.chat import Message, Reply
+from agents.vlm.chat import ConversationRefused, Message, Picture, Reply
 from agents.vlm.clients.budget import Budget, Entry, Ledger
 from agents.vlm.clients.chat_completions import (
     billed_usage,
@@ -45,6 +46,8 @@ _SEE_TO_IT = (
     "nothing has answered yet: check that the server is up and server.base_url is right, or raise "
     "server.timeout"
 )
+_PROBE = "Say OK."
+"""What a server is asked where it is not clear whether it fails or this conversation does."""
 _LATE_TRIES = 2
 """The most tries of a request that times out: a server may charge for an answer that came too late.
 """
@@ -57,7 +60,9 @@ class OpenAIClient:
     connection, 408, 409, 425, 429, 5xx, and answers that are cut off or empty. Each try takes at
     most ``settings.server.timeout`` seconds from first to last byte. Between tries the client waits
     as long as the server asks, or half a second, one second, two …; if another server is there, it
-    is asked without a wait (:class:`agents.vlm.clients.endpoints.Endpoints`). Each failed try is
+    is asked without a wait (:class:`agents.vlm.clients.endpoints.Endpoints`). Where it is not clear
+    whether the server fails or one conversation does, a short conversation shows it: a server that
+    answers that one does not stop the run. Each failed try is
     reported to ``supervisor``. An answer with status 2xx is entered in the ledger before it is
     checked.
 
@@ -112,6 +117,8 @@ class OpenAIClient:
             with self._endpoints.use() as used:
                 self._check(request, used.endpoint)
                 answer = self._try(used.endpoint, body, request_size, request)
+                if isinstance(answer, Failure) and answer.refuses:
+                    answer = self._judged(answer, messages, request, used)
             if isinstance(answer, Reply):
                 self._endpoints.replied(used)
                 request.answered()
@@ -120,12 +127,15 @@ class OpenAIClient:
             answer = self._endpoints.failed(used, answer, what)
             if answer.fatal:
                 raise self._supervisor.stop(self._with_tries(what, request))
+            if answer.refuses:
+                request.refused(what)
+                raise ConversationRefused(what, answer.refuses)
             late += answer.timed_out
             if not answer.retryable or request.attempt == request.of or late == _LATE_TRIES:
                 what = self._with_tries(what, request)
                 if answer.no_server:
                     raise self._supervisor.stop(f"{what}; {_SEE_TO_IT}, and {AGAIN}")
-                raise request.gave_up(what)
+                raise request.gave_up(what, partial(self._answers, messages, request, what))
             self._pause(answer, what, request)
         raise AssertionError("unreachable")
 
@@ -214,6 +224,44 @@ class OpenAIClient:
             usage=usage,
             cost=cost,
         )
+
+    # -- the server's fault, or this conversation's ------------------------------------------------
+
+    def _judged(
+        self, failure: Failure, messages: Sequence[Message], request: Request, used: Use
+    ) -> Failure:
+        """A refusal of this conversation; fatal if the server refuses a short one as well."""
+        if failure.known and used.endpoint.answered:
+            return failure
+        answer = self._probed(messages, request, used, self._line(failure, used))
+        if isinstance(answer, Reply):
+            return failure
+        if answer.fatal or answer.refuses:
+            fatal = answer.fatal or "every request like this will fail"
+            return replace(failure, refuses="", fatal=fatal)
+        return replace(failure, refuses="")
+
+    def _answers(self, messages: Sequence[Message], request: Request, what: str) -> bool:
+        """Whether a server answers a short conversation, though it gave this one no reply."""
+        with self._endpoints.use() as used:
+            return isinstance(self._probed(messages, request, used, what), Reply)
+
+    def _probed(
+        self, messages: Sequence[Message], request: Request, used: Use, what: str
+    ) -> Reply | Failure:
+        """The answer to a conversation of one short turn, with a picture if this one has some."""
+        request.probing(what)
+        self._check(request, used.endpoint)
+        pictures = [part for each in messages for part in each.parts if isinstance(part, Picture)]
+        least = sorted(pictures, key=lambda picture: len(picture.data))[:1]
+        short = (Message("user", (_PROBE, *least)),)
+        body = self._body(short, request.seed)
+        size = RequestSize.of(body, short, picture_bytes(short), self._fields)
+        answer = self._try(used.endpoint, body, size, request)
+        if isinstance(answer, Reply):
+            self._endpoints.replied(used)
+            request.answered()
+        return answer
 
     # -- between tries -----------------------------------------------------------------------------
 

@@ -33,7 +33,9 @@ _LONGEST_WAIT = 3600.0  # seconds of one wait; threads cannot wait for an infini
 _log = logging.getLogger(__name__)
 
 
-EventName = Literal["retry", "waiting", "failed", "stopped", "aside", "back"]
+EventName = Literal[
+    "retry", "waiting", "failed", "refused", "probe", "stopped", "aside", "back"
+]  # fmt: skip
 
 
 class ServerEvent(BaseModel):
@@ -42,8 +44,10 @@ class ServerEvent(BaseModel):
     Attributes:
         time: ISO 8601 in UTC.
         event: ``retry``: a try failed, and another follows after ``wait`` seconds; ``waiting``: no
-            answer yet; ``failed``: a request was given up; ``stopped``: the run was stopped; of
-            several servers, ``aside``: one is set aside; ``back``: it is back in use.
+            answer yet; ``failed``: a request was given up; ``refused``: one conversation was
+            refused, as it would be again; ``probe``: a request failed, and a short one shows
+            whether others would; ``stopped``: the run was stopped; of several servers, ``aside``:
+            one is set aside; ``back``: it is back in use.
         what: what happened, in one line.
         seed: the episode's seed; None for the whole run.
         attempt, of: the number of the try, and the most tries.
@@ -271,19 +275,36 @@ class Request:
         self._supervisor._failed(self)
         self._supervisor.emit("retry", what, self.seed, self.attempt, of, wait, shown)
 
+    def refused(self, what: str) -> None:
+        """Report that this conversation is refused and others are not."""
+        self._supervisor.emit("refused", what, self.seed, shown=False)
+
+    def probing(self, what: str) -> None:
+        """Report that a try failed and that a short request shows whether others fail as well."""
+        self._supervisor.emit("probe", what, self.seed, shown=False)
+
     def answered(self) -> None:
         """Report a reply."""
         self._supervisor._answered(time.monotonic() - self.began)
 
-    def gave_up(self, what: str) -> ModelError | CannotGoOn:
+    def gave_up(
+        self, what: str, answers: Callable[[], bool] = lambda: False
+    ) -> ModelError | CannotGoOn:
         """The exception to raise after the last try.
 
-        The run stops if the server has refused several requests in a row; otherwise the fault may
-        lie with this request alone.
+        The run stops if the server has refused several requests in a row and answers no other,
+        either; otherwise the fault may lie with these requests alone.
+
+        Args:
+            what: how it failed, in one line.
+            answers: asks the server something else; whether it answers.
         """
         self._supervisor._failed(self)
         try:
             refused = self._supervisor._gave_up(self)
+            if refused and answers():
+                self._supervisor.emit("failed", what, self.seed)
+                return ModelError(what)
         except CannotGoOn as error:
             self._supervisor.emit("stopped", what, self.seed)
             return error

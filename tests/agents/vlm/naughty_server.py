@@ -29,8 +29,9 @@ ENDLESS = 40_000_000
 _DRIP = 0.05  # seconds between two bytes
 _BLOCK = b"x" * 65_536
 
-Answer = Callable[[list[dict[str, Any]]], "str | dict[str, Any]"]
-"""From the conversation, as it came over the wire, to the assistant's words or whole message."""
+Answer = Callable[[list[dict[str, Any]]], "str | dict[str, Any] | Raw"]
+"""From the conversation, as it came over the wire, to the assistant's words or whole message, or
+to an answer of one's own."""
 
 
 @dataclass(frozen=True)
@@ -117,10 +118,12 @@ class _Exchange(BaseHTTPRequestHandler):
             return self.send(behaviour)
         return BEHAVIOURS[behaviour](self)
 
-    def completion(self, **choice: Any) -> dict[str, Any]:
+    def completion(self, **choice: Any) -> Any:
         """What a well-behaved server would send; ``choice`` overrules fields of the message."""
         answer = self.naughty.answer
         said = answer(json.loads(self.body)["messages"]) if callable(answer) else answer
+        if isinstance(said, Raw):
+            return said
         message = {"content": said} if isinstance(said, str) else said
         return completion({**message, **choice}, self.body)
 
@@ -159,7 +162,8 @@ def _error(status: int, message: str, code: str | None = None, **headers: str) -
 
 
 def _ok(exchange: _Exchange) -> None:
-    exchange.send(Raw(exchange.completion()))
+    said = exchange.completion()
+    exchange.send(said if isinstance(said, Raw) else Raw(said))
 
 
 def _rate_limited(exchange: _Exchange) -> None:

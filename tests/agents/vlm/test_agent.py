@@ -10,7 +10,15 @@ from typing import Any
 import pytest
 
 from agents.vlm.agent import VLMAgent
-from agents.vlm.chat import LEFT_OUT, Message, ModelError, Picture, Reply, Usage
+from agents.vlm.chat import (
+    LEFT_OUT,
+    ConversationRefused,
+    Message,
+    ModelError,
+    Picture,
+    Reply,
+    Usage,
+)
 from agents.vlm.clients.scripted import RecordedClient, ScriptedClient
 from agents.vlm.matching import Matcher
 from agents.vlm.prompts import load_prompts
@@ -271,6 +279,113 @@ def test_a_model_that_gives_no_reply_fails_the_episode(env: Callable[..., Embodi
     record, _ = left_by(agent, episode)
     assert record.rounds == []
     assert record.error == episode.error
+
+
+# -- a conversation over a limit -------------------------------------------------------------------
+
+
+class Limited(Script):
+    """A script for a server that takes so many pictures, and so many characters."""
+
+    def __init__(self, *replies: str, pictures: int = 999, characters: int = 10**9) -> None:
+        super().__init__(*replies)
+        self.pictures, self.characters = pictures, characters
+        self.tries = 0
+
+    def __call__(self, messages: Sequence[Message]) -> str | Reply:
+        self.tries += 1
+        assert [each.role for each in messages][-1] == "user"
+        if len(pictures(messages)) > self.pictures:
+            raise ConversationRefused(f"400, at most {self.pictures} images", "pictures")
+        if sum(len(texts(message)) for message in messages) > self.characters:
+            raise ConversationRefused("400, maximum context length is 10 tokens", "context")
+        return super().__call__(messages)
+
+
+LONG = [f"<Planning>{'so ' * 400}</Planning>{each}" for each in decided(*WAY)]
+
+
+def test_the_oldest_pictures_are_left_out_where_a_server_takes_no_more(
+    env: Callable[..., EmbodiedEnv],
+) -> None:
+    script = Limited(*decided("observe", *WAY), pictures=4)
+    agent, episode = play(env("rgb"), script, settings(sees="pictures"))
+    assert episode.success
+    numbers = [len(pictures(sent)) for sent in script.sent]
+    assert numbers == [1, 4, 4, *[4] * (len(numbers) - 3)]
+    record, files = left_by(agent, episode)
+    assert len(files) == 1 + 4 + len(WAY) - 1  # the record keeps them all
+    trimmed = [each.trimmed for each in record.rounds]
+    assert trimmed[0] is None
+    assert [each.pictures for each in trimmed if each] == [*range(1, len(numbers))]
+    assert script.tries == len(script.sent) + 1  # it is refused once
+    assert {each.why for each in trimmed if each} == {"400, at most 4 images"}
+    assert [each.causes for each in episode.steps[1:]] == [[], *[["trimmed"]] * (len(numbers) - 1)]
+    again = ConversationRecord.model_validate_json(record.model_dump_json())
+    assert again == record
+    assert "trimmed" not in record.rounds[0].model_dump()  # as older versions wrote it
+
+
+@pytest.mark.parametrize("decide", ["tags", "json"])
+def test_the_oldest_words_are_left_out_where_the_context_is_full(
+    env: Callable[..., EmbodiedEnv], decide: str
+) -> None:
+    whole = Script(*LONG)
+    play(env(), whole, settings(decide=decide))
+    most = max(sum(map(len, map(texts, sent))) for sent in whole.sent)
+    script = Limited(*LONG, characters=most - 100)
+    options = settings(decide=decide, history={"trim": True})
+    agent, episode = play(env(), script, options)
+    assert episode.success
+    last = script.sent[-1]
+    assert len(last) == len(whole.sent[-1])
+    form = {"tags": f"<DecisionMaking>{WAY[0]}</DecisionMaking>", "json": '"action": "navigate to"'}
+    reply = next(each for each in last if each.role == "assistant")
+    assert form[decide] in texts(reply)  # what it did stays
+    assert "so so" not in texts(reply)
+    assert [each.trimmed.messages for each in agent.rounds if each.trimmed] == [2]
+
+
+def test_an_episode_over_a_limit_ends_with_its_cause(env: Callable[..., EmbodiedEnv]) -> None:
+    """Where the settings forbid to shorten it, and where it cannot be shorter."""
+    for script, options, cause, replies in (
+        (Limited(*LONG, characters=4000), settings(), "context", 1),
+        (Limited(*LONG, characters=10), settings(history={"trim": True}), "context", 0),
+        (Limited(*decided("observe", *WAY), pictures=2), settings(sees="pictures"), "pictures", 1),
+        (
+            Limited(*decided(*WAY), pictures=1),
+            settings(sees="pictures", history={"trim": False}),
+            "pictures",
+            1,
+        ),
+    ):
+        agent, episode = play(env(options.obs_mode), script, options)
+        assert (episode.error, episode.success, episode.end_reason) == ("", False, "gave up")
+        assert (episode.cause, len(episode.steps) - 1) == (cause, replies)
+        assert episode.gave_up.startswith("400, ")
+        assert left_by(agent, episode)[0].error == episode.gave_up
+        assert EpisodeRecord.model_validate_json(episode.model_dump_json()) == episode
+
+
+def test_what_is_amiss_with_a_reply_is_in_the_record(env: Callable[..., EmbodiedEnv]) -> None:
+    good = decided("observe")[0]
+    for reply, causes in (
+        (Reply(good), []),
+        (Reply(good, finish="length"), ["cut"]),
+        (Reply("<Planning>I", finish="MAX_TOKENS"), ["cut"]),
+        (Reply("", reasoning="I think", finish="length"), ["cut", "unfinished thought"]),
+        (Reply("Well <think> I"), ["unfinished thought"]),
+        (Reply("<think>a</think> " + good), []),
+        (Reply(""), ["empty"]),
+        (Reply(" \n"), ["empty"]),
+        (Reply("I cannot help.", refused=True), ["refusal"]),
+        (Reply("", finish="content_filter"), ["filtered", "empty"]),
+        (Reply("Let us see."), ["unreadable"]),
+        (Reply("<DecisionMaking>fly</DecisionMaking>"), ["unreadable"]),
+        (Reply("<DecisionMaking>open Unicorn</DecisionMaking>"), []),
+    ):
+        _, episode = play(env(), Script(reply, *decided("end")), settings())
+        assert episode.steps[1].causes == causes, reply
 
 
 # -- the record ------------------------------------------------------------------------------------

@@ -21,13 +21,13 @@ from typing import Any
 
 import pytest
 from naughty_server import HUGE, MODEL, NaughtyServer, Raw, completion
-from support import run_python
+from support import in_one_test, run_python
 
 pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
 
 import openai
 
-from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
+from agents.vlm.chat import ConversationRefused, Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients import chat_completions, supervisor
 from agents.vlm.clients.budget import Budget, Ledger
 from agents.vlm.clients.openai_server import OpenAIClient
@@ -35,6 +35,7 @@ from agents.vlm.clients.supervisor import RequestSupervisor
 from agents.vlm.clients.tokens import RequestSize, picture_at_most, usage_of
 from agents.vlm.clients.transport import LARGEST_ANSWER, RateLimiter
 from agents.vlm.settings import AgentSettings, Prices, Server
+from benchmarks.checks.refusals import REFUSALS, Refused
 from er_gym.rollout.agent import CannotGoOn
 
 KEY = "sk-test-4f1c9e0b7a2d"
@@ -506,29 +507,67 @@ def test_what_ends_the_run(
 
 def test_a_request_that_is_wrong_in_itself_ends_the_run(naughty: NaughtyServer, make: Make) -> None:
     client = make(naughty.url)
-    naughty.then("400", "ok", "400")
-    with pytest.raises(CannotGoOn, match="400, unknown parameter 'top_p'; every request"):
-        client.reply(HELLO, seed=0)
-    client.reply(HELLO, seed=0)
-    with pytest.raises(ModelError, match=r"400, unknown parameter 'top_p'$"):
-        client.reply(HELLO, seed=0)
+    for answers in (["400", "400"], ["ok", "400", "400"]):
+        naughty.then(*answers)
+        if answers[0] == "ok":
+            client.reply(HELLO, seed=0)
+        with pytest.raises(CannotGoOn, match="400, unknown parameter 'top_p'; every request"):
+            client.reply(HELLO, seed=0)
 
 
-@pytest.mark.parametrize(
-    ("words", "code"),
+def test_a_request_that_is_refused_where_others_are_not_is_only_one(
+    naughty: NaughtyServer, make: Make
+) -> None:
+    client = make(naughty.url)
+    picture = Picture(b"\xff\xd8one", "image/jpeg", 28, 28)
+    for _ in range(5):
+        naughty.then("400", "ok")
+        with pytest.raises(ConversationRefused, match="400, unknown parameter 'top_p'") as caught:
+            client.reply([Message("user", ("hello", picture))], seed=0)
+        assert caught.value.cause == "request"
+    assert naughty.count == 10
+    asked = naughty.seen[-1].json  # short, and with a picture, which this model may not take
+    assert [part["type"] for part in asked["messages"][0]["content"]] == ["text", "image_url"]
+
+
+@in_one_test("refusal", REFUSALS)
+def test_a_conversation_that_is_refused_is_only_one(
+    naughty: NaughtyServer, make: Make, refusal: Refused
+) -> None:
+    """The words of many servers, before and after the server has answered anything: the kind is
+    told, and no number of them in a row stops the run."""
+    kind, status = refusal.kind, refusal.status
+    client = make(naughty.url)
+    before, sure = naughty.count, status in (400, 413, 422)
+    for time_ in range(4):
+        probed = ["ok"] * (not sure or time_ == 0)
+        naughty.then(Raw(refusal.body, status), *probed)
+        with pytest.raises(ConversationRefused, match=f"{status}, ") as caught:
+            client.reply(HELLO, seed=0)
+        assert caught.value.cause == kind
+    assert naughty.count - before == (5 if sure else 8)
+
+
+@in_one_test("refusal", REFUSALS)
+def test_a_refusal_of_all_is_none_of_one(
+    naughty: NaughtyServer, make: Make, refusal: Refused
+) -> None:
+    naughty.then(*[Raw(refusal.body, refusal.status)] * 2)
+    with pytest.raises(CannotGoOn, match="every request like this will fail"):
+        make(naughty.url).reply(HELLO, seed=0)
+
+
+@in_one_test(
+    "words",
     [
-        ("maximum context length is 10 tokens", "context_length_exceeded"),
-        ("The decoder prompt (length 9) is longer than the maximum model length of 8.", 400),
-        ("the request exceeds the available context size", "exceed_context_size_error"),
-        ("The response was filtered", "content_filter"),
+        "Rate limit reached: limit 30000 tokens per min exceeded",
+        "too many requests",
+        "You exceeded your requests per minute limit",
     ],
 )
-def test_a_conversation_that_is_too_long_is_only_one(
-    naughty: NaughtyServer, make: Make, words: str, code: str | int
-) -> None:
-    naughty.then(Raw({"error": {"message": words, "code": code}}, status=400))
-    with pytest.raises(ModelError, match="400, "):
-        make(naughty.url).reply(HELLO, seed=0)
+def test_a_limit_of_requests_is_no_refusal(naughty: NaughtyServer, make: Make, words: str) -> None:
+    naughty.then(Raw({"error": {"message": words}}, 429), "ok")
+    assert make(naughty.url).reply(HELLO, seed=0).text == "observe"
 
 
 def test_no_server(naughty: NaughtyServer, make: Make) -> None:
@@ -634,7 +673,7 @@ def test_the_key_never_appears(
     naughty.then(
         *[
             Raw({"error": {"message": gossip}}, status, {"x-request-id": KEY, KEY: "x"})
-            for status in (500, 500, 401, 400)
+            for status in (500, 500, 401, 400, 400)
         ],
         *[Raw(gossip.encode())] * 2,
     )
@@ -645,7 +684,7 @@ def test_the_key_never_appears(
         told += [repr(caught.value), "".join(traceback.format_exception(caught.value))]
     client.reply(HELLO, seed=0)
     told += [record.getMessage() + repr(record.args) for record in caplog.records]
-    assert naughty.count == 7
+    assert naughty.count == 8
     assert any("try 1 of 2" in line for line in told)  # it does log
     assert any("receive_response_headers.complete" in line for line in told)
     assert not [line for line in told if KEY[:10] in line]
@@ -743,15 +782,26 @@ def test_a_server_that_refuses_again_and_again_stops_the_run(
     naughty: NaughtyServer, make: Make
 ) -> None:
     client = make(naughty.url, tries=1)
-    naughty.then("500", "500", "ok", "500", "500", "500", "ok")
+    naughty.then("500", "500", "ok")
     for _ in range(2):
         with pytest.raises(ModelError):
             client.reply(HELLO, seed=0)
     client.reply(HELLO, seed=0)
+    naughty.then("500", "500", "500", "500", "ok")  # the last one of four is the short one
     for kind in (ModelError, ModelError, CannotGoOn):
         with pytest.raises(kind, match="500, something broke"):
             client.reply(HELLO, seed=0)
     assert client.reply(HELLO, seed=0).text == "observe"  # later requests are sent again
+
+
+def test_requests_that_fail_while_others_are_answered_stop_no_run(
+    naughty: NaughtyServer, make: Make
+) -> None:
+    client = make(naughty.url, tries=1)
+    for answers in (["500"], ["500"], ["500", "ok"]) * 3:
+        naughty.then(*answers)
+        with pytest.raises(ModelError, match="500, something broke"):
+            client.reply(HELLO, seed=0)
 
 
 def test_those_who_wait_are_let_go_when_the_run_stops(
