@@ -59,7 +59,7 @@ from agents.vlm.settings import AgentSettings
 from benchmarks.inspect_secrets import without_secrets
 from benchmarks.scoring.metrics import METRICS, score_episode
 from benchmarks.scoring.scorers import CORRECTED
-from er_gym.rollout.causes import CONTEXT, count_causes
+from er_gym.rollout.causes import CONTEXT, causes_in, count_causes
 from er_gym.rollout.env_pool import EnvPool
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
@@ -245,12 +245,10 @@ class _Conversation:
         output = await self._model.generate(sent, **how)
         if not output.choices:
             raise ModelError(f"{self._model} gave no reply: {output.error or 'no choices'}")
-        if output.stop_reason == "model_length":
-            why = output.error or output.completion or "no words"
-            return ConversationRefused(
-                f"{self._model}: the conversation is too long: {' '.join(why.split())[:400]}",
-                CONTEXT,
-            )
+        used = output.usage or ModelUsage()
+        if output.stop_reason == "model_length" and not used.output_tokens:
+            why = " ".join((output.error or output.completion).split())[:400]
+            return ConversationRefused(f"{self._model}: it is too long: {why}", CONTEXT)
         self._said = output.message
         self._state.messages.append(output.message)
         self._state.output = output
@@ -364,7 +362,7 @@ def episode_scores() -> Scorer:
             explanation=(record.error or record.gave_up or f"ended by {record.end_reason}")
             + missing
             + unmet,
-            metadata={"causes": [each.sentence() for each in count_causes([record])]},
+            metadata={"causes": [each.sentence() for each in count_causes([causes_in(record)])]},
         )
 
     return score

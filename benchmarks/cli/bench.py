@@ -237,6 +237,7 @@ def bench(
     except (KeyboardInterrupt, CannotGoOn) as error:
         why = str(error) if isinstance(error, CannotGoOn) else "interrupted"
         print_problem(f"{why}: {_left_in(out, chosen, samples)}")
+        _print_causes(out)
         return STOPPED if isinstance(error, CannotGoOn) else INTERRUPTED
     doing("computing the table")
     print_tables(tables([load_run(out)], scorer=scorer), stdout())
@@ -272,6 +273,16 @@ def _left_in(out: Path, chosen: Sequence[Task], samples: int) -> str:
         return f"no episode was played, and nothing is left in {out}"
     done = len(finished(RunDirectory.open(out), chosen, samples))
     return f"{done} of {samples * len(chosen)} episodes are in {out}; the same command continues"
+
+
+def _print_causes(out: Path) -> None:
+    """Say what was amiss with the agent's replies in a run that ended early."""
+    from benchmarks.scoring.report import load_run
+    from er_gym.rollout.run_directory import MANIFEST
+
+    if (out / MANIFEST).exists():
+        for words in load_run(out).causes_in_words:
+            print_problem(words)
 
 
 @contextmanager

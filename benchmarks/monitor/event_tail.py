@@ -12,6 +12,7 @@ from typing import Any
 from pydantic_core import from_json
 
 from benchmarks.monitor.line_tail import LineTail
+from er_gym.rollout.causes import EpisodeCauses
 from er_gym.rollout.events import EVENTS
 
 _LINE = re.compile(
@@ -38,6 +39,7 @@ class EpisodeRow:
         steps, reward, seconds: so far.
         tokens, cost: of the model's replies that were not cached, cost in US dollars.
         last: the last action.
+        causes: what was amiss with its replies; None while it plays.
     """
 
     key: str
@@ -56,6 +58,7 @@ class EpisodeRow:
     tokens: int = 0
     cost: float = 0.0
     last: str = ""
+    causes: EpisodeCauses | None = None
 
     @property
     def outcome(self) -> str:
@@ -184,6 +187,12 @@ class EventTail:
         row.end_reason, row.error = str(event["end_reason"]), str(event.get("error", ""))
         row.steps, row.seconds = int(event["steps"]), float(event["seconds"])
         row.reward = float(event["total_reward"])
+        row.causes = EpisodeCauses(
+            int(event.get("replies", 0)),
+            {str(name): int(number) for name, number in event.get("causes", {}).items()},
+            {str(name): int(number) for name, number in event.get("unusable", {}).items()},
+            str(event.get("ended", "")),
+        )
 
     def _run_ended(self, event: dict[str, Any]) -> None:
         self.stopped, self.why = True, str(event.get("stopped", ""))

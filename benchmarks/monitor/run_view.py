@@ -14,6 +14,7 @@ from benchmarks.monitor.failure_counts import FailureCounts
 from benchmarks.monitor.listing import AddressFilter
 from benchmarks.monitor.places import Place
 from benchmarks.scoring.metrics import wilson
+from er_gym.rollout.causes import count_causes
 from er_gym.rollout.run_directory import Manifest, RunDirectory, RunDirectoryError
 from er_gym.tasks.types import task_type
 
@@ -128,6 +129,7 @@ class RunSummary:
         tokens, cost: so far.
         decisions_per_second: in the last minute of play.
         seconds_left: by the speed of this start; None if unknown.
+        causes: what was amiss with the agent's replies, a line for each cause.
         version: changes when anything does.
     """
 
@@ -142,6 +144,7 @@ class RunSummary:
     cost: float
     decisions_per_second: float
     seconds_left: float | None
+    causes: Sequence[str]
     version: int
 
     @property
@@ -221,8 +224,14 @@ class RunView:
             cost=sum(row.cost for row in rows),
             decisions_per_second=_speed(rows, tail.time),
             seconds_left=left,
+            causes=self._causes(rows),
             version=tail.version,
         )
+
+    def _causes(self, rows: Iterable[EpisodeRow]) -> list[str]:
+        settings = self._manifest.agent_settings if self._manifest else {}
+        found = count_causes(row.causes for row in rows if row.causes is not None)
+        return [each.sentence(settings) for each in found]
 
     def chosen(self, filter: Filter) -> list[EpisodeRow]:
         """The rows that a filter takes, sorted."""

@@ -21,6 +21,7 @@ from benchmarks.scoring.metrics import (
 )
 from benchmarks.scoring.samples import TaskSamples, by, most_samples, task_samples
 from benchmarks.scoring.scorers import CORRECTED, PAPER, SCORERS
+from er_gym.rollout.causes import CauseCount, causes_in, count_causes
 from er_gym.rollout.judgement import lacks_search_targets
 from er_gym.rollout.records import EpisodeRecord, episode_key
 from er_gym.rollout.run_directory import Manifest, RunDirectory
@@ -40,7 +41,7 @@ class Miss:
     Attributes:
         task_id, task_type, scene: what was played; a later sample has its number in the id.
         end_reason: why the episode ended, ``"crashed"`` if it crashed.
-        feedback: the error, or what the agent was told last.
+        feedback: the error, why the agent gave up, or what it was told last.
         missing: the key actions that were not done, as ``"verb Type"``.
     """
 
@@ -108,6 +109,16 @@ class RunReport:
         return sum(bool(episode.error) for episode in self.episodes)
 
     @property
+    def causes(self) -> list[CauseCount]:
+        """What was amiss with the agent's replies, as the records name it."""
+        return count_causes(map(causes_in, self.episodes))
+
+    @property
+    def causes_in_words(self) -> tuple[str, ...]:
+        """The same, each in a line with what to do."""
+        return tuple(each.sentence(self.manifest.agent_settings) for each in self.causes)
+
+    @property
     def without_targets(self) -> int:
         """How many searches have records that do not say what is searched for."""
         return sum(map(lacks_search_targets, self.episodes))
@@ -144,7 +155,7 @@ def _miss(episode: EpisodeRecord, scored: Score) -> Miss:
         task_type=episode.task_type,
         scene=episode.scene,
         end_reason="crashed" if episode.error else episode.end_reason,
-        feedback=" ".join((episode.error or last).split()),
+        feedback=" ".join((episode.error or episode.gave_up or last).split()),
         missing=scored.missing,
     )
 
@@ -199,6 +210,10 @@ def _run(run: RunReport) -> dict[str, Any]:
         "manifest": run.manifest.model_dump(),
         "episodes": len(run.episodes),
         "crashed": run.crashed,
+        "causes": [
+            {**dataclasses.asdict(each), "in_words": words}
+            for each, words in zip(run.causes, run.causes_in_words, strict=True)
+        ],
         "not_counted": run.unusable,
         "scorers_differ": run.differ,
         "scorers": {
@@ -239,7 +254,7 @@ def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = Fal
 
     Rates are fractions; a missing interval is empty. A task that was set aside, or an object that
     stands for one that a scene lacks, has a line without figures; so does a file that is not an
-    episode.
+    episode, and a cause that records name.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -259,6 +274,7 @@ def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = Fal
             ("set aside", map(str, run.manifest.set_aside)),
             ("taken", describe_substitutions(run.manifest.taken)),
             ("not counted", run.unusable),
+            ("cause", run.causes_in_words),
         ):
             for line in lines:
                 writer.writerow([*head, "", level, line, 0, *[""] * len(columns)])

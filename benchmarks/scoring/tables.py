@@ -184,6 +184,7 @@ def _notes(run: RunReport) -> list[str]:
             f"{run.path}: {run.crashed} of {len(run.episodes)} episodes crashed and count as "
             "failures; running the same command again plays them again"
         )
+    notes += [f"{run.path}: {words}" for words in run.causes_in_words]
     return notes
 
 

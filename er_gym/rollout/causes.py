@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from er_gym.rollout.records import ERROR, EpisodeRecord
@@ -171,31 +171,54 @@ def _values(paths: Iterable[str], settings: Mapping[str, Any]) -> Iterable[str]:
             yield f"{path}={str(value).lower() if isinstance(value, bool) else value}"
 
 
-def count_causes(episodes: Iterable[EpisodeRecord]) -> list[CauseCount]:
-    """The causes that records name, in the order of :data:`CAUSES`, and others after them."""
+@dataclass(frozen=True)
+class EpisodeCauses:
+    """The causes that an episode's record names.
+
+    Attributes:
+        replies: how many replies of the agent it has.
+        causes: how many of them have a cause, by its name.
+        unusable: how many of these named no action.
+        ended: the cause that ended it; "" for none.
+    """
+
+    replies: int = 0
+    causes: Mapping[str, int] = field(default_factory=dict)
+    unusable: Mapping[str, int] = field(default_factory=dict)
+    ended: str = ""
+
+
+def causes_in(episode: EpisodeRecord) -> EpisodeCauses:
+    """The causes that a record names."""
+    causes, unusable = Counter[str](), Counter[str]()
+    replies = 0
+    for step in episode.steps:
+        if step.verb == INIT or step.appended or step.by:
+            continue
+        replies += 1
+        causes.update(step.causes)
+        unusable.update(step.causes if step.verb == ERROR else ())
+    ended = (episode.cause or REQUEST) if episode.gave_up else ""
+    return EpisodeCauses(replies, dict(causes), dict(unusable), ended)
+
+
+def count_causes(episodes: Iterable[EpisodeCauses]) -> list[CauseCount]:
+    """The causes of some episodes, in the order of :data:`CAUSES`, and others after them."""
     replies, unusable, within, over = Counter[str](), Counter[str](), Counter[str](), Counter[str]()
-    steps = played = 0
+    said = played = 0
     for episode in episodes:
         played += 1
-        over.update([episode.cause] * bool(episode.cause or episode.gave_up))
-        found: set[str] = set()
-        for step in episode.steps:
-            if step.verb == INIT or step.appended or step.by:
-                continue
-            steps += 1
-            replies.update(step.causes)
-            unusable.update(step.causes if step.verb == ERROR else ())
-            found.update(step.causes)
-        within.update(found)
-    order = {name: place for place, name in enumerate(CAUSES)}
+        said += episode.replies
+        replies.update(episode.causes)
+        unusable.update(episode.unusable)
+        within.update(episode.causes.keys())
+        over.update([episode.ended] * bool(episode.ended))
     counts = [
         *(
-            CauseCount(name, number, steps, "replies", within[name], unusable[name])
+            CauseCount(name, number, said, "replies", within[name], unusable[name])
             for name, number in replies.items()
         ),
-        *(
-            CauseCount(name or REQUEST, number, played, "episodes", number)
-            for name, number in over.items()
-        ),
+        *(CauseCount(name, number, played, "episodes", number) for name, number in over.items()),
     ]
+    order = {name: place for place, name in enumerate(CAUSES)}
     return sorted(counts, key=lambda each: (order.get(each.name, len(order)), each.name))

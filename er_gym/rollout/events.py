@@ -124,6 +124,8 @@ class EpisodeEnded(_Event):
         steps: the number of steps that the agent took.
         seconds: wall-clock time.
         error: the error it crashed with, in one line; ``""`` if it did not crash.
+        replies, causes, unusable, ended: what was amiss, as
+            :class:`er_gym.rollout.causes.EpisodeCauses` has it.
     """
 
     kind: Literal["episode_ended"] = "episode_ended"
@@ -135,6 +137,10 @@ class EpisodeEnded(_Event):
     steps: int
     seconds: float
     error: Words = ""
+    replies: int = 0
+    causes: dict[str, int] = {}
+    unusable: dict[str, int] = {}
+    ended: str = ""
 
 
 class Cost(_Event):

@@ -11,6 +11,7 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
+from er_gym.rollout.causes import causes_in
 from er_gym.rollout.events import Cost, EpisodeEnded, EventListener, EventLog, RunBegun, RunEnded
 from er_gym.rollout.executor import Assignment, Executor, Parallelism, PlayedEpisode
 from er_gym.rollout.process_executor import play_in_processes
@@ -189,6 +190,7 @@ class _Sink:
                 steps=sum(not step.appended for step in record.steps[1:]),
                 seconds=record.seconds,
                 error=record.error,
+                **vars(causes_in(record)),
             )
         )
         total = self.cost()

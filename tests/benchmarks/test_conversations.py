@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import html
 import importlib.util
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,11 +19,14 @@ from typing import Any
 import pytest
 
 pytest.importorskip("openai", reason="needs the extra vlm")
+pytest.importorskip("fastapi", reason="needs the extra ui")
 
 from click.testing import CliRunner
+from fastapi.testclient import TestClient
 
 from agents.vlm.record import ConversationRecord
 from benchmarks.cli.main import cli
+from benchmarks.monitor.app import make_app
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.tasks import load_suite
 
@@ -192,6 +197,54 @@ def test_a_run_of_nothing_but_refused_conversations_ends(tmp_path: Path) -> None
     assert result.return_value == 0, result.output
     causes = [each.cause for each in RunDirectory.open(tmp_path).episodes()]
     assert causes == ["request"] * 7
+
+
+def ended(content: str | None, finish: str = "stop", **message: Any) -> Any:
+    return naughty.Raw(
+        {"choices": [{"message": {"content": content, **message}, "finish_reason": finish}]}
+    )
+
+
+CUT = ended("<Planning>First I", "length")
+AMISS = {
+    "2 of 9 replies were cut at the most tokens of a reply (in 1 episodes, 2 of them named no "
+    "action): raise sampling.max_tokens, or": CUT,
+    "2 of 9 replies ended within their thoughts": ended("<think>Well, I", "length"),
+    "3 of 9 replies were empty": ended(None),
+    "1 of 9 replies were refusals": ended(None, refusal="No."),
+    "1 of 9 replies were withheld or cut by the server's content filter": ended(
+        "", "content_filter"
+    ),
+    "2 of 9 replies named no action": ended("Hm."),
+}
+
+
+def test_what_was_amiss_with_replies_is_told(tmp_path: Path) -> None:
+    """At the end of the run, by the report in every layout, and by the monitor."""
+    hm, *_ = [answer for words, answer in AMISS.items() if "named no action" in words[:40]]
+    script = [*AMISS.values(), ended("<think>Well, I"), ended(""), hm]
+    with naughty.NaughtyServer(script=script) as server:
+        result = bench(server.url, tmp_path, "--limit", "3", "--concurrency", "1")
+    assert result.return_value == 0, result.output
+    told = {"at the end": " ".join(result.output.split())}
+    for layout in ("table", "md", "json", "csv"):
+        report = ["report", str(tmp_path), "--format", layout]
+        said = CliRunner().invoke(cli, report, standalone_mode=False).output
+        told[layout] = " ".join(said.split())
+    client = TestClient(make_app([tmp_path]), base_url="http://127.0.0.1:8010")
+    (link,) = set(re.findall(r"/runs/\w+", client.get("/").text))
+    told["monitor"] = html.unescape(client.get(link).text)
+    missing = [(where, words) for where in told for words in AMISS if words not in told[where]]
+    assert not missing, told["at the end"]
+
+
+def test_what_was_amiss_is_told_of_a_run_that_a_budget_ends(tmp_path: Path) -> None:
+    with naughty.NaughtyServer(script=[CUT] * 99) as server:
+        more = ("--limit", "2", "--concurrency", "1", *PRICES)
+        result = bench(server.url, tmp_path, *more, "--max-usd", "0.04")
+    assert result.return_value == 3
+    assert "replies were cut at the most tokens of a reply" in result.output
+    assert "sampling.max_tokens=512" in result.output
 
 
 def test_a_key_that_is_refused_stops_the_run(tmp_path: Path, monkeypatch: Any) -> None:
