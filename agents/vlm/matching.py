@@ -7,25 +7,19 @@ model then compares the meaning.
 
 from __future__ import annotations
 
-import re
 import threading
 import unicodedata
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from agents.vlm.name_embeddings import NameEmbeddings
+from agents.vlm.names import ENTRIES, MatchMethod, keys_of, look_up
 from agents.vlm.settings import Matching
-from er_gym.data.names_en import MODIFIERS, NAMES_EN
-from er_gym.data.names_zh import NAMES_ZH
-from er_gym.data.shared_names import SHARED_EN, SHARED_ZH
 from er_gym.extras import MissingPackage
-from er_gym.thor import OBJECT_TYPES
-
-MatchMethod: TypeAlias = Literal["exact", "alias", "fuzzy", "meaning", "none"]
 
 _SHORTEST_FUZZY = 5
 """Shorter names are not matched fuzzily: "Pan" is not "Pen", and "Cup" is not "Cap"."""
@@ -68,71 +62,6 @@ class Match:
         return f"{words}; the nearest {'are' if others else 'is'} {known}."
 
 
-# -- lookup ----------------------------------------------------------------------------------------
-
-_WORD = re.compile(r"[^\W_]+")
-_NUMBER = re.compile(r"\d+$")
-_PLURALS = (
-    *(("ies", "y"), ("ves", "f"), ("ves", "fe"), ("s", "")),
-    *((f"{end}es", end) for end in ("s", "x", "z", "ch", "sh", "o")),
-)
-"""Plural endings and the singular endings that replace them."""
-
-
-def _key(name: str) -> str:
-    return "".join(_WORD.findall(name)).casefold()
-
-
-@dataclass(frozen=True)
-class _Entry:
-    types: tuple[str, ...]
-    how: MatchMethod
-
-
-def _entries() -> dict[str, _Entry]:
-    """All known names, by lookup key."""
-    entries = {_key(name): _Entry((name,), "exact") for name in OBJECT_TYPES}
-    for names in (NAMES_EN, NAMES_ZH):
-        for object_type, others in names.items():
-            entries.update((_key(other), _Entry((object_type,), "alias")) for other in others)
-    for shared in (SHARED_EN, SHARED_ZH):
-        entries.update((_key(name), _Entry(types, "alias")) for name, types in shared.items())
-    return entries
-
-
-_ENTRIES: Mapping[str, _Entry] = _entries()
-
-
-def _look_up(name: str) -> _Entry | None:
-    return next((_ENTRIES[key] for key in _keys(name) if key in _ENTRIES), None)
-
-
-def _keys(name: str) -> Iterator[str]:
-    """The lookup keys of a name, most likely first."""
-    first, *parts = name.split("|")  # AI2-THOR's ids: Sink|-00.50|+00.90|+01.20|SinkBasin
-    if parts and parts[-1][:1].isalpha():
-        first = parts[-1]
-    words = _WORD.findall(first.replace("_", " ").casefold())
-    while words and words[-1].isdigit():  # Fridge_1, Cabinet 2
-        words.pop()
-    plainer = list(words)
-    while len(plainer) > 1 and (plainer[0] in MODIFIERS or plainer[0].isdigit()):
-        plainer.pop(0)
-    # "bowl of fruit" becomes "bowl"; "slice of bread" is found as it stands before that.
-    outer = plainer[: plainer.index("of")] if "of" in plainer else plainer
-    for each in (words, plainer, outer):
-        yield from _with_singulars(_NUMBER.sub("", "".join(each)))
-    if "的" in first:  # 红色的苹果
-        yield from _with_singulars(_key(first.rpartition("的")[2]))
-
-
-def _with_singulars(key: str) -> Iterator[str]:
-    yield key
-    for plural, singular in _PLURALS:
-        if key.endswith(plural):
-            yield key.removesuffix(plural) + singular
-
-
 def _one_of(types: Sequence[str], prefer: Collection[str]) -> str:
     """The first preferred type, else the first type."""
     return next((each for each in types if each in prefer), types[0])
@@ -153,17 +82,17 @@ def _rapidfuzz() -> tuple[Callable[..., Any], Callable[..., Any], Callable[..., 
     return process.extract, fuzz.ratio, OSA.distance
 
 
-_MISSPELLABLE = tuple(key for key in _ENTRIES if key.isascii() and len(key) >= _SHORTEST_FUZZY)
+_MISSPELLABLE = tuple(key for key in ENTRIES if key.isascii() and len(key) >= _SHORTEST_FUZZY)
 
 
 def _fuzzy_match(name: str, at_least: float, prefer: Collection[str]) -> tuple[str, float]:
     """The type with the most similar spelling and its score from 0 to 1; "" and 0 for none."""
     extract, ratio, edits = _rapidfuzz()
-    for key in dict.fromkeys(_keys(name)):
+    for key in dict.fromkeys(keys_of(name)):
         if len(key) < _SHORTEST_FUZZY:
             continue
         found = [
-            (score, _ENTRIES[other].types)
+            (score, ENTRIES[other].types)
             for other, score, _ in extract(
                 key, _MISSPELLABLE, scorer=ratio, score_cutoff=at_least, limit=None
             )
@@ -178,8 +107,8 @@ def _fuzzy_match(name: str, at_least: float, prefer: Collection[str]) -> tuple[s
 
 def _nearest_by_letters(name: str) -> tuple[str, ...]:
     extract, ratio, _ = _rapidfuzz()
-    found = extract(next(_keys(name)), _ENTRIES.keys(), scorer=ratio, score_cutoff=1, limit=20)
-    return _first_types(_ENTRIES[key].types for key, _, _ in found)
+    found = extract(next(keys_of(name)), ENTRIES.keys(), scorer=ratio, score_cutoff=1, limit=20)
+    return _first_types(ENTRIES[key].types for key, _, _ in found)
 
 
 def _first_types(ranked: Iterable[Sequence[str]]) -> tuple[str, ...]:
@@ -236,7 +165,7 @@ class Matcher:
         return [found[name] for name in names]
 
     def _by_letters(self, name: str, plain: str, prefer: Collection[str]) -> Match:
-        if entry := _look_up(plain):
+        if entry := look_up(plain):
             return Match(name, _one_of(entry.types, prefer), entry.how, 1.0)
         object_type, score = _fuzzy_match(plain, self._settings.fuzzy, prefer)
         if object_type:

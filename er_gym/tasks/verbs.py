@@ -151,7 +151,7 @@ OWN: tuple[Verb, ...] = (
             "go toward/go over to/go back to/walk to/walk towards/walk toward/walk over to/move to/"
             "move towards/move toward/move over to/head to/head towards/head toward/"
             "head over to/get to/get closer to/move closer to/return to/travel to/approach",
-            "导航到/导航至/导航去/前往/走到/走向/走去/移动到/去到/去往",
+            "导航到/导航至/导航去/前往/走到/走向/走去/移动到/去到/去往/去",
         ),
     ),
     Verb(

@@ -7,15 +7,15 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from agents.vlm.names import look_up
 from agents.vlm.parsing.json_objects import JsonObject, fields_in, objects_in
+from agents.vlm.parsing.names import clean_name
+from agents.vlm.parsing.placing import receptacle_in
 from agents.vlm.parsing.rules import RULES
 from agents.vlm.parsing.vocabulary import (
     ALONE,
-    ARTICLE,
-    CLAUSE,
     EDGES,
     FILLER,
-    NO_NAME,
     OBJECT_FIELDS,
     PLACE_FIELDS,
     VERB_FIELDS,
@@ -63,21 +63,8 @@ _VERB = re.compile(
     # After Latin letters the word must end, or a capital must begin the next.
     rf"\s*(?:((?i:{_OURS}))(?:(?![A-Za-z0-9])|(?<=[a-z])(?=[A-Z]))|({_THEIRS}))"
 )
-_PUT = re.compile(
-    r"(?:put|place|set|lay|drop|insert|store|throw|toss)(?:\s(?:in|down|back|away))?(?![^\W_])"
-    r"(?P<what>.*?)(?<![^\W_])"
-    r"(?:in\sto|into|inside\sof|inside|in|onto|on\stop\sof|on\sto|on|atop|within)(?![^\W_])"
-    r"(?P<name>.*)",
-    re.IGNORECASE,
-)
 _PARTICLE = re.compile(r"[a-z]+ (?:up|down|on|off|out|away|over)")
 _PARTED: tuple[tuple[str, str, re.Pattern[str]], ...] = (
-    ("put form", verbs.PUT, _PUT),
-    (
-        "put form",
-        verbs.PUT,
-        re.compile(r"[把将](?P<what>.+?)放(?:进|入|到|在|置在|置到|回)去?(?P<name>.+)"),
-    ),
     (
         "verb parted",
         verbs.TOGGLE,
@@ -87,6 +74,11 @@ _PARTED: tuple[tuple[str, str, re.Pattern[str]], ...] = (
         "verb parted",
         verbs.PICKUP,
         re.compile(r"(?:pick|take)\s(?P<name>\S.*?)\s(?:up|out)\W*$", re.I),
+    ),
+    (
+        "verb parted",
+        verbs.PICKUP,
+        re.compile(r"从.{1,20}?(?:拿起|拿出|取出|拿取|捡起|拿)(?P<name>.+)"),
     ),
     *(
         ("verb parted", verb.name, re.compile(rf"{first}\s(?P<name>\S.*?)\s{last}\W*$", re.I))
@@ -101,7 +93,12 @@ _PARTED: tuple[tuple[str, str, re.Pattern[str]], ...] = (
     ),
 )
 """Verbs whose words surround a name: the rule, the verb, and the pattern."""
-_CALL = re.compile(r"\s*([A-Za-z][A-Za-z_ -]{0,40})\((.*?)\)?\W*$")
+_DOERS = frozenset(
+    {"act", "step", "do", "execute", "executeaction", "perform", "action", "takeaction"}
+)
+_CALL = re.compile(
+    r"\s*(?:[a-z_]{1,20}\.){0,2}([A-Za-z][A-Za-z_ -]{0,40})(?:\(|(?<=[a-z])\[)(.*?)[)\]]?\W*$"
+)
 _NAMED = re.compile(r"\s*(\w+)\s?=\s?")
 
 
@@ -126,7 +123,10 @@ def _called(line: str) -> ParsedAction | None:
     call = _CALL.match(line)
     if call is None:
         return None
-    phrase = _BY_PLAIN.get(normalized(call[1]), "")
+    if (inner := _quoted_action(call)) is not None:
+        return inner
+    said = normalized(call[1])
+    phrase = _BY_PLAIN.get(said) or _BY_PLAIN.get(said.replace("object", ""), "")
     if "=" in call[2] and call[1].isidentifier():
         fields = fields_in(_NAMED.sub(r" \1: ", call[2]))
         words = read_fields({**fields, VERB_FIELDS[0]: phrase})
@@ -143,14 +143,27 @@ def _called(line: str) -> ParsedAction | None:
     return ParsedAction(verb, name, ("call form", *(rule for rule in rules if rule != "marks")))
 
 
+def _quoted_action(call: re.Match[str]) -> ParsedAction | None:
+    """``env.step("open Fridge")``, ``act("put in", "Fridge")``: the action is what is given."""
+    if normalized(call[1]) not in _DOERS or "=" in call[2]:
+        return None
+    said = " ".join(call[2].replace(",", " ").replace('"', " ").replace("'", " ").split())
+    words = _parted(said) or _said(said)
+    return ParsedAction(words.verb, words.name, ("call form", *words.rules)) if words.verb else None
+
+
 def _parted(line: str) -> ParsedAction | None:
     spaced = line.replace("_", " ")  # of the same length, so that names can be had as written
+    if put := receptacle_in(line):
+        what, name, more = put
+        rule = "put form"
+        if f"{spaced} ".casefold().startswith("put in ") and not what:
+            rule = "" if spaced == line else "verb spelling"
+        return ParsedAction(verbs.PUT, name, (*filter(None, [rule]), *more))
     for rule, verb, pattern in _PARTED:
         if found := pattern.match(spaced):
             name, more = clean_name(line[slice(*found.span("name"))])
-            if f"{spaced} ".casefold().startswith("put in ") and not found["what"].strip():
-                rule = "" if spaced == line else "verb spelling"
-            return ParsedAction(verb, name, (*filter(None, [rule]), *more))
+            return ParsedAction(verb, name, (rule, *more))
     return None
 
 
@@ -176,24 +189,24 @@ def _said(line: str) -> ParsedAction:
     return ParsedAction(verb, name, (*rules, *needed))
 
 
-def clean_name(text: str) -> tuple[str, tuple[str, ...]]:
-    """A name without surrounding marks, article and clause, and the rules that this needed."""
-    name = text.strip(EDGES)
-    rules = ["marks"] if name != text.strip() else []
-    if found := ARTICLE.match(name):
-        name = name[found.end() :]
-        rules.append("article")
-    if found := CLAUSE.search(name):
-        name = name[: found.start()].strip(EDGES)
-        rules.append("clause")
-    return ("" if name.casefold() in NO_NAME else name), tuple(rules)
-
-
 # -- a decision ------------------------------------------------------------------------------------
 
 _NEXT_ACTION = re.compile(
     r"[\n;；]|\.?\s(?:and )?then\s|\s?(?:->|=>|→)\s?|\s\d{1,2}[.)、]\s|然后|[,，。]再", re.I
 )
+
+
+_ARROW = re.compile(
+    r"^(?P<what>\W{0,9}(?:put|place|move)\b[^\n>→-]{1,80})(?:->|=>|→)\s?(?P<name>[^\n>→-]{1,40})$",
+    re.IGNORECASE | re.MULTILINE,
+)
+_LONGEST_DECISION = 20_000
+
+
+def _put_into(found: re.Match[str]) -> str:
+    """``put Apple -> Fridge`` is one action if a name follows the arrow."""
+    name = clean_name(found["name"])[0]
+    return f"{found['what']} into {found['name']}" if look_up(name) else found[0]
 
 
 def _unfenced(text: str) -> str:
@@ -214,9 +227,13 @@ def read_decision(text: str) -> ParsedAction:
     if found := find_fields(text):
         words = read_fields(found.fields)
         return ParsedAction(words.verb, words.name, (*needed, "json", *words.rules))
+    text = _ARROW.sub(_put_into, text[:_LONGEST_DECISION])
     lines = [line for line in _NEXT_ACTION.split(text) if line.strip(EDGES)]
-    for line in lines[:MOST]:
+    for number, line in enumerate(lines[:MOST]):
         words = read_line(line)
+        if words.verb in verbs.OBJECT_VERBS and not words.name and len(lines) > number + 1:
+            following = read_line(f"{line} {lines[number + 1]}")  # the name is in the next line
+            words = following if look_up(following.name) else words
         if words.verb:
             more = ("several actions",) if len(lines) > 1 else ()
             return ParsedAction(words.verb, words.name, (*needed, *more, *words.rules))

@@ -13,6 +13,7 @@ choose. If one decision has several actions, the first counts, because actions a
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -25,10 +26,11 @@ from agents.vlm.parsing.decision import (
     read_decision,
     read_fields,
 )
+from agents.vlm.parsing.function_tags import tagged_calls
 from agents.vlm.parsing.json_objects import JsonObject
 from agents.vlm.parsing.rules import RULES, label
 from agents.vlm.parsing.tags import TaggedDecision, TaggedReply, Thought, split_at_tags
-from agents.vlm.parsing.vocabulary import THOUGHT_TAGS
+from agents.vlm.parsing.vocabulary import THOUGHT_TAGS, VERB_FIELDS
 from er_gym.tasks import verbs
 
 LONGEST = 200_000
@@ -72,7 +74,7 @@ def parse(
         decide: the form that the model was asked for. With ``json``, a text that is a JSON object
             needs no rule; nothing else depends on it.
     """
-    layout = split_at_tags(text[-LONGEST:])
+    layout = split_at_tags(tagged_calls(text[-LONGEST:]))
     if len(text) > LONGEST:
         layout.rules.append("long")
     chosen = _chosen(layout, call[-LONGEST:])
@@ -222,8 +224,23 @@ def _labelled_in(text: str) -> _Chosen | None:
             said = line[found.end() :]
             if not said.strip():  # a heading
                 said = next(filter(str.strip, lines[number + 1 :]), "")
+            said = _with_input(said, lines[number + 1 : number + 2])
             return _Chosen(read_decision(said), said, lines[:number], ("no tags",))
     return None
+
+
+_INPUT = re.compile(r"[\W_]{0,4}action[ _]?input\W{0,4}[:：]\W{0,4}(.*)", re.IGNORECASE)
+
+
+def _with_input(said: str, following: Sequence[str]) -> str:
+    """``Action: put`` with the line ``Action Input: Fridge`` after it."""
+    found = _INPUT.match(following[0][:_LONGEST_LABELLED]) if following else None
+    if found is None:
+        return said
+    fields = find_fields(following[0])
+    if fields is None:
+        return f"{said.strip()} {found[1]}"
+    return json.dumps({VERB_FIELDS[0]: said.strip(), **fields.fields})
 
 
 def _bare_in(text: str) -> _Chosen | None:

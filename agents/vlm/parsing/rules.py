@@ -27,15 +27,16 @@ class Rule:
 _LABEL = re.compile(
     r"[\W\d]{0,8}(?:(?:my|the|final|next|chosen)\s){0,2}"
     r"(?:decision[ _-]?making|decision|action|answer|command|决策|决定|行动|动作|下一步)"
-    r"(?:\s(?:is|to take))?[\s*_\])】]{0,4}(?:[:：]|(?<=[\])】*])|$)[\s*_]{0,4}",
+    r"(?:\s(?:is\sto(?=\s)|is|to take))?[\s*_\])】]{0,4}(?:[:：]|(?<=[\])】*])|(?<=is\sto\s)|$)"
+    r"[\s*_]{0,4}",
     re.IGNORECASE,
 )
-_LIST_MARK = re.compile(r"(?:[-+•]\s|(?:step\s?)?\(?\d{1,2}[.):、]\s?)+", re.IGNORECASE)
+_LIST_MARK = re.compile(r"(?:[-+•]\s|#{1,6}\s|(?:step\s?)?\(?\d{1,2}[.):、]\s?)+", re.IGNORECASE)
 _LEAD_IN = re.compile(
     r"(?:(?:so|now|next|then|first|finally|therefore|please|ok|okay),?\s)*"
     r"(?:(?:i|we)(?:\s(?:will|should|shall|must|can|choose to|decide to|need to|want to|have to|"
     r"am going to)|['’]ll|['’]m going to)\s|let(?:\sme|\sus|['’]s)\s)?"
-    r"(?:(?:now|first|next|then)\s)?"
+    r"(?:(?:now|first|next|then)\s)?(?:use\s)?"
     r"(?:(?:现在|接下来|下一步|首先|然后|因此),?)?(?:我们?(?:将|要|会|应该|需要|决定|选择)?|请|让我)?先?",
     re.IGNORECASE,
 )
@@ -62,6 +63,7 @@ def _off_the_front(pattern: re.Pattern[str]) -> Callable[[str], str]:
 
 
 def _without_marks(line: str) -> str:
+    line = line.removeprefix("(") if line.startswith("(") else line
     return " ".join(_MARKS.sub(" ", line).split())
 
 
@@ -86,7 +88,11 @@ RULES: tuple[Rule, ...] = (
     Rule("verb spelling", "navigate_to, NavigateTo, pick up, put"),
     Rule("verb synonym", "go to, grab, turn on …"),
     Rule("verb parted", "pick the Mug up, turn the DeskLamp on"),
-    Rule("put form", "put Apple into Fridge, place it on DiningTable: the receptacle counts"),
+    Rule(
+        "put form",
+        "put Apple into Fridge, put the Mug in my hand on/in DiningTable: the receptacle counts, "
+        "behind the last preposition that a type follows",
+    ),
     Rule("article", "the Fridge"),
     Rule("clause", "more is said behind the name: Egg from Fridge, Fridge (it is closed)"),
     Rule("words after", "words behind a verb that needs none: observe the room"),

@@ -35,8 +35,9 @@ DECISION_TAGS = frozenset(
 CALL_TAGS = frozenset({TOOL_CALL, "toolcalls", "functioncall", "tooluse"})
 
 VERB_FIELDS = (
-    "decisionmaking", "decision", "action", "nextaction", "verb", "command", "act", "answer",
-    "tool", "function", "toolname", "functionname", "name", "决策", "动作",
+    "decisionmaking", "decision", "action", "nextaction", "actiontype", "actionname", "verb",
+    "command", "act", "answer", "tool", "function", "toolname", "functionname", "name", "决策",
+    "动作",
 )  # fmt: skip
 """Fields of a JSON object that may hold the verb; the first that does counts. ``name`` is a tool's
 where it is a verb, else perhaps the object's."""
@@ -64,14 +65,15 @@ FILLER = frozenset(
 )  # fmt: skip
 
 ARTICLE = re.compile(
-    r"(?:(?:the|an?|this|that|these|those|my|your|some|any|another|nearest|closest|nearby)\s+"
+    r"(?:(?:the|an?|this|that|these|those|my|your|some|any|another|nearest|closest|nearby|"
+    r"(?:[\w-]{1,20}\s){0,2}[\w-]{1,20}['’]s)\s+"
     r"|[那这一][个台张把只扇盏]\s*)+",
     re.IGNORECASE,
 )
 CLAUSE = re.compile(
     r"\s+(?:from|out of|off|inside|into|in|onto|on|at|with|using|to|and|then|next to|near|beside|"
-    r"behind|under|over|by|for|so|because|since|which|that|where|if|while|again|now|first)(?!\w)"
-    r"|[,;:(){}<>\[\]、。]|\.\s|\s[-–—]\s|[里上中](?:面|边)?$|(?<=[^\x00-\x7f])内$",
+    r"behind|under|over|by|for|so|because|since|which|that|the|where|if|while|again|now|first)(?!\w)"
+    r"|那(?:里|儿|边)|[,;:(){}<>\[\]、。]|\.\s|\s[-–—]\s|[里上中前旁](?:面|边)?$|(?<=[^\x00-\x7f])内$",
     re.IGNORECASE,
 )
 """Marks the end of a name and the start of a clause: ``Egg from the Fridge``, ``Fridge, which is
