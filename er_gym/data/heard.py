@@ -24,7 +24,7 @@ from er_gym.tasks.suites import config_directory
 
 WRITER = "imported"
 _KIND_OF_TAG = {tag: kind for kind, tag in TAG_OF_KIND.items()}
-_TAGGED = re.compile(rf"<({'|'.join(_KIND_OF_TAG)})>(.*?)</\1>", re.DOTALL)
+_TAG = re.compile(rf"<(/?)({'|'.join(_KIND_OF_TAG)})>")
 _DECIDED = re.compile(rf"<{DECISION}>[^<>]*</{DECISION}>[\s.]*\Z")
 _SLOT = re.compile(r"(\{(?:picture|scene|task|actions|action|feedback)\})")
 _TASK = re.compile(
@@ -33,7 +33,7 @@ _TASK = re.compile(
 _CHINESE = re.compile(r"[\u4e00-\u9fff]")
 _BEGINS = r"(?:^|(?<=[\s.!?…。！？”\"']))"
 """Where a sentence of er-gym's own may begin: what a model thinks need not end in a full stop."""
-_BEGINS_SENTENCE = r"(?:^|(?<=[.!?…。！？\n])\s*)"
+_BEGINS_SENTENCE = r"(?:^|(?<=[.!?…。！？\n])[^\S\n]*)"
 _LONGEST_INSTRUCTION = 300
 _FEWEST_OWN = 20
 """The fewest characters that a dialect's text has beside its slots, to be known by them."""
@@ -75,8 +75,7 @@ def user_message(text: str, *, first: bool, shows: bool) -> UserMessage:
     """
     bare = text.replace(IMAGE, "").strip()
     for language, name, pattern in _patterns():
-        if (name == "first") == first and (found := pattern.fullmatch(bare)):
-            parts = found.groupdict()
+        if (name == "first") == first and (parts := _filled(pattern, bare)) is not None:
             return UserMessage(
                 language,
                 parts.get("task") or "",
@@ -100,7 +99,7 @@ def thoughts_of(reply: str, language: Language, *, first: bool) -> list[ThoughtR
     reasoning.
     """
     said = _DECIDED.sub("", reply).strip()
-    tagged = _TAGGED.findall(said)
+    tagged = list(_tagged(said))
     if tagged:
         return [_thought(_KIND_OF_TAG[tag], text) for tag, text in tagged if text.strip()]
     own = _openers(language)
@@ -120,6 +119,27 @@ def thoughts_of(reply: str, language: Language, *, first: bool) -> list[ThoughtR
         if text.strip():
             found.append(_thought(kinds[opener], text))
     return found
+
+
+def _tagged(text: str) -> Iterator[tuple[str, str]]:
+    """The tag and the text of each thought between two tags, in time linear in the text."""
+    ends: dict[str, list[re.Match[str]]] = {}
+    for found in _TAG.finditer(text):
+        if found[1]:
+            ends.setdefault(found[2], []).append(found)
+    for each in ends.values():
+        each.reverse()
+    at = 0
+    for begun in _TAG.finditer(text):
+        if begun[1] or begun.start() < at:
+            continue
+        later = ends.get(begun[2], [])
+        while later and later[-1].start() < begun.end():
+            later.pop()
+        if later:
+            end = later.pop()
+            at = end.end()
+            yield begun[2], text[begun.end() : end.start()]
 
 
 def language_of(text: str) -> Language:
@@ -174,28 +194,36 @@ def _last_of(closers: list[str]) -> re.Pattern[str]:
 
 
 @lru_cache(maxsize=1)
-def _patterns() -> tuple[tuple[Language, str, re.Pattern[str]], ...]:
-    """Each text of a user in er-gym's dialects, as a pattern without places of pictures."""
-    found: dict[tuple[Language, str, str], re.Pattern[str]] = {}
+def _patterns() -> tuple[tuple[Language, str, tuple[str, ...]], ...]:
+    """Each text of a user in er-gym's dialects without places of pictures: its own words and the
+    slots between them, in turn."""
+    found: dict[tuple[Language, str, str], tuple[str, ...]] = {}
     for language, texts in _dialects():
         for name in ("first", "failed", "astray", "observed", "forward", "after"):
             text = getattr(texts, name).replace("{picture}", "").strip()
             if len(_SLOT.sub("", text)) < _FEWEST_OWN:  # it would fit anything
                 continue
-            found[language, name, text] = re.compile(_as_pattern(text), re.DOTALL)
+            found[language, name, text] = tuple(_SLOT.split(text))
     return tuple((language, name, each) for (language, name, _), each in found.items())
 
 
-def _as_pattern(text: str) -> str:
-    seen: set[str] = set()
-    parts = []
-    for part in _SLOT.split(text):
-        name = part.strip("{}")
-        if not _SLOT.fullmatch(part):
-            parts.append(re.escape(part))
-        elif name in seen:
-            parts.append(f"(?P={name})")
-        else:
-            seen.add(name)
-            parts.append(f"(?P<{name}>.*?)")
-    return "".join(parts)
+def _filled(pattern: tuple[str, ...], text: str) -> dict[str, str] | None:
+    """What stands in the slots of a text; None if it is another text.
+
+    Each of the pattern's own words is taken where it comes first, the last one at the end. A slot
+    that comes again must hold the same. The time is linear in the text.
+    """
+    words, slots = pattern[::2], [name.strip("{}") for name in pattern[1::2]]
+    if not slots:
+        return {} if text == words[0] else None
+    if not text.startswith(words[0]) or not text.endswith(words[-1]):
+        return None
+    last = len(text) - len(words[-1])
+    at = len(words[0])
+    held: dict[str, str] = {}
+    for number, (slot, after) in enumerate(zip(slots, words[1:], strict=True), start=1):
+        end = last if number == len(slots) else text.find(after, at, last)
+        if end < at or held.setdefault(slot, text[at:end]) != text[at:end]:
+            return None
+        at = end + len(after)
+    return held

@@ -23,7 +23,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from er_gym.rollout.json_lines import JsonLines
-from er_gym.rollout.records import Words
+from er_gym.rollout.records import GrownRecord, Words
 
 EVENTS = "events.jsonl"
 """The file's name in a run directory."""
@@ -114,7 +114,7 @@ class StepDone(_Event):
     thought: Words = ""
 
 
-class EpisodeEnded(_Event):
+class EpisodeEnded(GrownRecord, _Event):
     """An episode is over and its record is in the run directory.
 
     Attributes:
@@ -127,6 +127,8 @@ class EpisodeEnded(_Event):
         replies, causes, unusable, ended: what was amiss, as
             :class:`er_gym.rollout.causes.EpisodeCauses` has it.
     """
+
+    added = ("replies", "causes", "unusable", "ended")
 
     kind: Literal["episode_ended"] = "episode_ended"
     task_id: str
