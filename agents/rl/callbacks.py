@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import shutil
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import torch
 from sb3_contrib.common.maskable.callbacks import MaskableEvalCallback
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import KVWriter
+from stable_baselines3.common.logger import KVWriter, TensorBoardOutputFormat
 from stable_baselines3.common.vec_env import VecEnv
+from torch.utils.tensorboard import SummaryWriter
 
 from agents.rl.config import Phase
 from agents.rl.model_file import save
@@ -38,7 +40,13 @@ class Checkpoints(BaseCallback):
     def save(self) -> None:
         """Save now."""
         self.model.num_timesteps = self.steps
+        self._save()
+
+    def _save(self) -> None:
         save(self.model, self._run)
+        for writer in self.model.logger.output_formats:
+            if isinstance(writer, TrackerWriter):
+                writer.saved(self.steps)
 
     def _on_training_start(self) -> None:
         self.steps = self._saved_at = self.num_timesteps
@@ -46,7 +54,7 @@ class Checkpoints(BaseCallback):
     def _on_rollout_start(self) -> None:
         self.steps = self.num_timesteps
         if self.steps - self._saved_at >= self._every:
-            save(self.model, self._run)
+            self._save()
             self._saved_at = self.steps
 
     def _on_rollout_end(self) -> None:
@@ -59,12 +67,16 @@ class Checkpoints(BaseCallback):
 class CurveWriter(KVWriter):
     """Writes each logger dump as a line of ``curve.jsonl``, with steps and seconds.
 
-    A continued run drops the lines after its checkpoint.
+    Args:
+        run: the run directory.
+        steps: of the checkpoint from which the run goes on, and the lines after it are dropped;
+            None for a run that begins.
     """
 
-    def __init__(self, run: Path, steps: int) -> None:
+    def __init__(self, run: Path, steps: int | None) -> None:
         self._file = run / CURVE
-        kept = [line for line in read_curve(run) if line["steps"] <= steps]
+        kept = read_curve(run) if steps is not None else []
+        kept = [line for line in kept if steps is not None and line["steps"] <= steps]
         write_atomic(self._file, "".join(json.dumps(line) + "\n" for line in kept))
         self._before = kept[-1]["seconds"] if kept else 0.0
         self._began = time.monotonic()
@@ -80,6 +92,63 @@ class CurveWriter(KVWriter):
 
     def close(self) -> None:
         """Nothing to do: each line is written at once."""
+
+
+class BoardWriter(TensorBoardOutputFormat):
+    """Writes each logger dump for TensorBoard.
+
+    Args:
+        folder: of its files.
+        steps: as :class:`CurveWriter` takes it. What was logged after these is void: TensorBoard
+            forgets it, as for a fine-tuning run.
+    """
+
+    def __init__(self, folder: Path, steps: int | None) -> None:
+        if steps is None:
+            shutil.rmtree(folder, ignore_errors=True)
+        self.writer = SummaryWriter(str(folder), purge_step=0 if steps is None else steps + 1)
+        self._is_closed = False
+
+
+class TrackerWriter(KVWriter):
+    """Sends each logger dump to a tracker that takes a step once, when a checkpoint holds it.
+
+    What a killed run had learnt after its checkpoint is learnt again, and a tracker cannot forget
+    as ``curve.jsonl`` does. So nothing is sent before it is certain.
+
+    Args:
+        send: takes values and the number of steps.
+        first: the least number of steps that the tracker does not have.
+        before: the lines of an earlier start of the run, up to its checkpoint.
+    """
+
+    def __init__(
+        self,
+        send: Callable[[dict[str, float], int], None],
+        first: int,
+        before: Sequence[Mapping[str, float]],
+    ) -> None:
+        self._send = send
+        self._waiting = [dict(line) for line in before if line["steps"] >= first]
+        self.saved(max((int(line["steps"]) for line in before), default=-1))
+
+    def write(
+        self, key_values: dict[str, Any], key_excluded: dict[str, Any], step: int = 0
+    ) -> None:
+        """Keep the values until they are certain."""
+        values = {key: float(value) for key, value in key_values.items() if _is_number(value)}
+        self._waiting.append({**values, "steps": step})
+
+    def saved(self, steps: int) -> None:
+        """A checkpoint of so many steps is on the disk."""
+        ready = [line for line in self._waiting if line["steps"] <= steps]
+        self._waiting = [line for line in self._waiting if line["steps"] > steps]
+        for line in ready:
+            self._send({key: line[key] for key in line if key != "steps"}, int(line["steps"]))
+
+    def close(self) -> None:
+        """Send the rest: the run is over."""
+        self.saved(max((int(line["steps"]) for line in self._waiting), default=-1))
 
 
 def _is_number(value: object) -> bool:
@@ -100,15 +169,27 @@ def read_curve(run: Path) -> list[dict[str, float]]:
     return lines
 
 
+def evaluated_at(run: Path, steps: int) -> int:
+    """The number of steps at the last evaluation up to a checkpoint; 0 without any."""
+    found = (
+        int(line["steps"])
+        for line in read_curve(run)
+        if line["steps"] <= steps and any(name.startswith("eval/") for name in line)
+    )
+    return max(found, default=0)
+
+
 class HeldOutEvaluation(MaskableEvalCallback):
-    """sb3-contrib's evaluation every ``every`` steps, between rollouts, rather than by calls."""
+    """sb3-contrib's evaluation every ``every`` steps, between rollouts, rather than by calls.
 
-    def __init__(self, env: Any, every: int, count: int, seed: int) -> None:
+    Args:
+        before: the number of steps at the last evaluation of an earlier start, so that one that
+            was due when the run was killed is done.
+    """
+
+    def __init__(self, env: Any, every: int, count: int, seed: int, before: int = 0) -> None:
         super().__init__(env, n_eval_episodes=count, eval_freq=1, verbose=0, warn=False)
-        self._every, self._seed = every, seed
-
-    def _on_training_start(self) -> None:
-        self._evaluated_at = self.num_timesteps
+        self._every, self._seed, self._evaluated_at = every, seed, before
 
     def _on_rollout_start(self) -> None:
         if self.num_timesteps - self._evaluated_at >= self._every:

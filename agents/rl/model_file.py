@@ -75,8 +75,33 @@ def _about(model: BaseAlgorithm) -> dict[str, Any]:
             {"r": float(each["r"]), "l": int(each["l"]), "t": float(each["t"])}
             for each in model.ep_info_buffer or ()
         ],
+        # Of the last update; they are logged with the next rollout.
+        "logged": _logged(model),
         "successes": [bool(each) for each in model.ep_success_buffer or ()],
     }
+
+
+def _logged(model: BaseAlgorithm) -> dict[str, float]:
+    """What the learner has recorded and not written yet."""
+    if not hasattr(model, "_logger"):  # it has not learnt
+        return {}
+    found = model.logger.name_to_value
+    return {name: float(value) for name, value in found.items() if hasattr(value, "__float__")}
+
+
+def log_again(file: Path, model: BaseAlgorithm) -> None:
+    """Record in a learner's logger what a file says was recorded and not written yet.
+
+    Raises:
+        ValueError: the file is damaged.
+    """
+    try:
+        with zipfile.ZipFile(file) as archive:
+            logged = read_about(archive).get("logged", {})  # older files lack it
+        for name, value in logged.items():
+            model.logger.record(str(name), float(value))
+    except (zipfile.BadZipFile, OSError, KeyError, TypeError, ValueError, AttributeError) as error:
+        raise unreadable(file, error) from error
 
 
 def _shapes(space: spaces.Space[Any]) -> dict[str, list[int]]:

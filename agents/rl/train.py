@@ -20,7 +20,7 @@ import torch
 from sb3_contrib import MaskablePPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList, ProgressBarCallback
-from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
+from stable_baselines3.common.logger import KVWriter, Logger
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 from torch.distributions import Distribution
@@ -29,16 +29,20 @@ from agents.configs import dump
 from agents.rl import dqn, ppo
 from agents.rl.callbacks import (
     CURVE,
+    BoardWriter,
     Checkpoints,
     Curriculum,
     CurveWriter,
     HeldOutEvaluation,
     SuccessByType,
     TorchThreads,
+    TrackerWriter,
+    evaluated_at,
+    read_curve,
 )
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, load_config
 from agents.rl.envs import evaluation_config, make_env
-from agents.rl.model_file import placeholder_env, restore, save
+from agents.rl.model_file import log_again, placeholder_env, restore, save
 from agents.rl.policy_file import CONFIG, LEARNERS, MODEL, SB3_MODEL, untrusted_model
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.vec_env import WorkerVecEnv
@@ -119,7 +123,9 @@ def _train(
     if model is not None and not (run / MODEL).exists():
         save(model, run)  # from now on the run needs no trust
     steps = 0 if model is None else model.num_timesteps
-    if model is not None and steps >= config.total_steps:
+    before = evaluated_at(run, steps)
+    evaluated = config.evaluation is None or before >= steps  # else it was killed meanwhile
+    if model is not None and steps >= config.total_steps and evaluated:
         return model
     spec = ALGORITHMS[config.algorithm.name]
     # A continued run plays different episodes than at its start.
@@ -132,7 +138,7 @@ def _train(
     try:
         if config.evaluation is not None:
             begin("starting the environments of evaluation")
-            held_out = _held_out(config, config.evaluation)
+            held_out = _held_out(config, config.evaluation, before)
             callbacks.append(held_out)
         if config.curriculum:
             curriculum = Curriculum(config.curriculum, config.env.types)
@@ -141,7 +147,8 @@ def _train(
         if show_progress:
             callbacks.append(ProgressBarCallback())
         begin("making the network")
-        logger = _logger(config, run, steps)  # its clock runs during the warm start, too
+        # Its clock runs during the warm start, too.
+        logger = _logger(config, run, None if model is None else steps)
         if model is None:
             model = spec.make(config, config.algorithm, env)
             if config.warm_start is not None:
@@ -149,18 +156,20 @@ def _train(
                 begin(f"cloning {config.warm_start.teacher}")
                 with fast_arithmetic():
                     warm_start(model, config, config.warm_start, run, seed, show_progress)
-                save(model, run)
                 logger.dump(0)  # a line with its duration
+                save(model, run)
             env.seed(seed)
         else:
             model.set_env(env)
             set_random_seed(seed)
         model.set_logger(logger)
+        if (run / MODEL).exists():
+            log_again(run / MODEL, model)
         begin("loading the rooms")
         try:
             with fast_arithmetic():
                 model.learn(
-                    config.total_steps - steps,
+                    max(config.total_steps - steps, 0),
                     callback=CallbackList(callbacks),
                     reset_num_timesteps=False,
                 )
@@ -193,9 +202,9 @@ def fast_arithmetic() -> Iterator[None]:
         Distribution.set_default_validate_args(__debug__)
 
 
-def _held_out(config: TrainConfig, asked: Evaluation) -> HeldOutEvaluation:
+def _held_out(config: TrainConfig, asked: Evaluation, before: int) -> HeldOutEvaluation:
     env = make_vec_env(config, evaluation_config(config.env, asked.episodes), _EVALUATION_SEED)
-    return HeldOutEvaluation(env, asked.every, asked.count, _EVALUATION_SEED)
+    return HeldOutEvaluation(env, asked.every, asked.count, _EVALUATION_SEED, before)
 
 
 def prepare_run(config: TrainConfig, run: Path) -> bool:
@@ -299,29 +308,34 @@ def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int) -> VecEnv:
     return env
 
 
-def _logger(config: TrainConfig, run: Path, steps: int) -> Logger:
+def _logger(config: TrainConfig, run: Path, steps: int | None) -> Logger:
+    """What is logged, rewound to the checkpoint of ``steps`` from which the run goes on."""
     writers: list[KVWriter] = [CurveWriter(run, steps)]
     if config.tensorboard:
-        writers.append(TensorBoardOutputFormat(str(run / TENSORBOARD)))
+        writers.append(BoardWriter(run / TENSORBOARD, steps))
     if config.wandb:
-        _start_wandb(config, run)
+        writers.append(_wandb_writer(config, run))
     return Logger(str(run), writers)
 
 
-def _start_wandb(config: TrainConfig, run: Path) -> None:
-    """Start Weights & Biases, which copies the TensorBoard logs."""
+def _wandb_writer(config: TrainConfig, run: Path) -> TrackerWriter:
+    """Start Weights & Biases; ``curve.jsonl`` has been rewound to the checkpoint."""
     try:
         import wandb
     except ImportError:
         raise ValueError(
             "wandb is not installed; pip install wandb, or leave 'wandb' empty in the configuration"
         ) from None
-    wandb.init(
+    started = wandb.init(
         project=config.wandb,
         name=run.name,
         id=run.name,
         resume="allow",
         dir=run,
         config=config.model_dump(mode="json"),
-        sync_tensorboard=True,
     )
+
+    def send(values: dict[str, float], steps: int) -> None:
+        started.log(values, step=steps)
+
+    return TrackerWriter(send, started.step, read_curve(run))

@@ -146,8 +146,9 @@ def bench(
     from benchmarks.scoring.tables import print_tables, tables
     from er_gym import __version__
     from er_gym.rollout.agent import CannotGoOn
+    from er_gym.rollout.outcomes import Outcomes
     from er_gym.rollout.run_directory import Manifest
-    from er_gym.rollout.runner import episodes_of, finished
+    from er_gym.rollout.runner import episodes_of, tell_late
     from er_gym.rollout.selection import Shard, select
     from er_gym.rollout.worker_pool import WorkerSetupError
     from er_gym.tasks.errors import summarise_set_aside
@@ -217,9 +218,8 @@ def bench(
         with _locked(out, manifest) as run_directory:
             for line in run_directory.move_aside(episodes):
                 print_problem(line)
-            before = [each.success for each in finished(run_directory, chosen, samples)]
-            title = f"{asked.name}, {agent}"
-            progress = Progress(console, title, len(episodes), len(before), sum(before))
+            before = Outcomes.of(each for each in run_directory.episodes() if each.key in episodes)
+            progress = Progress(console, f"{asked.name}, {agent}", len(episodes), before)
             with (
                 executor_options.workforce(progress.say, 1, agents=[agent]) as workforce,
                 _prepared_run(run_directory, chosen, samples, workforce, agent, vlm_run, trust) as (
@@ -227,6 +227,7 @@ def bench(
                     cost,
                 ),
             ):
+                tell_late(run_directory)
                 with progress, tracking(track, out, manifest.model_dump()) as listeners:
                     outcome = play(progress, listeners)
                 bill = cost()

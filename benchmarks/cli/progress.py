@@ -17,6 +17,7 @@ from rich.progress import Progress as RichProgress
 from benchmarks.cli.activity import doing
 from benchmarks.cli.live_line import LINE
 from er_gym.rollout.events import Cost, EpisodeEnded, Event
+from er_gym.rollout.outcomes import Outcomes
 
 _LINES = 10
 """The number of lines that a whole run prints without a terminal."""
@@ -57,8 +58,7 @@ class Progress:
         console: where to, a :func:`~benchmarks.cli.terminal.terminal`.
         title: what is played.
         total: how many episodes there are.
-        done: how many of them were there before.
-        succeeded: how many of those were a success.
+        before: what earlier starts of the run have come to; those that crashed are played again.
     """
 
     def __init__(
@@ -66,18 +66,19 @@ class Progress:
         console: Console,
         title: str,
         total: int,
-        done: int = 0,
-        succeeded: int = 0,
+        before: Outcomes | None = None,
     ) -> None:
         self._cost = ""
         self._console = console
         self._title = title
         self._total = total
-        self._before = self._done = done
-        self._succeeded = succeeded
+        self._outcomes = before or Outcomes()
+        self._before = self._done = self._outcomes.n - self._outcomes.crashed
         self._start = time.monotonic()
         self._bar = bar(console)
-        self._task = self._bar.add_task(title, total=total, completed=done, status=self._status())
+        self._task = self._bar.add_task(
+            title, total=total, completed=self._done, status=self._status()
+        )
 
     def __enter__(self) -> Progress:
         self._start = time.monotonic()
@@ -92,12 +93,12 @@ class Progress:
         if isinstance(event, Cost):
             self._cost = str(event)
         elif isinstance(event, EpisodeEnded):
-            self.episode(event.success)
+            self.episode(event.success, event.task_id, event.error)
 
-    def episode(self, success: bool) -> None:
-        """Count an episode."""
+    def episode(self, success: bool, key: str = "", error: str = "") -> None:
+        """Count an episode, by its key where it may have been counted before."""
         self._done += 1
-        self._succeeded += success
+        self._outcomes.add(key or f"{self._done}", success, error)
         self._bar.update(self._task, completed=self._done, status=self._status())
         lines = self._done * _LINES // self._total
         if not self._console.is_terminal and lines > (self._done - 1) * _LINES // self._total:
@@ -115,5 +116,5 @@ class Progress:
             return "starting"
         played = self._done - self._before
         speed = played / max(time.monotonic() - self._start, 1e-9)
-        said = f"{100 * self._succeeded / self._done:.1f} % success, {speed:.1f} episodes/s"
+        said = f"{100 * self._outcomes.rate:.1f} % success, {speed:.1f} episodes/s"
         return ", ".join(filter(None, (said, self._cost)))

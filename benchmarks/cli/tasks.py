@@ -67,12 +67,13 @@ def verify(suites: tuple[str, ...], executor_options: ExecutorOptions) -> int:
                 make_verifier, todo, workers=workforce.workers, room=attrgetter("scene")
             )
             for task, verdict in stack.enter_context(closing(results)):
-                problem = "the engine died" if isinstance(verdict, LostJob) else verdict.problem
+                problem, detail = "the engine died", ""
+                if not isinstance(verdict, LostJob):
+                    problem, detail = verdict.problem, verdict.detail
                 solved += not problem
                 progress.episode(not problem)
                 if problem:
-                    detail = "" if isinstance(verdict, LostJob) else f": {verdict.detail}"
-                    echo(f"{suite.name}: {task.id}: {problem}{detail}")
+                    echo(": ".join(filter(None, (suite.name, task.id, problem, detail))))
         every = len(todo) + len(aside)
         failed += every - solved
         told = f"; {len(aside)} set aside" if aside else ""

@@ -1,4 +1,9 @@
-"""Sends the figures of a run to TensorBoard or trackio while it is played."""
+"""Sends the figures of a run to TensorBoard or trackio while it is played.
+
+A figure's step is the number of results so far, those of episodes that crashed and were played
+again included. The run's event stream is what counts: a start first brings a log to where the
+stream is, whatever a kill has left of it. So no step is there twice, and none is lost.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +22,10 @@ from er_gym.rollout.events import (
     EventListener,
     read_events,
 )
+from er_gym.rollout.outcomes import Outcomes
 
-Log = Callable[[Mapping[str, float], int], None]
-"""Takes figures by name, and after how many episodes they hold."""
+Log = Callable[[Mapping[str, float], int, float], None]
+"""Takes figures by name, after how many results they hold, and when, in seconds since the epoch."""
 PACKAGES: Mapping[str, tuple[str, ...]] = {
     "tensorboard": ("tensorboard", "torch"),
     "trackio": ("trackio",),
@@ -28,41 +34,34 @@ PACKAGES: Mapping[str, tuple[str, ...]] = {
 
 
 class RunFigures:
-    """Figures of a run after each episode; an :data:`~er_gym.rollout.events.EventListener`.
+    """Figures of a run after each result; an :data:`~er_gym.rollout.events.EventListener`.
 
     Args:
         log: takes them.
-        before: the last events of the episodes that earlier starts of the run finished.
     """
 
-    def __init__(self, log: Log, before: Sequence[EpisodeEnded] = ()) -> None:
-        self._log = log
-        self._episodes = self._successes = self._crashed = 0
-        for event in before:
-            self._count(event)
+    def __init__(self, log: Log) -> None:
+        self._log, self._outcomes, self._results = log, Outcomes(), 0
 
     def __call__(self, event: Event) -> None:
         """Log what follows from an event."""
         if isinstance(event, EpisodeEnded):
-            self._count(event)
-            played = self._episodes - self._crashed
-            figures = {"crashed": float(self._crashed)}
-            if played:
-                figures["success"] = self._successes / played
+            self._results += 1
+            self._outcomes.add(event.task_id, event.success, event.error)
+            figures = {
+                "crashed": float(self._outcomes.crashed),
+                "success": self._outcomes.rate,
+            }
             if not event.error:
                 figures |= {
                     "episode/reward": event.total_reward,
                     "episode/steps": float(event.steps),
                     "episode/seconds": event.seconds,
                 }
-            self._log(figures, self._episodes)
+            self._log(figures, self._results, event.time)
         elif isinstance(event, Cost):
-            self._log({"tokens": float(event.tokens), "dollars": event.cost}, self._episodes)
-
-    def _count(self, event: EpisodeEnded) -> None:
-        self._episodes += 1
-        self._crashed += bool(event.error)
-        self._successes += event.success and not event.error
+            figures = {"tokens": float(event.tokens), "dollars": event.cost}
+            self._log(figures, self._results, event.time)
 
 
 @contextmanager
@@ -87,25 +86,26 @@ def tracking(
             )
     with ExitStack() as stack:
         logs = [stack.enter_context(_OPEN[name](run, settings)) for name in dict.fromkeys(names)]
-        before = {
-            event.task_id: event
-            for event in (read_events(run) if logs else ())
-            if isinstance(event, EpisodeEnded)
-        }
-        done = [event for event in before.values() if not event.error]
-        yield [RunFigures(log, done) for log in logs]
+        found = [RunFigures(log) for log in logs]
+        for event in read_events(run, ["episode_ended", "cost"]) if logs else ():
+            for each in found:
+                each(event)
+        yield [*found]
 
 
 @contextmanager
 def _tensorboard(run: Path, settings: Mapping[str, Any]) -> Iterator[Log]:
-    """Logs into ``RUN/tensorboard``."""
+    """Logs into ``RUN/tensorboard``, anew at each start: its files can only be appended to."""
     from torch.utils.tensorboard import SummaryWriter
 
-    writer = SummaryWriter(str(run / "tensorboard"))
+    folder = run / "tensorboard"
+    for old in folder.glob("events.out.tfevents.*"):
+        old.unlink()
+    writer = SummaryWriter(str(folder), purge_step=0)  # a TensorBoard that is open forgets, too
 
-    def log(figures: Mapping[str, float], episodes: int) -> None:
+    def log(figures: Mapping[str, float], step: int, when: float) -> None:
         for name, value in figures.items():
-            writer.add_scalar(name, value, episodes)
+            writer.add_scalar(name, value, step, walltime=when)
         writer.flush()
 
     try:
@@ -116,14 +116,20 @@ def _tensorboard(run: Path, settings: Mapping[str, Any]) -> Iterator[Log]:
 
 @contextmanager
 def _trackio(run: Path, settings: Mapping[str, Any]) -> Iterator[Log]:
-    """Logs into trackio's own folder, on this machine."""
+    """Logs into trackio's own folder, on this machine, the steps that are not there yet."""
     import trackio
 
     project = run.resolve().parent.name or "er-gym"
     with redirect_stdout(sys.stderr):  # the results alone go to stdout
         opened = trackio.init(project=project, name=run.name, config=dict(settings), resume="allow")
+    missing = getattr(opened, "_next_step", 0)  # it has no public name
+
+    def log(figures: Mapping[str, float], step: int, when: float) -> None:
+        if step >= missing:
+            opened.log(dict(figures), step=step)
+
     try:
-        yield lambda figures, episodes: opened.log(dict(figures), step=episodes)
+        yield log
     finally:
         with redirect_stdout(sys.stderr):
             trackio.finish()

@@ -130,7 +130,7 @@ def _tokens(path: Path, episodes: Sequence[EpisodeRecord]) -> float | None:
     """Tokens of the model's replies in an episode, on average."""
     counts = []
     for episode in episodes:
-        file = path / CONVERSATIONS / f"{file_stem(episode.task_id)}.json"
+        file = path / CONVERSATIONS / f"{file_stem(episode.key)}.json"
         if file.is_file():
             counts.append(json.loads(file.read_text(encoding="utf-8"))["completion_tokens"])
     return sum(counts) / len(counts) if counts else None

@@ -62,12 +62,10 @@ class Difference:
 
 
 def pairs_of(first: Mapping[str, EpisodeRow], second: Mapping[str, EpisodeRow]) -> list[Pair]:
-    """The episodes that both runs have finished, without those that crashed in either."""
-    return [
-        Pair(key, row, second[key])
-        for key, row in first.items()
-        if key in second and _counts(row) and _counts(second[key])
-    ]
+    """The episodes that have come out in both runs; those that crashed are failures, as everywhere
+    (:mod:`er_gym.rollout.outcomes`)."""
+    found = ((key, row.result, second[key].result) for key, row in first.items() if key in second)
+    return [Pair(key, one, other) for key, one, other in found if one and other]
 
 
 def difference(name: str, pairs: Sequence[Pair]) -> Difference:
@@ -109,7 +107,3 @@ def mcnemar(gained: int, lost: int) -> float:
     changed, fewer = gained + lost, min(gained, lost)
     tail = sum(comb(changed, k) for k in range(fewer + 1))
     return min(1.0, 2 * tail / 2**changed)
-
-
-def _counts(row: EpisodeRow) -> bool:
-    return row.outcome in ("success", "failure")

@@ -14,6 +14,7 @@ from pydantic_core import from_json
 from benchmarks.monitor.line_tail import LineTail
 from er_gym.rollout.causes import EpisodeCauses
 from er_gym.rollout.events import EVENTS
+from er_gym.rollout.outcomes import succeeded
 
 _LINE = re.compile(
     rb'(?:\{"time":([0-9.e+-]+),"kind":"step","task_id":"([^"]*)","step":([0-9]+),"verb":"([^"]*)",'
@@ -34,12 +35,13 @@ class EpisodeRow:
         task_type, scene, instruction, max_steps: of the task.
         begun: when it began, seconds since the epoch.
         ended: when it ended; None if it has not.
-        success: the environment's verdict.
+        success: whether it counts as a success (:mod:`er_gym.rollout.outcomes`).
         end_reason, error: as :class:`~er_gym.rollout.events.EpisodeEnded` has them.
         steps, reward, seconds: so far.
         tokens, cost: of the model's replies that were not cached, cost in US dollars.
         last: the last action.
         causes: what was amiss with its replies; None while it plays.
+        before: while it is played again, the result that it had: it had crashed.
     """
 
     key: str
@@ -59,6 +61,12 @@ class EpisodeRow:
     cost: float = 0.0
     last: str = ""
     causes: EpisodeCauses | None = None
+    before: EpisodeRow | None = None
+
+    @property
+    def result(self) -> EpisodeRow | None:
+        """The row of its latest result; None if it has none yet."""
+        return self.before if self.ended is None else self
 
     @property
     def outcome(self) -> str:
@@ -152,12 +160,15 @@ class EventTail:
     def _run_begun(self, event: dict[str, Any]) -> None:
         self.wanted, self.done_before = int(event["tasks"]), int(event["done"])
         self.begun, self.stopped, self.why = float(event["time"]), False, ""
-        for key in [key for key, row in self.rows.items() if row.ended is None or row.error]:
-            del self.rows[key]  # the start before was killed, or it is played again
+        for key, row in [*self.rows.items()]:
+            if row.result is None:  # the start before was killed
+                del self.rows[key]
+            else:  # one that crashed counts until it has been played again
+                self.rows[key] = row.result
 
     def _episode_begun(self, event: dict[str, Any]) -> None:
         key = str(event["task_id"])
-        self.rows.pop(key, None)
+        earlier = self.rows.pop(key, None)
         self.rows[key] = EpisodeRow(
             key,
             task_type=str(event["task_type"]),
@@ -165,6 +176,7 @@ class EventTail:
             instruction=str(event["instruction"]),
             max_steps=int(event["max_steps"]),
             begun=float(event["time"]),
+            before=earlier.result if earlier else None,
         )
 
     def _reply(self, event: dict[str, Any]) -> None:
@@ -183,8 +195,9 @@ class EventTail:
     def _ended(self, event: dict[str, Any]) -> None:
         row = self._row(str(event["task_id"]))
         row.task_type = str(event["task_type"])
-        row.ended, row.success = float(event["time"]), bool(event["success"])
-        row.end_reason, row.error = str(event["end_reason"]), str(event.get("error", ""))
+        row.ended, row.error = float(event["time"]), str(event.get("error", ""))
+        row.success = succeeded(bool(event["success"]), row.error)
+        row.end_reason, row.before = str(event["end_reason"]), None
         row.steps, row.seconds = int(event["steps"]), float(event["seconds"])
         row.reward = float(event["total_reward"])
         row.causes = EpisodeCauses(

@@ -26,7 +26,6 @@ from benchmarks.monitor.language import Translator
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.run_view import RunSummary, Tally
 from benchmarks.plan.run import Plan, PlanRecord
-from benchmarks.scoring.metrics import wilson
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.reading import read_text
 
@@ -249,8 +248,4 @@ def _measured(name: str, faults: float, outs: Sequence[str], inside: Inside) -> 
 
 
 def _sum(name: str, tallies: Sequence[Tally]) -> Tally:
-    n, successes = sum(each.n for each in tallies), sum(each.successes for each in tallies)
-    if not n:
-        return Tally(name, 0, 0, None, None, None)
-    estimate = wilson(successes, n)
-    return Tally(name, n, successes, estimate.mean, estimate.low, estimate.high)
+    return Tally.over(name, [result for each in tallies for result in each.results])

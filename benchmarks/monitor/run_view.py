@@ -13,8 +13,10 @@ from benchmarks.monitor.event_tail import EpisodeRow, EventTail
 from benchmarks.monitor.failure_counts import FailureCounts
 from benchmarks.monitor.listing import AddressFilter
 from benchmarks.monitor.places import Place
-from benchmarks.scoring.metrics import wilson
+from benchmarks.monitor.record_rows import RecordRows
+from benchmarks.scoring.metrics import success_rate
 from er_gym.rollout.causes import count_causes
+from er_gym.rollout.records import task_of_key
 from er_gym.rollout.run_directory import Manifest, RunDirectory, RunDirectoryError
 from er_gym.tasks.types import task_type
 
@@ -90,29 +92,46 @@ def _within(number: int, bounds: str) -> bool:
 
 @dataclass(frozen=True)
 class Tally:
-    """A count of successes.
+    """A count of successes, as reports have it (:mod:`er_gym.rollout.outcomes`).
 
     Attributes:
         name: of what was counted.
-        n, successes: finished episodes that did not crash.
-        rate, low, high: success with Wilson's 95 % interval, as fractions; None without episodes.
+        results: the task of each episode that has come out, and whether it is a success.
+        rate, low, high: success with its 95 % interval, as fractions; None without episodes.
     """
 
     name: str
-    n: int
-    successes: int
-    rate: float | None
-    low: float | None
-    high: float | None
+    results: Sequence[tuple[str, bool]] = field(default=(), repr=False)
+    rate: float | None = None
+    low: float | None = None
+    high: float | None = None
+
+    @property
+    def n(self) -> int:
+        """How many episodes have come out."""
+        return len(self.results)
+
+    @property
+    def successes(self) -> int:
+        """How many of them are a success."""
+        return sum(success for _, success in self.results)
+
+    @staticmethod
+    def over(name: str, results: Sequence[tuple[str, bool]]) -> Tally:
+        """Count some results."""
+        if not results:
+            return Tally(name)
+        tasks, successes = zip(*results, strict=True)
+        estimate = success_rate(tasks, successes)
+        return Tally(name, results, estimate.mean, estimate.low, estimate.high)
 
     @staticmethod
     def of(name: str, rows: Iterable[EpisodeRow]) -> Tally:
-        """Count."""
-        told = [row.success for row in rows if row.outcome in ("success", "failure")]
-        if not told:
-            return Tally(name, 0, 0, None, None, None)
-        estimate = wilson(sum(told), len(told))
-        return Tally(name, len(told), sum(told), estimate.mean, estimate.low, estimate.high)
+        """Count the episodes of a run."""
+        told = [(row.key, row.result) for row in rows]
+        return Tally.over(
+            name, [(task_of_key(key), row.success) for key, row in told if row is not None]
+        )
 
 
 @dataclass(frozen=True)
@@ -124,6 +143,7 @@ class RunSummary:
         manifest: what is played; None if that cannot be read, and ``problem`` says why.
         state: ``playing``, ``finished``, ``stopped`` or ``waiting``.
         wanted: how many episodes it is to have.
+        finished: how many of them have ended, without those that crashed and are played again.
         counts: episodes by outcome.
         success: over all.
         tokens, cost: so far.
@@ -138,6 +158,7 @@ class RunSummary:
     problem: str
     state: str
     wanted: int
+    finished: int
     counts: Mapping[str, int]
     success: Tally
     tokens: int
@@ -146,11 +167,6 @@ class RunSummary:
     seconds_left: float | None
     causes: Sequence[str]
     version: int
-
-    @property
-    def finished(self) -> int:
-        """How many episodes have ended."""
-        return sum(number for name, number in self.counts.items() if name != "playing")
 
 
 @dataclass
@@ -165,11 +181,14 @@ class RunView:
     place: Place
     failures: FailureCounts = field(default_factory=FailureCounts)
     _tail: EventTail = field(init=False)
+    _records: RecordRows = field(init=False)
+    _rows: Mapping[str, EpisodeRow] = field(default_factory=dict)
     _manifest: Manifest | None = None
     _problem: str = ""
 
     def __post_init__(self) -> None:
         self._tail = EventTail(self.place.path)
+        self._records = RecordRows(self.place.path)
 
     def refresh(self) -> None:
         """Read what is new."""
@@ -180,6 +199,7 @@ class RunView:
             except (RunDirectoryError, OSError) as error:
                 self._problem = str(error)
         self._tail.read()
+        self._rows = self._records.agreeing(self._tail.rows)
 
     def count_failures(self, seconds: float) -> None:
         """Read why episodes failed, for a while."""
@@ -187,19 +207,20 @@ class RunView:
             run = RunDirectory.open(self.place.path)
         except (RunDirectoryError, OSError):
             return
-        self.failures.read(run, self._tail.rows, seconds)
+        self.failures.read(run, self._rows, seconds)
 
     @property
     def rows(self) -> Mapping[str, EpisodeRow]:
         """The episodes by key."""
-        return self._tail.rows
+        return self._rows
 
     def summary(self, now: float | None = None) -> RunSummary:
         """The run at this moment."""
         now = time.time() if now is None else now
-        tail, rows = self._tail, list(self._tail.rows.values())
+        tail, rows = self._tail, list(self._rows.values())
         counts = Counter(row.outcome for row in rows)
-        finished = sum(counts.values()) - counts["playing"]
+        again = sum(row.outcome == "crashed" and (row.ended or 0) < tail.begun for row in rows)
+        finished = sum(counts.values()) - counts["playing"] - again
         wanted = max(tail.wanted or 0, finished)
         if tail.stopped:
             state = "finished" if finished >= wanted else "stopped"
@@ -218,6 +239,7 @@ class RunView:
             problem=self._problem,
             state=state,
             wanted=wanted,
+            finished=finished,
             counts=counts,
             success=Tally.of("", rows),
             tokens=sum(row.tokens for row in rows),
@@ -235,14 +257,14 @@ class RunView:
 
     def chosen(self, filter: Filter) -> list[EpisodeRow]:
         """The rows that a filter takes, sorted."""
-        rows = [row for row in self._tail.rows.values() if filter.takes(row)]
+        rows = [row for row in self._rows.values() if filter.takes(row)]
         rows.sort(key=SORTS[filter.sort.removeprefix("-")], reverse=filter.sort.startswith("-"))
         return rows
 
     def tallies(self) -> tuple[list[Tally], list[Tally]]:
         """Success by group and by task type, in the order of the paper's table."""
         by_type: dict[str, list[EpisodeRow]] = {}
-        for row in self._tail.rows.values():
+        for row in self._rows.values():
             by_type.setdefault(row.task_type, []).append(row)
         by_group: dict[str, list[EpisodeRow]] = {}
         for name, rows in by_type.items():
@@ -254,7 +276,7 @@ class RunView:
 
     def choices(self) -> dict[str, list[str]]:
         """The values by which rows can be filtered."""
-        rows = self._tail.rows.values()
+        rows = self._rows.values()
         return {
             "type": sorted({row.task_type for row in rows}),
             "scene": sorted({row.scene for row in rows}, key=_room_number),

@@ -36,8 +36,9 @@ from benchmarks.scoring.metrics import Score, score_episode, wilson
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym import __version__
 from er_gym.rollout.executor import Parallelism
+from er_gym.rollout.outcomes import Outcomes
 from er_gym.rollout.run_directory import Manifest, RunDirectory, locked_run_directory
-from er_gym.rollout.runner import finished, run
+from er_gym.rollout.runner import run
 from er_gym.tasks import jsonl_format, load_suite
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import GROUPS
@@ -132,15 +133,15 @@ class Evaluator:
     def _play(
         self, run_directory: RunDirectory, tasks: Sequence[Task], where: str, name: str
     ) -> list[Score]:
-        before = finished(run_directory, tasks)
-        progress = Progress(self._console, f"{where}, {name}", len(tasks), len(before), 0)
+        wanted = {task.id for task in tasks}
+        before = Outcomes.of(each for each in run_directory.episodes() if each.task_id in wanted)
+        progress = Progress(self._console, f"{where}, {name}", len(tasks), before)
         with progress:
             make, parallelism = (
                 NamedAgent(run_directory.manifest.agent, trust=self._trust),
                 Parallelism(self._workers),
             )
             run(run_directory, tasks, make, parallelism=parallelism, listeners=[progress])
-        wanted = {task.id for task in tasks}
         return [
             score_episode(episode, CORRECTED)
             for episode in run_directory.episodes()

@@ -196,6 +196,24 @@ def wilson(successes: int, n: int) -> Estimate:
     return _wilson(successes / n, n)
 
 
+def success_rate(tasks: Sequence[str], successes: Sequence[bool]) -> Estimate:
+    """The rate of success of some episodes with Wilson's interval.
+
+    Where tasks were played several times, the interval is that for the number of episodes of
+    different tasks that would tell as much (:mod:`benchmarks.scoring.samples`).
+
+    Args:
+        tasks: (n,) the task of each episode.
+        successes: (n,) whether it counts as a success (:mod:`er_gym.rollout.outcomes`).
+
+    Raises:
+        ValueError: there are no episodes.
+    """
+    if not successes:
+        raise ValueError("no episodes: a rate needs at least one")
+    return _wilson(sum(successes) / len(successes), effective_number(tasks, successes))
+
+
 def _wilson(rate: float, n: float) -> Estimate:
     scale = 1 + _Z**2 / n
     centre = (rate + _Z**2 / (2 * n)) / scale
@@ -243,21 +261,13 @@ def summarise(scores: Sequence[Score]) -> Summary:
     Raises:
         ValueError: there are no scores.
     """
-    if most_samples(scores) > 1:
-        return _summarise_samples(scores)
-    means = {metric: normal([getattr(each, metric) for each in scores]) for metric in METRICS[1:]}
-    rate = wilson(sum(each.success for each in scores), len(scores))
-    return Summary(len(scores), {"success": rate, **means})
-
-
-def _summarise_samples(scores: Sequence[Score]) -> Summary:
     tasks = [each.task_id for each in scores]
-    successes = [each.success for each in scores]
-    rate = _wilson(sum(successes) / len(scores), effective_number(tasks, successes))
-    means = {
-        metric: _between(tasks, [getattr(each, metric) for each in scores])
-        for metric in METRICS[1:]
-    }
+    rate = success_rate(tasks, [each.success for each in scores])
+    several = most_samples(scores) > 1
+    means = {}
+    for metric in METRICS[1:]:
+        values = [getattr(each, metric) for each in scores]
+        means[metric] = _between(tasks, values) if several else normal(values)
     return Summary(len(scores), {"success": rate, **means})
 
 

@@ -13,9 +13,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from er_gym.rollout.judgement import judged
+from er_gym.rollout.outcomes import succeeded
 from er_gym.rollout.records import ERROR, EpisodeRecord, KeyActionRecord
 from er_gym.tasks.task import KeyAction
 from er_gym.tasks.verbs import END, INIT, MOVE_FORWARD, NAVIGATE, OBSERVE
@@ -54,11 +55,16 @@ class Scorer:
 
     Attributes:
         name: as ``--scorer`` takes it.
-        tally: the walk through an episode.
+        walk: through an episode, as if it had not crashed.
     """
 
     name: str
-    tally: Callable[[EpisodeRecord], Tally]
+    walk: Callable[[EpisodeRecord], Tally]
+
+    def tally(self, episode: EpisodeRecord) -> Tally:
+        """What was done; an episode that crashed is no success (:mod:`er_gym.rollout.outcomes`)."""
+        counted = self.walk(episode)
+        return replace(counted, success=succeeded(counted.success, episode.error))
 
 
 # -- the paper's program ---------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from textwrap import fill
@@ -19,7 +20,8 @@ from er_gym.envs.protocol import DEFAULT
 from er_gym.tasks.types import BY_NAME, GROUPS
 
 _NONE = "-"
-_IDS_SHOWN = 5
+_MOST_IN_FULL = 4
+"""Of more runs and scorers at once, each has no table of its own."""
 _WORDS_WIDTH = 18
 """Columns of words are not folded to less than this many characters."""
 _GAP = 2
@@ -53,7 +55,7 @@ def tables(
     with_types: bool = False,
     with_misses: bool = False,
 ) -> list[Table]:
-    """The tables of a report.
+    """The tables of a report: one of all runs, and up to four runs one of each with all metrics.
 
     Args:
         runs: a line each, or one for each scorer where the scorers differ.
@@ -77,6 +79,9 @@ def tables(
         ]
     if with_misses:
         found += [_misses(run) for run in runs]
+    shown = [(run, name, scores) for run in runs for name, scores in run.shown(scorer).items()]
+    if len(shown) <= _MOST_IN_FULL:
+        found += [_metrics(*each) for each in shown if each[2]]
     return found
 
 
@@ -137,6 +142,27 @@ def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple
     )
 
 
+def _metrics(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
+    """Every metric with its interval, and success by group."""
+    whole = slices(scores)[0][2]
+    lines = [(name.replace("_", " ").capitalize(), whole.n, whole[name]) for name in METRICS]
+    lines += [
+        (f"Success: {group}", summary.n, summary["success"])
+        for group, summary in by_group(scores).items()
+    ]
+    between = ", between tasks" if most_samples(scores) > 1 else ""
+    return Table(
+        title=f"{run.path}, scorer {scorer}: every metric, in %",
+        head=("", "n", "Mean", "95 %"),
+        rows=tuple(
+            (name, str(n), percent(estimate.mean), interval(estimate))
+            for name, n, estimate in lines
+        ),
+        text_columns=1,
+        notes=(f"95 %: Wilson's interval of success, 1.96 standard errors{between} of the others",),
+    )
+
+
 def _samples(run: RunReport, scorer: str, scores: Sequence[Score], with_types: bool) -> Table:
     """Success by task, where tasks were played several times."""
     lines = [
@@ -168,11 +194,10 @@ def _samples(run: RunReport, scorer: str, scores: Sequence[Score], with_types: b
 def _notes(run: RunReport) -> list[str]:
     notes = [f"{run.path}: {note}" for note in run.left_out]
     if run.differ:
-        ids = ", ".join(run.differ[:_IDS_SHOWN])
-        more = f" and {len(run.differ) - _IDS_SHOWN} more" if len(run.differ) > _IDS_SHOWN else ""
         notes.append(
             f"{run.path}: the scorers differ in {len(run.differ)} of {len(run.episodes)} "
-            f"episodes: {ids}{more}"
+            f"episodes; er-gym report {shlex.quote(str(run.path))} --format json lists them as "
+            "scorers_differ"
         )
     if run.without_targets:
         notes.append(

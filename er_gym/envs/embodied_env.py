@@ -206,7 +206,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         illegal_penalty = number("illegal_penalty", illegal_penalty, 0)
         max_steps = None if max_steps is None else whole_number("max_steps", max_steps, 1)
         self.set_faults(faults)
-        names = task_type if isinstance(task_type, list | tuple) else [task_type]
+        names: Sequence[Any] = task_type if isinstance(task_type, list | tuple) else [task_type]
         self._task_types = types_named(each for each in names if each is not None)
         self._obs = parse_obs_mode(obs_mode)
         sensors = sensors_of(self._obs.values())

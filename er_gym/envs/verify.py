@@ -35,7 +35,7 @@ class Verdict:
 
     Attributes:
         problem: one of :data:`REASONS`, ``""`` for a task that can be done.
-        detail: the last feedback.
+        detail: the last feedback; of a goal that holds from the start, its conditions.
         steps: the number of steps, the placing of the agent included.
         start: x and z of the agent's start position, metres.
     """
@@ -104,7 +104,7 @@ class Verifier:
         pose = self._env.agent_pose
         where = (pose.x, pose.z)
         if task.goal and not unmet_conditions(task.goal, self._env.objects, info["interactable"]):
-            return Verdict(DONE_ALREADY, "", 1, where)
+            return Verdict(DONE_ALREADY, "; ".join(map(str, task.goal)), 1, where)
         solver = Solver()
         earned, over = 0.0, False
         while not over:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import contextlib
 import json
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
@@ -229,13 +229,23 @@ class EventLog:
         self._lines.close()
 
 
-def read_events(directory: Path) -> Iterator[Event]:
-    """All events of a run so far, oldest first; see :func:`parse_events`."""
+def read_events(directory: Path, kinds: Sequence[str] = ()) -> Iterator[Event]:
+    """All events of a run so far, oldest first; see :func:`parse_events`.
+
+    Args:
+        directory: the run directory.
+        kinds: no others are wanted, such as ``"episode_ended"``; most events are steps, and to
+            parse them takes most of the time.
+    """
     try:
         data = (directory / EVENTS).read_bytes()
     except FileNotFoundError:
         return
-    yield from parse_events(data.split(b"\n"))
+    lines = data.split(b"\n")
+    if kinds:
+        marks = [f'"kind":"{kind}"'.encode() for kind in kinds]
+        lines = [line for line in lines if any(mark in line for mark in marks)]
+    yield from parse_events(lines)
 
 
 def parse_events(lines: Iterable[bytes]) -> Iterator[Event]:

@@ -6,6 +6,7 @@ reader would misread takes a new ``format``.
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, ClassVar, Final, Literal, TypeAlias
 
 from pydantic import (
@@ -27,6 +28,8 @@ ERROR = "error"
 """The verb recorded for a reply that named no known action."""
 GAVE_UP = "gave up"
 """Why an episode ended that the agent could not finish."""
+
+_SAMPLE = re.compile(r"\.sample[1-9]\d*\Z")
 
 PERSON: Final = "person"
 """Who decided a step in place of the agent."""
@@ -64,6 +67,11 @@ def episode_key(task_id: str, sample: int = 1) -> str:
     """The name of an episode among those of its run: the task's id, and the number of the sample
     where it is not the first."""
     return task_id if sample == 1 else f"{task_id}.sample{sample}"
+
+
+def task_of_key(key: str) -> str:
+    """The id of the task whose episode has a key (:func:`episode_key`)."""
+    return _SAMPLE.sub("", key)
 
 
 class KeyActionRecord(_Record):

@@ -267,6 +267,14 @@ class RunDirectory:
         """
         return self._episode(self._file(key))
 
+    def episode_in(self, name: str) -> EpisodeRecord:
+        """The episode in a file of the folder of episodes.
+
+        Raises:
+            ValueError: the file is not usable; the message says why.
+        """
+        return self._episode(self.path / EPISODES / name)
+
     def move_aside(self, keys: Iterable[str]) -> list[str]:
         """Rename unusable files that have the file name of one of these episodes.
 

@@ -12,7 +12,15 @@ from dataclasses import dataclass, field, replace
 
 from er_gym.rollout.agent import CannotGoOn, MakeAgent
 from er_gym.rollout.causes import causes_in
-from er_gym.rollout.events import Cost, EpisodeEnded, EventListener, EventLog, RunBegun, RunEnded
+from er_gym.rollout.events import (
+    Cost,
+    EpisodeEnded,
+    EventListener,
+    EventLog,
+    RunBegun,
+    RunEnded,
+    read_events,
+)
 from er_gym.rollout.executor import Assignment, Executor, Parallelism, PlayedEpisode
 from er_gym.rollout.process_executor import play_in_processes
 from er_gym.rollout.records import EpisodeRecord, episode_key
@@ -85,6 +93,41 @@ def _finished(directory: RunDirectory, wanted: Container[str]) -> Iterator[Episo
     return (each for each in directory.episodes() if each.key in wanted and not each.error)
 
 
+def tell_late(directory: RunDirectory) -> None:
+    """Append the events of results that the stream does not tell of.
+
+    A process that was killed between a record and its event leaves such a result. Whoever follows
+    the stream would never hear of it.
+    """
+    told = {
+        event.task_id: (event.success, event.error)
+        for event in read_events(directory.path, ["episode_ended"])
+        if isinstance(event, EpisodeEnded)
+    }
+    late = [
+        _ended(each.key, each)
+        for each in directory.episodes()
+        if told.get(each.key) != (each.success, each.error)
+    ]
+    if late:
+        with closing(EventLog(directory.path)) as log:
+            log.append(late)
+
+
+def _ended(key: str, record: EpisodeRecord) -> EpisodeEnded:
+    return EpisodeEnded(
+        task_id=key,
+        task_type=record.task_type,
+        success=record.success,
+        end_reason=record.end_reason,
+        total_reward=record.total_reward,
+        steps=sum(not step.appended for step in record.steps[1:]),
+        seconds=record.seconds,
+        error=record.error,
+        **vars(causes_in(record)),
+    )
+
+
 def run(
     directory: RunDirectory,
     tasks: Sequence[Task],
@@ -129,6 +172,7 @@ def run(
     if executor not in EXECUTORS:
         raise ValueError(f"unknown executor {executor!r}; choose one of: {', '.join(EXECUTORS)}")
     wanted = episodes_of(tasks, samples)
+    tell_late(directory)
     done = {episode.key for episode in _finished(directory, wanted)}
     # An episode goes through the executors as a task of its own, whose id is the episode's key.
     todo = [
@@ -180,19 +224,7 @@ class _Sink:
         self.played += 1
         if record.error:
             self.crashed.append(record)
-        self.emit(
-            EpisodeEnded(
-                task_id=record.task_id,
-                task_type=record.task_type,
-                success=record.success,
-                end_reason=record.end_reason,
-                total_reward=record.total_reward,
-                steps=sum(not step.appended for step in record.steps[1:]),
-                seconds=record.seconds,
-                error=record.error,
-                **vars(causes_in(record)),
-            )
-        )
+        self.emit(_ended(record.task_id, record))
         total = self.cost()
         if total is not None:
             self.emit(total)

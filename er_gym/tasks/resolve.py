@@ -3,7 +3,7 @@
 An id that a scene lacks usually comes from another build of AI2-THOR, in which the object has a
 slightly different position. The nearest object of the same type replaces it, if it is at most
 :data:`NEAR` metres away and no other object is as near. A task is set aside if an id that it needs
-remains unclear.
+remains unclear, or if it needs some object of a type and the scene has none.
 """
 
 from __future__ import annotations
@@ -11,14 +11,17 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from math import dist, inf
 from typing import Any
 
 from er_gym.activity import begin
 from er_gym.tasks.arrangement import Arrangement, set_up_scene
 from er_gym.tasks.errors import SetAsideTask, Substitution, TaskFileError
+from er_gym.tasks.judge import search_targets
 from er_gym.tasks.task import Task, type_of_id
 from er_gym.thor import make_controller
+from er_gym.thor.object_types import OBJECT_TYPES
 
 NEAR = 0.25
 """The largest distance between a missing object and its substitute, metres."""
@@ -65,7 +68,7 @@ def resolve_task(
 
     Raises:
         TaskFileError: the scene lacks an object of a key action, of the goal or of the arrangement,
-            and no object, or several, could replace it.
+            and no object, or several, could replace it; or it lacks a type that the task needs.
     """
     try:
         return _resolve(task, objects)
@@ -163,6 +166,9 @@ def _resolve(
         if whole in missing and whole not in found:
             gone = there | {other for other, _ in found.values()}
             raise TaskFileError(_missing_message(whole, task.scene, objects, gone, positions))
+    lacking = _lacking_type(task, objects)
+    if lacking:
+        raise TaskFileError(lacking)
     instead = {**respelled, **{named: other for named, (other, _) in found.items()}}
     notes = [
         f"task {task.id}: {named} is {other} in {task.scene}" for named, other in respelled.items()
@@ -225,6 +231,34 @@ def _with_ids(task: Task, instead: Mapping[str, str]) -> Task:
         # The pose that the file states for the object itself wins.
         poses={fit(i): task.poses[i] for i in sorted(task.poses, key=lambda i: fit(i) == i)},
     )
+
+
+def _lacking_type(task: Task, objects: Iterable[str]) -> str:
+    """Which type of thing a task needs and its scene lacks, in words; "" if there is none.
+
+    Where a task names a type and no id, any object of the type will do, but one there must be.
+    """
+    there = {type_of_id(i) for i in objects}
+    there |= {f"{kind}Sliced" for kind in there} | {f"{kind}Cracked" for kind in there}
+    wanted = [key.object_type for key in task.key_actions if key.scored and not key.object_id]
+    wanted += [one.object_type for one in task.goal if not one.object_id]
+    wanted += [one.inside for one in task.goal]
+    searched = sorted(search_targets(task) - {""})
+    if not there.intersection(searched):
+        wanted += searched[:1]
+    for kind in dict.fromkeys(filter(None, wanted)):
+        if kind not in there:
+            return f"{task.scene} has no {kind}{_other_spelling(kind)}"
+    return ""
+
+
+def _other_spelling(kind: str) -> str:
+    """What else may have been meant by a type that AI2-THOR does not have."""
+    if kind in OBJECT_TYPES:
+        return ""
+    near = get_close_matches(kind, OBJECT_TYPES, n=3)
+    hint = f"; did you mean {' or '.join(near)}?" if near else ""
+    return f", and there is no such type of object{hint}"
 
 
 def _whole_of_slice(object_id: str) -> str:
@@ -381,4 +415,6 @@ def _contains_all(task: Task, scenes: _Scenes) -> bool:
             for name, pose in poses.items()
         )
 
+    if _lacking_type(task, scenes.names(task.scene).values()):
+        return False
     return all(i in still or moved_there(i) for i in map(_whole_of_slice, _all_ids(task)))

@@ -252,6 +252,8 @@ def test_a_task_that_cannot_be_done_is_named(er_gym: Command, made: Path, tmp_pa
         ["some", "idle", "the goal holds from the start"],
         ["some", "wishful", "the goal does not hold in the end"],
     ]
+    (said,) = (line for line in problems if "holds from the start" in line)
+    assert "Fridge" in said.split(": ", 3)[3]  # what holds
     assert of_some == "some: 2 of 4 tasks can be done"
     assert of_made == "six: 6 of 6 tasks can be done"  # the others are played all the same
 

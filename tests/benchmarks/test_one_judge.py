@@ -83,7 +83,7 @@ def test_a_search_whose_old_record_does_not_say_for_what(
     ]
     for record in old:
         run_directory.write(record)
-    (overview,) = tables([load_run(run_directory.path)])
+    overview, *_ = tables([load_run(run_directory.path)])
     assert f"{run_directory.path}: 4 of 4 episodes are searches whose old records" in str(
         overview.notes
     )

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from benchmarks.cli import options as cli_options
 from benchmarks.scoring import report
+from benchmarks.scoring.metrics import METRICS, summarise
 from benchmarks.scoring.report import load_run
 from benchmarks.scoring.tables import as_markdown, print_tables, tables
 from er_gym.envs.protocol import PROTOCOLS
@@ -61,7 +62,37 @@ def test_where_the_scorers_differ_there_are_two_rows_and_a_note(run):
             *("100.00", "100.00", "-", "-", "100.00", "100.00"),
         ),
     )
-    assert overview.notes == (f"{run.path}: the scorers differ in 1 of 2 episodes: task-2",)
+    assert overview.notes == (
+        f"{run.path}: the scorers differ in 1 of 2 episodes; er-gym report {run.path} "
+        "--format json lists them as scorers_differ",
+    )
+    assert json.loads(report.as_json([run]))["runs"][0]["scorers_differ"] == ["task-2"]
+
+
+def test_every_metric_has_its_interval(run):
+    *_, paper, corrected = tables([run])
+    assert paper.title == f"{run.path}, scorer paper: every metric, in %"
+    assert corrected.head == ("", "n", "Mean", "95 %")
+    rows = {name: cells for name, *cells in corrected.rows}
+    summary = summarise(run.scores["corrected"])
+    for metric in METRICS:
+        name = metric.replace("_", " ").capitalize()
+        estimate = summary[metric]
+        assert rows[name] == [
+            "2",
+            f"{100 * estimate.mean:.2f}",
+            f"{100 * estimate.low:.1f} to {100 * estimate.high:.1f}",
+        ]
+    assert rows["Success"] == ["2", "100.00", "34.2 to 100.0"]
+    assert rows["Success: Transport"] == ["1", "100.00", "20.7 to 100.0"]
+    assert "Wilson" in corrected.notes[0]
+    out = io.StringIO()
+    print_tables(tables([run]), Console(file=out, width=100))
+    noted = ("scorers_differ", str(run.path))
+    lines = out.getvalue().splitlines()
+    assert all(len(line) <= 100 for line in lines if not any(word in line for word in noted))
+    # A table for each of many runs would bury the one of all.
+    assert len(tables([run] * 3)) == 1
 
 
 def test_where_they_agree_there_is_one(run_directory, episode):
@@ -130,7 +161,7 @@ def test_another_protocol_than_the_default_is_named(run, tmp_path, manifest, epi
 
 
 def test_by_type(run):
-    _, paper, corrected = tables([run], with_types=True)
+    _, paper, corrected, *_ = tables([run], with_types=True)
     assert paper.title.endswith("scorer paper, in %")
     assert [row[:2] for row in paper.rows] == [
         ("All", "2"),

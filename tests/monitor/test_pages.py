@@ -65,6 +65,7 @@ def test_runs_are_read_before_a_page_is_asked_for(runs, tmp_path):
     late = Site(Places([folder]))
     late.read_runs(closing)
     (folder / "events.jsonl").unlink()
+    shutil.rmtree(folder / "episodes")
     assert late.summary(late.places.all()[0]).finished == 0
 
 

@@ -6,17 +6,21 @@ import random
 import re
 from dataclasses import replace
 from math import dist
+from typing import Any
 
 import pytest
-from support import make_task, with_ids
+from support import in_one_test, make_task, with_ids
 
 from er_gym.tasks import AgentPose, Task, TaskFileError, load_suite
 from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.paper_format import read_tasks
 from er_gym.tasks.resolve import NEAR, resolve_task, resolve_tasks
+from er_gym.tasks.task import KeyAction
+from er_gym.tasks.types import task_type
 
 SAFE = "Safe|+01.62|00.00|+00.45"
+SEARCH = task_type("single_search")
 POSE = AgentPose(0.0, 0.9, 0.0, 90.0)
 
 
@@ -60,6 +64,42 @@ def test_the_nearest_of_the_type_is_taken_wherever_the_id_stands() -> None:
     assert taken.metres == pytest.approx(0.05)
     assert str(taken) == f"FloorPlan1 has no {off}: {SAFE}, 0.05 m off, is used instead"
     assert notes == []
+
+
+UNICORN = "Unicorn|+01.00|+01.00|+01.00"
+NO_SUCH_TYPE: dict[str, tuple[dict[str, Any], str]] = {
+    "key action": ({"key_actions": (KeyAction("pickup", "", "Unicorn"),)}, "is no such type"),
+    "misspelled": ({"key_actions": (KeyAction("pickup", "", "Aple"),)}, "did you mean Apple"),
+    "of another room": ({"key_actions": (KeyAction("open", "", "Bed"),)}, "FloorPlan1 has no Bed$"),
+    "goal": ({"goal": (Condition("Unicorn", held=True),)}, "FloorPlan1 has no Unicorn"),
+    "place": ({"goal": (Condition("Safe", inside="Bathtub"),)}, "FloorPlan1 has no Bathtub$"),
+    "search": ({"type": SEARCH, "related_objects": (UNICORN,)}, "FloorPlan1 has no Unicorn"),
+}
+
+
+@in_one_test("case", NO_SUCH_TYPE)
+def test_a_task_about_a_type_that_is_not_there_is_set_aside(case: str) -> None:
+    changes, message = NO_SUCH_TYPE[case]
+    task = replace(make_task("single_pickup", ("open", SAFE)), **changes)
+    with pytest.raises(TaskFileError, match=message):
+        resolve_task(task, [SAFE, "Fridge|+00.00|+00.00|+00.00"])
+
+
+@pytest.mark.parametrize("arrange", [True, False])
+def test_a_suites_task_about_a_unicorn_is_set_aside(arrange: bool) -> None:
+    good = load_suite("mini").tasks[0]
+    bad = replace(good, id="fabulous", goal=(Condition("Unicorn", held=True),))
+    found = resolve_tasks([good, bad], arrange=arrange)
+    assert [task.id for task in found.tasks] == [good.id]
+    assert [one.task for one in found.set_aside] == ["fabulous"]
+    assert f"{good.scene} has no Unicorn, and there is no such type" in str(found.set_aside[0])
+
+
+def test_what_comes_to_be_is_not_missing() -> None:
+    apple, egg = "Apple|+01.00|+01.00|+01.00", "Egg|+02.00|+01.00|+01.00"
+    goal = (Condition("AppleSliced"), Condition("EggCracked"), Condition("Apple", inside="Safe"))
+    task = replace(make_task("single_pickup"), goal=goal, key_actions=(KeyAction("end"),))
+    assert resolve_task(task, [SAFE, apple, egg])[0].goal == goal
 
 
 def test_poses_may_be_of_another_build_than_the_task() -> None:

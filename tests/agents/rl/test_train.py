@@ -16,7 +16,7 @@ import pytest
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.configs import dump
-from agents.rl.callbacks import read_curve
+from agents.rl.callbacks import TrackerWriter, read_curve
 from agents.rl.config import TrainConfig
 from agents.rl.policy_file import MODEL
 from agents.rl.train import RunConflict, load_last_checkpoint, train
@@ -187,33 +187,72 @@ def test_it_learns_from_pictures_and_the_sentence(make_config: Make, tmp_path: P
     assert all((a == b).all() for a, b in zip(weights(model), weights(again), strict=True))
 
 
-def test_sigkill_and_the_same_command_again(make_config: Make, tmp_path: Path) -> None:
-    """Killed at a random moment, it ends with the same number of steps and a model that loads."""
+def test_after_a_sigkill_the_logs_are_those_of_an_unbroken_run(
+    make_config: Make, tmp_path: Path
+) -> None:
+    """Killed past its checkpoint: no step is there twice, and none is lost."""
     file, run = tmp_path / "small.yaml", tmp_path / "run"
-    config = make_config(total_steps=4000, checkpoint_every=256)
+    config = make_config(
+        total_steps=3072, checkpoint_every=1024, tensorboard=True,
+        evaluation={"episodes": "mini", "every": 1024, "count": 2},
+    )  # fmt: skip
     file.write_text(dump(config))
     command = [
         sys.executable, "-m", "benchmarks.cli", "train-rl", "--config", str(file), "--out", str(run)
     ]  # fmt: skip
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    first = subprocess.Popen(
+    with subprocess.Popen(
         command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    deadline = time.monotonic() + 90
-    while not (run / MODEL).exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    time.sleep(np.random.default_rng().uniform(0, 1.0))
-    first.send_signal(signal.SIGKILL)
-    first.wait()
+    ) as first:
+        # The checkpoint is that of step 1024; what follows is void.
+        while not any(line["steps"] >= 1536 for line in read_curve(run)):
+            assert first.poll() is None
+            time.sleep(0.01)
+        first.send_signal(signal.SIGKILL)
     killed = load_last_checkpoint(run)
     assert killed is not None
-    assert killed.num_timesteps % 256 == 0
-    again = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
+    assert killed.num_timesteps == 1024
+    twice = [line["steps"] for line in read_curve(run)]
+    assert max(twice) > 1024
+    again = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
     assert again.returncode == 0, again.stderr
+    assert "3,072 steps" in again.stdout
     done = load_last_checkpoint(run)
     assert done is not None
-    assert done.num_timesteps == 4096  # 4,000 asked for, in rollouts of 256
-    assert "4,096 steps" in again.stdout
+    assert done.num_timesteps == 3072
+
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    board = EventAccumulator(str(run / "tensorboard"))
+    board.Reload()
+    rollouts, evaluations = [*range(256, 3073, 256)], [1024, 2048, 3072]
+    for name, wanted in (
+        ("rollout/success_rate", rollouts),
+        ("train/loss", rollouts[1:]),  # an update is logged with the next rollout
+        ("eval/success_rate", evaluations),
+    ):
+        assert _steps_of(name, read_curve(run)) == wanted, name
+        assert [each.step for each in board.Scalars(name)] == wanted, name
+
+
+def _steps_of(name: str, curve: list[dict[str, float]]) -> list[float]:
+    return [line["steps"] for line in curve if name in line]
+
+
+def test_a_tracker_that_cannot_forget_hears_of_a_step_once_and_when_it_is_certain() -> None:
+    sent: list[tuple[int, dict[str, float]]] = []
+    before = [{"steps": 256, "seconds": 1.0, "a": 0.1}, {"steps": 512, "seconds": 2.0, "a": 0.2}]
+    # Killed after the checkpoint of step 512 and before that was sent.
+    writer = TrackerWriter(lambda values, steps: sent.append((steps, values)), 257, before)
+    assert [steps for steps, _ in sent] == [512]
+    writer.write({"a": 0.3, "words": "no number"}, {}, 768)
+    writer.write({"a": 0.4}, {}, 1024)
+    assert len(sent) == 1
+    writer.saved(768)
+    writer.saved(768)
+    assert sent[1:] == [(768, {"a": 0.3})]
+    writer.close()
+    assert [steps for steps, _ in sent] == [512, 768, 1024]
 
 
 def test_two_do_not_train_in_one_directory(make_config: Make, tmp_path: Path) -> None:
