@@ -134,7 +134,7 @@ class Worlds:
                 if not step.appended:
                     env.step(_action(step.verb, step.object_type))
             picture = env.render()
-            if picture is None:
+            if not isinstance(picture, np.ndarray):
                 raise CannotReplay("nothing is drawn")
             return picture
 

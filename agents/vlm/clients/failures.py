@@ -29,48 +29,39 @@ _MALFORMED = frozenset({400, 405, 415, 422})
 """Statuses for a request that is invalid, for example with an unknown parameter; or for a single
 conversation."""
 Refusal: TypeAlias = Literal["", "context", "pictures", "content", "request"]
-_REFUSALS: tuple[tuple[Refusal, re.Pattern[str]], ...] = tuple(
-    (kind, re.compile("|".join(words), re.IGNORECASE))
-    for kind, words in (
-        (
-            "pictures",
-            (
-                r"(?:too many|exceed\w*|maximum|max|at most|up to|more than|limit|only)\b.{0,60}"
-                r"\b(?:images?|pictures?|image_url|multimodal|mm)\b",
-                r"\b(?:images?|pictures?)\b.{0,60}(?:too many|exceed|limit|at most|maximum)",
-                r"limit.mm.per.prompt",
-                r"图片.{0,20}(?:过多|超过|超出|上限|限制)",
-            ),
-        ),
-        (
-            "content",
-            (
-                r"content.{0,2}(?:filter|policy|policies|management|violation)|moderation|flagged",
-                r"data_inspection_failed|inappropriate content|responsible.?ai|safety system",
-                r"considered high risk|sensitive (?:content|words?)|prohibited.content|usage polic",
-                r"违规|敏感|不安全|不当内容",
-            ),
-        ),
-        (
-            "context",
-            (
-                r"context.{0,20}(?:length|size|window|limit|overflow)|exceed_context_size",
-                r"context_length_exceeded|string_above_max_length",
-                r"(?:prompt|input|request|conversation|messages?|text).{0,30}"
-                r"too (?:long|large|big)\b",
-                r"longer than|too many (?:input |prompt |total )?tokens|request_too_large",
-                r"(?:entity|payload|body).{0,10}too large|maximum request body",
-                r"tokens?\b.{0,60}\bexceed|\bexceed\w*.{0,60}\b(?:tokens?|length|limit of \d)",
-                r"reduce the (?:length|size|number)|max_new_tokens.{0,4} must be|must be <= \d+",
-                r"range of input length|max(?:imum)?_?(?:model|input|seq\w*).{0,5}len",
-                r"(?:超长|过长|超过.{0,12}(?:长度|上限|限制)|超出.{0,12}(?:长度|上限|限制))",
-            ),
-        ),
-    )
-)
+_SAID_OF: Mapping[Refusal, tuple[str, ...]] = {
+    "pictures": (
+        r"(?:too many|exceed\w*|maximum|max|at most|up to|more than|limit|only)\b.{0,60}"
+        r"\b(?:images?|pictures?|image_url|multimodal|mm)\b",
+        r"\b(?:images?|pictures?)\b.{0,60}(?:too many|exceed|limit|at most|maximum)",
+        r"limit.mm.per.prompt",
+        r"图片.{0,20}(?:过多|超过|超出|上限|限制)",
+    ),
+    "content": (
+        r"content.{0,2}(?:filter|policy|policies|management|violation)|moderation|flagged",
+        r"data_inspection_failed|inappropriate content|responsible.?ai|safety system",
+        r"considered high risk|sensitive (?:content|words?)|prohibited.content|usage polic",
+        r"违规|敏感|不安全|不当内容",
+    ),
+    "context": (
+        r"context.{0,20}(?:length|size|window|limit|overflow)|exceed_context_size",
+        r"context_length_exceeded|string_above_max_length",
+        r"(?:prompt|input|request|conversation|messages?|text).{0,30}"
+        r"too (?:long|large|big)\b",
+        r"longer than|too many (?:input |prompt |total )?tokens|request_too_large",
+        r"(?:entity|payload|body).{0,10}too large|maximum request body",
+        r"tokens?\b.{0,60}\bexceed|\bexceed\w*.{0,60}\b(?:tokens?|length|limit of \d)",
+        r"reduce the (?:length|size|number)|max_new_tokens.{0,4} must be|must be <= \d+",
+        r"range of input length|max(?:imum)?_?(?:model|input|seq\w*).{0,5}len",
+        r"(?:超长|过长|超过.{0,12}(?:长度|上限|限制)|超出.{0,12}(?:长度|上限|限制))",
+    ),
+}
 """What servers say of one conversation, by kind; the first kind that fits counts. The words are of
 OpenAI, Azure, Anthropic, Gemini, DashScope, Zhipu, Moonshot, Mistral, Groq, OpenRouter, vLLM,
 SGLang, TGI, llama.cpp, Ollama and LM Studio."""
+_REFUSALS = tuple(
+    (kind, re.compile("|".join(words), re.IGNORECASE)) for kind, words in _SAID_OF.items()
+)
 _TOO_LARGE = 413
 _FORBIDDEN, _BROKEN = 403, 500
 _ONE_TOO_LARGE = re.compile(r"request too large", re.IGNORECASE)

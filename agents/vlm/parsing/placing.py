@@ -55,9 +55,9 @@ def receptacle_in(line: str) -> tuple[str, str, tuple[str, ...]] | None:
         if begun[0].casefold().endswith(" in"):
             at -= len(" in")
         return _behind_preposition(line, spaced, at) or _two_names(line, at)
-    begun = _MOVE.match(spaced)
-    found = _behind_preposition(line, spaced, begun.end(), only_known=True) if begun else None
-    return found if found and _known(found[0]) else None
+    moved = _MOVE.match(spaced)
+    placed = _behind_preposition(line, spaced, moved.end(), only_known=True) if moved else None
+    return placed if placed and _known(placed[0]) else None
 
 
 def _known(name: str) -> bool:
