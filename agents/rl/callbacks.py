@@ -202,7 +202,17 @@ class HeldOutEvaluation(MaskableEvalCallback):
         """Evaluate now, on the same episodes every time."""
         self._evaluated_at = self.num_timesteps
         self.eval_env.seed(self._seed)
+        # The values of the last update wait for the next rollout; written now, they would stand at
+        # a step that has those of the update before.
+        waiting = (
+            self.logger.name_to_value, self.logger.name_to_count, self.logger.name_to_excluded
+        )  # fmt: skip
+        kept = [dict(each) for each in waiting]
+        for each in waiting:
+            each.clear()
         super()._on_step()
+        for each, values in zip(waiting, kept, strict=True):
+            each.update(values)
 
 
 class TorchThreads(BaseCallback):

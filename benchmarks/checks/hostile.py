@@ -1,4 +1,4 @@
-"""Tries bad command lines, terminals, strangers' files, failing servers and misuses of Gymnasium.
+"""Tries command lines, terminals, strangers' files, failing servers, kills and misuses of Gymnasium.
 
     python -m benchmarks.checks.hostile [--quick | --all]
 
@@ -49,6 +49,10 @@ def _tallies(lines: int | None) -> Iterator[Tally]:
     yield misuse.check()
     yield foreign_files.check()
     yield server_faults.check((), with_runs=lines != _QUICK_LINES)
+    if lines != _QUICK_LINES:
+        from benchmarks.checks import side_logs
+
+        yield side_logs.check()
 
 
 if __name__ == "__main__":

@@ -310,10 +310,8 @@ def test_an_ended_run_continues(tasks_file, tmp_path, signum):
     # Ten times seven episodes, so that the run is under way for long after the first of them.
     command = bench(tasks_file, out, "--agent", "random", "--workers", "2", "--samples", "10")
     process = start(command)
-    deadline = time.monotonic() + 60
     while not (out / "episodes").exists() or not episode_times(out):
         assert process.poll() is None, process.communicate()[1]
-        assert time.monotonic() < deadline
         time.sleep(0.02)
     if signum == signal.SIGINT:
         os.killpg(process.pid, signum)  # as the terminal does on Ctrl-C
