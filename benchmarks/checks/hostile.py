@@ -1,4 +1,4 @@
-"""Tries command lines, terminals, strangers' files, failing servers, kills and misuses of Gymnasium.
+"""Tries bad command lines, terminals, foreign files, failing servers, kills and Gymnasium misused.
 
     python -m benchmarks.checks.hostile [--quick | --all]
 
