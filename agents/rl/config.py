@@ -48,6 +48,8 @@ class EnvConfig(_Model):
             action alone is worth no more than any other.
         shaping: scale of the potential of the key actions left, in training only; 0 for none
             (:class:`er_gym.envs.wrappers.KeyActionShaping`).
+        reward: a wrapper that changes the reward, in training only: ``package.module:Name``, or the
+            name of an entry point (:mod:`agents.rl.rewards`); "" for none.
         max_steps: the step limit of an episode; None for the task type's own.
     """
 
@@ -64,6 +66,7 @@ class EnvConfig(_Model):
     illegal_penalty: float = Field(0.0, ge=0)
     success_bonus: float = Field(1.0, ge=0)
     shaping: float = Field(0.0, ge=0)
+    reward: str = ""
     max_steps: Positive | None = None
 
     _types = field_validator("types")(canonical_names)

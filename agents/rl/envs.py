@@ -14,6 +14,7 @@ from agents.rl.adviser import Adviser
 from agents.rl.config import EnvConfig
 from agents.rl.demonstrations import Demonstrations, demonstrate
 from agents.rl.policy_observation import Obs, PolicyObservation
+from agents.rl.rewards import with_reward
 from er_gym.envs.actions import ACTIONS, INDEX
 from er_gym.envs.embodied_env import EmbodiedEnv, verification_env
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
@@ -21,8 +22,11 @@ from er_gym.envs.wrappers import KeyActionShaping
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TaskType, types_named
 
-_TRAINING_ONLY = ("step_penalty", "illegal_penalty", "success_bonus", "shaping")
-"""The fields that change the reward."""
+_OWN_REWARD = {
+    **dict.fromkeys(("step_penalty", "illegal_penalty", "success_bonus", "shaping"), 0.0),
+    "reward": "",
+}
+"""The fields that change the reward, each with the value that leaves it as it is."""
 ADVICE = "advice"
 """The key of an advised environment's observation."""
 
@@ -164,7 +168,7 @@ def make_env(
         share: ``(index, count)`` of the worker process; each plays in its own rooms.
 
     Raises:
-        ValueError: the suite or the encoder does not exist.
+        ValueError: the suite, the encoder or the reward wrapper does not exist.
         TaskFileError: the suite has not been built, or its file is damaged. (It is a ValueError.)
     """
     env: gymnasium.Env[Any, Any] = TrainingRules(
@@ -182,6 +186,7 @@ def make_env(
     )
     if options.shaping:
         env = KeyActionShaping(env, gamma, options.shaping)
+    env = with_reward(env, options.reward)
     source = make_source(options.episodes, verification_env)
     if isinstance(source, TaskList):
         source = source.share(*share)
@@ -191,4 +196,4 @@ def make_env(
 
 def evaluation_config(options: EnvConfig, episodes: str) -> EnvConfig:
     """The same configuration for other episodes, with the environment's own reward."""
-    return options.model_copy(update={"episodes": episodes, **dict.fromkeys(_TRAINING_ONLY, 0.0)})
+    return options.model_copy(update={"episodes": episodes, **_OWN_REWARD})

@@ -20,6 +20,12 @@ from benchmarks.cli.terminal import echo
     help="The training run: a YAML file, or the name of one that comes with er-gym.",
 )
 @overrides_option("total_steps=20000 or env.types=[single_search]")
+@click.option(
+    "--reward",
+    metavar="NAME",
+    help="A wrapper that changes the reward in training: package.module:Name, or an entry point.  "
+    "[default: the configuration's]",
+)
 @click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the configuration's]")
 @click.option(
     "--out",
@@ -28,7 +34,12 @@ from benchmarks.cli.terminal import echo
 )
 @trust_option
 def train_rl(
-    config: str, overrides: tuple[str, ...], seed: int | None, out: Path | None, trust: bool
+    config: str,
+    overrides: tuple[str, ...],
+    reward: str | None,
+    seed: int | None,
+    out: Path | None,
+    trust: bool,
 ) -> int:
     """Train a policy by reinforcement learning; needs the extra rl.
 
@@ -40,7 +51,9 @@ def train_rl(
 
     with bad_input():
         file = config_file(config)
-        wanted = load_config(file, overrides, {} if seed is None else {"seed": seed})
+        chosen = () if reward is None else (f"env.reward={reward}",)
+        more = {} if seed is None else {"seed": seed}
+        wanted = load_config(file, (*overrides, *chosen), more)
     run = out or Path("runs") / "rl" / f"{file.stem}-{wanted.seed}"
     begin_import("PyTorch and Stable-Baselines3", "torch", "stable_baselines3", "sb3_contrib")
     try:
