@@ -6,6 +6,8 @@ user got wrong ends the command with exit code 2 and one line on stderr.
 
 from __future__ import annotations
 
+import atexit
+import gc
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -48,6 +50,8 @@ _directory = click.Path(file_okay=False, path_type=Path)
 def main(args: Sequence[str] | None = None) -> NoReturn:
     """Run the command and exit: 0; 2 for bad input; others as in ``benchmarks.cli.errors``."""
     use_any_encoding()
+    # At its end Python looks through all objects for cycles, in seconds where torch is loaded.
+    atexit.register(gc.freeze)
     try:
         with interrupted_by_sigterm(), saying_what_it_does():
             code = cli.main(args=args, prog_name="er-gym", standalone_mode=False)
