@@ -29,8 +29,9 @@ data_file = {data}
 parallel = true
 patch = subprocess
 """
-_WAIT = 12
-"""The limit on the wall clock, in limits on the processor's time."""
+_LOOK, _IDLE = 5.0, 36
+"""Seconds between two looks at the processes of a run. After so many looks in a row at which none
+of them had anything to do, the run hangs."""
 
 
 @dataclass(frozen=True)
@@ -135,8 +136,8 @@ def run_tests(
     """Run tests in a copy of a checkout.
 
     Args:
-        seconds: the limit on the processor's time of each process. It does not depend on the load
-            of the machine; the limit on the wall clock is a dozen times as long.
+        seconds: the limit on the processor's time of each process, which does not depend on the
+            load of the machine. Tests that wait and do nothing are ended as well.
     """
 
     def limited() -> None:
@@ -146,6 +147,7 @@ def run_tests(
         listed = Path(folder) / "wanted"
         listed.write_text("\n".join(tests), encoding="utf-8")
         command = [sys.executable, "-m", "pytest", "-n0", "-rfE", "-p", "no:cacheprovider"]
+        command += ["-o", "faulthandler_timeout=0"]
         process = subprocess.Popen(
             [*command, "--tb=line", f"--basetemp={folder}/tmp", *more, f"@{listed}"],
             cwd=checkout,
@@ -153,6 +155,9 @@ def run_tests(
                 **os.environ,
                 "PYTHONPATH": f"{checkout}{os.pathsep}{_ROOT}",
                 "PYTHONDONTWRITEBYTECODE": "1",
+                # The tests' own limits are on the wall clock: on a busy machine they would notice
+                # what is no fault.
+                "PYTEST_TIMEOUT": "0",
                 **environment,
             },
             stdout=subprocess.PIPE,
@@ -163,9 +168,7 @@ def run_tests(
             preexec_fn=limited,
         )
         try:
-            output, _ = process.communicate(timeout=_WAIT * seconds)
-        except subprocess.TimeoutExpired:
-            output = ""
+            output = _said(process)
         finally:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
@@ -174,6 +177,27 @@ def run_tests(
     late = code in (-signal.SIGXCPU, -signal.SIGKILL)
     failed = _FAILED.search(output)
     return Run(code == 0, failed[1] if failed else "", late, output)
+
+
+def _said(process: subprocess.Popen[str]) -> str:
+    """The output of a run; what it said so far is lost if it hangs."""
+    idle = 0
+    while idle < _IDLE:
+        try:
+            return process.communicate(timeout=_LOOK)[0]
+        except subprocess.TimeoutExpired:
+            idle = 0 if _is_busy(process.pid) else idle + 1
+    return ""
+
+
+def _is_busy(session: int) -> bool:
+    """Whether any process of a session runs, or waits for a processor or a disk."""
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            state, _, _, its_session = status.read_text().rpartition(") ")[2].split()[:4]
+            if int(its_session) == session and state in "RD":
+                return True
+    return False
 
 
 def failing_of(checkout: Path, tests: Sequence[str]) -> set[str]:
