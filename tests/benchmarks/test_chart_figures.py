@@ -38,7 +38,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., dict
         found[path.stem] = figure
 
     for module in (charts, data_charts):
-        monkeypatch.setattr(module, "write_figure", keep)
+        monkeypatch.setattr(module, "write_chart", keep)
 
     def run(draw: Callable[..., Any], *arguments: Any) -> dict[str, Any]:
         found.clear()

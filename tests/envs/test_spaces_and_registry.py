@@ -115,7 +115,7 @@ def test_a_seed_gives_the_same_bytes_in_any_process() -> None:
             "unknown obs_mode 'rgb\\+smell'.*rgb, depth, instance, objects, state, text",
         ),
         ({"instances": "any"}, "unknown instances 'any'.*target, explore"),
-        ({"render_mode": "human"}, r"unknown render_mode 'human'.*rgb_array"),
+        ({"render_mode": "film"}, r"unknown render_mode 'film'.*ansi, human"),
         ({"task_type": "cleaning"}, "unknown task type 'cleaning'.*single_search"),
     ],
 )

@@ -350,7 +350,7 @@ def test_a_profile_that_is_not_there(tmp_path: Path) -> None:
 
 def test_without_jinja(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "jinja2", None)
-    with pytest.raises(ValueError, match=r"need jinja2, .*: pip install 'er-gym\[vlm\]'"):
+    with pytest.raises(ValueError, match=r"needs jinja2, .*: pip install 'er-gym\[vlm\]'"):
         load_prompts(Prompts())
 
 

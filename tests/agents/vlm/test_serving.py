@@ -488,15 +488,20 @@ def test_nothing_is_left_however_it_ends(serving, number, code):
     wait_for(lambda: not any(map(alive, pids)))
 
 
-def test_progress_is_one_line_on_a_terminal(stand_in, capfd, monkeypatch):
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "60")
-    command = stand_in(STAND_IN.replace("import http", f"print({'x' * 200!r}); import http"), 1.5)
-    with pytest.raises(click.ClickException, match="not ready"):
-        run_server(command, patience=1.0)
-    err = capfd.readouterr().err
-    assert "stand-in, 0 s: " in err
-    assert "x" * 60 not in err.partition("stand-in: ")[0].partition("\n")[0]
+def test_the_servers_last_line_is_its_progress(monkeypatch):
+    class Server:
+        def wait_until_ready(self, url, patience, hear):
+            hear(1.0, "loading \x1b[1mweights")
+            return 2.0
+
+    told = []
+    monkeypatch.setattr(cli_serve, "doing", lambda *said: told.append(said))
+    address = "http://127.0.0.1:1"
+    command = Command("vllm", ("vllm",), {}, "small", address, address)
+    assert cli_serve._wait(Server(), command, 5.0, verbose=False) == 2.0
+    (what, last), ended = told
+    assert (what, last()) == ("starting vllm for small", r"loading \x1b[1mweights")
+    assert ended == ("",)
 
 
 # -- the command `er-gym match-server` -------------------------------------------------------------

@@ -13,6 +13,7 @@ import pytest
 from agents.vlm.paper_prompts import read_prompts
 from agents.vlm.prompt_set import IMAGE_MARK, LastAction, TurnContext
 from agents.vlm.templates import directory_of, load_templates
+from er_gym.data.album import Outside
 from er_gym.data.chat import IMAGE
 from er_gym.data.collection import Collection
 from er_gym.data.exports import ExportError, ExportOptions, ExportSummary, export
@@ -235,7 +236,7 @@ def test_the_readme_speaks_of_the_splits_that_there_are(
     assert "There is no split `validation`" in told
     for row in EXPORTS.own.values():
         for samples in ({"train": 3}, {"train": 3, "validation": 2}):
-            summary = ExportSummary(row.name, 5, {}, samples, 9, 9, 9, 9, 9)
+            summary = ExportSummary(row.name, 5, {}, samples, 9, 9, 9, 9, 9, Outside())
             text = _readme(row, summary, OPTIONS, collection)
             assert "[[" not in text
             assert "]]" not in text
