@@ -100,7 +100,7 @@ def test_a_run_fills_by_itself_though_run_and_server_are_killed(page, serve, tmp
         page.wait_for_selector(".state.finished")
         assert page.locator("#rows tbody tr").count() == 100
         page.click("#rows >> text=Next >> nth=0")
-        assert page.locator("#rows tbody tr").count() == 32
+        page.wait_for_function("document.querySelectorAll('#rows tbody tr').length === 32")
     finally:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
