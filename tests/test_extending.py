@@ -88,6 +88,7 @@ def test_the_files_of_the_walk_throughs_work(page: str, repository: Path, tmp_pa
 def test_the_groups_are_those_that_are_looked_into(page: str) -> None:
     from agents import AGENTS
     from agents.expert.writers.registry import WRITERS
+    from agents.rl.rewards import REWARDS
     from agents.vlm.clients.registry import CLIENTS
     from er_gym.data.exports import EXPORTS
     from er_gym.envs.observations import OBSERVATIONS
@@ -97,7 +98,8 @@ def test_the_groups_are_those_that_are_looked_into(page: str) -> None:
     from er_gym.tasks.paraphrase import PARAPHRASERS
     from er_gym.tasks.suites import suite_registry
 
-    registries = (AGENTS, CLIENTS, EXPORTS, OBSERVATIONS, PARAPHRASERS, WRITERS, suite_registry())
+    own = (AGENTS, CLIENTS, EXPORTS, OBSERVATIONS, PARAPHRASERS, REWARDS, WRITERS)
+    registries = (*own, suite_registry())
     tables = (types, verbs, actions, shapes)
     groups = {*(table.GROUP for table in tables), *(registry.group for registry in registries)}
     for table in tables:

@@ -18,7 +18,6 @@ NEVER: Mapping[str, tuple[str, ...]] = {
     "installs packages, or changes this Python's": (
         "README.md: make bench",
         "README.md: pip uninstall",
-        "README.md: pip install",
         "README.md: er-gym player install",
         "README.md: er-gym player uninstall",
         "docs/agents.md: pip install",
