@@ -204,8 +204,9 @@ class HeldOutEvaluation(MaskableEvalCallback):
         self.eval_env.seed(self._seed)
         # The values of the last update wait for the next rollout; written now, they would stand at
         # a step that has those of the update before.
-        waiting = (
-            self.logger.name_to_value, self.logger.name_to_count, self.logger.name_to_excluded
+        log = self.logger
+        waiting: tuple[dict[str, Any], ...] = (
+            log.name_to_value, log.name_to_count, log.name_to_excluded
         )  # fmt: skip
         kept = [dict(each) for each in waiting]
         for each in waiting:
