@@ -1,4 +1,4 @@
-"""Tries bad command lines, terminals, foreign files, failing servers, kills and Gymnasium misused.
+"""Tries bad command lines, terminals, long texts, foreign files, servers, kills, Gymnasium misused.
 
     python -m benchmarks.checks.hostile [--quick | --all]
 
@@ -43,8 +43,9 @@ def _tallies(lines: int | None) -> Iterator[Tally]:
     from benchmarks.checks import command_lines
 
     yield command_lines.check((), at_least=lines)
-    from benchmarks.checks import foreign_files, misuse, server_faults, terminals
+    from benchmarks.checks import foreign_files, long_texts, misuse, server_faults, terminals
 
+    yield long_texts.check()
     yield terminals.check(quick=lines == _QUICK_LINES)
     yield misuse.check()
     yield foreign_files.check()

@@ -7,6 +7,7 @@ does as well.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 
 from er_gym.data import claims, deeds, form
@@ -14,8 +15,12 @@ from er_gym.data.knowledge import Knowledge
 from er_gym.data.thought import Refusal, Thought
 from er_gym.data.trajectory import ThoughtKind
 
-__all__ = ["CHECKS", "Refusal", "check"]
+__all__ = ["CHECKS", "LONGEST_WORD", "Refusal", "check"]
 
+_SPACE = re.compile(r"\s+")
+"""Each run is read as one space, or one end of a line."""
+LONGEST_WORD = 30
+"""A text with more characters for each word that it may have is not read."""
 CHECKS: tuple[Callable[[Thought], Iterator[Refusal]], ...] = (
     form.length,
     form.language,
@@ -49,7 +54,12 @@ def check(text: str, kind: ThoughtKind, knowledge: Knowledge, *, limit: int) -> 
         limit: the most words (in Chinese, two characters count as a word).
 
     Returns:
-        Every reason to refuse it; empty if it may stand.
+        Every reason to refuse it; empty if it may stand. A text with more than 30 characters for
+        each word of the limit is refused for its length alone and not read any further, since some
+        checks take a time that grows faster than the text.
     """
-    thought = Thought(text, kind, limit, knowledge)
+    if len(text) > LONGEST_WORD * limit:
+        return (Refusal("length", f"The thought is far too long; write at most {limit} words."),)
+    plain = _SPACE.sub(lambda run: "\n" if "\n" in run[0] else " ", text)
+    thought = Thought(plain, kind, limit, knowledge)
     return tuple(dict.fromkeys(refusal for each in CHECKS for refusal in each(thought)))

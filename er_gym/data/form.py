@@ -19,7 +19,9 @@ _MARKUP = re.compile(
     r"</?[A-Za-z_|][^<>\n]{0,40}>|<\|[^<>\n]{0,40}|\[/?(?:INST|SYS|IMG|image)\]"
     r"|</?(?:think|Observation|Thinking|Planning|Reflection|Verification|DecisionMaking)\b"
 )
-_HEADING = re.compile(r"^\s{0,3}#{1,6}\s|```|^\s*(?:---|===)\s*$|^\s*[{\[]\s*[\"{]", re.MULTILINE)
+_HEADING = re.compile(
+    r"^\s{0,3}#{1,6}\s|```|^[^\S\n]*(?:---|===)[^\S\n]*$|^[^\S\n]*[{\[]\s*[\"{]", re.MULTILINE
+)
 _PLAIN = re.compile(r"[\W_]+")
 _MOST_LATIN = 2
 """So many words of Latin letters may stand in a Chinese thought beside object types: OK, TV ..."""

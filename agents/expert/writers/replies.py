@@ -7,13 +7,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from agents.vlm.chat import Reply
-from er_gym.data.critic import Refusal
+from er_gym.data.critic import LONGEST_WORD, Refusal
 from er_gym.data.trajectory import TAG_OF_KIND, ThoughtKind
 
 NO_REPLY = "no reply"
 """The code of a request without a reply, after all tries."""
-_LONGEST_WORD = 30
-"""A text with more characters for each word that it may have is not read any further."""
 _RUN, _CHINESE_RUN = 9, 14
 """So many words in a row, or Chinese characters, are no coincidence."""
 _HAN = re.compile(r"[一-鿿]")
@@ -58,7 +56,7 @@ def read_thought(reply: Reply, kind: ThoughtKind, limit: int) -> ReadThought:
         return _refused("twice", f"There must be one {start} and one {end}, no more.")
     at, to = reply.text.index(start) + len(start), reply.text.index(end)
     text = " ".join(reply.text[at:to].split())
-    if len(text) > _LONGEST_WORD * limit:
+    if len(text) > LONGEST_WORD * limit:
         return _refused("length", f"The thought is far too long; write at most {limit} words.")
     return ReadThought(text)
 

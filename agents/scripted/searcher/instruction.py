@@ -294,10 +294,17 @@ def _first_things_first(instruction: str) -> str:
     )
 
 
+_LONGEST = 2_000
+
+
 @lru_cache(maxsize=4096)
 def understand(instruction: str) -> tuple[Goal, ...]:
-    """The goals of an instruction in the order in which they are to be done; () if it has none."""
-    text = re.sub(r"'s\b", "", _first_things_first(instruction.strip()))
+    """The goals of an instruction in the order in which they are to be done; () if it has none.
+
+    Only its first 2,000 characters are read, each run of white space as one.
+    """
+    instruction = " ".join(instruction.split())[:_LONGEST]
+    text = re.sub(r"'s\b", "", _first_things_first(instruction))
     text = re.sub(
         r"([^.?!,;]+?),?\s+after\s+(?:having\s+)?((?!that|this)\w+ing\s[^.?!,;]+)",
         r"\2, \1",
