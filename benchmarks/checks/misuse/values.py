@@ -100,7 +100,7 @@ _WRONG: dict[str, tuple[Any, ...]] = {
     "task_type": ("cleaning", "", 3, ["single_search"], b"single_search"),
     "annotate": (1, "yes", None, 0.0),
     "render_device": ("tpu", "", None, 3, ["cpu"]),
-    "render_mode": ("human", "", 3, ["rgb_array"], True),
+    "render_mode": ("svg", "", 3, ["rgb_array"], True),
     "episode_source": (
         None, 3, "", "no suite", "no/such/file.jsonl", Path("nowhere.json"), {"a": 1}, [1, 2],
         [None], "/tmp", "a/\x00", "x" * 5000, b"mini", object(), np.arange(3),

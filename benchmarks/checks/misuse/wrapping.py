@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -29,13 +29,25 @@ from er_gym.envs.wrappers import InstructionEmbedding, KeyActionShaping
 
 # -- wrappers and the registry --------------------------------------------------------------------
 
+_LIMIT = 4
 _WRAPPERS: dict[str, Callable[[Any], Any]] = {
     "shaping": lambda env: KeyActionShaping(env, 0.9),
     "instruction": InstructionEmbedding,
-    "limit": lambda env: TimeLimit(env, 4),
+    "limit": lambda env: TimeLimit(env, _LIMIT),
     "statistics": RecordEpisodeStatistics,
     "flat": FlattenObservation,
 }
+
+
+def _form(info: Mapping[str, Any]) -> dict[str, object]:
+    """The types of plain values, and the shapes of arrays."""
+    for name, value in info.items():
+        plain = isinstance(value, bool | int | float | str | np.ndarray | dict)
+        require(plain, f"info[{name!r}] is no plain data")
+    return {
+        name: (value.dtype, value.shape) if isinstance(value, np.ndarray) else type(value)
+        for name, value in info.items()
+    }
 
 
 def _in_order(names: Sequence[str]) -> None:
@@ -43,8 +55,12 @@ def _in_order(names: Sequence[str]) -> None:
     for name in names:
         env = _WRAPPERS[name](env)
     obs, info = env.reset(seed=2)
+    form = _form(info)
+    if "limit" in names:
+        require(info["max_steps"] == _LIMIT + 1, f"a limit of {info['max_steps']} steps is told")
     for _ in range(6):
         require(obs in env.observation_space, "not in its space")
+        require(form.items() <= _form(info).items(), "info has another form")
         mask = env.get_wrapper_attr("action_masks")()
         require((mask == info["action_mask"]).all(), "another mask")
         obs, _, ended, cut, info = env.step(int(np.flatnonzero(mask)[-1]))
@@ -110,6 +126,22 @@ def _vector_plays(make: Callable[[], Any]) -> None:
         vec.close()
 
 
+def _vector_tells(mode: str) -> None:
+    """Texts and the step limit are those of the environments."""
+    vec = gymnasium.make_vec(
+        ENV_ID, 2, vectorization_mode=mode, obs_mode="text", max_episode_steps=3
+    )
+    try:
+        obs, info = vec.reset(seed=[1, 2])
+        for steps in (1, 2, 3):
+            for text, feedback in zip(obs["text"], info["feedback"], strict=True):
+                require(f"Step {steps} of 4. {feedback}" in text, f"the text is {text[:80]!r}")
+            obs, _, _, cut, info = vec.step(np.full(2, OBSERVE))
+        require(cut.all(), "the limit does not hold")
+    finally:
+        vec.close()
+
+
 def _vector_before(make: Callable[[], Any], ask: Callable[[Any], object]) -> None:
     vec = make()
     try:
@@ -127,6 +159,8 @@ def vectors() -> Iterator[Try]:
     kinds |= {kind: partial(_sb3, kind) for kind in ("DummyVecEnv", "SubprocVecEnv")}
     for name, make in kinds.items():
         yield Try(f"{name} plays", partial(_vector_plays, make))
+    for mode in ("sync", "async"):
+        yield Try(f"{mode} tells what its environments tell", partial(_vector_tells, mode))
     asked: dict[str, Callable[[Any], object]] = {
         **{f"get_attr {name}": lambda vec, n=name: vec.get_attr(n) for name in ("task", "objects")},
         "masks": lambda vec: getattr(vec, "env_method", getattr(vec, "call", None))("action_masks"),
