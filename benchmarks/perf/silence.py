@@ -93,7 +93,11 @@ ROWS = (
     Row("data-stats", "data stats made", ("collect",)),
     Row("data-verify", "data verify made", ("collect",)),
     Row("data-export", _SHAREGPT, ("collect",)),
-    Row("data-import", "data import sharegpt/dataset_info.json --out imported", ("data-export",)),
+    Row(
+        "data-import",
+        "data import sharegpt/dataset_info.json --dataset er_gym_train --out imported",
+        ("data-export",),
+    ),
     Row("data-show", "data show made --trajectory FIRST", ("collect",)),
     Row("data-frames", "data frames --suite train --frames 12 --out views"),
     Row("new-model", "new-model tiny-text --data made --out model", ("collect",)),
