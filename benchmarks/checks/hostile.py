@@ -45,7 +45,7 @@ def _tallies(lines: int | None) -> Iterator[Tally]:
     yield command_lines.check((), at_least=lines)
     from benchmarks.checks import foreign_files, long_texts, misuse, server_faults, terminals
 
-    yield long_texts.check()
+    yield long_texts.check(framed=lines is None)
     yield terminals.check(quick=lines == _QUICK_LINES)
     yield misuse.check()
     yield foreign_files.check()

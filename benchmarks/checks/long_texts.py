@@ -308,16 +308,19 @@ def growing(read: Reader, length: int = _SHORT, *, framed: bool = True) -> Itera
             yield f"{name}: {first:,} lines, and {second:,} for a text twice as long"
 
 
-def check(words: Sequence[str] = ()) -> Tally:
-    """Try the readers whose names hold the words, and print the failures."""
+def check(words: Sequence[str] = (), *, framed: bool = True) -> Tally:
+    """Try the readers whose names hold the words, and print the failures.
+
+    If the texts are not to be ``framed``, there are fewer, and nothing stands around them.
+    """
     began, tried, short = time.monotonic(), 0, 0
     for reader, read in readers().items():
         if not all(word in reader for word in words):
             continue
         read("Put the Apple into the Fridge.")  # what is loaded once is loaded now
-        tried += (1 if reader in BOUNDED else 2) * sum(1 for _ in texts(0))
-        grows = () if reader in BOUNDED else growing(read)
-        for problem in (*grows, *slow(read)):
+        tried += (1 if reader in BOUNDED else 2) * sum(1 for _ in texts(0, framed=framed))
+        grows = () if reader in BOUNDED else growing(read, framed=framed)
+        for problem in (*grows, *slow(read, framed=framed)):
             short += 1
             print(f"{reader}, {problem}", flush=True)
     return Tally("long texts", tried, short, time.monotonic() - began)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from benchmarks.scoring.samples import effective_number, most_samples, variance_between
 from benchmarks.scoring.scorers import JUDGED_BY_NAME, Scorer, Tally
@@ -251,8 +251,17 @@ def _between(tasks: Sequence[str], values: Sequence[float]) -> Estimate:
     return Estimate(mean, mean - half, mean + half)
 
 
+def _within(estimate: Estimate, most: float) -> Estimate:
+    """The same mean, with the part of its interval that lies from 0 to ``most``."""
+    if estimate.low is None or estimate.high is None:
+        return estimate
+    return replace(estimate, low=max(estimate.low, 0.0), high=min(estimate.high, most))
+
+
 def summarise(scores: Sequence[Score]) -> Summary:
     """Means over episodes with 95 % intervals: Wilson's for success, the normal one for the rest.
+
+    No metric is below 0. An interval ends there, and at 1 unless an episode has more than 1.
 
     Where tasks were played several times, the intervals are those between tasks: the normal one of
     that standard error, and Wilson's for the number of episodes of different tasks that would tell
@@ -267,7 +276,8 @@ def summarise(scores: Sequence[Score]) -> Summary:
     means = {}
     for metric in METRICS[1:]:
         values = [getattr(each, metric) for each in scores]
-        means[metric] = _between(tasks, values) if several else normal(values)
+        mean = _between(tasks, values) if several else normal(values)
+        means[metric] = _within(mean, max(1.0, *values))
     return Summary(len(scores), {"success": rate, **means})
 
 

@@ -390,3 +390,18 @@ def test_means_over_tasks_types_and_groups(episode):
 
 def test_every_metric_is_a_field_of_the_score():
     assert set(METRICS) < {field.name for field in dataclasses.fields(Score)}
+
+
+def test_an_interval_ends_where_the_metric_does(episode):
+    good = score_episode(episode(TRANSPORT, TRANSPORT), PAPER)
+    bad = score_episode(episode(TRANSPORT, ("pickup Egg", "end")), PAPER)
+    for scores in ([good, *[bad] * 5], [*[good] * 5, bad]):
+        for metric in METRICS[1:]:
+            estimate = summarise(scores)[metric]
+            assert 0 <= estimate.low <= estimate.mean <= estimate.high <= 1, metric
+
+
+def test_an_interval_goes_as_far_as_the_largest_value(episode):
+    good = score_episode(episode(TRANSPORT, TRANSPORT), PAPER)
+    short = [dataclasses.replace(good, search_efficiency=value) for value in (0.2, 1.4)]
+    assert summarise(short)["search_efficiency"].high == 1.4

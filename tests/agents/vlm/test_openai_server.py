@@ -458,7 +458,7 @@ def test_the_server_says_how_long_to_wait(make: Make) -> None:
         assert second.at - first.at >= 1.2  # the SDK alone would wait half a second
 
 
-@pytest.mark.parametrize("pause", [0.01, 600])
+@pytest.mark.parametrize("pause", [0.1, 600])
 def test_who_listens_slowly_or_not_at_all_is_not_waited_for(make: Make, pause: float) -> None:
     done = threading.Event()
 
@@ -476,7 +476,7 @@ def test_who_listens_slowly_or_not_at_all_is_not_waited_for(make: Make, pause: f
         began = time.monotonic()
         with pytest.raises(CannotGoOn, match=r"no whole answer within 0.5 s; nothing has answered"):
             client.reply((Message("user", (much,)),), seed=0)
-        assert time.monotonic() - began < 4  # at 64 KiB each hundredth of a second: 6 s
+        assert time.monotonic() - began < 30  # at 64 KiB each tenth of a second: a minute
         done.set()
 
 
