@@ -340,6 +340,7 @@ def test_how_long_a_server_may_ask_to_wait(tmp_path: Path) -> None:
         result = bench(server.url, tmp_path, "--limit", "2")
         assert result.return_value == 3
         assert "the server asks to wait 5 min: run the same command again" in result.output
+        assert "or give --max-minutes" in result.output
         result = bench(server.url, tmp_path, "--limit", "2", "--max-minutes", "4")
         assert result.return_value == 3
         assert "asks to wait 5 min, and 4 min of --max-minutes are left" in result.output

@@ -285,7 +285,7 @@ class OpenAIClient:
         if pause > _LONGEST_ASKED and math.isinf(left):
             raise self._supervisor.stop(
                 f"{what}; the server asks to wait {duration(pause)}: {AGAIN} after that, or give "
-                "a higher --max-minutes, and er-gym waits"
+                "--max-minutes, and er-gym waits"
             )
         request.retry(what, pause, of)
         if failure.server:

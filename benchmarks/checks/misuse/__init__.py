@@ -20,7 +20,7 @@ from benchmarks.checks.misuse.values import actions, arguments, resets
 from benchmarks.checks.misuse.wrapping import orders, registry, vectors
 from benchmarks.checks.tally import Tally
 
-_LONGEST = 400
+_LONGEST = 500
 """Characters of a message."""
 GROUPS = (actions, arguments, out_of_turn, resets, copies, handed_out, orders, registry, vectors)
 

@@ -97,7 +97,7 @@ _WRONG: dict[str, tuple[Any, ...]] = {
     "protocol": ("Paper", "", None, 3, ["paper"]),
     "obs_mode": ("", "rgb+", "rgb+rgb", "smell", None, 3, ["rgb"], b"rgb"),
     "backend": ("blender", "", None, 3, ["unity"]),
-    "task_type": ("cleaning", "", 3, ["single_search"], b"single_search"),
+    "task_type": ("cleaning", "", 3, ["cleaning"], [["Search"]], b"single_search"),
     "annotate": (1, "yes", None, 0.0),
     "render_device": ("tpu", "", None, 3, ["cpu"]),
     "render_mode": ("svg", "", 3, ["rgb_array"], True),
@@ -110,6 +110,7 @@ _WRONG: dict[str, tuple[Any, ...]] = {
 _RIGHT: tuple[tuple[str, Any], ...] = (
     ("max_steps", np.int64(5)), ("max_steps", 1), ("step_penalty", np.float32(0.5)),
     ("width", np.int16(64)), ("annotate", np.False_), ("visibility_distance", 10**6),
+    ("task_type", ["single_search", "Composite"]),
 )  # fmt: skip
 
 
