@@ -1,5 +1,5 @@
 # make bench    play the bundled suite with the oracle and the random agent, and print the table
-# make test     run the tests, a process per core; one process: make test ARGS=-n0
+# make test     run the tests, several at a time; one process: make test ARGS=-n0
 # make lint     check style and types
 # make check    lint, then test
 # make cover    run the tests and say which lines they do not reach (half as slow again)

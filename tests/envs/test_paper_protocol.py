@@ -305,6 +305,19 @@ def test_of_several_poses_the_last_one_in_the_pose_file_counts() -> None:
     assert task.poses == {FRIDGE: two}
 
 
+def test_going_to_what_holds_an_object_of_the_task_leads_to_the_object(
+    env: EmbodiedEnv, play: Play
+) -> None:
+    def goes_to(kind: str, target: str, *related: str) -> AgentPose:
+        task = replace(TAKE_APPLE, target_objects=(target,), related_objects=related)
+        play(replace(task, navigable_objects=(kind,)), f"navigate to {kind}")
+        return env.agent_pose
+
+    at_the_apple = goes_to("Apple", APPLE, APPLE)
+    assert goes_to("CounterTop", ISLAND, APPLE) == at_the_apple
+    assert goes_to("CounterTop", ISLAND) != at_the_apple  # the island is three metres long
+
+
 @pytest.mark.parametrize("kind", ["Fridge", "CounterTop", "Sink", "Toaster", "Drawer", "Window"])
 def test_going_somewhere_leads_to_within_a_metre_and_a_half(
     env: EmbodiedEnv, play: Play, kind: str

@@ -30,7 +30,7 @@ def test_a_tiny_model_with_vision_plays_what_it_has_learnt_by_heart(
         (tmp_path / "actions" / file.name).write_text(words)
     dialect = str(tmp_path / "actions")
     data, base, run, played = (tmp_path / each for each in ("data", "base", "run", "played"))
-    er_gym("collect", "--suite", NAME, "--parts", "imitation", "--kinds", "b", "--limit", "8",
+    er_gym("collect", "--suite", NAME, "--parts", "imitation", "--kinds", "b", "--limit", "4",
            "--workers", "1", "--out", data)  # fmt: skip
     er_gym("new-model", "tiny-vl", "--set", "vocabulary=500", "--data", data, "--dialect", dialect,
            "--out", base)  # fmt: skip
@@ -42,5 +42,5 @@ def test_a_tiny_model_with_vision_plays_what_it_has_learnt_by_heart(
            "--out", played)  # fmt: skip
     report = load_run(played)
     scores = report.scores[CORRECTED.name]
-    assert len(scores) == tasks.count(",") + 1 == 8
+    assert len(scores) == tasks.count(",") + 1 == 4
     assert [each.task_id for each in scores if not each.success] == []
