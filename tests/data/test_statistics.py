@@ -11,7 +11,14 @@ import pytest
 from played_collection import make_collection
 
 from er_gym.data.collection import Collection
-from er_gym.data.paper_figures import SETS, TASK_TYPES, THOUGHTS, TRANSITIONS, VERBS
+from er_gym.data.paper_figures import (
+    SETS,
+    STAGE_OF_PART,
+    TASK_TYPES,
+    THOUGHTS,
+    TRANSITIONS,
+    VERBS,
+)
 from er_gym.data.statistics import mean_and_most, statistics
 from er_gym.data.trajectory import THOUGHT_KINDS, Cost, ThoughtRecord, Trajectory
 from er_gym.data.words import count_words, sentences
@@ -130,6 +137,8 @@ def test_words_and_sentences() -> None:
 
 def test_the_papers_figures_add_up() -> None:
     assert sum(TASK_TYPES.values()) == sum(one.trajectories for one in SETS) == 9_390
+    assert [one.stage for one in SETS] == sorted({*STAGE_OF_PART.values()}) == [1, 2, 3]
+    assert sum(one.pictures for one in SETS) == 64_236  # the paper's text says 64K
     assert TASK_TYPES.keys() <= BY_NAME.keys()
     assert VERBS.keys() <= {*verbs.BARE_VERBS, *verbs.OBJECT_VERBS}
     assert sum(VERBS.values()) - VERBS[verbs.END] == 58_437

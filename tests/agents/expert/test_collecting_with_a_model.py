@@ -8,6 +8,7 @@ import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -17,7 +18,7 @@ pytest.importorskip("openai", reason="needs the extra vlm")
 from click.testing import CliRunner
 from small_suite import NAME, small
 
-from agents.expert.decider import Deciders
+from agents.expert.decider import Deciders, DecidingAgent
 from benchmarks.checks.expert_server import collect_with_faults, wrong_thoughts
 from benchmarks.checks.scripted_expert import ScriptedExpert, answers, good, scripted_expert
 from benchmarks.cli.main import cli
@@ -46,6 +47,14 @@ def server() -> Iterator[ScriptedExpert]:
     """A model that does as it is asked."""
     with scripted_expert() as one:
         yield one
+
+
+def test_an_episode_whose_scene_does_not_load_leaves_no_trajectory() -> None:
+    model: Any = SimpleNamespace(obs_mode="text")
+    settings: Any = None
+    agent = DecidingAgent(model, "m", settings, settings, lambda trajectory: "")
+    episode: Any = None
+    assert agent.attachments(episode, "stem") == {}
 
 
 def test_eight_trajectories_with_a_server_that_misbehaves(tmp_path: Path) -> None:
