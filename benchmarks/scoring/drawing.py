@@ -55,7 +55,7 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def write_chart(path: Path, figure: Figure, *, force: bool = False, **options: Any) -> None:
+def write_chart(path: Path, figure: Figure, *, force: bool, **options: Any) -> None:
     """Write a chart as :func:`~er_gym.writing.write_figure` does, in :func:`own_style`."""
     with own_style():
         write_figure(path, figure, force=force, **options)
