@@ -126,6 +126,24 @@ def test_a_miss_without_feedback_or_left_key_actions_has_dashes(
     assert miss[3:] == ("step limit", "-", "end")
 
 
+def test_a_miss_says_why_an_agent_gave_up(run_directory, episode) -> None:
+    gave_up = episode(("pickup Egg", "end"), ("!pickup Egg",), end_reason="gave up")
+    run_directory.write(gave_up.model_copy(update={"gave_up": "the server\nrefused"}))
+    (miss,) = tables([load_run(run_directory.path)], with_misses=True)[1].rows
+    assert miss[3:5] == ("gave up", "the server refused")
+
+
+def test_samples_are_counted_of_all_tasks_and_of_each_group(run_directory, episode) -> None:
+    keys = ("pickup Egg", "end")
+    for sample in (1, 2):
+        done = episode(keys, keys if sample == 1 else ("end",))
+        run_directory.write(done.model_copy(update={"sample": sample}))
+    found = tables([load_run(run_directory.path)], scorer="corrected", with_types=True)
+    (samples,) = (table for table in found if "samples of each task" in table.title)
+    names = ["All", "Transport", "Exposed-to-Exposed Object Transfer"]
+    assert list(samples.rows) == [(name, "1", "50.00", "100.00", "0.00") for name in names]
+
+
 STATISTICS = Statistics(
     name="ours",
     parts={
@@ -176,6 +194,7 @@ def test_statistics_beside_the_papers() -> None:
     assert "-" in begin.values()
     types = {row[0]: row[1:] for row in found["ours: types of tasks"].rows}
     assert types["single_search"][:2] == ("3", "75.0")
+    assert types["single_pickup"][:2] == ("0", "0.0")
     assert types["mine"] == ("1", "25.0", "-")
     assert [*types][-1] == "mine"  # after the paper's
     wording = found["ours: wording"]

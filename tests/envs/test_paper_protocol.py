@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import hypot
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -19,7 +20,7 @@ from er_gym.envs.actions import ACTIONS, INDEX, NO_ACTION, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.info import with_details
 from er_gym.envs.paper_action_handler import NO_OBJECT, understand_as_paper
-from er_gym.envs.paper_skills import observe
+from er_gym.envs.paper_skills import _back_off, observe
 from er_gym.envs.protocol import PROTOCOLS
 from er_gym.rollout.agent import Decision
 from er_gym.rollout.play import play_episode
@@ -380,6 +381,36 @@ def test_a_blocked_walk_is_a_step_to_the_side(env: EmbodiedEnv, play: Play) -> N
     }
     assert {(True, 0.0, 0.5), (True, 0.5, 0.0)} <= seen
     assert seen <= {(True, 0.0, 0.5), (True, 0.5, 0.0), (True, 0.0, 0.0)}
+
+
+@pytest.mark.parametrize(
+    ("blocked", "moves"),
+    [
+        ((), ["MoveBack"]),
+        (("MoveBack",), ["MoveBack", "RotateRight 90", "MoveAhead"]),
+        (
+            ("MoveBack", "MoveAhead"),
+            ["MoveBack", "RotateRight 90", "MoveAhead", "RotateLeft 180", "MoveAhead"],
+        ),
+        (
+            ("MoveBack", "RotateRight", "MoveAhead"),
+            ["MoveBack", "RotateRight 90", "MoveAhead", "MoveAhead"],
+        ),
+    ],
+)
+def test_who_is_shut_in_on_three_sides_backs_off(
+    blocked: tuple[str, ...], moves: list[str]
+) -> None:
+    """No place in the recorded rooms is so narrow."""
+    tried = []
+
+    def step(action: str, renderImage: bool, degrees: int | str = "", **_: Any) -> Any:
+        tried.append(f"{action} {degrees}".rstrip())
+        error = "blocked" if action in blocked else ""
+        return SimpleNamespace(metadata={"errorMessage": error})
+
+    _back_off(SimpleNamespace(step=step))
+    assert tried == moves
 
 
 def test_a_step_to_the_side_goes_towards_what_the_task_is_about(

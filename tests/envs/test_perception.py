@@ -16,6 +16,7 @@ from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.legality import KnownTypes, available_objects, legal_actions, navigable_within
+from er_gym.envs.object_view import object_features
 from er_gym.envs.observations import Memory
 from er_gym.envs.perception import Perception, perceive, type_names
 from er_gym.sim.lazy_metadata import LazyMetadata
@@ -202,6 +203,14 @@ def test_views_are_of_what_is_seen_and_not_held_the_nearest_first() -> None:
     views = perception.object_views
     assert [view.object_id for view in views] == ["Fridge|1", "Mug|1"]
     assert [(view.is_open, view.is_toggled) for view in views] == [(True, False), (None, None)]
+
+
+def test_features_count_the_objects_of_a_type_up_to_ten() -> None:
+    for count in (1, 3, 12):
+        perception = perception_of(*(make_entry(f"Mug|{n}") for n in range(count)))
+        features = object_features(perception)
+        assert features[KIND_OF["Mug"], 0] == pytest.approx(min(count / 10, 1))
+        assert features[:, 0].sum() == features[KIND_OF["Mug"], 0]
 
 
 # -- random play -----------------------------------------------------------------------------------
