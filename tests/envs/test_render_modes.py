@@ -55,6 +55,22 @@ def test_a_window_shows_each_reset_and_step(shown: gymnasium.Env[Any, Any]) -> N
     assert np.array_equal(on_screen(), first)
 
 
+def test_a_window_keeps_the_rate_of_pictures(
+    shown: gymnasium.Env[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pygame = pytest.importorskip("pygame", reason="needs the extra render")
+    rates = []
+
+    class Clock:
+        def tick(self, per_second: float) -> None:
+            rates.append(per_second)
+
+    monkeypatch.setattr(pygame.time, "Clock", Clock)
+    shown.reset(seed=3)
+    shown.step("observe")
+    assert rates == [1000, 1000]
+
+
 def test_a_window_shows_what_no_observation_draws(shown: gymnasium.Env[Any, Any]) -> None:
     blind = gymnasium.make(ID, obs_mode="text", render_mode="human", **SIZE)
     obs, _ = shown.reset(seed=3)
