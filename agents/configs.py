@@ -71,7 +71,14 @@ def load(
         if not (equals and path):
             raise ValueError(f"{text!r} is not an override; give NAME=VALUE")
         _put(data, path.split("."), parse_yaml(value, f"--set {text:.60}"), text)
-    where = f"{file}: the {what}" if file else f"the {what}"
+
+    def where(field: str) -> str:
+        for text in reversed(overrides):
+            name = text.partition("=")[0]
+            if field == name or field.startswith(f"{name}."):
+                return f"--set {text:.80}: the {what}"
+        return f"{file}: the {what}" if file else f"the {what}"
+
     return validated(model, {**data, **(more or {})}, where)
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -39,8 +40,12 @@ def as_utf8(text: str, path: Path) -> bytes:
         ) from None
 
 
-def validated(model: type[Model], data: object, where: str) -> Model:
+def validated(model: type[Model], data: object, where: str | Callable[[str], str]) -> Model:
     """Build a pydantic model from parsed JSON.
+
+    Args:
+        where: what the data are, for the message; or a function that says so for the path of a
+            field (``evaluation.every``).
 
     Raises:
         TaskFileError: the data do not fit; the message is ``where`` and the first problem.
@@ -48,7 +53,9 @@ def validated(model: type[Model], data: object, where: str) -> Model:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise TaskFileError(f"{where} {_first_problem(error)}") from None
+        place = ".".join(map(str, error.errors(include_url=False)[0]["loc"]))
+        place = where if isinstance(where, str) else where(place)
+        raise TaskFileError(f"{place} {_first_problem(error, model)}") from None
 
 
 def known_type(name: str, where: str) -> TaskType:
@@ -158,7 +165,7 @@ class TaskFile:
         return list(self.tasks)
 
 
-def _first_problem(error: ValidationError) -> str:
+def _first_problem(error: ValidationError, model: type[BaseModel]) -> str:
     """The first problem that pydantic found, worded to follow the name of the faulty record."""
     problem = error.errors(include_url=False)[0]
     field = re.sub(r"\.(\d+)", r"[\1]", ".".join(map(str, problem["loc"])))
@@ -166,8 +173,32 @@ def _first_problem(error: ValidationError) -> str:
         return f"lacks field {field!r}"
     if problem["type"] == "value_error":  # one of our own validators: the message is complete
         return f"has a wrong field {field!r}: {problem['ctx']['error']}"
+    if problem["type"] == "extra_forbidden":
+        *way, name = problem["loc"]
+        return (
+            f"has a wrong field {field!r}: there is no such field{_known_fields(model, way, name)}"
+        )
     given = repr(problem["input"])
     if len(given) > _LONGEST_QUOTE:
         given = given[: _LONGEST_QUOTE - 1] + "…"
     message = problem["msg"][0].lower() + problem["msg"][1:]
     return f"has a wrong field {field!r}: {message}, not {given}" if field else f"is {given}"
+
+
+def _known_fields(model: type[BaseModel], way: Iterable[int | str], name: int | str) -> str:
+    """What else a field can be named, where ``way`` leads from a model; "" if that is not known."""
+    part: type[BaseModel] | None = model
+    for step in way:
+        if part is None or step not in part.model_fields:
+            return ""
+        kinds = part.model_fields[str(step)].annotation
+        part = next((each for each in (kinds, *get_args(kinds)) if _is_model(each)), None)
+    if part is None:
+        return ""
+    near = get_close_matches(str(name), part.model_fields, n=1)
+    meant = f" (did you mean {near[0]}?)" if near else ""
+    return f"{meant}; there are: {', '.join(part.model_fields)}"
+
+
+def _is_model(kind: object) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)
