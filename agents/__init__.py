@@ -53,7 +53,7 @@ AGENTS: Registry[Callable[..., Agent]] = Registry(
 without arguments."""
 
 
-def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
+def make_agent(name: str, seed: int = 0) -> Agent:
     """Make an agent by name: one of :data:`AGENTS`, ``package.module:Class``, ``rl:RUN`` for a
     trained policy, ``zoo:NAME`` for a model of the zoo, or a model agent with default settings
     (:mod:`agents.vlm.factory`).
@@ -61,15 +61,13 @@ def make_agent(name: str, seed: int = 0, *, trust: bool = False) -> Agent:
     Args:
         name: the agent's name.
         seed: of the agent's random choices.
-        trust: whether a policy may be loaded from a file that can run code
-            (:mod:`agents.rl.model_file`).
 
     Raises:
         ValueError: no agent has this name, or it cannot be made; the message lists the agents.
     """
     behind = resolved(name)
     if behind.startswith(RL_PREFIX):
-        return _rl_agent(name, behind.removeprefix(RL_PREFIX), trust)
+        return _rl_agent(name, behind.removeprefix(RL_PREFIX))
     if is_model_agent(name):
         return _model_agents(name).agent(seed)
     make = AGENTS.get(name)
@@ -107,12 +105,10 @@ class NamedAgent:
     """Makes the agents of a run by name, in any process: a :class:`.rollout.agent.MakeAgent`."""
 
     name: str
-    trust: bool = False
-    """See :func:`make_agent`."""
 
     def __call__(self, task: Task, seed: int) -> Agent:
         """Make the agent of an episode."""
-        return make_agent(self.name, seed, trust=self.trust)
+        return make_agent(self.name, seed)
 
     def carried(self) -> MakeAgent:
         """The same for workers that do not see this machine's files."""
@@ -120,7 +116,7 @@ class NamedAgent:
             return self
         from agents.carried_policy import CarriedPolicy
 
-        return CarriedPolicy.of(Path(self.name.removeprefix(RL_PREFIX)), self.trust)
+        return CarriedPolicy.of(Path(self.name.removeprefix(RL_PREFIX)))
 
 
 @lru_cache(maxsize=4)
@@ -128,10 +124,10 @@ def _model_agents(name: str) -> AgentFactory:
     return AgentFactory(name, load_settings(None, (), settings_file(name)))
 
 
-def _rl_agent(name: str, path: str, trust: bool) -> Agent:
+def _rl_agent(name: str, path: str) -> Agent:
     begin_import("PyTorch", "torch")
     try:
         from agents.rl.agent import RLAgent  # late: torch
     except ImportError as error:
         raise MissingPackage(f"agent {name}", str(error.name), "er-gym[rl]") from error
-    return RLAgent(path, trust)
+    return RLAgent(path)

@@ -22,14 +22,12 @@ class CarriedPolicy:
 
     Attributes:
         files: contents by file name; the first is the policy's.
-        trust: see :class:`agents.rl.agent.RLAgent`.
     """
 
     files: Mapping[str, bytes] = field(repr=False)
-    trust: bool = False
 
     @classmethod
-    def of(cls, run: Path, trust: bool = False) -> CarriedPolicy:
+    def of(cls, run: Path) -> CarriedPolicy:
         """The policy of a run directory or model file.
 
         Raises:
@@ -37,13 +35,13 @@ class CarriedPolicy:
             OSError: its files cannot be read.
         """
         file = policy_file(run)
-        return cls({each.name: each.read_bytes() for each in (file, file.parent / CONFIG)}, trust)
+        return cls({each.name: each.read_bytes() for each in (file, file.parent / CONFIG)})
 
     def __call__(self, task: Task, seed: int) -> Agent:
         """Make the agent of an episode."""
         from agents.rl.agent import RLAgent  # late: torch
 
-        return RLAgent(_unpacked(tuple(self.files.items())), self.trust)
+        return RLAgent(_unpacked(tuple(self.files.items())))
 
 
 @lru_cache(maxsize=4)

@@ -26,7 +26,7 @@ def write_untrained_run(config: TrainConfig, run: Path, *, steps: int | None = N
     algorithm = config.algorithm
     space = PolicyObservation(config.env, LEARNERS[algorithm.name].needs_mask).space
     env = placeholder_env(space, len(ACTIONS), config.vec.envs)
-    model = ALGORITHMS[algorithm.name].make(config, algorithm, env)
+    model = ALGORITHMS[algorithm.name](config, algorithm, env)
     for weights in model.policy.parameters():  # so that no two actions are alike
         torch.nn.init.normal_(weights, std=0.3)
     model.num_timesteps = config.total_steps if steps is None else steps

@@ -11,7 +11,7 @@ import torch
 
 from agents.rl.config import load_config
 from agents.rl.greedy import GreedyPolicy
-from agents.rl.policy_file import CONFIG, policy_file, untrusted_model
+from agents.rl.policy_file import CONFIG, policy_file
 from agents.rl.policy_observation import Obs, PolicyObservation
 from er_gym.envs.actions import ACTIONS, Action
 from er_gym.rollout.agent import Decision, check_observation
@@ -25,21 +25,17 @@ class RLAgent:
     encoding. From ``info`` it reads the action mask.
 
     Args:
-        path: the run directory, or a model file with its ``config.yaml`` beside it: ``model.npz``,
-            ``policy.safetensors`` or, with ``trust``, a file of Stable-Baselines3.
-        trust: whether a file of Stable-Baselines3, which can run code, may be loaded.
+        path: the run directory, or a model file with its ``config.yaml`` beside it: ``model.npz``
+            or ``policy.safetensors``.
 
     Raises:
-        UntrustedModel: the file can run code, and ``trust`` is False.
         ValueError: the run does not exist, or its model cannot be read.
     """
 
-    def __init__(self, path: str | Path, trust: bool = False) -> None:
+    def __init__(self, path: str | Path) -> None:
         file = policy_file(Path(path))
-        if file.suffix == ".zip" and not trust:
-            raise untrusted_model(file)
         config = load_config(file.parent / CONFIG)
-        self._policy = _loaded(file, file.stat().st_mtime_ns, trust)
+        self._policy = _loaded(file, file.stat().st_mtime_ns)
         self._policy_observation = PolicyObservation(config.env)
         self.obs_mode: str = config.env.obs_mode
 
@@ -69,7 +65,7 @@ class RLAgent:
 
 
 @lru_cache(maxsize=4)
-def _loaded(file: Path, changed: int, trust: bool) -> GreedyPolicy:
+def _loaded(file: Path, changed: int) -> GreedyPolicy:
     """Load the policy of a file; the cache serves many episodes while the file is unchanged."""
     torch.set_num_threads(1)  # observations come one at a time, and several workers may run
-    return GreedyPolicy.load(file, trust)
+    return GreedyPolicy.load(file)

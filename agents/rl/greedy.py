@@ -29,9 +29,9 @@ class GreedyPolicy:
         self._network = network
 
     @staticmethod
-    def load(file: Path, trust: bool = False) -> GreedyPolicy:
+    def load(file: Path) -> GreedyPolicy:
         """Load a model file; see :func:`.policy_file.load_network`."""
-        return GreedyPolicy(load_network(file, trust=trust))
+        return GreedyPolicy(load_network(file))
 
     def best(self, seen: Obs, mask: NDArray[np.int8]) -> int:
         """The index of an action.

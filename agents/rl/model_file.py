@@ -4,9 +4,6 @@
 ``optimizer/N/…`` (Adam's state for the N-th weight) and ``about``, JSON in UTF-8 (the algorithm,
 its observations and its progress). ``config.yaml`` beside it holds the rest: the hyper-parameters
 and the shape of the network.
-
-Files of Stable-Baselines3, such as the ``model.zip`` of older runs, hold pickled objects. Reading
-one runs the code in it, so it needs an explicit ``trust``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 A run directory of ``er-gym train-rl`` holds ``model.npz`` (:mod:`agents.rl.model_file`), a model of
 the zoo ``policy.safetensors``, which has nothing but the network's weights and a little JSON. Both
 are read without running code. ``config.yaml`` beside them says how the network is made. Only torch
-is needed for this; Stable-Baselines3 is imported for its own files alone.
+is needed for this.
 """
 
 from __future__ import annotations
@@ -31,8 +31,6 @@ from er_gym.writing import YAML_MARK, write_atomic
 
 CONFIG = "config.yaml"
 MODEL = "model.npz"
-SB3_MODEL = "model.zip"
-"""The model file of Stable-Baselines3, which runs of er-gym 0.1.0 hold."""
 POLICY = "policy.safetensors"
 """The model file of the zoo: the weights of the network that chooses the actions."""
 FORMAT = 1
@@ -43,19 +41,6 @@ _HEADER = 4096
 _LONGEST_ABOUT = 1_000_000
 
 Weights = dict[str, torch.Tensor]
-
-
-class UntrustedModel(ValueError):
-    """Reading the file can run code; the message says how to allow it."""
-
-
-def untrusted_model(file: Path) -> UntrustedModel:
-    """The error for a file of Stable-Baselines3 without ``trust``."""
-    return UntrustedModel(
-        f"{file} is a file of Stable-Baselines3, and reading it runs whatever code is in it: "
-        "if you know who made it, give --trust (in Python: trust=True); "
-        f"er-gym's own runs hold {MODEL}, which needs no trust"
-    )
 
 
 class Learner(NamedTuple):
@@ -85,9 +70,14 @@ def policy_file(path: Path) -> Path:
     Raises:
         ValueError: there is none.
     """
-    for file in (path, *(path / name for name in (MODEL, POLICY, SB3_MODEL))):
-        if file.is_file() and (file.name in (MODEL, POLICY) or file.suffix == ".zip"):
+    for file in (path, path / MODEL, path / POLICY):
+        if file.is_file() and file.name in (MODEL, POLICY):
             return file
+    if path.suffix == ".zip" and path.is_file():
+        raise ValueError(
+            f"{path} is a zip file, as Stable-Baselines3 writes, and reading one can run code; "
+            f"give rl: and a directory with {MODEL}, which er-gym train-rl makes"
+        )
     raise ValueError(
         f"there is no trained model {path / MODEL}; give rl: and a directory that er-gym train-rl "
         "has made"
@@ -97,31 +87,17 @@ def policy_file(path: Path) -> Path:
 # -- reading -------------------------------------------------------------------------------------
 
 
-def load_network(file: Path, *, trust: bool = False) -> TypeNetwork:
+def load_network(file: Path) -> TypeNetwork:
     """The network of a model file that chooses the actions, with the ``config.yaml`` beside it.
 
     Args:
-        file: ``model.npz`` or ``policy.safetensors``; or, with ``trust``, a file of
-            Stable-Baselines3.
-        trust: whether a file of Stable-Baselines3, which can run code, may be loaded.
+        file: ``model.npz`` or ``policy.safetensors``.
 
     Raises:
-        UntrustedModel: ``trust`` is False, and the file can run code. (It is a ValueError.)
         ValueError: the file cannot be read or belongs to another learner.
     """
     config = load_config(file.parent / CONFIG)
     network = _untrained(config)
-    if file.suffix == ".zip":
-        if not trust:
-            raise untrusted_model(file)
-        from agents.rl.train import load_model  # late: Stable-Baselines3
-
-        weights = load_model(file, trust).policy.state_dict()
-        start = LEARNERS[config.algorithm.name].network
-        network.load_state_dict(
-            {name.removeprefix(start): weights[name] for name in weights if name.startswith(start)}
-        )
-        return network.eval()
     read = _read_safetensors if file.name == POLICY else _read_archive
     try:
         about, weights = read(file, config, network.state_dict())

@@ -9,11 +9,11 @@ done, it does nothing.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
@@ -43,7 +43,7 @@ from agents.rl.callbacks import (
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, load_config
 from agents.rl.envs import evaluation_config, make_env
 from agents.rl.model_file import log_again, placeholder_env, restore, save
-from agents.rl.policy_file import CONFIG, LEARNERS, MODEL, SB3_MODEL, untrusted_model
+from agents.rl.policy_file import CONFIG, LEARNERS, MODEL
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.vec_env import WorkerVecEnv
 from agents.rl.warm_start import WARM_START, warm_start
@@ -53,25 +53,18 @@ from er_gym.locking import exclusive_use
 from er_gym.writing import YAML_MARK, is_ours, make_folder, write_atomic
 
 TENSORBOARD = "tensorboard"
-_OF_A_RUN = (MODEL, SB3_MODEL, CURVE, WARM_START, TENSORBOARD)
+_OF_A_RUN = (MODEL, CURVE, WARM_START, TENSORBOARD)
 _EVALUATION_SEED = 10_000
 """All evaluations of all runs use the same episodes."""
 
 
-class AlgorithmSpec(NamedTuple):
-    """How the learners of an algorithm are made and loaded."""
-
-    make: Callable[..., BaseAlgorithm]
-    """Called with the configuration, that of the algorithm and the environments."""
-    model_class: type[BaseAlgorithm]
-    """The class that loads a file of Stable-Baselines3, which may run code in it."""
-
-
-ALGORITHMS = {
-    "ppo": AlgorithmSpec(ppo.make, MaskablePPO),
-    "dqn": AlgorithmSpec(dqn.make, dqn.LegalDQN),
-    "qrdqn": AlgorithmSpec(dqn.make, dqn.LegalQRDQN),
+ALGORITHMS: Mapping[str, Callable[..., BaseAlgorithm]] = {
+    "ppo": ppo.make,
+    "dqn": dqn.make,
+    "qrdqn": dqn.make,
 }
+"""Makes the learner of an algorithm from the configuration, that of the algorithm and the
+environments."""
 
 
 class RunConflict(ValueError):
@@ -83,7 +76,6 @@ def train(
     run: Path,
     *,
     show_progress: bool = False,
-    trust: bool = False,
     more: tuple[BaseCallback, ...] = (),
 ) -> BaseAlgorithm:
     """Train until ``config.total_steps`` steps are done, and return the learner.
@@ -92,19 +84,17 @@ def train(
         config: the configuration of the run.
         run: the run directory.
         show_progress: whether to show a progress bar.
-        trust: whether a checkpoint of Stable-Baselines3 may be loaded.
         more: additional callbacks.
 
     Raises:
         RunConflict: the directory holds a run of another configuration.
-        UntrustedModel: the checkpoint can run code, and ``trust`` is False.
         Locked: another process trains in the directory.
         KeyboardInterrupt: Ctrl-C; the learner is saved first.
     """
     with exclusive_use(run):
         new = prepare_run(config, run)
         try:
-            return _train(config, run, show_progress, trust, more)
+            return _train(config, run, show_progress, more)
         except BaseException:  # Ctrl-C too
             if new and not (run / MODEL).exists():
                 _withdraw(run)
@@ -115,19 +105,16 @@ def _train(
     config: TrainConfig,
     run: Path,
     show_progress: bool,
-    trust: bool,
     more: tuple[BaseCallback, ...],
 ) -> BaseAlgorithm:
     begin("reading the last checkpoint")
-    model = load_last_checkpoint(run, trust)
-    if model is not None and not (run / MODEL).exists():
-        save(model, run)  # from now on the run needs no trust
+    model = load_last_checkpoint(run)
     steps = 0 if model is None else model.num_timesteps
     before = evaluated_at(run, steps)
     evaluated = config.evaluation is None or before >= steps  # else it was killed meanwhile
     if model is not None and steps >= config.total_steps and evaluated:
         return model
-    spec = ALGORITHMS[config.algorithm.name]
+    make_learner = ALGORITHMS[config.algorithm.name]
     # A continued run plays different episodes than at its start.
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
     begin(f"starting {config.vec.envs} environments in {config.vec.workers} workers")
@@ -150,7 +137,7 @@ def _train(
         # Its clock runs during the warm start, too.
         logger = _logger(config, run, None if model is None else steps)
         if model is None:
-            model = spec.make(config, config.algorithm, env)
+            model = make_learner(config, config.algorithm, env)
             if config.warm_start is not None:
                 assert isinstance(model, MaskablePPO)  # as the configuration has checked
                 begin(f"cloning {config.warm_start.teacher}")
@@ -217,7 +204,7 @@ def prepare_run(config: TrainConfig, run: Path) -> bool:
         RunConflict: the directory belongs to another run, or holds files that er-gym did not write.
     """
     file = run / CONFIG
-    new = not any((run / name).exists() for name in (MODEL, SB3_MODEL))
+    new = not (run / MODEL).exists()
     if file.exists() and new and not is_ours(file):
         raise RunConflict(f"{file} exists, and er-gym did not write it; give another --out")
     if not file.exists():
@@ -257,45 +244,21 @@ def _differences(one: dict[str, Any], other: dict[str, Any], path: str = "") -> 
     return ", ".join(filter(None, found))
 
 
-def load_last_checkpoint(run: Path, trust: bool = False) -> BaseAlgorithm | None:
-    """Load a run's last checkpoint, None if there is none yet; see :func:`load_model`."""
-    file = next((run / name for name in (MODEL, SB3_MODEL) if (run / name).exists()), None)
-    return None if file is None else load_model(file, trust)
-
-
-def load_model(file: Path, trust: bool = False) -> BaseAlgorithm:
-    """Load the learner of a file, with the ``config.yaml`` beside it.
-
-    Args:
-        file: ``model.npz``; or, with ``trust``, a file of Stable-Baselines3.
-        trust: whether a file of Stable-Baselines3, which can run code, may be loaded.
+def load_last_checkpoint(run: Path) -> BaseAlgorithm | None:
+    """Load the learner of a run's last checkpoint, None if there is none yet.
 
     Raises:
-        UntrustedModel: ``trust`` is False, and the file can run code. (It is a ValueError.)
         ValueError: the file cannot be read or belongs to another learner.
     """
-    foreign = file.suffix == ".zip"
-    if foreign and not trust:
-        raise untrusted_model(file)
-    config = load_config(file.parent / CONFIG)
-    spec = ALGORITHMS[config.algorithm.name]
+    if not (run / MODEL).exists():
+        return None
+    config = load_config(run / CONFIG)
+    make_learner = ALGORITHMS[config.algorithm.name]
     space = PolicyObservation(config.env, LEARNERS[config.algorithm.name].needs_mask).space
     env = placeholder_env(space, len(ACTIONS), config.vec.envs)
-    model = spec.make(config, config.algorithm, env)
-    if not foreign:
-        restore(file, model)
-        return model
-    try:
-        found = spec.model_class.load(file, device="cpu")
-    except Exception as error:  # unpickled classes can raise anything
-        raise ValueError(f"{file} cannot be read as a model: {error}") from error
-    for name in ("observation_space", "action_space"):
-        if getattr(found, name) != getattr(model, name):
-            raise ValueError(
-                f"{file} has the {name} {getattr(found, name)}, and {CONFIG} beside it asks for "
-                f"{getattr(model, name)}; give the {CONFIG} of its own run"
-            )
-    return found
+    model = make_learner(config, config.algorithm, env)
+    restore(run / MODEL, model)
+    return model
 
 
 def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int) -> VecEnv:

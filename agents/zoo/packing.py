@@ -22,7 +22,6 @@ from agents.rl.policy_file import (
     CONFIG,
     MODEL,
     POLICY,
-    SB3_MODEL,
     trained_steps,
     write_policy,
 )
@@ -74,7 +73,7 @@ def pack(run: Path, folder: Path, dtype: str) -> Packed:
             links; or the type does not hold its weights.
     """
     kind: Kind
-    if (run / MODEL).is_file() or (run / SB3_MODEL).is_file():
+    if (run / MODEL).is_file():
         kind, weights = "policy", folder / POLICY
         trained_on, made_by = _pack_policy(run, folder, dtype)
     elif (run / RUN).is_file() or any((run / name).is_file() for name in _MODEL_CONFIGS):
@@ -164,11 +163,6 @@ def same_files(one: Path, other: Path) -> bool:
 
 
 def _pack_policy(run: Path, folder: Path, dtype: str) -> tuple[str, tuple[str, ...]]:
-    if not (run / MODEL).is_file():
-        raise ValueError(
-            f"{run / SB3_MODEL} holds pickled objects, which the zoo does not take; "
-            f"er-gym train-rl --trust writes {MODEL} beside it"
-        )
     _refuse_links(run, (run / MODEL, run / CONFIG))
     config, steps = load_config(run / CONFIG), trained_steps(run)
     if steps < config.total_steps:

@@ -32,7 +32,6 @@ from benchmarks.cli.options import (
     scorer_option,
     seed_option,
     split,
-    trust_option,
 )
 from benchmarks.cli.terminal import stdout, terminal
 from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
@@ -100,7 +99,6 @@ TRACKERS = ("tensorboard", "trackio")
 )
 @seed_option
 @click.option("--backend", help="The engine: embedded or unity.  [default: the suite's]")
-@trust_option
 @click.option(
     "--instances", help="Which object a type name means: target or explore.  [default: the suite's]"
 )
@@ -125,7 +123,6 @@ def bench(
     track: tuple[str, ...],
     seed: int,
     backend: str | None,
-    trust: bool,
     instances: str | None,
     protocol: str,
     faults: Faults | None,
@@ -139,7 +136,6 @@ def bench(
     be played, the command names it and plays the others. The options from --agent-config on are for
     vision-language agents, such as openai:MODEL.
     """
-    from agents import RL_PREFIX
     from benchmarks.cli.progress import Progress
     from benchmarks.cli.trackers import tracking
     from benchmarks.scoring.report import load_run
@@ -163,15 +159,12 @@ def bench(
         asked = _load_suite(suite, tasks_file, poses, protocol)
         doing("preparing the agent")
         vlm_run = _vlm_run(agent, vlm_options)
-        if trust and not agent.startswith(RL_PREFIX):
-            raise BadInput(f"--trust is for trained policies, {RL_PREFIX}RUN, not for {agent}")
         env = _env_kwargs(
             asked,
             agent,
             seed,
             vlm_run,
             protocol,
-            trust,
             faults,
             backend=backend,
             instances=instances,
@@ -222,7 +215,7 @@ def bench(
             progress = Progress(console, f"{asked.name}, {agent}", len(episodes), before)
             with (
                 executor_options.workforce(progress.say, 1, agents=[agent]) as workforce,
-                _prepared_run(run_directory, chosen, samples, workforce, agent, vlm_run, trust) as (
+                _prepared_run(run_directory, chosen, samples, workforce, agent, vlm_run) as (
                     play,
                     cost,
                 ),
@@ -294,7 +287,6 @@ def _prepared_run(
     workforce: Workforce,
     agent: str,
     vlm_run: VLMRun | None,
-    trust: bool,
 ) -> Iterator[
     tuple[Callable[[Progress, list[EventListener]], RunSummary], Callable[[], Cost | None]]
 ]:
@@ -305,7 +297,7 @@ def _prepared_run(
     from er_gym.rollout.runner import run
 
     if vlm_run is None:
-        named_agent = NamedAgent(agent, trust)
+        named_agent = NamedAgent(agent)
         with bad_input():
             shared = workforce.machines.shares_files
             make = named_agent if shared else named_agent.carried()
@@ -372,7 +364,6 @@ def _env_kwargs(
     seed: int,
     vlm_run: VLMRun | None,
     protocol: str,
-    trust: bool,
     faults: Faults | None,
     **given: str | None,
 ) -> dict[str, Any]:
@@ -399,7 +390,7 @@ def _env_kwargs(
             f"unknown backend {env['backend']!r}; choose one of: {', '.join(BACKENDS)}"
         )
     if vlm_run is None:
-        env["obs_mode"] = make_agent(agent, seed=seed, trust=trust).obs_mode
+        env["obs_mode"] = make_agent(agent, seed=seed).obs_mode
     else:
         env |= vlm_run.env
     EmbodiedEnv((), **env)

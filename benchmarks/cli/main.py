@@ -86,6 +86,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
 @click.pass_context
 def cli(context: click.Context, version: bool) -> None:
     """Embodied reasoning tasks in AI2-THOR rooms: play them, score them, report."""
+    context.obj = main  # for commands that run others
     if version:
         from er_gym import __version__
 

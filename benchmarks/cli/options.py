@@ -109,12 +109,6 @@ agent_config_option = click.option(
     help="The agent's settings: a YAML file, or the name of one that comes with er-gym.",
 )
 
-trust_option = click.option(
-    "--trust",
-    is_flag=True,
-    help="Also load policies from files of Stable-Baselines3. Loading runs any code in the file.",
-)
-
 
 def overrides_option(example: str) -> Any:
     """``--set NAME=VALUE``, which overrides settings of a file."""

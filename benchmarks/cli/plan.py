@@ -108,7 +108,7 @@ def carry_out(
 
     try:
         with bad_input(PlanError, Locked, ForeignFile):
-            run_plan(plan, out, tell, until)
+            run_plan(plan, out, click.get_current_context().obj, tell, until)
     except PhaseFailed as error:
         print_problem(f"{error}; the same command continues {out}")
         return error.code

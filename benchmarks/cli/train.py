@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import MOST_SEED, Place, overrides_option, trust_option
+from benchmarks.cli.options import MOST_SEED, Place, overrides_option
 from benchmarks.cli.terminal import echo
 
 
@@ -32,14 +32,12 @@ from benchmarks.cli.terminal import echo
     type=Place(file_okay=False, path_type=Path),
     help="The run directory.  [default: runs/rl/CONFIG-SEED]",
 )
-@trust_option
 def train_rl(
     config: str,
     overrides: tuple[str, ...],
     reward: str | None,
     seed: int | None,
     out: Path | None,
-    trust: bool,
 ) -> int:
     """Train a policy by reinforcement learning; needs the extra rl.
 
@@ -65,7 +63,7 @@ def train_rl(
         ) from error
     try:
         with bad_input():
-            model = training.train(wanted, run, show_progress=True, trust=trust)
+            model = training.train(wanted, run, show_progress=True)
     except (RuntimeError, EOFError, MemoryError) as error:
         raise click.ClickException(f"{error}; what has been learnt is in {run}") from error
     except KeyboardInterrupt:

@@ -26,10 +26,10 @@ from rich.console import Console
 from agents import NamedAgent, make_agent
 from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig, how_learnt, load_config
-from agents.rl.policy_file import MODEL, SB3_MODEL
+from agents.rl.policy_file import MODEL
 from agents.rl.policy_observation import IMAGES
 from benchmarks.cli.errors import bad_input
-from benchmarks.cli.options import force_option, trust_option
+from benchmarks.cli.options import force_option
 from benchmarks.cli.progress import Progress
 from benchmarks.scoring.curves import draw_curves
 from benchmarks.scoring.metrics import Score, score_episode, wilson
@@ -69,7 +69,7 @@ class TrainedRun:
         Raises:
             ValueError: it is not a run directory, or its training is not complete.
         """
-        if not any((path / name).exists() for name in (MODEL, SB3_MODEL)):
+        if not (path / MODEL).exists():
             raise ValueError(f"{path} has no {MODEL}; give run directories of er-gym train-rl")
         trained = TrainedRun(path, load_config(path / "config.yaml"))
         if trained.steps < trained.config.total_steps:
@@ -106,11 +106,10 @@ class Evaluator:
     Args:
         work: where the episodes are kept.
         workers: how many processes.
-        trust: whether policies may be read from files of Stable-Baselines3.
     """
 
-    def __init__(self, work: Path, workers: int, trust: bool = False) -> None:
-        self._work, self._workers, self._trust = work, workers, trust
+    def __init__(self, work: Path, workers: int) -> None:
+        self._work, self._workers = work, workers
         self._console = Console(stderr=True)
 
     def play(self, agent: str, tasks: Sequence[Task], where: str, name: str) -> list[Score]:
@@ -120,7 +119,7 @@ class Evaluator:
             suite_digest=jsonl_format.digest(tasks),
             suite_size=len(tasks),
             agent=agent,
-            env={"instances": "explore", "obs_mode": make_agent(agent, trust=self._trust).obs_mode}
+            env={"instances": "explore", "obs_mode": make_agent(agent).obs_mode}
             | _picture_size(agent),
             seed=_SEED,
             er_gym=__version__,
@@ -138,7 +137,7 @@ class Evaluator:
         progress = Progress(self._console, f"{where}, {name}", len(tasks), before)
         with progress:
             make, parallelism = (
-                NamedAgent(run_directory.manifest.agent, trust=self._trust),
+                NamedAgent(run_directory.manifest.agent),
                 Parallelism(self._workers),
             )
             run(run_directory, tasks, make, parallelism=parallelism, listeners=[progress])
@@ -207,7 +206,6 @@ def machine() -> str:
 @click.option("--each", type=click.IntRange(min=1), default=_EACH, help="Tasks of a type.")
 @click.option("--out", type=click.Path(path_type=Path), default=_DOCS / "baselines.md")
 @force_option
-@trust_option
 def main(
     runs: tuple[Path, ...],
     work: Path,
@@ -215,7 +213,6 @@ def main(
     each: int,
     out: Path,
     force: bool,
-    trust: bool,
 ) -> None:
     """Write docs/baselines.md and its pictures."""
     families: defaultdict[str, list[TrainedRun]] = defaultdict(list)
@@ -224,7 +221,7 @@ def main(
         families[trained.name].append(trained)
     with bad_input():
         check_output(out, force=force)
-    evaluator = Evaluator(work, workers, trust)
+    evaluator = Evaluator(work, workers)
     unseen = load_suite(UNSEEN).tasks
     parts = []
     for name, members in families.items():

@@ -20,6 +20,9 @@ from er_gym.rollout.processes import CONTEXT, GRACE_SECONDS, end_with_parent
 from er_gym.tasks.reading import read_text
 from er_gym.writing import make_folder, write_atomic
 
+Command = Callable[[Sequence[str]], None]
+"""Runs the words of a command of er-gym, such as ``("bench", "--suite", "mini")``, and ends the
+process with its exit code. It is picklable."""
 _RUNNING = "running"
 _PATIENCE = 3 * GRACE_SECONDS
 _KEEP_SECONDS = 10.0
@@ -165,7 +168,11 @@ def check_phases(phases: Iterable[Phase]) -> list[str]:
 
 
 def run_plan(
-    plan: Plan, root: Path, tell: Callable[[Phase, int, int], None], until: str | None = None
+    plan: Plan,
+    root: Path,
+    command: Command,
+    tell: Callable[[Phase, int, int], None],
+    until: str | None = None,
 ) -> PlanRecord:
     """Run the phases that are not done yet.
 
@@ -175,6 +182,7 @@ def run_plan(
     Args:
         plan: the phases.
         root: its directory.
+        command: runs a phase's words.
         tell: is called with each phase before it runs, its number from 1, and how many there are.
         until: the name of the last phase to run; None for all.
 
@@ -211,13 +219,13 @@ def run_plan(
         for number, phase in enumerate(plan.phases, 1):
             if phase.name not in done:
                 tell(phase, number, len(plan.phases))
-                record = _try(phase, root, plan.file, record)
+                record = _try(phase, root, command, plan.file, record)
             if phase.name == until:
                 break
     return record
 
 
-def _try(phase: Phase, root: Path, file: str, record: PlanRecord) -> PlanRecord:
+def _try(phase: Phase, root: Path, command: Command, file: str, record: PlanRecord) -> PlanRecord:
     """Run a phase to its end, and keep how long it takes.
 
     Returns:
@@ -236,7 +244,7 @@ def _try(phase: Phase, root: Path, file: str, record: PlanRecord) -> PlanRecord:
         _write(root / file, record.model_copy(update={"tried": tried}))
 
     try:
-        _run(phase, root, keep)
+        _run(phase, root, command, keep)
     except (PhaseFailed, KeyboardInterrupt):
         keep()
         raise
@@ -251,14 +259,15 @@ def _write(file: Path, record: PlanRecord) -> None:
     write_atomic(file, record.model_dump_json(indent=1) + "\n")
 
 
-def _run(phase: Phase, root: Path, keep: Callable[[], None]) -> None:
+def _run(phase: Phase, root: Path, command: Command, keep: Callable[[], None]) -> None:
     """Run a phase to its end; ``keep`` is called from time to time.
 
     Raises:
         PhaseFailed: it ended with an error.
         KeyboardInterrupt: it was interrupted, and has ended.
     """
-    process = CONTEXT.Process(target=_command, args=(phase.command, str(root / _RUNNING)))
+    running = str(root / _RUNNING)
+    process = CONTEXT.Process(target=_run_here, args=(command, phase.command, running))
     process.start()
     try:
         process.join(_KEEP_SECONDS)
@@ -274,13 +283,11 @@ def _run(phase: Phase, root: Path, keep: Callable[[], None]) -> None:
         raise PhaseFailed(phase, process.exitcode)
 
 
-def _command(arguments: Sequence[str], running: str) -> None:
-    """Run a command of er-gym's in this process, and end it."""
-    from benchmarks.cli.main import main
-
+def _run_here(command: Command, words: Sequence[str], running: str) -> None:
+    """Run a phase's words in this process."""
     end_with_parent()
     with exclusive_use(Path(running)):
-        main(list(arguments))
+        command(words)
 
 
 def _wait_for_running(root: Path) -> None:

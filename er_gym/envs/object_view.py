@@ -7,16 +7,15 @@ object in view.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.thor.objects import KIND_OF, TYPES
-
-if TYPE_CHECKING:
-    from er_gym.envs.perception import Perception
+from er_gym.tasks.task import AgentPose
+from er_gym.thor.objects import KIND_OF, TYPES, ObjectTable
 
 Side: TypeAlias = Literal["left", "ahead", "right"]
 _AHEAD = 12.0
@@ -57,12 +56,19 @@ class ObjectView:
         return "left" if self.bearing < 0 else "right"
 
 
-def views_of_objects(perception: Perception) -> tuple[ObjectView, ...]:
-    """See :attr:`er_gym.envs.perception.Perception.object_views`."""
-    objects, pose = perception.objects, perception.pose
+def views_of_objects(
+    objects: ObjectTable, visible: NDArray[np.bool_], pose: AgentPose
+) -> tuple[ObjectView, ...]:
+    """The objects in view without the held one and the floor, nearest first.
+
+    Args:
+        objects: the N objects of the scene.
+        visible: (N,) AI2-THOR's ``visible``.
+        pose: the agent's, metres and degrees in the world frame.
+    """
     rows = [
         row
-        for row in np.flatnonzero(perception.visible).tolist()
+        for row in np.flatnonzero(visible).tolist()
         if row != objects.held and objects.type_of(row) != "Floor"
     ]
     east = objects.centre[rows, 0] - pose.x
@@ -71,7 +77,7 @@ def views_of_objects(perception: Perception) -> tuple[ObjectView, ...]:
     bearings = ((np.degrees(np.arctan2(east, north)) - pose.rotation + 180) % 360 - 180).round(3)
     found = []
     for row, bearing, distance in zip(rows, bearings.tolist(), distances.tolist(), strict=True):
-        holders = (holder for holder in objects.parents[row] if perception.visible[holder])
+        holders = (holder for holder in objects.parents[row] if visible[holder])
         holder = next((k for k in holders if objects.type_of(k) != "Floor"), None)
         found.append(
             ObjectView(
@@ -80,22 +86,21 @@ def views_of_objects(perception: Perception) -> tuple[ObjectView, ...]:
                 bearing=bearing,
                 distance=distance,
                 on="" if holder is None else objects.type_of(holder),
-                is_open=_state(perception, "isOpen", "openable", row),
-                is_toggled=_state(perception, "isToggled", "toggleable", row),
+                is_open=_state(objects, "isOpen", "openable", row),
+                is_toggled=_state(objects, "isToggled", "toggleable", row),
             )
         )
     return tuple(sorted(found, key=lambda each: (each.distance, each.object_id)))
 
 
-def _state(perception: Perception, state: str, ability: str, row: int) -> bool | None:
-    has = perception.objects.has
-    return bool(has[state][row]) if has[ability][row] else None
+def _state(objects: ObjectTable, state: str, ability: str, row: int) -> bool | None:
+    return bool(objects.has[state][row]) if objects.has[ability][row] else None
 
 
-def object_features(perception: Perception) -> NDArray[np.float32]:
-    """(T, len(FEATURES)) float32, -1 to 1: see :data:`FEATURES`."""
+def object_features(views: Sequence[ObjectView]) -> NDArray[np.float32]:
+    """(T, len(FEATURES)) float32, -1 to 1, of views, the nearest first; see :data:`FEATURES`."""
     table = np.zeros((len(TYPES), len(FEATURES)), dtype=np.float32)
-    for view in reversed(perception.object_views):  # the nearest is written last
+    for view in reversed(views):  # the nearest is written last
         row = table[KIND_OF[view.object_type]]
         angle = np.radians(view.bearing)
         row[0] = min(row[0] + 1 / _COUNT_SCALE, 1.0)

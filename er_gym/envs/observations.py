@@ -415,7 +415,7 @@ OBSERVATIONS: Registry[Observation] = Registry(
             lambda width, height: spaces.Box(
                 -1.0, 1.0, (len(TYPES), len(OBJECT_FEATURES)), np.float32
             ),
-            lambda situation: object_features(situation.perception),
+            lambda situation: object_features(situation.perception.object_views),
             details=_object_views,
         ),
         "state": Observation(

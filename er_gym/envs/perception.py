@@ -85,7 +85,7 @@ class Perception:
     @cached_property
     def object_views(self) -> tuple[ObjectView, ...]:
         """The objects in view without the held one and the floor, nearest first."""
-        return views_of_objects(self)
+        return views_of_objects(self.objects, self.visible, self.pose)
 
     @property
     def held_name(self) -> str:

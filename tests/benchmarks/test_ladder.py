@@ -19,7 +19,7 @@ import yaml
 from click.testing import CliRunner
 
 from agents.finetune.settings import load_settings
-from benchmarks.cli.main import cli
+from benchmarks.cli.main import cli, main
 from benchmarks.ladder.phases import plan_of, rungs
 from benchmarks.ladder.settings import ladder_names, load_ladder
 from benchmarks.pages.models import main as models_page
@@ -338,7 +338,7 @@ def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
     assert all(f"| {name} |" in written for name in done(root))
     assert written.count("](images/") == len([*page.parent.glob("images/*.png")]) >= 2
     before = [each.stat().st_mtime_ns for each in sorted(root.rglob("*.safetensors"))]
-    run_plan(plan_of(settings, root), root, lambda *phase: pytest.fail(f"{phase} runs again"))
+    run_plan(plan_of(settings, root), root, main, lambda *phase: pytest.fail(f"{phase} runs again"))
     assert before == [each.stat().st_mtime_ns for each in sorted(root.rglob("*.safetensors"))]
     other = ["ladder", "--config", str(file), "--set", "seed=3", "--out", str(root)]
     told = CliRunner().invoke(cli, other)
@@ -352,12 +352,12 @@ def test_the_time_of_a_phase_is_that_of_all_its_tries(tmp_path: Path) -> None:
     seconds = []
     for _ in range(2):
         with pytest.raises(PhaseFailed):
-            run_plan(plan, tmp_path / "x", lambda *phase: None)
+            run_plan(plan, tmp_path / "x", main, lambda *phase: None)
         record = PlanRecord.model_validate_json((tmp_path / "x" / "ladder.json").read_text())
         seconds.append(record.tried["suites"])
     assert 0 < seconds[0] < seconds[1]
     mended = replace(plan, phases=(Phase("suites", ("--version",), "suites"),))
-    (ended,) = run_plan(mended, tmp_path / "x", lambda *phase: None).done
+    (ended,) = run_plan(mended, tmp_path / "x", main, lambda *phase: None).done
     assert ended.seconds > seconds[1]
 
 

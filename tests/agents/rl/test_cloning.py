@@ -59,7 +59,7 @@ def test_a_policy_learns_the_teachers_actions(make_config: Make) -> None:
     seen = collect_demonstrations(config, how, seed=0)
     env = make_vec_env(config, config.env, 0)
     try:
-        model = ALGORITHMS["ppo"].make(config, config.algorithm, env)
+        model = ALGORITHMS["ppo"](config, config.algorithm, env)
         agreed = clone_behaviour(model, seen, how, seed=0)
     finally:
         env.close()

@@ -53,7 +53,7 @@ def configured(name: str, **settings: Any) -> TrainConfig:
 
 def learner(env: VecEnv, name: str, **settings: Any) -> Any:
     config = configured(name, **settings)
-    model = ALGORITHMS[name].make(config, config.algorithm, env)
+    model = ALGORITHMS[name](config, config.algorithm, env)
     env.seed(0)
     return model
 

@@ -1,8 +1,7 @@
-"""Model files are weights and JSON. A file that could run code is read only with ``trust``."""
+"""Model files are weights and JSON. No file that could run code is read."""
 
 from __future__ import annotations
 
-import base64
 import io
 import json
 import pickle
@@ -17,10 +16,9 @@ import pytest
 from click.testing import CliRunner
 
 from agents import make_agent
-from agents.rl.agent import RLAgent
 from agents.rl.config import TrainConfig
-from agents.rl.policy_file import MODEL, SB3_MODEL, UntrustedModel
-from agents.rl.train import CONFIG, load_last_checkpoint, train
+from agents.rl.policy_file import MODEL
+from agents.rl.train import load_last_checkpoint, train
 from benchmarks.cli.main import cli
 
 Make = Callable[..., TrainConfig]
@@ -49,72 +47,20 @@ class Writes:
         return Path.write_text, (self.file, "ran")
 
 
-@pytest.fixture
-def hostile(copied: Path) -> tuple[Path, Path]:
-    """A run directory with a model of Stable-Baselines3 that writes a file, and that file."""
-    written = copied / "written"
-    load_last_checkpoint(copied).save(copied / SB3_MODEL)
-    with zipfile.ZipFile(copied / SB3_MODEL) as archive:
-        parts = {name: archive.read(name) for name in archive.namelist()}
-    data = json.loads(parts["data"])
-    code = base64.b64encode(pickle.dumps(Writes(written))).decode()
-    data["policy_class"] = {":type:": "x", ":serialized:": code}
-    with zipfile.ZipFile(copied / SB3_MODEL, "w") as archive:
-        for name, content in {**parts, "data": json.dumps(data).encode()}.items():
-            archive.writestr(name, content)
+def test_a_zip_of_stable_baselines_is_refused_unread(copied: Path, tmp_path: Path) -> None:
+    file = copied / "model.zip"
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("data", pickle.dumps(Writes(copied / "written")))
+    bench = ["bench", "--suite", "mini", "--limit", "1", "--agent", f"rl:{file}"]
+    result = CliRunner().invoke(cli, [*bench, "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2, result.output
+    assert "reading one can run code; give rl: and a directory with model.npz" in result.output
     (copied / MODEL).unlink()
-    return copied, written
-
-
-def test_a_zip_that_runs_code_is_refused_and_does_not_run(hostile: tuple[Path, Path]) -> None:
-    path, written = hostile
-    for refused in (
-        lambda: make_agent(f"rl:{path}"),
-        lambda: RLAgent(path / SB3_MODEL),
-        lambda: load_last_checkpoint(path),
-    ):
-        with pytest.raises(UntrustedModel, match=r"runs whatever code is in it.*give --trust"):
-            refused()
-    assert not written.exists()
-    with pytest.raises(ValueError, match="cannot be read as a model"):
-        load_last_checkpoint(path, trust=True)
-    assert written.exists()  # otherwise this test would prove nothing
-
-
-def test_the_commands_refuse_it_in_one_line(hostile: tuple[Path, Path], tmp_path: Path) -> None:
-    path, written = hostile
-    bench = ["bench", "--suite", "mini", "--limit", "1", "--agent", f"rl:{path}"]
-    commands = [
-        [*bench, "--out", str(tmp_path / "out")],
-        ["train-rl", "--config", str(path / CONFIG), "--out", str(path)],
-    ]
-    for command in commands:
-        result = CliRunner().invoke(cli, command)
-        assert result.exit_code == 2, result.output
-        assert "give --trust" in result.output
-        assert len(result.output.strip().splitlines()) == 1
-    assert not written.exists()
+    with pytest.raises(ValueError, match="there is no trained model"):
+        make_agent(f"rl:{copied}")
+    assert load_last_checkpoint(copied) is None
+    assert not (copied / "written").exists()
     assert not (tmp_path / "out").exists()
-
-
-def test_a_run_of_before_is_read_with_trust_and_then_needs_none(
-    copied: Path, make_config: Make, tmp_path: Path
-) -> None:
-    before = load_last_checkpoint(copied)
-    before.save(copied / SB3_MODEL)
-    (copied / MODEL).unlink()
-    command = ["bench", "--suite", "mini", "--limit", "1", "--agent", f"rl:{copied}"]
-    command += ["--instances", "explore", "--out", str(tmp_path / "out"), "--trust"]
-    result = CliRunner().invoke(cli, command)
-    assert result.exit_code == 0, result.output
-    train(make_config(total_steps=64, **SMALL), copied, trust=True)  # all its steps are done
-    assert load_last_checkpoint(copied).num_timesteps == 64
-
-
-def test_trust_is_for_trained_policies() -> None:
-    result = CliRunner().invoke(cli, ["bench", "--suite", "mini", "--agent", "random", "--trust"])
-    assert result.exit_code == 2
-    assert "--trust is for trained policies" in result.output
 
 
 def test_a_run_goes_on_from_all_that_it_was(run: Path) -> None:
