@@ -30,8 +30,8 @@ from agents.vlm.settings import AgentSettings
 from agents.vlm.tuned_model import agent_file
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import Place
-from benchmarks.cli.terminal import stdout
 from benchmarks.scoring.tables import Table, as_markdown, print_tables
+from benchmarks.terminal import stdout
 from er_gym.data.dialects import load_dialect
 from er_gym.data.frame_chat import Question, questions, words_for_frames
 from er_gym.data.frames import Frame, FrameSet

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,7 @@ _ENVS = {*_TASKS, "er_gym.envs"}
 _ROLLOUT = {*_ENVS, "er_gym", "er_gym.rollout"}
 _DATA = {*_ROLLOUT, "er_gym.data"}
 _AGENTS = {*_DATA, "agents"}
-_SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.cli.terminal"}
+_SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.terminal"}
 _COMMAND = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.cli"}
 _SCRIPTS = {*_COMMAND, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "benchmarks.pages"}
 ALLOWED = {
@@ -38,7 +39,7 @@ ALLOWED = {
     "er_gym.data": _DATA,
     "agents": _AGENTS,
     "benchmarks.scoring": _SCORING,
-    "benchmarks.cli.terminal": {*_ENVS, "benchmarks.cli.terminal"},
+    "benchmarks.terminal": {*_ENVS, "benchmarks.terminal"},
     "benchmarks.cli": _COMMAND,
     "benchmarks": _COMMAND,
     # Scripts that measure or check look at the engine itself.
@@ -93,6 +94,30 @@ def test_imports_only_from_layers_below(path: Path) -> None:
         if (theirs := layer(imported)) is not None and theirs not in ALLOWED[mine]
     ]
     assert not wrong
+
+
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    """Late imports, and those for types alone, count too."""
+    names = {module_name(path): path for path in SOURCES}
+    graph: dict[str, set[str]] = {}
+    for name, path in names.items():
+        package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+        found = (
+            known_module(imported, names)
+            for _, imported in imported_modules(path.read_text(encoding="utf-8"), package)
+        )
+        graph[name] = {module for module in found if module is not None} - {name}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(" imports ".join(reversed(error.args[1])))
+
+
+def known_module(imported: str, known: Container[str]) -> str | None:
+    """The module of ours that an imported name is, or is part of; None for another's."""
+    while imported and imported not in known:
+        imported = imported.rpartition(".")[0]
+    return imported or None
 
 
 def test_sees_late_and_relative_imports() -> None:

@@ -10,7 +10,7 @@ import click
 from benchmarks.cli.errors import bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions
 from benchmarks.cli.plan import carry_out, plan_options
-from benchmarks.cli.terminal import echo, stdout
+from benchmarks.terminal import echo, stdout
 
 if TYPE_CHECKING:
     from benchmarks.ablation.result import RowResult

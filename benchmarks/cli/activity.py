@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable, Iterator
 
 from benchmarks.cli.live_line import LINE
-from benchmarks.cli.terminal import echo, plain
+from benchmarks.terminal import echo, plain
 
 Count = Callable[[], str]
 _HEARD = "er_gym.activity"

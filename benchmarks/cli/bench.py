@@ -33,8 +33,8 @@ from benchmarks.cli.options import (
     seed_option,
     split,
 )
-from benchmarks.cli.terminal import stdout, terminal
 from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
+from benchmarks.terminal import stdout, terminal
 
 if TYPE_CHECKING:
     from benchmarks.cli.progress import Progress

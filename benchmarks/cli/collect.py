@@ -31,7 +31,7 @@ from benchmarks.cli.options import (
     seed_option,
     size_options,
 )
-from benchmarks.cli.terminal import stdout, terminal
+from benchmarks.terminal import stdout, terminal
 
 if TYPE_CHECKING:
     from agents.expert.collect import CollectSettings, CollectSummary, Stratum

@@ -14,7 +14,7 @@ from benchmarks.cli.data_import import import_
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
 from benchmarks.cli.options import Place, force_option
-from benchmarks.cli.terminal import echo, stdout, terminal
+from benchmarks.terminal import echo, stdout, terminal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,7 +9,7 @@ import click
 
 from benchmarks.cli.errors import BadInput, bad_input
 from benchmarks.cli.options import Place, split
-from benchmarks.cli.terminal import echo, terminal
+from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from er_gym.data.exports import ExportSummary

@@ -10,7 +10,7 @@ import click
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import Place, given_size, seed_option, size_options, workers_option
-from benchmarks.cli.terminal import echo, terminal
+from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from er_gym.data.frame_camera import Camera, Visit

@@ -9,7 +9,7 @@ import click
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import bad_input, print_problem
 from benchmarks.cli.options import Place
-from benchmarks.cli.terminal import echo, terminal
+from benchmarks.terminal import echo, terminal
 
 
 @click.command(name="import")

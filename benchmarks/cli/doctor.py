@@ -10,7 +10,7 @@ import click
 
 from benchmarks.cli.errors import BadInput, bad_input
 from benchmarks.cli.options import Place, Words
-from benchmarks.cli.terminal import echo
+from benchmarks.terminal import echo
 
 if TYPE_CHECKING:
     from benchmarks.cli.doctor_checks import Check

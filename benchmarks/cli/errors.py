@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from benchmarks.cli.terminal import echo
+from benchmarks.terminal import echo
 
 _LONGEST = 2_000  # characters of a line
 _MOST_LINES = 10  # about tasks of a suite

@@ -9,7 +9,7 @@ import click
 
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import Place, Words, overrides_option
-from benchmarks.cli.terminal import echo
+from benchmarks.terminal import echo
 
 if TYPE_CHECKING:
     from agents.finetune.loop import Progress

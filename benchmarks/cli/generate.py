@@ -14,7 +14,7 @@ from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
 from benchmarks.cli.options import MOST_SEED, Span, force_option, split
-from benchmarks.cli.terminal import echo, terminal
+from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from rich.console import Console

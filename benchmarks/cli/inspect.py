@@ -9,7 +9,7 @@ import click
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import Words, agent_config_option, overrides_option, seed_option
-from benchmarks.cli.terminal import echo
+from benchmarks.terminal import echo
 
 if TYPE_CHECKING:
     from inspect_ai.log import EvalLog

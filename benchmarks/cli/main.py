@@ -38,10 +38,10 @@ from benchmarks.cli.prompts import prompts
 from benchmarks.cli.render import play, render
 from benchmarks.cli.serve import match_server, serve
 from benchmarks.cli.tasks import tasks
-from benchmarks.cli.terminal import echo, stdout, terminal, use_any_encoding
 from benchmarks.cli.train import train_rl
 from benchmarks.cli.ui import ui
 from benchmarks.cli.zoo import zoo
+from benchmarks.terminal import echo, stdout, terminal, use_any_encoding
 
 FORMATS = ("table", "md", "csv", "json")
 _directory = click.Path(file_okay=False, path_type=Path)

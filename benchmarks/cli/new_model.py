@@ -9,7 +9,7 @@ import click
 
 from benchmarks.cli.errors import BadInput, bad_input
 from benchmarks.cli.options import MOST_SEED, Place, overrides_option
-from benchmarks.cli.terminal import echo
+from benchmarks.terminal import echo
 
 
 @click.command(name="new-model")

@@ -13,7 +13,7 @@ import click
 from benchmarks.cli.errors import INTERRUPTED, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, with_executor_options
 from benchmarks.cli.options import Place, overrides_option
-from benchmarks.cli.terminal import echo, terminal
+from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from benchmarks.plan.phase import Phase

@@ -7,7 +7,7 @@ import sys
 import click
 
 from benchmarks.cli.errors import bad_input
-from benchmarks.cli.terminal import echo
+from benchmarks.terminal import echo
 
 
 @click.group()

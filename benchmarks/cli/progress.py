@@ -55,7 +55,7 @@ class Progress:
     """A context manager that follows a run by its events, or by calls of :meth:`episode`.
 
     Args:
-        console: where to, a :func:`~benchmarks.cli.terminal.terminal`.
+        console: where to, a :func:`~benchmarks.terminal.terminal`.
         title: what is played.
         total: how many episodes there are.
         before: what earlier starts of the run have come to; those that crashed are played again.

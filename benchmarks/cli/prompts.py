@@ -11,7 +11,7 @@ import click
 
 from benchmarks.cli.errors import BadInput, bad_input
 from benchmarks.cli.options import Place, force_option
-from benchmarks.cli.terminal import echo
+from benchmarks.terminal import echo
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import click
 
 from benchmarks.cli.errors import BadInput, bad_input
 from benchmarks.cli.options import Finite, Place, force_option, seed_option
-from benchmarks.cli.terminal import echo
+from benchmarks.terminal import echo
 
 if TYPE_CHECKING:
     import numpy as np

@@ -15,7 +15,7 @@ import click
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.options import Finite, agent_config_option, overrides_option
-from benchmarks.cli.terminal import echo, plain
+from benchmarks.terminal import echo, plain
 
 if TYPE_CHECKING:
     from agents.vlm.serving import Command

@@ -13,7 +13,7 @@ from benchmarks.cli.errors import BadInput, bad_input, report_set_aside
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
 from benchmarks.cli.generate import generate
 from benchmarks.cli.options import Place, force_option, split
-from benchmarks.cli.terminal import echo, terminal
+from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from er_gym.tasks.suites import Suite

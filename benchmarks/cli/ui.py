@@ -17,9 +17,9 @@ import click
 
 from benchmarks.cli.errors import BadInput
 from benchmarks.cli.options import Place
-from benchmarks.cli.terminal import echo
 from benchmarks.cli.ui_export import FileOptions, file_options, write_files
 from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
+from benchmarks.terminal import echo
 
 _LOOPBACK = "127.0.0.1"
 _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")

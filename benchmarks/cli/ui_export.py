@@ -13,7 +13,7 @@ import click
 
 from benchmarks.cli.errors import BadInput, bad_input
 from benchmarks.cli.options import Place
-from benchmarks.cli.terminal import echo, terminal
+from benchmarks.terminal import echo, terminal
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 _FOLDER = Place(exists=True, file_okay=False, path_type=Path)

@@ -10,7 +10,7 @@ import click
 
 from benchmarks.cli.errors import BadInput, bad_input
 from benchmarks.cli.options import Place, Words
-from benchmarks.cli.terminal import echo, stdout
+from benchmarks.terminal import echo, stdout
 
 if TYPE_CHECKING:
     from agents.zoo.card import Card, Figure, Rate

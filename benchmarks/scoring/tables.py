@@ -12,10 +12,10 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from benchmarks.cli.terminal import plain
 from benchmarks.scoring.metrics import METRICS, Estimate, Score, Summary
 from benchmarks.scoring.report import BOTH, RunReport, by_group, by_type, sample_slices, slices
 from benchmarks.scoring.samples import most_samples
+from benchmarks.terminal import plain
 from er_gym.envs.protocol import DEFAULT
 from er_gym.tasks.types import BY_NAME, GROUPS
 

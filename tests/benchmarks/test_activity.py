@@ -13,7 +13,7 @@ from benchmarks.cli import activity, live_line
 from benchmarks.cli.activity import doing, saying_what_it_does
 from benchmarks.cli.live_line import Line
 from benchmarks.cli.progress import bar
-from benchmarks.cli.terminal import echo, terminal
+from benchmarks.terminal import echo, terminal
 from er_gym.activity import LOG, begin, begin_import
 
 ER_GYM = (sys.executable, "-m", "benchmarks.cli")

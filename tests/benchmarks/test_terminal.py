@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import terminal as terminal_module
 from benchmarks.checks import terminals
 from benchmarks.checks.bad_files import HOSTILE
 from benchmarks.cli import main as cli
-from benchmarks.cli import terminal as terminal_module
 from benchmarks.cli.progress import Progress
-from benchmarks.cli.terminal import plain, terminal
 from benchmarks.scoring.tables import Table, print_tables
+from benchmarks.terminal import plain, terminal
 
 
 def test_terminal_control_characters_are_shown_as_escapes():
