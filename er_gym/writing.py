@@ -30,7 +30,7 @@ import secrets
 import shutil
 import stat
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path, PurePath, PureWindowsPath
 from typing import IO, TYPE_CHECKING, Any
 
@@ -313,6 +313,49 @@ def make_folder(path: Path) -> None:
     except OSError as error:
         reason = "a file is there" if isinstance(error, FileExistsError) else error.strerror
         raise CannotWrite(f"{path}: the folder cannot be made: {reason}") from error
+
+
+def check_replaceable(folder: Path, stamp: str, names: Collection[str] | None = None) -> None:
+    """Raise an error unless a folder may be replaced as a whole: it is empty, or er-gym filled it.
+
+    Args:
+        folder: it need not exist.
+        stamp: the name of the file that er-gym puts into each folder of the kind.
+        names: what it may hold beside that; None if this is not known yet.
+
+    Raises:
+        ForeignFile: it is a link or a file, or holds something else.
+    """
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise ForeignFile(
+            f"{folder} is there already and is no folder of its own; choose another name or move "
+            "it away"
+        )
+    held = {each.name for each in folder.iterdir()} if folder.exists() else set()
+    other = sorted(held if stamp not in held else () if names is None else held - {stamp, *names})
+    if other:
+        raise ForeignFile(
+            f"{folder} holds {other[0]}, which would be lost; choose another name or move it away"
+        )
+
+
+def replace_folder(draft: Path, folder: Path, stamp: str) -> None:
+    """Move a finished draft to its place, whatever er-gym wrote there before.
+
+    Args:
+        draft: a folder on the same disk.
+        folder: its place.
+        stamp: see :func:`check_replaceable`. What the draft has may be there.
+
+    Raises:
+        ForeignFile: as :func:`check_replaceable`; nothing is changed.
+    """
+    check_replaceable(folder, stamp, [each.name for each in draft.iterdir()])
+    old = draft.with_name(f".{draft.name}.{secrets.token_hex(4)}.old")
+    if folder.exists():
+        folder.rename(old)
+    draft.rename(folder)
+    shutil.rmtree(old, ignore_errors=True)
 
 
 def is_ours(path: Path) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.vlm.tuned_model import MODEL, RUN
-from er_gym.writing import write_atomic
+from er_gym.writing import check_replaceable, replace_folder, write_atomic
 
 STAMP = "merged_from.json"
 """The file that says what a model was merged from."""
@@ -43,7 +43,8 @@ def merge(directory: Path) -> Path:
         the directory of the whole model (:func:`merged_directory`).
 
     Raises:
-        ValueError: the adapter or its base cannot be loaded, or the disk cannot be written.
+        ValueError: the adapter or its base cannot be loaded, the disk cannot be written, or
+            something else is in the whole model's place.
     """
     from agents.vlm.clients.adapters import adapter_chain
 
@@ -54,6 +55,7 @@ def merge(directory: Path) -> Path:
     stamp = json.dumps([_files(each) for each in (base, *adapters)])
     if (target / STAMP).is_file() and (target / STAMP).read_text(encoding="utf-8") == stamp:
         return target
+    check_replaceable(target, STAMP)
     draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}.draft")
     try:
         draft.mkdir()
@@ -63,11 +65,7 @@ def merge(directory: Path) -> Path:
                     shutil.copyfile(file, draft / file.name)
         _merged(base, adapters).save_pretrained(draft)
         write_atomic(draft / STAMP, stamp)
-        old = target.with_name(f"{draft.name}.old")
-        if target.exists():
-            target.rename(old)
-        draft.rename(target)
-        shutil.rmtree(old, ignore_errors=True)
+        replace_folder(draft, target, STAMP)
     except OSError as error:
         raise ValueError(f"{target} cannot be written: {error.strerror or error}") from None
     finally:

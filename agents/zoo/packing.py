@@ -30,7 +30,7 @@ from agents.vlm.tuned_model import RUN, model_directory
 from agents.zoo.card import Kind
 from agents.zoo.index import CARD, MOST_BYTES, SUFFIXES, files_of
 from er_gym.tasks.reading import parse_json, read_text
-from er_gym.writing import write_atomic
+from er_gym.writing import check_output, check_replaceable, replace_folder, write_atomic
 
 DTYPES = {"float16": torch.float16, "bfloat16": torch.bfloat16, "float32": torch.float32}
 """The types of weights in a folder, by name."""
@@ -91,16 +91,19 @@ def pack(run: Path, folder: Path, dtype: str) -> Packed:
 
 @contextmanager
 def new_folder(models: Path, name: str) -> Iterator[Path]:
-    """Fill a model's folder whole or not at all; one that is there is replaced.
+    """Fill a model's folder whole or not at all; a model that is there is replaced.
 
     Args:
         models: the folder of all models.
         name: of the model.
 
     Raises:
-        ValueError: the folder would hold a file that no model may have, or all models together
-            would be too large.
+        ValueError: the folder would hold a file that no model may have, all models together would
+            be too large, or the folder holds something that is no model's.
     """
+    check_replaceable(models / name, CARD)
+    if (models / name).is_dir():
+        check_output(models / name / CARD)
     models.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=models, prefix=f".{name}-") as made:
         draft = Path(made) / name
@@ -109,9 +112,7 @@ def new_folder(models: Path, name: str) -> Iterator[Path]:
         check_files(draft)
         others = (each for each in models.glob("[!.]*") if each.is_dir() and each.name != name)
         check_size((*others, draft))
-        if (models / name).exists():
-            (models / name).rename(Path(made) / "before")
-        draft.rename(models / name)
+        replace_folder(draft, models / name, CARD)
 
 
 def _refuse_links(folder: Path, files: Iterable[Path]) -> None:

@@ -99,7 +99,7 @@ def _tensorboard(run: Path, settings: Mapping[str, Any]) -> Iterator[Log]:
     from torch.utils.tensorboard import SummaryWriter
 
     folder = run / "tensorboard"
-    for old in folder.glob("events.out.tfevents.*"):
+    for old in folder.glob("events.out.tfevents.[0-9]*"):
         old.unlink()
     writer = SummaryWriter(str(folder), purge_step=0)  # a TensorBoard that is open forgets, too
 

@@ -278,7 +278,7 @@ WRONG = {
         [paper_task(er_gym=[])],
         "task 1 (identity 57) has a wrong field 'er_gym': input should be",
     ),
-    "own: unknown field": (with_own(gaol=[]), "'er_gym.gaol': there is no such field (did you mean goal?)"),
+    "own: unknown field": (with_own(gaol=[]), "'er_gym.gaol': there is no such field (did you"),
     "own: no list": (with_own(goal={}), "has a wrong field 'er_gym.goal': input should be"),
     "own: empty condition": (with_own(goal=[{}]), "lacks field 'er_gym.goal[0].object_type'"),
     "own: short pose": (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shlex
+import shutil
 import signal
 import socket
 import subprocess
@@ -585,8 +586,17 @@ def test_the_run_of_an_adapter_is_merged_once_and_whole(
     assert (merged / "model.safetensors").stat().st_mtime_ns == before
     (run / "model" / "agent.yaml").write_text("prompts: {dialect: tags}\n")
     assert "tags" in (merge(run / "model") / "agent.yaml").read_text()
+    (run / "merged" / "notes.txt").write_text("mine")
+    (run / "model" / "agent.yaml").write_text("prompts: {dialect: paper}\n")
+    with pytest.raises(ValueError, match=r"holds notes\.txt, which would be lost"):
+        merge(run / "model")
+    (run / "merged" / "merged_from.json").rename(run / "merged" / "stamp.json")
+    with pytest.raises(ValueError, match=r"merged holds .*, which would be lost"):
+        merge(run / "model")
+    assert (run / "merged" / "notes.txt").read_text() == "mine"
+    shutil.rmtree(run / "merged")
     (run / "model" / "adapter_model.safetensors").write_bytes(b"?")
     with pytest.raises(ValueError, match="cannot be merged into"):
         merge(run / "model")
-    assert sorted(each.name for each in run.iterdir()) == ["finetune.json", "merged", "model"]
+    assert sorted(each.name for each in run.iterdir()) == ["finetune.json", "model"]
     assert merge(base) == base

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,9 @@ from agents.finetune.architecture import load_architecture
 from agents.finetune.new_model import make_model
 from agents.rl.config import TrainConfig, config_file, load_config
 from agents.zoo import packing
+from agents.zoo.index import CARD
 from agents.zoo.packing import HISTORY, WEIGHTS, new_folder, pack, same_files
+from er_gym.writing import YAML_MARK, ForeignFile
 
 SMALL = ("hidden_size=32", "intermediate_size=32", "num_hidden_layers=1")
 STAGE = {
@@ -167,9 +169,39 @@ def test_a_policy_that_is_not_taken(tmp_path: Path) -> None:
         pack(tmp_path, tmp_path, "float16")
 
 
+OWN: Mapping[str, Mapping[str, str]] = {
+    "a thesis": {"thesis.txt": "mine"},
+    "a card of the user's": {"card.yaml": "title: mine"},
+    "a note in a model of the zoo": {"card.yaml": f"{YAML_MARK}x: 1", "a.json": "1", "n.md": "m"},
+}
+
+
+@pytest.mark.parametrize("files", OWN.values(), ids=OWN)
+def test_what_would_be_lost_is_not_replaced(files: Mapping[str, str], tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    refused = pytest.raises(ForeignFile, match=r"would be lost|er-gym did not write")
+    with refused, new_folder(tmp_path, "data") as draft:
+        (draft / "a.json").write_text("2")
+        (draft / "card.yaml").write_text(YAML_MARK)
+    assert {each.name: each.read_text() for each in folder.iterdir()} == files
+    assert [*tmp_path.iterdir()] == [folder]
+
+
+def test_a_link_is_not_replaced_by_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    (tmp_path / "data").symlink_to("there")
+    with pytest.raises(ForeignFile, match="is no folder of its own"), new_folder(tmp_path, "data"):
+        pass
+    assert (tmp_path / "data").is_symlink()
+
+
 def test_a_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
     with new_folder(tmp_path, "one") as draft:
         (draft / "a.json").write_text("1")
+        (draft / CARD).write_text(YAML_MARK)
     with (
         pytest.raises(FileNotFoundError, match="nowhere"),
         new_folder(tmp_path, "one") as draft,
@@ -177,9 +209,12 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
         (draft / "nowhere" / "a.json").write_text("2")
     assert (tmp_path / "one" / "a.json").read_text() == "1"
     with new_folder(tmp_path, "one") as draft:
-        (draft / "b.json").write_text("2")
+        for name, text in (("a.json", "2"), ("b.json", "2"), (CARD, YAML_MARK)):
+            (draft / name).write_text(text)
         assert not same_files(draft, tmp_path / "one")
-    assert [each.name for each in tmp_path.rglob("*")] == ["one", "b.json"]
+    names = sorted(each.name for each in tmp_path.rglob("*"))
+    assert names == ["a.json", "b.json", CARD, "one"]
+    assert (tmp_path / "one" / "a.json").read_text() == "2"
 
 
 @pytest.mark.parametrize("name", ["model.bin", "weights.pkl", "code.py", "notes", "x.json.gz"])
@@ -207,7 +242,8 @@ def test_all_models_together_must_stay_small(
     monkeypatch.setattr(packing, "MOST_BYTES", 100)
     for _ in range(2):  # a model takes its own place
         with new_folder(tmp_path, "one") as draft:
-            (draft / "a.txt").write_text("x" * 60)
+            (draft / "a.txt").write_text("x" * 40)
+            (draft / CARD).write_text(YAML_MARK)
     with (
         pytest.raises(ValueError, match=r"110 bytes together, and 100 are allowed: one 60, two 50"),
         new_folder(tmp_path, "two") as draft,
