@@ -49,7 +49,7 @@ from agents.rl.vec_env import WorkerVecEnv
 from agents.rl.warm_start import WARM_START, warm_start
 from er_gym.activity import begin
 from er_gym.envs.actions import ACTIONS
-from er_gym.locking import exclusive_use
+from er_gym.locking import check_kind, exclusive_use
 from er_gym.writing import YAML_MARK, is_ours, make_folder, write_atomic
 
 TENSORBOARD = "tensorboard"
@@ -208,6 +208,7 @@ def prepare_run(config: TrainConfig, run: Path) -> bool:
     if file.exists() and new and not is_ours(file):
         raise RunConflict(f"{file} exists, and er-gym did not write it; give another --out")
     if not file.exists():
+        check_kind(run, CONFIG, RunConflict)
         there = [name for name in _OF_A_RUN if (run / name).exists()]
         if there:
             raise RunConflict(

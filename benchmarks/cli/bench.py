@@ -70,7 +70,7 @@ TRACKERS = ("tensorboard", "trackio")
 @click.option(
     "--spread",
     is_flag=True,
-    help="With --limit and --skip: take tasks of all types and rooms, not the first ones.",
+    help="With --limit and --skip: take a fixed random sample, not the first tasks.",
 )
 @click.option(
     "--skip",

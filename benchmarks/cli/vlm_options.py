@@ -63,10 +63,12 @@ _VLM_OPTIONS = (
         type=click.IntRange(1, 1000),
         help="The number of simultaneous conversations.  [default: 8]",
     ),
-    click.option("--max-usd", type=Finite(), help="Stop after spending this many US dollars."),
+    click.option("--max-usd", type=Finite(min=0), help="Stop after spending this many US dollars."),
     click.option("--max-tokens", type=int, help="Stop after this many tokens."),
     click.option(
-        "--max-minutes", type=Finite(), help="Stop after this many minutes, even within a request."
+        "--max-minutes",
+        type=Finite(min=0),
+        help="Stop after this many minutes, even within a request.",
     ),
 )
 """For vision-language agents. The budgets limit the whole run, however often it is continued; the

@@ -54,7 +54,7 @@ def _scene_table(chosen: Sequence[Task]) -> Table:
         )
         for scene in scenes
     )
-    names = tuple(kind.env_id.removeprefix("ER-").removesuffix("-v0") for kind in kinds)
+    names = tuple(kind.title for kind in kinds)
     return Table("Tasks by scene", ("Scene", *names, "all"), rows, 1)
 
 

@@ -32,7 +32,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from er_gym.envs.protocol import DEFAULT
-from er_gym.locking import exclusive_use
+from er_gym.locking import check_kind, exclusive_use
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.events import EVENTS
 from er_gym.rollout.play import episode_seed
@@ -167,8 +167,9 @@ class RunDirectory:
             for name, here in manifest.model_dump(mode="json").items():
                 there = theirs[name]
                 if there != here:
+                    part, old, new = first_difference(name, there, here)
                     raise RunDirectoryError(
-                        f"{path} holds another run: its {name} is {there!r}, this one's {here!r}; "
+                        f"{path} holds another run: its {part} is {old!r}, this one's {new!r}; "
                         "choose another --out, or start that run again as it was"
                     )
         elif there := [name for name in _KEPT if _holds_something(path / name)]:
@@ -177,6 +178,7 @@ class RunDirectory:
                 "choose another --out"
             )
         else:
+            check_kind(path, MANIFEST, RunDirectoryError)
             make_folder(path / EPISODES)
             write_atomic(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
         return cls(path, manifest)
@@ -364,6 +366,18 @@ def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirector
             if new and not paid and all(one.error and refused for one in run_directory.episodes()):
                 run_directory._withdraw()
             raise
+
+
+def first_difference(name: str, one: Any, other: Any) -> tuple[str, Any, Any]:
+    """The first place in which two values of a setting differ: ``env.faults``, and both values.
+
+    What only one of two tables has is None in the other.
+    """
+    if isinstance(one, dict) and isinstance(other, dict):
+        for key in [*one, *(key for key in other if key not in one)]:
+            if one.get(key) != other.get(key):
+                return first_difference(f"{name}.{key}", one.get(key), other.get(key))
+    return name, one, other
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -51,8 +51,9 @@ def select(
     The selection starts from the named tasks (all tasks if none is named) of the named types (all
     types if none is named). It keeps those in the shard, leaves out the first ``skip`` of these,
     and keeps the ``limit`` after them. With ``spread`` the first tasks are those whose ids have the
-    lowest hashes, which are of all types and rooms. A larger limit adds tasks, and ``skip=n``
-    leaves out exactly what ``limit=n`` keeps. Tasks that were set aside are never played.
+    lowest hashes: a random sample, the same on every machine. A larger limit adds tasks, and
+    ``skip=n`` leaves out exactly what ``limit=n`` keeps. Tasks that were set aside are never
+    played.
 
     Raises:
         ValueError: the suite has no task of a given id, or all that were named are set aside; or a

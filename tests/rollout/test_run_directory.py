@@ -121,15 +121,17 @@ def test_tuples_do_not_make_another_run(tmp_path, manifest):
         ("suite", "other"),
         ("suite_digest", "def"),
         ("agent", "random"),
-        ("env", {"backend": "unity", "obs_mode": "text"}),
+        ("env.backend", "unity"),
         ("seed", 1),
         ("er_gym", "0.2.0"),
     ],
 )
 def test_another_run_is_refused_by_the_field_that_differs(run_directory, manifest, field, value):
     before = (run_directory.path / "run.json").read_bytes()
+    name, _, key = field.partition(".")
+    change = {name: {**manifest.env, key: value} if key else value}
     with pytest.raises(RunDirectoryError, match=rf"its {field} is .*another --out") as caught:
-        RunDirectory.create(run_directory.path, manifest.model_copy(update={field: value}))
+        RunDirectory.create(run_directory.path, manifest.model_copy(update=change))
     assert repr(value) in str(caught.value)
     assert (run_directory.path / "run.json").read_bytes() == before
 
@@ -281,6 +283,15 @@ def test_files_of_unknown_origin_are_refused(tmp_path, manifest, name):
     with pytest.raises(RunDirectoryError, match=rf"holds {name.split('/')[0]} but no run\.json"):
         RunDirectory.create(tmp_path / "x", manifest)
     assert path.read_text() == "mine"
+
+
+def test_another_kind_of_folder_is_left_alone(tmp_path, manifest):
+    (tmp_path / "log.txt").write_text("of this run")
+    (tmp_path / "collection.json").write_text("{}")
+    with pytest.raises(RunDirectoryError, match=r"is a collection \(it holds collection\.json\)"):
+        RunDirectory.create(tmp_path, manifest)
+    (tmp_path / "collection.json").unlink()
+    RunDirectory.create(tmp_path, manifest)
 
 
 def test_two_do_not_play_in_one_directory(run_directory, manifest):
