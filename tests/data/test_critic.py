@@ -179,6 +179,12 @@ def test_what_is_in_view_is_not_denied_beside_what_is_not(text: str) -> None:
     assert codes(text, scene(language=language, view=[], decision=Action("observe"))) == set()
 
 
+def test_a_deed_that_is_only_guessed_stands() -> None:
+    assert "history" in codes("I opened the fridge before.", scene())
+    for text in ("Perhaps I opened the fridge before.", "Did I open the fridge before?"):
+        assert codes(text, scene()) == set()
+
+
 def test_a_denial_that_is_only_guessed_stands() -> None:
     known = scene(held="Apple")
     for text in (

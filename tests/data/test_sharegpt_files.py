@@ -197,6 +197,13 @@ def test_damaged_files(text: str, words: str, tmp_path: Path) -> None:
         json_items(file)
 
 
+def test_the_line_of_an_item_counts_every_line_before_it(tmp_path: Path) -> None:
+    file = tmp_path / "lines.json"
+    file.write_text('\n{"a": 1}\n\n{"b": 2}', encoding="utf-8")
+    items = json_items(file)
+    assert [items.line(index) for index in range(len(items))] == [2, 4]
+
+
 def test_items_hold_brackets_and_quotes_in_strings(tmp_path: Path) -> None:
     values = [{"a": 'b]}"{\\'}, {"c": [{"d": "é\n"}]}]
     for number, text in enumerate(

@@ -51,6 +51,21 @@ def test_episodes_are_those_of_the_trajectories(
     env.close()
 
 
+def test_an_episode_that_stops_on_the_way_is_cut_off(
+    collection: Collection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = next(iter(collection.trajectories()))
+    other = Collection.create(tmp_path / "other", collection.manifest)
+    (other.path / "parts").symlink_to(collection.path / "parts")
+    other.write([first.model_copy(update={"turns": first.turns[:-1]})])
+    assert export(other, "minari", tmp_path / "out").samples == {"train": 1}
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "out"))
+    (episode,) = minari.load_dataset("er-gym/train-v0").iterate_episodes()
+    steps = len(first.turns) - 1
+    assert episode.terminations.tolist() == [False] * steps
+    assert episode.truncations.tolist() == [False] * (steps - 1) + [True]
+
+
 def test_what_turns_out_otherwise_is_left_out(collection: Collection, tmp_path: Path) -> None:
     first, second, third, *_ = collection.trajectories()
     other = Collection.create(tmp_path / "other", collection.manifest)
