@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -73,11 +75,11 @@ def train_rl(
             f"interrupted; {left or 'nothing had been learnt, and nothing is left behind'}"
         )
         return INTERRUPTED
-    _say_result(run, model)
+    _say_result(run, model, wanted.env.types)
     return 0
 
 
-def _say_result(run: Path, model: Any) -> None:
+def _say_result(run: Path, model: Any, types: Sequence[str]) -> None:
     from agents.rl.callbacks import read_curve
 
     echo(f"{model.num_timesteps:,} steps: {run}")
@@ -85,4 +87,5 @@ def _say_result(run: Path, model: Any) -> None:
     if looked:
         rate = looked[-1]["eval/success_rate"]
         echo(f"success on the episodes of evaluation: {100 * rate:.1f} %")
-    echo(f"er-gym bench --suite mini --instances explore --agent rl:{run}")
+    learnt = f"--types {shlex.quote(','.join(types))} " if types else ""
+    echo(f"er-gym bench --suite mini {learnt}--instances explore --agent rl:{run}")
