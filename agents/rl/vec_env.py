@@ -167,7 +167,7 @@ class WorkerVecEnv(VecEnv):
         except (EOFError, OSError):
             raise self._dead(worker) from None
         if error is not None:
-            raise error
+            raise error from RuntimeError(f"in worker process {worker + 1}:\n\n{answer}")
         return answer
 
     def _dead(self, worker: int) -> RuntimeError:

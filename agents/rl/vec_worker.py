@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import traceback
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
@@ -119,7 +120,8 @@ def _batch(
 
 def serve(pipe: Connection, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]]) -> None:
     """Answer ``(method of WorkerEnvs, arguments)`` with ``(error or None, result)``, until
-    ``close`` is called or the pipe is closed."""
+    ``close`` is called or the pipe is closed. An error's result is where it was raised, in words,
+    since a pickle of it does not hold that."""
     # With SCHED_BATCH a woken worker does not preempt the trainer. Otherwise, with as many workers
     # as cores, the other workers would wait for their actions until it is done.
     with contextlib.suppress(AttributeError, OSError):  # not everywhere, nor always allowed
@@ -133,7 +135,7 @@ def serve(pipe: Connection, make: Sequence[Callable[[], gymnasium.Env[Any, Any]]
                     envs = WorkerEnvs(make)
                 answer: tuple[Exception | None, Any] = (None, getattr(envs, method)(*args))
             except Exception as error:  # every error is sent to the trainer
-                answer = (error, None)
+                answer = (error, traceback.format_exc())
             pipe.send(answer)
             if method == "close":
                 return

@@ -151,5 +151,8 @@ def test_a_worker_that_dies_is_reported(vec: WorkerVecEnv) -> None:
 
 def test_an_environment_that_cannot_be_made_says_why() -> None:
     options = OPTIONS.model_copy(update={"episodes": "nowhere"})
-    with pytest.raises(ValueError, match="unknown suite 'nowhere'"):
+    with pytest.raises(ValueError, match="unknown suite 'nowhere'") as caught:
         WorkerVecEnv([partial(make_env, options)], workers=1)
+    where = str(caught.value.__cause__)  # a pickle of an error does not hold its traceback
+    assert "in worker process 1" in where
+    assert ", in make_env\n" in where
