@@ -230,7 +230,7 @@ def bench(
         raise BadInput(f"{error}; {_left_in(out, chosen, samples)}") from error
     except (KeyboardInterrupt, CannotGoOn) as error:
         why = str(error) if isinstance(error, CannotGoOn) else "interrupted"
-        print_problem(f"{why}: {_left_in(out, chosen, samples)}")
+        print_problem(f"{why}: {_left_in(out, chosen, samples, told='same command' in why)}")
         _print_causes(out)
         return STOPPED if isinstance(error, CannotGoOn) else INTERRUPTED
     doing("computing the table")
@@ -258,15 +258,16 @@ def _locked(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
         yield run_directory
 
 
-def _left_in(out: Path, chosen: Sequence[Task], samples: int) -> str:
-    """Say in words what a run that ended early has left."""
+def _left_in(out: Path, chosen: Sequence[Task], samples: int, *, told: bool = False) -> str:
+    """Say what a run that ended early has left, and how to go on, unless that was ``told``."""
     from er_gym.rollout.run_directory import MANIFEST, RunDirectory
     from er_gym.rollout.runner import finished
 
     if not (out / MANIFEST).exists():
         return f"no episode was played, and nothing is left in {out}"
     done = len(finished(RunDirectory.open(out), chosen, samples))
-    return f"{done} of {samples * len(chosen)} episodes are in {out}; the same command continues"
+    again = "" if told else "; the same command continues"
+    return f"{done} of {samples * len(chosen)} episodes are in {out}{again}"
 
 
 def _print_causes(out: Path) -> None:

@@ -99,15 +99,15 @@ CAUSES: Mapping[str, Cause] = {
         Cause(
             CONTEXT,
             "ended since the conversation did not fit into the model's context",
-            "raise the context length of the server, lower sampling.max_tokens or pictures.keep, "
-            "or give history.trim=true",
+            "raise the context length of the server, lower sampling.max_tokens or pictures.keep; "
+            "history.trim=true first leaves out what is oldest",
             ("sampling.max_tokens", "pictures.keep", "history.trim"),
         ),
         Cause(
             PICTURES,
             "ended since the conversation had more pictures than the server takes",
-            "raise the limit of the server, lower pictures.keep, or give history.trim=true; "
-            "pictures.views=false sends one picture of a turn",
+            "raise the limit of the server, or lower pictures.keep; history.trim=true first leaves "
+            "out the oldest pictures, pictures.views=false sends one picture of a turn",
             ("pictures.keep", "pictures.views", "history.trim"),
         ),
         Cause(

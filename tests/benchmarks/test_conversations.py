@@ -522,7 +522,7 @@ def test_the_server_is_killed_and_comes_back(server: Any, tmp_path: Path) -> Non
     assert code == 3, said
     assert "(try 1 of 2); trying again in 0." in said
     assert "requests in a row, the last with: naughty-1 at http://127.0.0.1:" in said
-    assert "the same command continues" in said
+    assert "run the same command again to continue: " in said
     crashed = [each for each in RunDirectory.open(tmp_path).episodes() if each.error]
     assert len(crashed) <= 2  # not one by one to the last
     port = int(url.rpartition(":")[2].partition("/")[0])
