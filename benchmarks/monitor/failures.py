@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Literal, TypeAlias
+from collections.abc import Mapping
+from typing import Final, Literal, TypeAlias
 
 from benchmarks.scoring.scorers import CORRECTED
-from er_gym.rollout.records import ERROR, EpisodeRecord
+from er_gym.envs.info import REPEATED
+from er_gym.rollout.records import ERROR, GAVE_UP, EpisodeRecord
 from er_gym.tasks.verbs import END, INIT, NAVIGATE, OBSERVE
 
 Failure: TypeAlias = Literal[
-    "crashed", "unusable replies", "wrong order", "wrong object", "never found", "repeated",
-    "out of steps", "ended too early",
+    "crashed", "gave up", "unusable replies", "wrong order", "wrong object", "never found",
+    "repeated", "repeated action", "out of steps", "ended too early", "ended otherwise",
 ]  # fmt: skip
 FAILURES: tuple[Failure, ...] = (
-    "crashed", "unusable replies", "wrong order", "wrong object", "never found", "repeated",
-    "out of steps", "ended too early",
+    "crashed", "gave up", "unusable replies", "wrong order", "wrong object", "never found",
+    "repeated", "repeated action", "out of steps", "ended too early", "ended otherwise",
 )  # fmt: skip
 """The kinds, in the order in which they are looked for."""
+_NO_ACTION: Final = "no known action"
+_BY_END: Mapping[str, Failure] = {
+    "end": "ended too early",
+    "step limit": "out of steps",
+    REPEATED: "repeated action",
+}
+"""What an episode is called in whose steps nothing else stands out, by the reason of its end. A
+record that was made elsewhere may have another reason."""
 _MOST_UNUSABLE = 0.25
 """More replies than this share that name no action explain a failure."""
 _MOST_REPEATS = 0.5
@@ -27,20 +37,25 @@ _MOST_REPEATS = 0.5
 def failure_of(episode: EpisodeRecord) -> Failure | None:
     """Why an episode failed; None for a success by the corrected scorer.
 
-    ``crashed``: it has no end. ``unusable replies``: many replies named no action, or they ended
-    it. ``wrong order``: every key action was done, but not in the task's order. ``wrong object``:
+    ``crashed``: it has no end. ``gave up``: the agent could not finish it, such as when the server
+    refused the conversation. ``unusable replies``: many replies named no action, or they ended it.
+    ``wrong order``: every key action was done, but not in the task's order. ``wrong object``:
     it did to another object what the task asks for. ``never found``: the first thing that the task
     wants was never within reach. ``repeated``: half of the navigations went where it had been.
-    ``out of steps``: the limit ended it. ``ended too early``: it said ``end`` before all was done.
+    ``repeated action``: the same action again and again ended it. ``out of steps``: the limit ended
+    it. ``ended too early``: it said ``end`` before all was done. ``ended otherwise``: for a reason
+    that er-gym does not know.
     """
     if episode.error:
         return "crashed"
+    if episode.end_reason == GAVE_UP:
+        return "gave up"
     tally = CORRECTED.tally(episode)
     if tally.success:
         return None
     steps = [step for step in episode.steps if step.verb != INIT]
     unusable = sum(step.verb == ERROR for step in steps)
-    if steps and unusable / len(steps) > _MOST_UNUSABLE:
+    if episode.end_reason == _NO_ACTION or (steps and unusable / len(steps) > _MOST_UNUSABLE):
         return "unusable replies"
     did = [(step.verb, step.object_type) for step in steps if step.success and step.object_type]
     wanted = [
@@ -59,7 +74,7 @@ def failure_of(episode: EpisodeRecord) -> Failure | None:
     went = [step.object_type for step in steps if step.verb == NAVIGATE]
     if went and 1 - len(set(went)) / len(went) >= _MOST_REPEATS:
         return "repeated"
-    return "ended too early" if steps and steps[-1].verb == END else "out of steps"
+    return _BY_END.get(episode.end_reason, "ended otherwise")
 
 
 def _did_to_another(did: list[tuple[str, str]], wanted: list[tuple[str, str]]) -> bool:

@@ -14,8 +14,10 @@ from benchmarks.monitor.failure_counts import FailureCounts
 from benchmarks.monitor.listing import AddressFilter
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.record_rows import RecordRows
+from benchmarks.monitor.spending_tail import SpendingTail
 from benchmarks.scoring.metrics import success_rate
 from er_gym.rollout.causes import count_causes
+from er_gym.rollout.events import Cost
 from er_gym.rollout.records import task_of_key
 from er_gym.rollout.run_directory import Manifest, RunDirectory, RunDirectoryError
 from er_gym.tasks.types import task_type
@@ -146,7 +148,7 @@ class RunSummary:
         finished: how many of them have ended, without those that crashed and are played again.
         counts: episodes by outcome.
         success: over all.
-        tokens, cost: so far.
+        spent: so far, by the run's ledger; by its replies if it has none.
         decisions_per_second: in the last minute of play.
         seconds_left: by the speed of this start; None if unknown.
         causes: what was amiss with the agent's replies, a line for each cause.
@@ -161,8 +163,7 @@ class RunSummary:
     finished: int
     counts: Mapping[str, int]
     success: Tally
-    tokens: int
-    cost: float
+    spent: Cost
     decisions_per_second: float
     seconds_left: float | None
     causes: Sequence[str]
@@ -182,6 +183,7 @@ class RunView:
     failures: FailureCounts = field(default_factory=FailureCounts)
     _tail: EventTail = field(init=False)
     _records: RecordRows = field(init=False)
+    _spending: SpendingTail = field(init=False)
     _rows: Mapping[str, EpisodeRow] = field(default_factory=dict)
     _manifest: Manifest | None = None
     _problem: str = ""
@@ -189,6 +191,7 @@ class RunView:
     def __post_init__(self) -> None:
         self._tail = EventTail(self.place.path)
         self._records = RecordRows(self.place.path)
+        self._spending = SpendingTail(self.place.path)
 
     def refresh(self) -> None:
         """Read what is new."""
@@ -199,6 +202,7 @@ class RunView:
             except (RunDirectoryError, OSError) as error:
                 self._problem = str(error)
         self._tail.read()
+        self._spending.read()
         self._rows = self._records.agreeing(self._tail.rows)
 
     def count_failures(self, seconds: float) -> None:
@@ -242,12 +246,11 @@ class RunView:
             finished=finished,
             counts=counts,
             success=Tally.of("", rows),
-            tokens=sum(row.tokens for row in rows),
-            cost=sum(row.cost for row in rows),
+            spent=self._spending.spent or _of_replies(rows),
             decisions_per_second=_speed(rows, tail.time),
             seconds_left=left,
             causes=self._causes(rows),
-            version=tail.version,
+            version=tail.version + (self._spending.spent.requests if self._spending.spent else 0),
         )
 
     def _causes(self, rows: Iterable[EpisodeRow]) -> list[str]:
@@ -283,6 +286,12 @@ class RunView:
             "outcome": sorted({row.outcome for row in rows}),
             "reason": sorted({row.end_reason for row in rows} - {""}),
         }
+
+
+def _of_replies(rows: Sequence[EpisodeRow]) -> Cost:
+    """What replies cost by the event stream, which does not tell how many of them were paid for."""
+    tokens, cost = sum(row.tokens for row in rows), sum(row.cost for row in rows)
+    return Cost(requests=0, tokens=tokens, cost=cost)
 
 
 def _group(name: str) -> str:

@@ -12,10 +12,13 @@ from xml.etree import ElementTree
 import pytest
 from fastapi.testclient import TestClient
 
+from agents.vlm.chat import Usage
+from agents.vlm.clients.budget import Budget, Entry, Ledger
+from agents.vlm.settings import Prices
 from benchmarks.monitor.app import make_app
 from benchmarks.monitor.places import Places
 from benchmarks.monitor.site import Site
-from er_gym.rollout.run_directory import RunDirectory
+from er_gym.rollout.run_directory import SPENDING, RunDirectory
 
 
 @pytest.fixture
@@ -67,6 +70,35 @@ def test_runs_are_read_before_a_page_is_asked_for(runs, tmp_path):
     (folder / "events.jsonl").unlink()
     shutil.rmtree(folder / "episodes")
     assert late.summary(late.places.all()[0]).finished == 0
+
+
+def test_a_run_costs_what_its_ledger_says_with_the_answers_that_were_rejected(
+    runs, tmp_path, visit
+):
+    folder = shutil.copytree(runs / "random", tmp_path / "random")
+    ledger = Ledger(Budget(), Prices())
+    ledger.open(folder / SPENDING)
+    client = visit(folder)
+    address = f"/runs/{Places([folder]).all()[0].id}"
+
+    def pay(usage: Usage, rejected: str) -> None:
+        ledger.enter(Entry.of(usage, model="m", seed=1, cost=0.75, seconds=0.1, rejected=rejected))
+
+    pay(Usage(1_100, 7), "")
+    pay(Usage(2_000, 100), "no choices")
+    for path in ("/", address):
+        text = said(client.get(path).text)
+        assert "3,207" in text, path
+        assert "$1.50" in text, path
+        assert "at most" not in text, path
+    pay(Usage(1_000, 0, estimated=True), "no choices")
+    with (folder / SPENDING).open("ab") as file:
+        file.write(b'{"time": "half an en')
+    for path in ("/", address):
+        text = said(client.get(path).text)
+        assert f"at most {ledger.spent.usage.total:,}" in text, path
+        assert "at most $2.25" in text, path
+    ledger.close()
 
 
 def test_a_run_can_be_filtered_and_sorted_by_its_address(client, ids, runs):
