@@ -16,7 +16,7 @@ from rich.progress import Progress as RichProgress
 
 from benchmarks.cli.activity import doing
 from benchmarks.cli.live_line import LINE
-from er_gym.rollout.events import Cost, EpisodeEnded, Event
+from er_gym.rollout.events import Cost, EpisodeEnded, Event, RunEnded
 from er_gym.rollout.outcomes import Outcomes
 
 _LINES = 10
@@ -69,6 +69,8 @@ class Progress:
         before: Outcomes | None = None,
     ) -> None:
         self._cost = ""
+        self._due = False
+        """Whether a line is to be printed, as soon as it is known what it says."""
         self._console = console
         self._title = title
         self._total = total
@@ -89,23 +91,49 @@ class Progress:
         self._bar.stop()
 
     def __call__(self, event: Event) -> None:
-        """Take an event of the run."""
+        """Take an event of the run. The cost of an episode is told after its end."""
         if isinstance(event, Cost):
             self._cost = str(event)
+            self._show()
+            self._print()
         elif isinstance(event, EpisodeEnded):
-            self.episode(event.success, event.task_id, event.error)
+            self._print()
+            self._count(event.success, event.task_id, event.error)
+            if not self._cost and self._done < self._total:
+                self._print()
+        elif isinstance(event, RunEnded):
+            self._print()
 
     def episode(self, success: bool, key: str = "", error: str = "") -> None:
         """Count an episode, by its key where it may have been counted before."""
+        self._count(success, key, error)
+        self._print()
+
+    def _count(self, success: bool, key: str, error: str) -> None:
         self._done += 1
         self._outcomes.add(key or f"{self._done}", success, error)
-        self._bar.update(self._task, completed=self._done, status=self._status())
+        self._show()
         lines = self._done * _LINES // self._total
-        if not self._console.is_terminal and lines > (self._done - 1) * _LINES // self._total:
+        self._due |= lines > (self._done - 1) * _LINES // self._total
+
+    def _show(self) -> None:
+        self._bar.update(self._task, completed=self._done, status=self._status())
+
+    def _print(self) -> None:
+        """Print the line that is due."""
+        if self._due and not self._console.is_terminal:
+            played = 0 if self._none_played else self._done
             self._console.print(
-                f"{self._title}: {self._done}/{self._total} episodes, {self._status()}",
+                f"{self._title}: {played}/{self._total} episodes, {self._status()}",
                 soft_wrap=True,
             )
+        self._due = False
+
+    @property
+    def _none_played(self) -> bool:
+        """Whether all so far have crashed and there are more to come. A run that stops then, such
+        as one whose model refused all of them, has played no episode and has no rate."""
+        return self._outcomes.crashed == self._outcomes.n and self._done < self._total
 
     def say(self, what: object) -> None:
         """Print a line, above the bar where there is one; from any thread."""
@@ -116,5 +144,7 @@ class Progress:
             return "starting"
         played = self._done - self._before
         speed = played / max(time.monotonic() - self._start, 1e-9)
-        said = f"{100 * self._outcomes.rate:.1f} % success, {speed:.1f} episodes/s"
-        return ", ".join(filter(None, (said, self._cost)))
+        told = f"{100 * self._outcomes.rate:.1f} % success"
+        if self._none_played:
+            told = f"{self._done:,} crashed"
+        return ", ".join(filter(None, (told, f"{speed:.1f} episodes/s", self._cost)))

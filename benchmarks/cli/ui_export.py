@@ -65,7 +65,7 @@ _OPTIONS: Sequence[Callable[[Any], Any]] = (
         multiple=True,
         metavar="NAME=VALUE",
         help="With --export: which episodes can be replayed, as the page filters and sorts them, "
-        "such as outcome=failure, type=single_search, steps=5-10 or sort=-steps.",
+        "such as outcome=failure, type=single_search, type=Search, steps=5-10 or sort=-steps.",
     ),
     click.option(
         "--draw",

@@ -11,7 +11,7 @@ from benchmarks.monitor.charts import Axis, Series, chart, points
 from benchmarks.monitor.collection_index import CollectionIndex, Head
 from benchmarks.monitor.flow import flow
 from benchmarks.monitor.language import Translator
-from benchmarks.monitor.listing import AddressFilter
+from benchmarks.monitor.listing import TypeFilter
 from er_gym.data import paper_figures as paper
 from er_gym.data.statistics import STATES, mean_and_most
 from er_gym.data.trajectory import TAG_OF_KIND, THOUGHT_KINDS, PictureRecord, Trajectory, Turn
@@ -20,11 +20,11 @@ from er_gym.tasks.verbs import INIT
 
 
 @dataclass(frozen=True)
-class DataFilter(AddressFilter):
+class DataFilter(TypeFilter):
     """Which trajectories are shown; every field is a parameter of the address.
 
     Attributes:
-        part, kind, type, language, outcome: exact values; "" for any.
+        part, kind, language, outcome: exact values; "" for any.
         refused: a code of the critic's; "" for any.
         text: part of the id or the instruction, whatever the case.
         sort: ``order``, ``turns``, ``thoughts`` or ``refused``; with ``-`` before it, descending.
@@ -35,7 +35,6 @@ class DataFilter(AddressFilter):
 
     part: str = ""
     kind: str = ""
-    type: str = ""
     language: str = ""
     outcome: str = ""
     refused: str = ""
@@ -48,7 +47,7 @@ class DataFilter(AddressFilter):
         return (
             self.part in ("", head.part)
             and self.kind in ("", head.kind)
-            and self.type in ("", head.task_type)
+            and self.takes_type(head.task_type)
             and self.language in ("", head.language)
             and self.outcome in ("", outcome_of(head))
             and (not self.refused or self.refused in head.refused)

@@ -161,6 +161,9 @@ class _Maker:
         self._words = Translator(wanted.language)
         self._run = RunDirectory.open(root)
         with self._site.runs.use(place) as view:
+            unknown = wanted.filter.unknown_type(view.choices()["type"])
+            if unknown:
+                raise CannotExport(unknown)
             rows = [row for row in view.chosen(wanted.filter) if row.ended]
             self.keys = [row.key for row in rows[: wanted.episodes]]
             total = sum(row.ended is not None for row in view.rows.values())

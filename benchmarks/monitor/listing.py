@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, ClassVar, Generic, TypeVar
 from urllib.parse import urlencode
+
+from er_gym.tasks.types import canonical_names
 
 PAGE_ROWS = 100
 _MOST_TEXT = 300
@@ -43,6 +46,43 @@ class AddressFilter:
         told |= {"page": 1, **changes}
         defaults = {each.name: each.default for each in fields(self)}
         return urlencode({k: str(value) for k, value in told.items() if value != defaults.get(k)})
+
+
+@dataclass(frozen=True)
+class TypeFilter(AddressFilter):
+    """A filter by the type of task.
+
+    Attributes:
+        type: any name of a type or of a group, which stands for its types
+            (:func:`er_gym.tasks.types.types_named`); "" for any.
+    """
+
+    type: str = ""
+
+    @cached_property
+    def _types(self) -> frozenset[str]:
+        try:
+            return frozenset((self.type, *canonical_names([self.type])))
+        except ValueError:  # of a package that is not installed here, or unknown
+            return frozenset([self.type])
+
+    def takes_type(self, name: str) -> bool:
+        """Whether a type is shown, by its name in task files."""
+        return not self.type or name in self._types
+
+    def unknown_type(self, present: Collection[str]) -> str:
+        """Why the name of the type means nothing, in a line; "" if it means something.
+
+        Args:
+            present: the types in the list; one that another package adds may be unknown here.
+        """
+        if self.type in ("", *present):
+            return ""
+        try:
+            canonical_names([self.type])
+        except ValueError as error:
+            return str(error)
+        return ""
 
 
 @dataclass(frozen=True)

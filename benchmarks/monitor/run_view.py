@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from benchmarks.monitor.event_tail import EpisodeRow, EventTail
 from benchmarks.monitor.failure_counts import FailureCounts
-from benchmarks.monitor.listing import AddressFilter
+from benchmarks.monitor.listing import TypeFilter
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.record_rows import RecordRows
 from benchmarks.monitor.spending_tail import SpendingTail
@@ -49,11 +49,11 @@ def _room_number(scene: str) -> tuple[int, str]:
 
 
 @dataclass(frozen=True)
-class Filter(AddressFilter):
+class Filter(TypeFilter):
     """Which rows are shown; every field is a parameter of the address.
 
     Attributes:
-        type, scene, outcome, reason: exact values; "" for any.
+        scene, outcome, reason: exact values; "" for any.
         steps: ``5``, ``5-10``, ``-10`` or ``5-``; "" for any.
         text: part of the name or the instruction, whatever the case.
         sort: a column of :data:`SORTS`; with ``-`` before it, descending.
@@ -62,7 +62,6 @@ class Filter(AddressFilter):
 
     sorts: ClassVar[Collection[str]] = SORTS
 
-    type: str = ""
     scene: str = ""
     outcome: str = ""
     reason: str = ""
@@ -74,7 +73,7 @@ class Filter(AddressFilter):
     def takes(self, row: EpisodeRow) -> bool:
         """Whether a row is shown."""
         return (
-            self.type in ("", row.task_type)
+            self.takes_type(row.task_type)
             and self.scene in ("", row.scene)
             and self.outcome in ("", row.outcome)
             and self.reason in ("", row.end_reason)

@@ -15,6 +15,8 @@ import pytest
 
 from benchmarks.cli import main as cli
 from benchmarks.monitor.offline import offline
+from er_gym.rollout.run_directory import RunDirectory
+from er_gym.tasks.types import canonical_names
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 HOSTILE = (
@@ -97,6 +99,12 @@ def test_what_is_chosen_has_replays(runs, tmp_path):
     assert page.tags.count("template") == 8
     assert "任务类型" in out.read_text(encoding="utf-8")
     assert export(runs / "oracle", "--out", out) == 2  # it is there
+    types = [each.task_type for each in RunDirectory.open(runs / "oracle").episodes()]
+    for name in ("Search", "Exposed Object Search", "long_range"):
+        some = ("--only", f"type={name}", "--overwrite")
+        assert export(runs / "oracle", "--out", out, *some) == 0
+        expected = sum(each in canonical_names([name]) for each in types)
+        assert Seen(out.read_text(encoding="utf-8")).tags.count("template") == expected, name
     none = ("--only", "outcome=failure", "--overwrite")
     assert export(runs / "oracle", "--out", out, *none) == 0
     assert "<template" not in out.read_text(encoding="utf-8")
@@ -128,6 +136,7 @@ def test_a_folder_links_its_pages(runs, tmp_path):
     [
         (("--out", "x.html", "--only", "colour=red"), "type, scene"),
         (("--out", "x.html", "--only", "sort=colour"), "steps"),
+        (("--out", "x.html", "--only", "type=serch"), "did you mean Search"),
         ((), "--out"),
     ],
 )

@@ -7,18 +7,25 @@ import re
 import shutil
 import threading
 from pathlib import Path
+from typing import get_args
 from xml.etree import ElementTree
 
 import pytest
+from episodes_by_hand import make_step
 from fastapi.testclient import TestClient
 
 from agents.vlm.chat import Usage
 from agents.vlm.clients.budget import Budget, Entry, Ledger
 from agents.vlm.settings import Prices
 from benchmarks.monitor.app import make_app
+from benchmarks.monitor.failures import FAILURES, Failure, failure_of
+from benchmarks.monitor.language import words_in
 from benchmarks.monitor.places import Places
+from benchmarks.monitor.run_view import Filter
 from benchmarks.monitor.site import Site
 from er_gym.rollout.run_directory import SPENDING, RunDirectory
+from er_gym.tasks.types import canonical_names
+from tests.support import in_one_test
 
 
 @pytest.fixture
@@ -119,6 +126,61 @@ def test_a_run_can_be_filtered_and_sorted_by_its_address(client, ids, runs):
     downward = [int(re.search(r'"number">(\d+)/\d+<', row)[1]) for row in rows(again.text)]
     assert downward == sorted(downward, reverse=True)
     assert not rows(client.get(address, params={"text": "no such task"}).text)
+
+
+@in_one_test("name", ["Search", "search", "single_search", "ER-SingleSearch-v0", "SingleSearch",
+                      "Exposed Object Search", "long_range", "Enclosed Object Search"])  # fmt: skip
+def test_a_run_is_filtered_by_any_name_of_a_type_or_group(name, client, ids, runs):
+    types = [each.task_type for each in RunDirectory.open(runs / "random").episodes()]
+    expected = sum(each in canonical_names([name]) for each in types)
+    answer = client.get(f"/runs/{ids['random']}", params={"type": name})
+    assert len(rows(answer.text)) == expected
+    assert "unknown task type" not in answer.text
+    assert f" selected>{name}</option>" in answer.text or name in types
+
+
+def test_an_unknown_name_of_a_type_is_told_with_the_known_ones(client, ids):
+    answer = client.get(f"/runs/{ids['random']}", params={"type": "<serch>"})
+    assert answer.status_code == 200
+    assert not rows(answer.text)
+    assert "unknown task type '<serch>'" in said(answer.text)
+    assert "long-range tasks" in said(answer.text)
+    assert "<serch>" not in answer.text
+
+
+def test_a_type_that_only_the_run_knows_is_no_unknown_name():
+    assert Filter(type="of another package").takes_type("of another package")
+    assert not Filter(type="of another package").unknown_type(["of another package"])
+    assert Filter(type="of another package").unknown_type(["single_search"])
+    assert not Filter(type="Search").takes_type("of another package")
+
+
+KEYS = ("navigate to Egg", "pickup Egg", "navigate to Bowl", "put Bowl", "end")
+NEAR = make_step("navigate to Egg", ("Egg",))
+
+
+@pytest.mark.parametrize(
+    ("steps", "reason", "kind"),
+    [
+        ((NEAR, "!pickup Egg"), "gave up", "gave up"),
+        ((), "gave up", "gave up"),
+        ((NEAR, *["!pickup Egg"] * 4), "repeated action", "repeated action"),
+        ((NEAR, *["open Fridge", "close Fridge"] * 4, "error"), "no known action",
+         "unusable replies"),
+        ((NEAR, "pickup Egg", *["observe"] * 20), "step limit", "out of steps"),
+        ((NEAR, "pickup Egg", "end"), "step limit", "out of steps"),  # er-gym said end
+        ((NEAR, "pickup Egg", "end"), "end", "ended too early"),
+        ((NEAR, "pickup Egg"), "the lights went out", "ended otherwise"),
+    ],
+)  # fmt: skip
+def test_a_failure_has_the_name_of_what_ended_it(steps, reason, kind, episode):
+    assert failure_of(episode(KEYS, steps, end_reason=reason)) == kind
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_every_kind_of_failure_has_words(language):
+    assert set(FAILURES) - {"crashed"} <= words_in(language).keys()
+    assert set(FAILURES) == set(get_args(Failure))
 
 
 def test_a_run_tells_success_why_it_failed_and_the_papers_rows(client, ids):

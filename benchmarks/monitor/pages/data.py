@@ -83,6 +83,7 @@ class DataPages(ReplayPages):
             taken = chosen(index, filter)
             told = overview(index, self._site.translator(request))
             told |= {"total": len(index.heads), "found": index.found, "damaged": index.damaged}
+            told["unknown"] = filter.unknown_type(index.found.task_types)
         told |= {
             "row": self._row(place),
             "filter": filter,

@@ -30,13 +30,15 @@ def _paper_rows() -> list[tuple[str, Mapping[str, float], float]]:
 def run_told(view: RunView, chosen: Filter) -> dict[str, Any]:
     """What the page of a run says."""
     groups, types = view.tallies()
+    choices = view.choices()
     return {
         "run": view.summary(),
         "filter": chosen,
         "page": page_of(view.chosen(chosen), chosen.page),
         "groups": groups,
         "types": types,
-        "choices": view.choices(),
+        "choices": choices,
+        "unknown": chosen.unknown_type(choices["type"]),
         "failures": view.failures,
         "paper": _paper_rows(),
     }
