@@ -19,6 +19,7 @@ from benchmarks.monitor.places import Places
 from er_gym.data.collection import Collection
 from er_gym.data.statistics import statistics
 from er_gym.data.trajectory import Trajectory
+from er_gym.tasks.types import canonical_names
 
 HOSTILE = "<script>alert(1)</script> \u202e \"'><img src=x onerror=alert(1)> {{ 7 * 7 }}"
 
@@ -140,12 +141,16 @@ def test_trajectories_are_filtered_and_sorted(client, address, collection):
     for name, value, takes in (
         ("part", "anomalies", lambda each: each.part == "anomalies"),
         ("type", every[0].task_type, lambda each: each.task_type == every[0].task_type),
+        ("type", "Transport", lambda each: each.task_type in canonical_names(["Transport"])),
         ("refused", "side", lambda each: each.id == every[0].id),
         ("text", every[1].id.upper(), lambda each: each.id == every[1].id),
         ("sort", "nonsense", lambda each: True),
     ):
         shown = rows(client.get(address, params={name: value}).text)
         assert len(shown) == sum(map(takes, every)), name
+    unknown = client.get(address, params={"type": "serch"}).text
+    assert not rows(unknown)
+    assert "did you mean Search" in said(unknown)
     by_turns = rows(client.get(address, params={"sort": "-turns"}).text)
     turns = [int(re.findall(r'class="number">(\d+)<', row)[0]) for row in by_turns]
     assert turns == sorted((each.actions for each in every), reverse=True)
