@@ -358,6 +358,59 @@ def replace_folder(draft: Path, folder: Path, stamp: str) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
+def check_new_folder(path: Path) -> None:
+    """Raise the exception that :func:`whole_folder` would raise, as far as it can be foreseen.
+
+    Raises:
+        ForeignFile: something else than an empty folder, or a link to one, is there.
+        CannotWrite: the folder cannot be made or written to.
+    """
+    if path.is_dir():
+        if any(path.iterdir()):
+            raise ForeignFile(f"{path} is not empty; choose another output, or remove it first")
+    elif os.path.lexists(path):
+        raise ForeignFile(f"{path} is there already and is no folder; choose another output")
+    there = next(each for each in (path, *path.absolute().parents) if os.path.lexists(each))
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        why = "read-only" if there.is_dir() else "no folder"
+        raise CannotWrite(f"{path}: the folder cannot be made: {there} is {why}")
+
+
+@contextlib.contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """Write a folder completely or not at all: ``with whole_folder(path) as draft``.
+
+    A new folder is written beside its place and moved there. An empty one that is there stays, as
+    it may be the working directory, or a link leads to it: what is written moves into it.
+
+    Raises:
+        ForeignFile, CannotWrite: as :func:`check_new_folder`; nothing is changed.
+        OSError: something cannot be written or moved; nothing is left.
+    """
+    check_new_folder(path)
+    is_new = not path.is_dir()
+    name = os.fsdecode(os.fsencode(path.name)[:_LONGEST_NAME])
+    draft = (path.parent if is_new else path) / f".{name}.{secrets.token_hex(4)}.draft"
+    make_folder(draft)
+    moved: list[Path] = []
+    try:
+        yield draft
+        if is_new:
+            draft.rename(path)
+            return
+        if [*path.iterdir()] != [draft]:
+            raise ForeignFile(f"{path} was empty and is no more; choose another output")
+        for each in sorted(draft.iterdir()):
+            each.rename(path / each.name)
+            moved.append(each)
+    except BaseException:  # Ctrl-C too
+        for each in moved:
+            (path / each.name).rename(each)
+        raise
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
 def is_ours(path: Path) -> bool:
     """Whether er-gym wrote a file, by the mark in the file; an empty file counts as er-gym's."""
     try:

@@ -24,6 +24,7 @@ from er_gym.writing import (
     ForeignFile,
     check_output,
     is_ours,
+    whole_folder,
     write_atomic,
     write_output,
     write_picture,
@@ -270,3 +271,28 @@ def test_names_of_files_stay_in_their_folder(tmp_path: Path) -> None:
             writing.inside(tmp_path / "in", name)
     with pytest.raises(writing.OutsideFolder, match="is a link that leads out of"):
         writing.inside(tmp_path / "in", "out/x", links=False)
+
+
+@pytest.mark.parametrize("is_there", [False, True])
+def test_a_folder_is_written_whole_or_not_at_all(is_there: bool, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    if is_there:
+        out.mkdir()
+    with pytest.raises(UnicodeEncodeError), whole_folder(out) as draft:
+        (draft / "a").write_text("\ud800")  # the file is there, and empty
+    assert [*tmp_path.rglob("*")] == ([out] if is_there else [])
+    with whole_folder(out) as draft:
+        (draft / "sub").mkdir()
+        (draft / "sub" / "a").touch()
+    assert [*tmp_path.rglob("*")] == [out, out / "sub", out / "sub" / "a"]
+    with pytest.raises(ForeignFile, match="is not empty; choose another output"):
+        whole_folder(out).__enter__()
+
+
+def test_a_folder_that_others_fill_meanwhile_is_theirs(tmp_path: Path) -> None:
+    with (
+        pytest.raises(ForeignFile, match="was empty and is no more"),
+        whole_folder(tmp_path),
+    ):
+        (tmp_path / "theirs").touch()
+    assert [each.name for each in tmp_path.iterdir()] == ["theirs"]

@@ -29,7 +29,8 @@ from benchmarks.terminal import echo, terminal
     "--dataset",
     default="",
     metavar="NAME",
-    help="The entry of dataset_info.json, if FILE is one that has several, or its folder.",
+    help="The entry of dataset_info.json, if FILE is one that has several, its folder, or a data "
+    "file with several entries there.",
 )
 @click.option("--leave-out", is_flag=True, help="Leave out samples that have problems.")
 @click.option(
@@ -47,11 +48,18 @@ def import_(
     from benchmarks.cli.progress import bar
     from er_gym.data.sharegpt_files import open_sharegpt
     from er_gym.data.sharegpt_import import LEFT_OUT, import_sharegpt
+    from er_gym.writing import check_new_folder
 
     with bad_input():
+        check_new_folder(out)
         doing(f"reading {file}")
         opened = open_sharegpt(
-            file, dataset=dataset, pictures=pictures, decisions=True, leave_out=leave_out
+            file,
+            dataset=dataset,
+            pictures=pictures,
+            decisions=True,
+            decode=True,
+            leave_out=leave_out,
         )
         first, *problems = opened.report.lines()
         for line in (*opened.places.lines(), *problems):

@@ -1,8 +1,9 @@
 """Picture files: equal pixels and options give equal bytes.
 
-Every picture of a file is opened here (:func:`open_picture`, :func:`picture_size`): only those of
-the formats that are meant, since some of Pillow's others start programs or fail in ways of their
-own, and only up to a number of pixels, which is looked up before any is decoded.
+Every picture of a file is opened here (:func:`open_picture`, :func:`picture_size`,
+:func:`check_picture`): only those of the formats that are meant, since some of Pillow's others
+start programs or fail in ways of their own, and only up to a number of pixels, which is looked up
+before any is decoded.
 """
 
 from __future__ import annotations
@@ -98,10 +99,20 @@ def open_picture(source: Path | bytes) -> Image.Image:
 
     Raises:
         UnusablePicture: it is not there, is no picture of one of :data:`FORMATS`, has more than
-            :data:`MOST_PIXELS`, or is damaged.
+            :data:`MOST_PIXELS` or 16 bits of grey, or is damaged.
     """
     with _opened(source, _name(source)) as picture:
         return picture.convert("RGB")
+
+
+def check_picture(source: Path | bytes) -> None:
+    """Decode a picture as a whole, and keep nothing of it.
+
+    Raises:
+        UnusablePicture: as :func:`open_picture`.
+    """
+    with _opened(source, _name(source)) as picture:
+        picture.load()  # verify() would not notice that the end is missing
 
 
 def picture_size(source: Path | bytes) -> tuple[int, int]:
@@ -127,6 +138,12 @@ def _opened(source: Path | bytes, name: str) -> Iterator[Image.Image]:
                 width, height = picture.size
                 if width * height > MOST_PIXELS:
                     raise _too_large(name, f"{width:,} × {height:,} = {width * height:,}")
+                if picture.mode.startswith("I"):
+                    # Pillow makes almost all of it white, and so do the libraries that train.
+                    raise UnusablePicture(
+                        f"{name}: a picture of 16-bit grey; er-gym reads 8 bits a channel; convert "
+                        "it to 8-bit grey or RGB"
+                    )
                 yield picture
     except UnusablePicture:
         raise

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any
 
 from er_gym.data.chat import IMAGE, Role
@@ -21,6 +22,10 @@ _ALSO: Mapping[str, Role] = {
 """How speakers are called, beside what the columns say."""
 _LIKE_PICTURES = re.compile(r"im(?:age|g)|pic(?:ture)?|photo|frame|visual", re.IGNORECASE)
 _MOST_KEYS = 100
+_KINDS: Mapping[type, str] = {
+    NoneType: "null", bool: "true or false", str: "a text", list: "a list",
+}  # fmt: skip
+"""What else a sample may be, but for numbers."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ def guessed_columns(first: object) -> Columns | None:
 def sample_of(item: object, columns: Columns) -> Sample:
     """A sample by the names of its columns; :attr:`Sample.wrong` says what is wrong with it."""
     if not isinstance(item, dict):
-        return Sample(wrong=f"a {type(item).__name__}, not an object")
+        return Sample(wrong=f"{_KINDS.get(type(item), 'a number')}, not an object")
     name = item.get("id")
     told = str(name) if isinstance(name, str | int) else ""
     try:
@@ -112,7 +117,10 @@ def _read(item: Mapping[str, Any], columns: Columns, told: str) -> Sample:
         texts.append(text)
         shown += within
         if role == "assistant":
-            flags.append(message.get("loss") not in (False, 0))
+            loss = message.get("loss")
+            if loss not in (True, False, None):  # 1 and 0 are equal to the first two
+                raise _Wrong(f"message {number} has the loss {repr(loss)[:60]}; give true or false")
+            flags.append(loss in (True, None))
     places = sum(text.count(IMAGE) for text in texts)
     found, key = (shown, columns.content) if shown else _images(item, columns, places)
     return Sample(

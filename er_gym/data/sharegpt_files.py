@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,6 @@ from er_gym.data.sharegpt_report import (
     Problems,
     Report,
     Sample,
-    problems_of,
     report_of,
 )
 from er_gym.data.trajectory import PictureRecord
@@ -76,6 +75,7 @@ class ShareGptFile:
         places: PicturePlaces,
         columns: Columns,
         last_turn_only: bool,
+        problems: Problems,
         report: Report,
         chosen: array[int],
     ) -> None:
@@ -84,6 +84,7 @@ class ShareGptFile:
         self.columns = columns
         self.places = places
         self.report = report
+        self._problems = problems
         self._items = items
         self._last_turn_only = last_turn_only
         self._chosen = chosen
@@ -102,7 +103,7 @@ class ShareGptFile:
             IndexError: there is no such conversation.
         """
         place = self._chosen[index]
-        sample = sample_of(self._items[place], self.columns)
+        sample = _sample(self._items, place, self.columns)
         turns: list[ChatTurn] = []
         images = iter(sample.images)
         for role, text in zip(sample.roles, sample.texts, strict=True):
@@ -118,15 +119,15 @@ class ShareGptFile:
     def ids(self) -> Iterator[str]:
         """The id of each conversation, in order."""
         for place in self._chosen:
-            yield self._id(sample_of(self._items[place], self.columns), place)
+            yield self._id(_sample(self._items, place, self.columns), place)
 
     def left_out(self) -> Iterator[dict[str, Any]]:
         """Of each sample that has problems: its number in the file, its id, and all problems."""
         chosen = {*self._chosen}
         for index in range(len(self._items)):
             if index not in chosen:
-                sample = sample_of(self._items[index], self.columns)
-                why = problems_of(sample, self.places)
+                sample = _sample(self._items, index, self.columns)
+                why = self._problems.of(sample, self.places)
                 if not self.report.harmless.issuperset(why):
                     yield {"item": index, "id": sample.id, "why": why}
 
@@ -165,13 +166,15 @@ def open_sharegpt(
     feedback: bool | None = None,
     last_turn_only: bool | None = None,
     decisions: bool = False,
+    decode: bool = False,
     leave_out: bool = False,
 ) -> ShareGptFile:
     """Open a ShareGPT file, and check all of it. Memory grows by some bytes a sample.
 
     Args:
         path: the file; or ``dataset_info.json``, or a folder that has it.
-        dataset: the entry of ``dataset_info.json``; needed only if it has several.
+        dataset: the entry of ``dataset_info.json``, which may be the one beside the file; needed
+            only if it has several, or several for the file that name its parts differently.
         pictures: what the paths of pictures are relative to; by default the file's folder, or one
             above or below it where the first pictures are
             (:mod:`er_gym.data.sharegpt_pictures`).
@@ -181,21 +184,23 @@ def open_sharegpt(
             name ends in ``_turns``, as er-gym's export has it. Otherwise a message's ``loss`` says
             whether it is learnt, and if there is none, all the assistant's are.
         decisions: whether a reply that does not end in a known action is a problem, too.
+        decode: decode each picture once, so that one that is cut off is a problem, too; it takes
+            some milliseconds a picture. Otherwise only the beginnings of their files are read.
         leave_out: leave out the samples that have problems, instead of raising.
 
     Raises:
         ShareGptError: there is no such file or entry, or nothing is left; or samples have problems
             and ``leave_out`` is False: the message counts them and names the first.
-        TaskFileError: the file is no JSON; the message says where.
+        TaskFileError: the file is no list of JSON values; the message says where.
     """
     file, columns = _file_and_columns(path, dataset)
     items = json_items(file)
     columns = columns or _guessed(items)
     places = find_pictures(file, _first_pictures(items, columns), pictures)
-    problems = Problems(harmless=frozenset() if decisions else HARMLESS)
+    problems = Problems(harmless=frozenset() if decisions else HARMLESS, decode=decode)
     chosen = array("Q")
     for index in range(len(items)):
-        sample = sample_of(items[index], columns)
+        sample = _sample(items, index, columns)
         sound = problems.look(index, sample, places)
         if (sound or not leave_out) and (feedback is None or feedback == sample.has_feedback):
             chosen.append(index)
@@ -209,7 +214,13 @@ def open_sharegpt(
             f"{report.in_one_line()}"
         )
     only_last = file.stem.endswith(_TURNS) if last_turn_only is None else last_turn_only
-    return ShareGptFile(items, places, columns, only_last, report, chosen)
+    return ShareGptFile(items, places, columns, only_last, problems, report, chosen)
+
+
+def _sample(items: JsonItems, index: int, columns: Columns) -> Sample:
+    """A sample of a file; :attr:`Sample.wrong` says so if it cannot be read."""
+    value, wrong = items.look(index)
+    return Sample(wrong=wrong) if wrong else sample_of(value, columns)
 
 
 # -- which file, which columns ---------------------------------------------------------------------
@@ -217,24 +228,40 @@ def open_sharegpt(
 
 def _file_and_columns(path: Path, dataset: str) -> tuple[Path, Columns | None]:
     """The data file, and its columns if a ``dataset_info.json`` tells them."""
-    if path.is_dir() or path.name == INFO:
-        file = path / INFO if path.is_dir() else path
-        entries = _entries(file)
-        fitting = [dataset] if dataset else list(entries)
-        if len(fitting) != 1 or fitting[0] not in entries:
-            raise ShareGptError(
-                f"{file} has the datasets {', '.join(entries) or '-'}; "
-                + (f"there is no {dataset!r:.80}" if dataset else "name one of them")
-            )
-        return _entry(file, fitting[0], entries[fitting[0]])
-    info = path.parent / INFO
-    if info.is_file():
-        for name, entry in _entries(info).items():
-            if isinstance(entry, Mapping) and entry.get("file_name") == path.name:
-                return _entry(info, name, entry)
-    if dataset:
-        raise ShareGptError(f"{path} is no {INFO}, so it has no dataset {dataset!r:.80}")
-    return path, None
+    is_table = path.is_dir() or path.name == INFO
+    info = (path if path.is_dir() else path.parent) / INFO
+    if not is_table and not info.is_file():
+        if dataset:
+            raise ShareGptError(f"{path} has no {INFO} beside it, so no dataset {dataset!r:.80}")
+        return path, None
+    entries = _entries(info)
+    fitting = [
+        name
+        for name, entry in entries.items()
+        if is_table or (isinstance(entry, Mapping) and entry.get("file_name") == path.name)
+    ]
+    if dataset and dataset not in fitting:
+        has = f"the datasets {_listed(fitting)}" + ("" if is_table else f" for {path.name}")
+        raise ShareGptError(f"{info} has {has}; there is no {dataset!r:.80}")
+    names = [dataset] if dataset else fitting
+    if not is_table:
+        if not names:
+            return path, None
+        if all(_how(entries[name]) == _how(entries[names[0]]) for name in names):
+            names = names[:1]
+    if len(names) != 1:
+        of = "" if is_table else f" for {path.name}, which name its parts differently"
+        raise ShareGptError(f"{info} has the datasets {_listed(names)}{of}; name one of them")
+    return _entry(info, names[0], entries[names[0]])
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names)[:300] or "-"
+
+
+def _how(entry: Mapping[str, Any]) -> list[Any]:
+    """What an entry says of its file, but for its name."""
+    return [entry.get(key) for key in ("formatting", "columns", "tags")]
 
 
 def _entries(file: Path) -> Mapping[str, Any]:
@@ -273,7 +300,7 @@ def _entry(file: Path, name: str, entry: Any) -> tuple[Path, Columns]:
 
 def _guessed(items: JsonItems) -> Columns:
     """The columns by the first sample that has known ones."""
-    looked_at = (items[index] for index in range(min(len(items), _LOOKED_AT)))
+    looked_at = (items.look(index)[0] for index in range(min(len(items), _LOOKED_AT)))
     columns = next(filter(None, map(guessed_columns, looked_at)), None)
     if columns is None:
         first = items[0]
@@ -291,6 +318,6 @@ def _first_pictures(items: JsonItems, columns: Columns) -> list[str]:
     paths = (
         path
         for index in range(min(len(items), _LOOKED_AT))
-        for path in sample_of(items[index], columns).images
+        for path in _sample(items, index, columns).images
     )
     return list(dict.fromkeys(paths))[:_LOOKED_AT]

@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
-import secrets
-import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -30,7 +27,7 @@ from er_gym.data.sharegpt_report import decision
 from er_gym.data.trajectory import Language, PictureRecord, Trajectory, Turn
 from er_gym.tasks import verbs
 from er_gym.tasks.types import BY_NAME
-from er_gym.writing import file_stem, make_folder, replaced
+from er_gym.writing import file_stem, replaced, whole_folder
 
 SOURCE = "imported"
 """The name of the suite of imported collections, and the key of their settings."""
@@ -84,8 +81,8 @@ def import_sharegpt(
 ) -> ImportSummary:
     """Write the conversations of a file as a collection.
 
-    Everything is written to a folder beside ``out``, which is renamed when it is complete. Memory
-    does not grow with the file, but for the ids. Nothing outside ``out`` is opened for writing.
+    All of it is written, or nothing (:func:`er_gym.writing.whole_folder`). Memory does not grow
+    with the file, but for the ids. Nothing outside ``out`` is opened for writing.
 
     Args:
         file: opened with ``decisions=True``, so that every reply ends in a known action.
@@ -94,25 +91,16 @@ def import_sharegpt(
         progress: is called after each sample with the number done and the total.
 
     Raises:
-        ImportFailed: ``out`` is not empty.
+        ForeignFile: ``out`` is not empty.
         ShareGptError: a picture cannot be read.
         OSError: something cannot be written.
     """
-    if os.path.lexists(out) and not (out.is_dir() and not any(out.iterdir())):
-        raise ImportFailed(f"{out} is there and is no empty folder; choose another output")
-    make_folder(out.parent)
-    draft = out.parent / f".{out.name}.{secrets.token_hex(4)}.draft"
     counts: Counter[str] = Counter()
-    album = Album(draft, copy=copy)
-    try:
+    with whole_folder(out) as draft:
+        album = Album(draft, copy=copy)
         collection = Collection.create(draft, _manifest(file))
         collection.write(_trajectories(file, album, counts, progress))
         left_out = _write_left_out(file, draft)
-        if out.is_dir():
-            out.rmdir()
-        draft.rename(out)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
     return ImportSummary(
         samples=len(file),
         trajectories=counts["trajectories"],

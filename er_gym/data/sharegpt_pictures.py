@@ -16,7 +16,13 @@ from pathlib import Path
 _MOST_BELOW = 50
 _ABOVE = 3
 """Folders below the file's, and levels above it, in which pictures are looked for."""
-_ADDRESS = re.compile(r"(?:[a-z][a-z0-9+.-]+://|data:)", re.IGNORECASE)
+_NO_PATHS = {
+    re.compile(r"data:", re.IGNORECASE): "is a picture in the file itself, not the path of one; "
+    "save it as a file, and name that",
+    re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE): "is an address, not a file; download it "
+    "first, and name the file",
+}
+"""What else stands where a path belongs, and what to do."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +51,9 @@ class PicturePlaces:
 
     def missing(self, told: str) -> str:
         """Why there is no picture, in words."""
-        if _ADDRESS.match(told):
-            return f"{told!r:.120} is an address, not a file; download it first"
+        for kind, what in _NO_PATHS.items():
+            if kind.match(told):
+                return f"{told[:80]!r} {what}"
         return f"{self.path_of(told)!r:.160} is not in {self.folder}"
 
     def lines(self) -> list[str]:
@@ -64,6 +71,8 @@ def find_pictures(file: Path, paths: Sequence[str], given: Path | None) -> Pictu
         paths: of its first pictures.
         given: the folder that the user gave; None to look around the file.
     """
+    # A picture in the file itself has thousands of parts that look like folders.
+    paths = [path for path in paths if not any(kind.match(path) for kind in _NO_PATHS)]
     best, most = PicturePlaces(given or file.parent), 0
     for places in _candidates(file, paths, given):
         found = sum(map(places.has, paths))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -13,7 +13,7 @@ from er_gym.data.chat import IMAGE, Role
 from er_gym.data.exports.paper import DECISION
 from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
 from er_gym.data.json_items import JsonItems
-from er_gym.data.pictures import UnusablePicture, picture_size
+from er_gym.data.pictures import UnusablePicture, check_picture, picture_size
 from er_gym.data.sharegpt_pictures import PicturePlaces
 from er_gym.envs.actions import Action, parse
 
@@ -120,9 +120,11 @@ class Problems:
 
     Attributes:
         harmless: kinds of problems with which a sample is used all the same.
+        decode: whether each picture is decoded, once however many samples show it.
     """
 
     harmless: frozenset[ProblemKind] = HARMLESS
+    decode: bool = False
     samples: int = 0
     replies: int = 0
     pictures: int = 0
@@ -130,6 +132,8 @@ class Problems:
     unsound: int = 0
     counts: Counter[ProblemKind] = field(default_factory=Counter)
     first: dict[ProblemKind, list[tuple[int, str]]] = field(default_factory=dict)
+    _whole: set[int] = field(default_factory=set)
+    """The hashes of the paths of pictures that were decoded."""
 
     def look(self, index: int, sample: Sample, places: PicturePlaces) -> bool:
         """Note what is wrong with a sample, and say whether it can be learnt from."""
@@ -137,7 +141,7 @@ class Problems:
         self.replies += sample.roles.count("assistant")
         self.pictures += len(sample.images)
         self.with_feedback += sample.has_feedback
-        found = problems_of(sample, places)
+        found = self.of(sample, places)
         for kind, why in found.items():
             self.counts[kind] += 1
             named = self.first.setdefault(kind, [])
@@ -146,6 +150,17 @@ class Problems:
         sound = self.harmless.issuperset(found)
         self.unsound += not sound
         return sound
+
+    def of(self, sample: Sample, places: PicturePlaces) -> dict[ProblemKind, str]:
+        """What is wrong with a sample: of each kind the first."""
+        return _problems_of(sample, places, self._check)
+
+    def _check(self, picture: Path) -> None:
+        if not self.decode:
+            picture_size(picture)
+        elif hash(picture) not in self._whole:
+            check_picture(picture)
+            self._whole.add(hash(picture))
 
 
 def report_of(items: JsonItems, problems: Problems) -> Report:
@@ -172,8 +187,9 @@ def decision(reply: str) -> Action | None:
     return parse(found[1].strip().strip(".")) if found else None
 
 
-def problems_of(sample: Sample, places: PicturePlaces) -> dict[ProblemKind, str]:
-    """What is wrong with a sample: of each kind the first."""
+def _problems_of(
+    sample: Sample, places: PicturePlaces, check: Callable[[Path], None]
+) -> dict[ProblemKind, str]:
     if sample.wrong:
         return {"layout": sample.wrong}
     found: list[tuple[ProblemKind, str]] = []
@@ -204,7 +220,7 @@ def problems_of(sample: Sample, places: PicturePlaces) -> dict[ProblemKind, str]
             found.append(("missing picture", places.missing(path)))
             continue
         try:
-            picture_size(places.folder / places.path_of(path))
+            check(places.folder / places.path_of(path))
         except UnusablePicture as error:
             found.append(("unusable picture", str(error)[:300]))
     return dict(reversed(found))

@@ -15,6 +15,7 @@ from er_gym.data.pictures import (
     FORMATS,
     MOST_PIXELS,
     UnusablePicture,
+    check_picture,
     difference,
     open_picture,
     picture_size,
@@ -82,6 +83,24 @@ def test_damage_is_told_in_one_line(tmp_path: Path) -> None:
         with pytest.raises(UnusablePicture, match=r"\A[^\n]+\Z"):
             open_picture(file)
     assert difference(whole[:200], np.zeros((64, 64, 3), np.uint8)) == "is no whole picture"
+
+
+@pytest.mark.parametrize("form", ["JPEG", "PNG", "WEBP"])
+def test_an_end_that_is_missing_is_noticed(form: str, tmp_path: Path) -> None:
+    file = tmp_path / "a"
+    Image.effect_noise((64, 64), 90).convert("RGB").save(file, form)
+    check_picture(file)
+    file.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
+    with pytest.raises(UnusablePicture, match=r"a damaged picture: \w"):
+        check_picture(file)
+
+
+def test_sixteen_bits_of_grey_are_refused(tmp_path: Path) -> None:
+    """Pillow would make all but 256 of the 65,536 greys white."""
+    Image.fromarray(np.arange(1 << 16, dtype=np.uint16).reshape(256, 256)).save(tmp_path / "a.png")
+    for read in (picture_size, open_picture, check_picture):
+        with pytest.raises(UnusablePicture, match="16-bit grey; er-gym reads 8 bits a channel"):
+            read(tmp_path / "a.png")
 
 
 def test_every_picture_is_opened_in_one_place() -> None:

@@ -185,7 +185,11 @@ def test_every_problem_is_told_before_anything_is_used(folder: Path) -> None:
         ("[]", "no items"),
         ('[{"a": 1}, {"b": ', "ends in the middle of item 1; was it cut off"),
         ('[{"a": 1}', "the list has no end after item 0"),
-        ('[{"a": 1}, 7]', "line 1: expected an object or the end, found '7]'"),
+        ('[{"a": 1}, x]', "line 1: expected an object or the end, found 'x]'"),
+        ('[{"a": 1}, nullnull]', "line 1: expected an object or the end, found 'nullnull]'"),
+        ('[null, {"a": 1}', "the list has no end after item 1"),
+        ("PAR1", "Parquet; write it as JSON Lines first, with pandas"),
+        ("PK\x03\x04", "a zip file; unpack it first"),
         ('{"a": 1}\nx', "line 2: expected an object or the end"),
         ('[{"a": "b', "a string without an end"),
     ],
@@ -202,6 +206,15 @@ def test_the_line_of_an_item_counts_every_line_before_it(tmp_path: Path) -> None
     file.write_text('\n{"a": 1}\n\n{"b": 2}', encoding="utf-8")
     items = json_items(file)
     assert [items.line(index) for index in range(len(items))] == [2, 4]
+
+
+def test_other_values_are_items_too(tmp_path: Path) -> None:
+    values = [None, {"a": 1}, 7, "x]", [1, [2]], True, -1.5e3, {"b": [None]}, None]
+    for text in (json.dumps(values), "\n".join(map(json.dumps, values[1:]))):
+        file = tmp_path / "x.json"
+        file.write_text(text)
+        items = json_items(file)
+        assert [items[index] for index in range(len(items))] == values[-len(items) :]
 
 
 def test_items_hold_brackets_and_quotes_in_strings(tmp_path: Path) -> None:

@@ -246,21 +246,171 @@ def test_the_cause_of_each_sample_that_is_left_out_is_named(home: Path, tmp_path
     bad += [talk(f"gone-{number}", "gone.png") for number in range(4)]
     bad += [
         talk("eps", "bad.png"), talk("net", "https://x.example/a.png"),
+        talk("url", "data:image/png;base64," + "a/b" * 9000),
         talk("other", "a.png", "pictures"), talk("bytes", [{"bytes": "aGk="}]),
     ]  # fmt: skip
     arguments = ["import", str(written(home / "t.json", bad)), "--leave-out"]
     result = CliRunner().invoke(data, [*arguments, "--out", str(tmp_path / "out")])
     assert result.exit_code == 0, result.output
-    assert f"8 samples are left out; {tmp_path / 'out' / LEFT_OUT} names each" in result.output
+    assert f"9 samples are left out; {tmp_path / 'out' / LEFT_OUT} names each" in result.output
     _, *lines = (tmp_path / "out" / LEFT_OUT).read_text().splitlines()
     told = {row["id"]: " ".join(row["why"].values()) for row in map(json.loads, lines)}
-    assert len(told) == 8
+    assert len(told) == 9
     for name, words in {
         "gone-3": "'gone.png' is not in", "eps": "no picture of a format that er-gym reads",
-        "net": "is an address, not a file", "bytes": "'images' is no list of paths",
+        "net": "is an address, not a file", "url": "is a picture in the file itself",
+        "bytes": "'images' is no list of paths",
         "other": "1 places, 0 pictures: nothing in 'images' or 'image'; the sample has 'pictures'",
     }.items():  # fmt: skip
         assert words in told[name]
+
+
+def data_import(*words: object) -> tuple[int, str]:
+    result = CliRunner().invoke(data, ["import", *map(str, words)])
+    return result.exit_code, " ".join(result.output.split())
+
+
+@pytest.mark.parametrize(
+    ("item", "words"),
+    [
+        ('{"id": "\\ud800", "conversations": []}', "half a character"),
+        ('{"id": 123456789012345678901234567890}', "a whole number of 30 digits"),
+        ('{"a": 1e999}', "is too large"),
+        ("{'a': 1}", "not JSON"),
+        ("null", "null, not an object"),
+        ("7", "a number, not an object"),
+        ('"x"', "a text, not an object"),
+        ("[1]", "a list, not an object"),
+    ],
+)
+def test_one_item_that_cannot_be_read_does_not_spoil_the_others(
+    item: str, words: str, home: Path, tmp_path: Path
+) -> None:
+    good = json.dumps(talk("good", "a.png"))
+    for number, text in enumerate(
+        (f"[{good}, {item}]", f"[{item}, {good}]", f"{good}\n{item}\n", f"{good}\n{item}\n{good}")
+    ):
+        (home / "t.json").write_text(text)
+        out = tmp_path / str(number)
+        code, told = data_import(home / "t.json", "--out", out)
+        assert (code, out.exists()) == (2, False)
+        assert f"1 are laid out otherwise (first: item {int(number != 1)} (line" in told
+        assert words in told
+        code, told = data_import(home / "t.json", "--out", out, "--leave-out")
+        assert code == 0, told
+        assert "1 samples are left out" in told
+        assert words in (out / LEFT_OUT).read_text()
+        assert next(Collection.open(out).trajectories()).id == "good"
+
+
+def test_the_dataset_that_is_named_is_taken(home: Path, tmp_path: Path) -> None:
+    both = {**talk("x", ["a.png"]), "thumbs": ["b.png"]}
+    file = written(home / "train.json", [both])
+    entry = {**INFO["mine"], "file_name": "train.json"}
+    small = {**entry, "columns": {"messages": "conversations", "images": "thumbs"}}
+    other = {**entry, "file_name": "other.json"}
+    info = written(
+        home / "dataset_info.json", {"full": entry, "small": small, "other": other, "odd": 3}
+    )
+    for name, picture_name in (("full", "a.png"), ("small", "b.png")):
+        for place in (file, home, info):
+            out = tmp_path / f"{name}-{place.name}"
+            (one,) = imported(place, out, dataset=name)
+            placed = out / one.turns[0].pictures[0].path
+            assert placed.read_bytes() == (home / picture_name).read_bytes()
+    for name in ("nope", "other"):
+        code, told = data_import(file, "--dataset", name, "--out", tmp_path / "y")
+        assert code == 2
+        assert f"has the datasets full, small for train.json; there is no '{name}'" in told
+    code, told = data_import(file, "--out", tmp_path / "y")
+    assert code == 2
+    assert "full, small for train.json, which name its parts differently; name one" in told
+    written(info, {"full": entry, "again": dict(entry)})
+    (one,) = imported(file, tmp_path / "z")
+    info.unlink()
+    code, told = data_import(file, "--dataset", "full", "--out", tmp_path / "y")
+    assert code == 2
+    assert "has no dataset_info.json beside it, so no dataset 'full'" in told
+
+
+@pytest.mark.parametrize("form", ["png", "jpeg"])
+def test_a_picture_that_is_cut_off_is_not_carried_off(
+    form: str, home: Path, tmp_path: Path
+) -> None:
+    Image.effect_noise((64, 64), 90).convert("RGB").save(home / "cut", form)
+    whole = (home / "cut").read_bytes()
+    (home / "cut").write_bytes(whole[: len(whole) * 2 // 3])
+    file = written(home / "t.json", [talk("x", "a.png"), talk("y", "cut"), talk("z", "a.png")])
+    code, told = data_import(file, "--out", tmp_path / "out")
+    assert (code, (tmp_path / "out").exists()) == (2, False)
+    assert f"item 1 (line 1): {home / 'cut'}: a damaged picture: " in told
+    code, told = data_import(file, "--out", tmp_path / "out", "--leave-out")
+    assert code == 0, told
+    assert [each.id for each in Collection.open(tmp_path / "out").trajectories()] == ["x", "z"]
+    assert "a damaged picture" in (tmp_path / "out" / LEFT_OUT).read_text()
+
+
+def test_each_picture_is_decoded_once(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[str] = []
+    monkeypatch.setattr(
+        "er_gym.data.sharegpt_report.check_picture", lambda picture: seen.append(picture.name)
+    )
+    file = written(home / "t.json", [talk("x", "a.png"), talk("y", "b.png"), talk("z", "a.png")])
+    assert len(open_sharegpt(file, decode=True)) == 3
+    assert seen == ["a.png", "b.png"]
+
+
+def test_the_output_may_be_the_working_directory_or_a_link(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = written(home / "t.json", [talk("x", "a.png")])
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to("real")
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    made = os.stat(".").st_ino
+    assert data_import(file, "--out", ".")[0] == 0
+    assert os.stat(tmp_path / "here").st_ino == made  # it is still the shell's
+    assert data_import(file, "--out", tmp_path / "link")[0] == 0
+    for place in ("here", "link"):
+        names = {each.name for each in (tmp_path / place).iterdir()}
+        assert names == {"collection.json", "trajectories.jsonl", "pictures"}
+    assert (tmp_path / "link").is_symlink()
+    (tmp_path / "real2").mkdir()
+    (tmp_path / "link2").symlink_to("real2")
+    export(Collection.open(Path()), "trl", tmp_path / "link2")
+    assert (tmp_path / "real2" / "README.md").is_file()
+
+
+def test_an_output_that_cannot_be_is_told_before_anything_is_read(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    (tmp_path / "lost").symlink_to("nowhere")
+    for name, words in (
+        ("lost", "is there already and is no folder"),
+        ("file/x", f"{tmp_path / 'file'} is no folder"),
+        (".", "is not empty"),
+    ):
+        code, told = data_import(tmp_path / "none.json", "--out", tmp_path / name)
+        assert code == 2
+        assert words in told
+
+
+@pytest.mark.parametrize(
+    ("loss", "learnt"),
+    [(True, True), (1, True), (None, True), (False, False), (0, False), ("no", None), ([], None)],
+)
+def test_a_loss_is_true_or_false(
+    loss: object, learnt: bool | None, home: Path, tmp_path: Path
+) -> None:
+    one = talk("x", "a.png")
+    one["conversations"][1]["loss"] = loss
+    file = written(home / "t.json", [one])
+    if learnt is None:
+        with pytest.raises(ShareGptError, match=r"message 1 has the loss .*; give true or false"):
+            open_sharegpt(file)
+    else:
+        (chat,) = open_sharegpt(file)
+        assert chat.turns[-1].train is learnt
 
 
 # -- every field of every file as every type -------------------------------------------------------

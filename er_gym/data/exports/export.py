@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
-import secrets
-import shutil
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -34,7 +31,7 @@ from er_gym.data.exports.verl import VERL
 from er_gym.plugins import Registry
 from er_gym.tasks import splits
 from er_gym.thor import SCENE_NAMES
-from er_gym.writing import MARKDOWN_MARK, make_folder, write_atomic
+from er_gym.writing import MARKDOWN_MARK, check_new_folder, whole_folder, write_atomic
 
 EXPORTS: Registry[ExportFormat] = Registry(
     kind="export format",
@@ -60,8 +57,8 @@ def export(
 ) -> ExportSummary:
     """Write a collection as training files.
 
-    Everything is written to a folder beside ``out``, which is renamed when it is complete; if
-    anything goes wrong, ``out`` stays as it was. Memory does not grow with the collection.
+    All of it is written, or nothing (:func:`er_gym.writing.whole_folder`). Memory does not grow
+    with the collection.
 
     Args:
         collection: what to export.
@@ -71,8 +68,9 @@ def export(
         progress: is called after each trajectory with the number done and the total.
 
     Raises:
-        ExportError: ``out`` is not empty, a picture is missing, there is nothing to export, or a
-            library is not installed.
+        ForeignFile: ``out`` is not empty.
+        ExportError: a picture is missing, there is nothing to export, or a library is not
+            installed.
         ValueError: there is no such format, dialect or room; the message lists the known ones.
         CollectionError: the collection is damaged.
         OSError: something cannot be written.
@@ -80,13 +78,10 @@ def export(
     options = options or ExportOptions()
     row = EXPORTS.get(format)
     dialect = load_dialect(options.dialect)
-    _check_out(out)
+    check_new_folder(out)
     scenes = _count_rooms(collection)
     held_out = _held_out(scenes, options.held_out)
-    make_folder(out.parent)
-    draft = out.parent / f".{out.name}.{secrets.token_hex(4)}.draft"
-    draft.mkdir()
-    try:
+    with whole_folder(out) as draft:
         job = ExportJob(
             collection, draft, options, dialect, held_out, sum(scenes.values()), progress
         )
@@ -110,20 +105,7 @@ def export(
         )
         write_atomic(draft / "README.md", _readme(row, summary, options, collection))
         write_atomic(draft / MANIFEST, _manifest(summary, options, held_out, collection))
-        if out.exists():
-            out.rmdir()
-        draft.rename(out)
-    except BaseException:  # Ctrl-C too
-        shutil.rmtree(draft, ignore_errors=True)
-        raise
     return summary
-
-
-def _check_out(out: Path) -> None:
-    if os.path.lexists(out) and not (out.is_dir() and not out.is_symlink()):
-        raise ExportError(f"{out} is there already and is no folder; choose another output")
-    if out.is_dir() and any(out.iterdir()):
-        raise ExportError(f"{out} is not empty; choose another output, or remove it first")
 
 
 def _count_rooms(collection: Collection) -> dict[str, int]:

@@ -78,4 +78,4 @@ def test_the_commands_take_what_was_imported(collection: Collection, tmp_path: P
     result = run.invoke(data, ["verify", str(tmp_path / "y")])
     assert "cannot be replayed; stats, show and export work on it" in result.output
     result = run.invoke(data, ["import", file, "--out", str(tmp_path / "y")])
-    assert "is no empty folder; choose another output" in result.output
+    assert "is not empty; choose another output" in result.output
