@@ -1,16 +1,20 @@
 """Reads decisions to put what is held somewhere: "put the Apple in my hand into the Fridge".
 
-The receptacle is what counts. It stands behind the last preposition that is followed by the name of
-a type, up to the first word that begins an explanation; without any, behind the first preposition.
+The receptacle is what counts. Places are looked for up to the first word that begins an explanation
+or an opposite ("instead of"). :func:`_chosen` says which of several places is the receptacle; the
+others say where the thing is now, or where the receptacle is.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from agents.vlm.names import look_up
 from agents.vlm.parsing.names import clean_name
-from agents.vlm.parsing.vocabulary import EDGES
+from agents.vlm.parsing.vocabulary import EDGES, VERBS
+from er_gym.thor import OBJECT_TYPES
 
 _BEFORE, _AFTER = r"(?<![^\W_])", r"(?![^\W_])"  # a word ends, or an underscore
 _PUT = re.compile(
@@ -18,15 +22,32 @@ _PUT = re.compile(
     rf"(?:\s(?:in|down|back|away))?{_AFTER}",
     re.IGNORECASE,
 )
-_MOVE = re.compile(rf"(?:move|return|bring|transfer|take){_AFTER}", re.IGNORECASE)
-"""Verbs that put only where they say what and where."""
+_MOVE = re.compile(rf"(?:move|return|bring|transfer|(?P<fetch>take|get)){_AFTER}", re.IGNORECASE)
+"""Verbs that put only where they say what and where. ``fetch``: "take the Mug in the Sink" picks it
+up, "take the Mug to the Sink" does not."""
+_NOT = r"instead\sof|rather\sthan|not"
+_OPPOSITE = re.compile(rf"{_BEFORE}(?:{_NOT}){_AFTER}", re.IGNORECASE)
 _STEP = re.compile(
-    rf"{_BEFORE}(?P<place>(?:in|on)\s?/\s?(?:in|on|onto|into)|in\sto|into|inside\sof|inside|in|"
+    rf"{_BEFORE}(?P<place>(?:into|onto|in|on)\s?/\s?(?:in|on|onto|into)|in\sto|into|inside\sof|inside|in|"
     rf"onto|on\stop\sof|on\sto|on|atop|within|(?<!next\s)(?<!close\s)to){_AFTER}"
     rf"|{_BEFORE}(?P<stop>because|since|so|as|which|that|who|where|if|while|and|then|before|after)"
-    rf"{_AFTER}|[,;，；。]|\.\s",
+    rf"{_AFTER}|(?P<opposite>{_NOT}){_AFTER}|[,;，；。]|\.\s",
     re.IGNORECASE,
 )
+_MOTION = re.compile(r"into|onto|(?:in|on)\sto|to|.+/.+", re.IGNORECASE)
+"""Prepositions that say where to, and never where something is."""
+_INSIDE = frozenset({"inside", "inside of", "within"})
+_PRONOUN = re.compile(
+    r"(?:it|them|this|that|(?:(?:the|my)\s)?(?:held\s)?(?:object|item|thing))"
+    r"(?:\s(?:back|down|away))?",
+    re.IGNORECASE,
+)
+_PARTS = frozenset({"Drawer", "Shelf", "Cabinet"})
+_FURNITURE = frozenset(
+    {"CoffeeTable", "CounterTop", "Desk", "DiningTable", "Dresser", "ShelvingUnit", "SideTable",
+     "TVStand"}
+)  # fmt: skip
+"""What has parts, and is not itself what something is "in"."""
 _BETWEEN = re.compile(r"[\s,\[\]()]+")
 _HANDS = frozenset({"hand", "hands", "gripper", "arm", "inventory", "possession"})
 _CHINESE = (
@@ -54,9 +75,15 @@ def receptacle_in(line: str) -> tuple[str, str, tuple[str, ...]] | None:
         at = begun.end()
         if begun[0].casefold().endswith(" in"):
             at -= len(" in")
-        return _behind_preposition(line, spaced, at) or _two_names(line, at)
+        placed = _behind_preposition(line, spaced, at) or _two_names(line, at)
+        # "not in the Fridge" says no place, and what is put is none.
+        return placed or ((line[at:], "", ()) if _OPPOSITE.search(spaced, at) else None)
     moved = _MOVE.match(spaced)
-    placed = _behind_preposition(line, spaced, moved.end(), only_known=True) if moved else None
+    if moved is None:
+        return None
+    placed = _behind_preposition(
+        line, spaced, moved.end(), only_known=True, only_motion=bool(moved["fetch"])
+    )
     return placed if placed and _known(placed[0]) else None
 
 
@@ -64,22 +91,85 @@ def _known(name: str) -> bool:
     return look_up(clean_name(name)[0]) is not None
 
 
+@dataclass(frozen=True)
+class _Place:
+    """A preposition and the name behind it; ``types`` is empty for an unknown name."""
+
+    start: int
+    preposition: str
+    name: str
+    rules: tuple[str, ...]
+    types: tuple[str, ...]
+
+    @property
+    def motion(self) -> bool:
+        return _MOTION.fullmatch(self.preposition) is not None
+
+    @property
+    def carried(self) -> bool:
+        """Whether it may itself stand in or on something."""
+        movable = {"pickupable", "moveable"}
+        return any(movable & {*OBJECT_TYPES[each].properties} for each in self.types)
+
+    def is_part_of(self, other: _Place) -> bool:
+        """``in the Drawer in the Desk``"""
+        part, whole = _PARTS.issuperset(self.types), _FURNITURE.issuperset(other.types)
+        return part and whole and other.preposition in {"in", *_INSIDE}
+
+
 def _behind_preposition(
-    line: str, spaced: str, start: int, *, only_known: bool = False
+    line: str, spaced: str, start: int, *, only_known: bool = False, only_motion: bool = False
 ) -> tuple[str, str, tuple[str, ...]] | None:
-    chosen = first = None
+    places = _places(line, spaced, start)
+    if only_motion:
+        places = [each for each in places if each.motion]
+    known = [each for each in places if each.types]
+    if not only_known and (first := next(iter(places), None)):
+        # An unknown place is what is meant where no other place can be.
+        known = [first] if first.motion and not first.types else known or [first]
+    if not known:
+        return None
+    taken = _chosen(known, line[start : places[0].start].strip(EDGES))
+    return line[start : taken.start].strip(EDGES), taken.name, taken.rules
+
+
+def _places(line: str, spaced: str, start: int) -> list[_Place]:
+    """The places of a line, without hands, and without those of an explanation."""
+    places: list[_Place] = []
+    opposite = False
     for step in _STEP.finditer(spaced, start):
         if step["place"] is None:
-            if chosen is not None:
+            opposite = step["opposite"] is not None
+            if any(each.types or each.motion for each in places):
                 break
             continue
+        preposition = " ".join(step["place"].casefold().split())
         name, rules = clean_name(line[step.end() :])
-        if look_up(name):
-            chosen = step.start(), name, rules
-        elif name.casefold() not in _HANDS and step["place"].casefold() != "to":
-            first = first or (step.start(), name, rules)
-    taken = chosen or (None if only_known else first)
-    return None if taken is None else (line[start : taken[0]].strip(EDGES), *taken[1:])
+        entry = look_up(name)
+        if opposite or name.casefold() in _HANDS:
+            opposite = False
+        elif preposition != "to" or (entry and name.casefold().split()[0] not in VERBS):
+            places.append(
+                _Place(step.start(), preposition, name, rules, entry.types if entry else ())
+            )
+        elif places:  # a purpose: "to cut bread on the plate"
+            break
+    return places
+
+
+def _chosen(known: Sequence[_Place], what: str) -> _Place:
+    """The receptacle among places."""
+    first, *others = known
+    for each in known:
+        if each.motion:
+            return each
+    if others and (
+        _PRONOUN.fullmatch(what)  # a place behind "it" does not say which thing is meant
+        or first.is_part_of(others[0])
+        or (first.preposition in _INSIDE and first.carried)
+    ):
+        return first
+    return known[-1]
 
 
 def _two_names(line: str, start: int) -> tuple[str, str, tuple[str, ...]] | None:

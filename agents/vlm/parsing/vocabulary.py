@@ -72,8 +72,9 @@ ARTICLE = re.compile(
 )
 CLAUSE = re.compile(
     r"\s+(?:from|out of|off|inside|into|in|onto|on|at|with|using|to|and|then|next to|near|beside|"
-    r"behind|under|over|by|for|so|because|since|which|that|the|where|if|while|again|now|first)(?!\w)"
-    r"|那(?:里|儿|边)|[,;:(){}<>\[\]、。]|\.\s|\s[-–—]\s|[里上中前旁](?:面|边)?$|(?<=[^\x00-\x7f])内$",
+    r"behind|under|over|by|for|so|because|since|which|that|the|where|if|while|again|now|first|"
+    r"instead of|rather than|not)(?!\w)"
+    r"|而不是|而非|那(?:里|儿|边)|[,;:(){}<>\[\]、。]|\.\s|\s[-–—]\s|[里上中前旁](?:面|边)?$|(?<=[^\x00-\x7f])内$",
     re.IGNORECASE,
 )
 """Marks the end of a name and the start of a clause: ``Egg from the Fridge``, ``Fridge, which is

@@ -227,6 +227,30 @@ ODD = [
     (tagged("关闭冰箱门"), "close Fridge"),
     (tagged("打开电视"), "open Television"),
     (tagged("去冰箱"), "navigate to Fridge"),
+    # the opposite place
+    (tagged("put the Apple into the Fridge instead of on the CounterTop"), "put in Fridge"),
+    (tagged("put the Apple into the Fridge rather than on the CounterTop"), "put in Fridge"),
+    (tagged("put the Apple in the Fridge instead of the CounterTop"), "put in Fridge"),
+    (tagged("put the Apple in the Fridge and not on the CounterTop"), "put in Fridge"),
+    (tagged("put the Apple in the Fridge, not on the CounterTop"), "put in Fridge"),
+    (tagged("put the Apple not on the CounterTop but in the Fridge"), "put in Fridge"),
+    (tagged("navigate to the Fridge instead of the CounterTop"), "navigate to Fridge"),
+    (tagged("把苹果放进冰箱而不是桌子上"), "put in Fridge"),
+    # the place of the place
+    (tagged("put the Apple into the Bowl on the DiningTable"), "put in Bowl"),
+    (tagged("put the Pen inside the Box on top of the Dresser"), "put in Box"),
+    (tagged("put it inside the Box on the Bed"), "put in Box"),
+    (tagged("put it on the Plate in the Fridge"), "put in Plate"),
+    (tagged("put the Watch in the Drawer in the Desk"), "put in Drawer"),
+    (tagged("put the Watch in the Drawer on the Desk"), "put in Desk"),
+    (tagged("put the knife on the countertop to cut bread on the plate"), "put in CounterTop"),
+    (tagged("put the mug on the table into the sink"), "put in Sink"),
+    (tagged("put the mug on the table in the sink"), "put in Sink"),
+    (tagged("put the Apple onto/into the Fridge"), "put in Fridge"),
+    (tagged("get the Mug into the Sink"), "put in Sink"),
+    (tagged("take the Mug to the Sink"), "put in Sink"),
+    (tagged("take the Mug on the DiningTable"), "pickup Mug"),
+    (tagged("get the Mug in the Sink"), "pickup Mug"),
 ]  # fmt: skip
 
 
@@ -263,6 +287,8 @@ def test_the_record_shows_what_was_taken(odd: tuple[str, str, tuple[str, ...]]) 
         "step(Fridge)",
         "put",
         "I put my trust in you",
+        "put the Apple not in the Fridge",
+        "put the Apple into the Frobnicator on the CounterTop",
     ],
 )
 def test_what_is_no_action_stays_none(said: str) -> None:
