@@ -16,8 +16,11 @@ from agents.vlm.parsing.vocabulary import (
     ALONE,
     EDGES,
     FILLER,
+    HELD_FIELDS,
+    MAYBE_PLACE_FIELDS,
     OBJECT_FIELDS,
     PLACE_FIELDS,
+    THOUGHT_TAGS,
     VERB_FIELDS,
     VERBS,
     normalized,
@@ -130,7 +133,8 @@ def _called(line: str) -> ParsedAction | None:
     if "=" in call[2] and call[1].isidentifier():
         fields = fields_in(_NAMED.sub(r" \1: ", call[2]))
         words = read_fields({**fields, VERB_FIELDS[0]: phrase})
-        if words.name or words.verb in verbs.BARE_VERBS:
+        several = words.verb == verbs.PUT and len(fields) > 1  # and none is a known place
+        if words.name or words.verb in verbs.BARE_VERBS or several:
             return ParsedAction(words.verb, words.name, ("call form", *words.rules))
     if not phrase:
         return None
@@ -258,7 +262,9 @@ def read_fields(fields: Mapping[str, str]) -> ParsedAction:
         order = (*PLACE_FIELDS, *OBJECT_FIELDS)
         if words.verb != verbs.PUT:
             order = (*OBJECT_FIELDS, *PLACE_FIELDS)
-        names = (clean_name(fields.get(name, "")) for name in order if name != field)
+        elif _place_is_unclear(fields, field, words):
+            return ParsedAction(words.verb, "", words.rules)
+        names = (_field_name(fields.get(name, "")) for name in order if name != field)
         name, rules = next((found for found in names if found[0]), ("", ()))
         if words.verb in verbs.BARE_VERBS:
             return ParsedAction(words.verb, "", (*words.rules, *(("words after",) if name else ())))
@@ -266,3 +272,34 @@ def read_fields(fields: Mapping[str, str]) -> ParsedAction:
             return words
         return ParsedAction(words.verb, name, (*words.rules, *rules))
     return ParsedAction("")
+
+
+_LONGEST_NAME = 40
+_NO_PLACE = {*VERB_FIELDS, *THOUGHT_TAGS, *HELD_FIELDS} - {*OBJECT_FIELDS}
+
+
+_PREPOSITION = re.compile(
+    r"\A(?:in|on)(?:to|side(?: of)?|\s?/\s?(?:in|on)| top of)?\s", re.IGNORECASE
+)
+
+
+def _field_name(value: str) -> tuple[str, tuple[str, ...]]:
+    """The name in a field such as ``"where": "in the Fridge"``."""
+    return clean_name(_PREPOSITION.sub("", value.lstrip(), count=1))
+
+
+def _place_is_unclear(fields: Mapping[str, str], verb_field: str, words: ParsedAction) -> bool:
+    """Whether fields to put something name several types, and none of the fields says that it is
+    the place: one of them is what is put."""
+    places = [name for name in PLACE_FIELDS if _field_name(fields.get(name, ""))[0]]
+    if words.name:  # "put Bowl" with "in": "Fridge"
+        said_where = "put form" in words.rules or MAYBE_PLACE_FIELDS.issuperset(places)
+        values = [] if said_where else [words.name, *(fields[name] for name in places)]
+    elif places:
+        return False
+    else:
+        values = [
+            value for name, value in fields.items() if name != verb_field and name not in _NO_PLACE
+        ]
+    found = (look_up(_field_name(each)[0]) for each in values if len(each) <= _LONGEST_NAME)
+    return len({entry.types for entry in found if entry}) > 1

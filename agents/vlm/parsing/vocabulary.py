@@ -37,18 +37,27 @@ CALL_TAGS = frozenset({TOOL_CALL, "toolcalls", "functioncall", "tooluse"})
 VERB_FIELDS = (
     "decisionmaking", "decision", "action", "nextaction", "actiontype", "actionname", "verb",
     "command", "act", "answer", "tool", "function", "toolname", "functionname", "name", "决策",
-    "动作",
+    "动作", "actions", "type",
 )  # fmt: skip
 """Fields of a JSON object that may hold the verb; the first that does counts. ``name`` is a tool's
 where it is a verb, else perhaps the object's."""
 PLACE_FIELDS = (
-    "receptacle", "container", "destination", "place", "location", "where", "target",
-    "targetobject",
+    "receptacle", "receptacleobjectid", "receptacleid", "receptaclename", "receptacletype", "recep",
+    "targetreceptacle", "container", "targetcontainer", "destination", "destinationobject",
+    "destinationreceptacle", "place", "location", "targetlocation", "surface", "targetsurface",
+    "where", "into", "onto", "inside", "in", "on", "inon", "to", "putin", "target", "targetobject",
+    "args 2", "arguments 2", "parameters 2", "params 2", "inputs 2", "objects 2",
 )  # fmt: skip
-"""Fields that hold the receptacle rather than the object; the first that is set counts."""
+"""Fields that hold the receptacle rather than the object; the first that is set counts. ``args 2``
+is the second string of a list."""
+MAYBE_PLACE_FIELDS = frozenset({"target", "targetobject"})
+"""Those of them that hold the object in other replies."""
+HELD_FIELDS = frozenset({"held", "helditem", "heldobject", "holding", "inhand", "inventory"})
+"""Fields that hold what is in the hand."""
 OBJECT_FIELDS = (
     "objecttype", "object", "objectid", "objectname", "target", "targetobject", "item", "thing",
-    "name", "argument", "arguments", "args", "arg", "parameter", "input", "物体", "对象", "目标",
+    "name", "argument", "arguments", "args", "arg", "parameter", "parameters", "params", "input",
+    "inputs", "objects", "物体", "对象", "目标",
 )  # fmt: skip
 
 VERBS: Mapping[str, str] = {phrase: verb.name for verb in verbs.table() for phrase in verb.said}

@@ -251,6 +251,30 @@ ODD = [
     (tagged("take the Mug to the Sink"), "put in Sink"),
     (tagged("take the Mug on the DiningTable"), "pickup Mug"),
     (tagged("get the Mug in the Sink"), "pickup Mug"),
+    # fields for the place
+    *(
+        (f'{{"action": "put", "object": "Bowl", "{name}": "Fridge"}}', "put in Fridge")
+        for name in (
+            "in", "into", "on", "onto", "to", "in_on", "in/on", "inside", "recep", "surface",
+            "target_receptacle", "target_location", "destination_object", "destination",
+        )
+    ),
+    ('{"action": "put", "object": "Bowl", "where": "in the Fridge"}', "put in Fridge"),
+    ('{"action": "put", "object": "Bowl", "to": {"object": "Fridge"}}', "put in Fridge"),
+    ('{"action": "put", "object": {"name": "Bowl"}, "receptacle": {"name": "Fridge"}}', "put in Fridge"),
+    ('{"action": "put in", "object": "Fridge", "held": "Bowl"}', "put in Fridge"),
+    ('{"action": "put", "object": "Fridge", "why": "It is open."}', "put in Fridge"),
+    ('{"action": "put", "args": ["Bowl", "Fridge"]}', "put in Fridge"),
+    ('{"action": "put", "args": ["Fridge"]}', "put in Fridge"),
+    ('{"action": "pickup", "args": ["Bowl", "Fridge"]}', "pickup Bowl"),
+    ('{"action":"PutObject","objectId":"Bowl|1|2|3","receptacleObjectId":"Fridge|1|2|3"}', "put in Fridge"),
+    ('{"action": "PutObject", "objectId": "Fridge|1|2|3"}', "put in Fridge"),
+    (tagged('put_object(object="Bowl", to="Fridge")'), "put in Fridge"),
+    (tagged('put_object(object="Fridge")'), "put in Fridge"),
+    # the outermost action
+    ('{"steps": [{"action": "pickup Egg", "done": true}], "action": "put in Fridge"}', "put in Fridge"),
+    ('{"action": {"type": "navigate to", "object": "Fridge"}}', "navigate to Fridge"),
+    ('{"actions": ["navigate to Fridge", "open Fridge"]}', "navigate to Fridge"),
 ]  # fmt: skip
 
 
@@ -288,6 +312,12 @@ def test_the_record_shows_what_was_taken(odd: tuple[str, str, tuple[str, ...]]) 
         "put",
         "I put my trust in you",
         "put the Apple not in the Fridge",
+        '{"action": "put", "object": "Bowl", "xyz": "Fridge"}',
+        '{"action": "put", "object": "Bowl", "xyz": "in the Fridge"}',
+        '{"action": "put", "object": "Bowl", "item": "Fridge"}',
+        '{"action": "put Bowl", "in": "Fridge"}',
+        'put_object(object="Bowl", xyz="Fridge")',
+        'put_object(xyz="Fridge", object="Bowl")',
         "put the Apple into the Frobnicator on the CounterTop",
     ],
 )
