@@ -15,7 +15,6 @@ from agents.vlm.parsing.rules import RULES
 from agents.vlm.parsing.vocabulary import (
     ALONE,
     EDGES,
-    FILLER,
     HELD_FIELDS,
     MAYBE_PLACE_FIELDS,
     OBJECT_FIELDS,
@@ -76,8 +75,13 @@ _PARTED: tuple[tuple[str, str, re.Pattern[str]], ...] = (
     (
         "verb parted",
         verbs.PICKUP,
-        re.compile(r"(?:pick|take)\s(?P<name>\S.*?)\s(?:up|out)\W*$", re.I),
+        re.compile(
+            r"(?:pick|take)\s(?P<name>\S.*?)\s(?:up|out)"
+            r"(?:\s(?:from|off|of|in|on|inside)\s.*|\W*)$",
+            re.I,
+        ),
     ),
+    ("verb parted", verbs.TOGGLE, re.compile(r"[开关](?![闭上启关掉])(?P<name>\w{0,6}灯)\W*$")),
     (
         "verb parted",
         verbs.PICKUP,
@@ -185,12 +189,26 @@ def _said(line: str) -> ParsedAction:
         rules = ("verb spelling" if spelt else "verb synonym",)
     if verb in verbs.BARE_VERBS:
         after = [normalized(word) for word in rest.split() if normalized(word)]
-        if phrase in ALONE and not FILLER.issuperset(after):
+        if phrase in ALONE and not ALONE[phrase].issuperset(after):
             return ParsedAction("")
         more = ("words after",) if after else ("marks",) if rest.strip() else ()
         return ParsedAction(verb, rules=(*rules, *more))
     name, needed = clean_name(rest)
+    if phrase in _ON_OR_OPEN and _only_toggles(name):
+        verb = verbs.TOGGLE
     return ParsedAction(verb, name, (*rules, *needed))
+
+
+_ON_OR_OPEN = frozenset({"打开", "关闭", "关上"})
+"""Chinese phrases for "open" or "close" that are also those for "switch on" or "switch off"."""
+
+
+def _only_toggles(name: str) -> bool:
+    """Whether a thing of this name can be switched, but not opened."""
+    entry, opens, toggles = look_up(name), *map(verbs.verb_named, (verbs.OPEN, verbs.TOGGLE))
+    return entry is not None and all(
+        toggles.takes(each) and not opens.takes(each) for each in entry.types
+    )
 
 
 # -- a decision ------------------------------------------------------------------------------------

@@ -33,17 +33,19 @@ _LABEL = re.compile(
 )
 _LIST_MARK = re.compile(r"(?:[-+•]\s|#{1,6}\s|(?:step\s?)?\(?\d{1,2}[.):、]\s?)+", re.IGNORECASE)
 _LEAD_IN = re.compile(
+    r"(?:(?:since|because|as)\s[^,.;]{1,120},\s)?"
     r"(?:(?:so|now|next|then|first|finally|therefore|please|ok|okay),?\s)*"
-    r"(?:(?:i|we)(?:\s(?:will|should|shall|must|can|choose to|decide to|need to|want to|have to|"
-    r"am going to)|['’]ll|['’]m going to)\s|let(?:\sme|\sus|['’]s)\s)?"
+    r"(?:(?:i|we)(?:\s(?:will|would like to|would|should|shall|must|can|choose to|decide to|"
+    r"need to|want to|have to|am going to)|['’]ll|['’]d like to|['’]d|['’]m going to)\s|would\s|let(?:\sme|\sus|['’]s)\s)?"
     r"(?:(?:now|first|next|then)\s)?(?:use\s)?"
+    r"(?:go\s(?:and\s)?(?=(?:open|close|pick|grab|get|take|put|place|toggle|turn|switch|slice)\s))?"
     r"(?:(?:现在|接下来|下一步|首先|然后|因此),?)?(?:我们?(?:将|要|会|应该|需要|决定|选择)?|请|让我)?先?",
     re.IGNORECASE,
 )
 _MARKS = re.compile(
     # End-of-turn tokens, closing tags or parts of them, LaTeX's box, quotes and brackets.
     r"<\|[^<>|]{1,30}\|>|</\w{0,30}(?:>|$)|\\(?:boxed|text)(?!\w)"
-    r"|[\[\]{}<>*`\"“”「」『』《》【】]+|(?<!\w)['‘’]|['‘’](?!\w)"
+    r"|[\[\]{}<>*$`\"“”「」『』《》【】]+|(?<!\w)['‘’]|['‘’](?!\w)"
 )
 
 

@@ -60,11 +60,11 @@ OBJECT_FIELDS = (
     "inputs", "objects", "物体", "对象", "目标",
 )  # fmt: skip
 
-VERBS: Mapping[str, str] = {phrase: verb.name for verb in verbs.table() for phrase in verb.said}
+VERBS: Mapping[str, str] = {
+    **dict.fromkeys(("take a step forward", "take one step forward"), verbs.MOVE_FORWARD),
+    **{phrase: verb.name for verb in verbs.table() for phrase in verb.said},
+}
 """The verb by each phrase for it, in lower case with single spaces."""
-ALONE = frozenset(phrase for phrase, verb in VERBS.items() if verb == verbs.END) | {"look"}
-"""Phrases that mean their verb only if nothing but :data:`FILLER` follows: "stop the Microwave"
-does not end the episode."""
 FILLER = frozenset(
     {
         "the", "this", "my", "our", "a", "task", "tasks", "episode", "mission", "search", "job",
@@ -72,9 +72,20 @@ FILLER = frozenset(
         "搜索", "了",
     }
 )  # fmt: skip
+_ROOM = frozenset(
+    {"room", "rooms", "house", "scene", "surroundings", "environment", "around", "view", "一下",
+     "四周", "周围", "环境", "周围环境", "周围的环境", "房间", "整个房间"}
+)  # fmt: skip
+ALONE: Mapping[str, frozenset[str]] = {
+    **{phrase: FILLER for phrase, verb in VERBS.items() if verb == verbs.END},
+    **dict.fromkeys(("look", "look at", "take a look", "查看"), FILLER | _ROOM | {"at"}),
+}
+"""Phrases that mean their verb only if nothing but certain words follow: "stop the Microwave" does
+not end the episode, and "look at the Fridge" is no turn around."""
 
 ARTICLE = re.compile(
     r"(?:(?:the|an?|this|that|these|those|my|your|some|any|another|nearest|closest|nearby|"
+    r"(?:doors?|lid|location|position|handle)\sof|"
     r"(?:[\w-]{1,20}\s){0,2}[\w-]{1,20}['’]s)\s+"
     r"|[那这一][个台张把只扇盏]\s*)+",
     re.IGNORECASE,
@@ -88,6 +99,10 @@ CLAUSE = re.compile(
 )
 """Marks the end of a name and the start of a clause: ``Egg from the Fridge``, ``Fridge, which is
 closed``."""
+PART_OF = re.compile(
+    r"['’]s\s(?:current\s)?(?:location|position|spot|doors?|lid|handle)(?!\w)", re.IGNORECASE
+)
+"""Follows a name: ``the egg's location``."""
 NO_NAME = frozenset(
     {
         "it", "them", "this", "that", "one", "there", "object", "objects", "something", "nothing",
