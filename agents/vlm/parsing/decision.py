@@ -77,11 +77,15 @@ _PARTED: tuple[tuple[str, str, re.Pattern[str]], ...] = (
         verbs.PICKUP,
         re.compile(
             r"(?:pick|take)\s(?P<name>\S.*?)\s(?:up|out)"
-            r"(?:\s(?:from|off|of|in|on|inside)\s.*|\W*)$",
+            r"(?:\s(?:from|off|of|in|on|inside|and)\s.*|\W*)$",
             re.I,
         ),
     ),
-    ("verb parted", verbs.TOGGLE, re.compile(r"[开关](?![闭上启关掉])(?P<name>\w{0,6}灯)\W*$")),
+    (
+        "verb parted",
+        verbs.TOGGLE,
+        re.compile(r"(?:关掉|[开关](?![闭上启关掉]))(?P<name>\w{0,6}灯)\W*$"),
+    ),
     (
         "verb parted",
         verbs.PICKUP,

@@ -25,13 +25,14 @@ _PUT = re.compile(
 _MOVE = re.compile(rf"(?:move|return|bring|transfer|(?P<fetch>take|get)){_AFTER}", re.IGNORECASE)
 """Verbs that put only where they say what and where. ``fetch``: "take the Mug in the Sink" picks it
 up, "take the Mug to the Sink" does not."""
-_NOT = r"instead\sof|rather\sthan|not"
-_OPPOSITE = re.compile(rf"{_BEFORE}(?:{_NOT}){_AFTER}", re.IGNORECASE)
+_NOT = r"(?:instead\sof|rather\sthan|not)(?=\s(?:in|on|inside|into|onto|to)\s)"
+_OPPOSITE = re.compile(rf"{_BEFORE}{_NOT}", re.IGNORECASE)
 _STEP = re.compile(
     rf"{_BEFORE}(?P<place>(?:into|onto|in|on)\s?/\s?(?:in|on|onto|into)|in\sto|into|inside\sof|inside|in|"
     rf"onto|on\stop\sof|on\sto|on|atop|within|(?<!next\s)(?<!close\s)to){_AFTER}"
-    rf"|{_BEFORE}(?P<stop>because|since|so|as|which|that|who|where|if|while|and|then|before|after)"
-    rf"{_AFTER}|(?P<opposite>{_NOT}){_AFTER}|[,;，；。]|\.\s",
+    rf"|{_BEFORE}(?P<stop>because|since|so|as|which|that|who|where|if|while|and|then|before|after|"
+    rf"(?:instead\sof|rather\sthan)(?!\s(?:in|on|inside|into|onto|to)\s))"
+    rf"{_AFTER}|{_BEFORE}(?P<opposite>{_NOT})|[,;，；。]|\.\s",
     re.IGNORECASE,
 )
 _MOTION = re.compile(r"into|onto|(?:in|on)\sto|to|.+/.+", re.IGNORECASE)

@@ -36,7 +36,8 @@ _LEAD_IN = re.compile(
     r"(?:(?:since|because|as)\s[^,.;]{1,120},\s)?"
     r"(?:(?:so|now|next|then|first|finally|therefore|please|ok|okay),?\s)*"
     r"(?:(?:i|we)(?:\s(?:will|would like to|would|should|shall|must|can|choose to|decide to|"
-    r"need to|want to|have to|am going to)|['’]ll|['’]d like to|['’]d|['’]m going to)\s|would\s|let(?:\sme|\sus|['’]s)\s)?"
+    r"need to|want to|have to|am going to)|['’]ll|['’]d like to|['’]d|['’]m going to)\s|would\s|"
+    r"let(?:\sme|\sus|['’]s)\s)?"
     r"(?:(?:now|first|next|then)\s)?(?:use\s)?"
     r"(?:go\s(?:and\s)?(?=(?:open|close|pick|grab|get|take|put|place|toggle|turn|switch|slice)\s))?"
     r"(?:(?:现在|接下来|下一步|首先|然后|因此),?)?(?:我们?(?:将|要|会|应该|需要|决定|选择)?|请|让我)?先?",
@@ -92,8 +93,8 @@ RULES: tuple[Rule, ...] = (
     Rule("verb parted", "pick the Mug up, turn the DeskLamp on"),
     Rule(
         "put form",
-        "put Apple into Fridge, put the Mug in my hand on/in DiningTable: the receptacle counts, "
-        "behind the last preposition that a type follows",
+        "put Apple into Fridge, put the Mug in my hand on/in DiningTable: the receptacle counts; it "
+        "stands behind 'into', 'onto' or 'to', else mostly behind the last preposition",
     ),
     Rule("article", "the Fridge"),
     Rule("clause", "more is said behind the name: Egg from Fridge, Fridge (it is closed)"),

@@ -236,6 +236,10 @@ ODD = [
     (tagged("put the Apple not on the CounterTop but in the Fridge"), "put in Fridge"),
     (tagged("navigate to the Fridge instead of the CounterTop"), "navigate to Fridge"),
     (tagged("把苹果放进冰箱而不是桌子上"), "put in Fridge"),
+    (tagged("put the Apple instead of the Bowl in the Fridge"), "put in Fridge"),
+    (tagged("put the Apple in the Fridge instead of the Bowl on the Desk"), "put in Fridge"),
+    (tagged("put the Apple that is not sliced in the Fridge"), "put in Fridge"),
+    (tagged("put the Apple which is not in the Bowl into the Fridge"), "put in Fridge"),
     # the place of the place
     (tagged("put the Apple into the Bowl on the DiningTable"), "put in Bowl"),
     (tagged("put the Pen inside the Box on top of the Dresser"), "put in Box"),
@@ -301,6 +305,8 @@ ODD = [
     (tagged("打开电脑"), "open Laptop"),
     (tagged("打开微波炉"), "open Microwave"),
     (tagged("关灯"), "toggle LightSwitch"),
+    (tagged("关掉台灯"), "toggle DeskLamp"),
+    (tagged("pick the egg up and put it on the desk"), "pickup Egg"),
     (tagged("开台灯"), "toggle DeskLamp"),
 ]  # fmt: skip
 
