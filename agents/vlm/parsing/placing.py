@@ -2,7 +2,8 @@
 
 The receptacle is what counts. Places are looked for up to the first word that begins an explanation
 or an opposite ("instead of"). :func:`_chosen` says which of several places is the receptacle; the
-others say where the thing is now, or where the receptacle is.
+others say where the thing is now, or where the receptacle is. A place behind "into" or "onto" is
+the receptacle, known or not.
 """
 
 from __future__ import annotations
@@ -122,12 +123,11 @@ def _behind_preposition(
     line: str, spaced: str, start: int, *, only_known: bool = False, only_motion: bool = False
 ) -> tuple[str, str, tuple[str, ...]] | None:
     places = _places(line, spaced, start)
-    if only_motion:
-        places = [each for each in places if each.motion]
+    motions = [each for each in places if each.motion]
+    places = motions[:1] or ([] if only_motion else places)
     known = [each for each in places if each.types]
-    if not only_known and (first := next(iter(places), None)):
-        # An unknown place is what is meant where no other place can be.
-        known = [first] if first.motion and not first.types else known or [first]
+    if not known and not only_known:
+        known = places[:1]
     if not known:
         return None
     taken = _chosen(known, line[start : places[0].start].strip(EDGES))
@@ -159,11 +159,8 @@ def _places(line: str, spaced: str, start: int) -> list[_Place]:
 
 
 def _chosen(known: Sequence[_Place], what: str) -> _Place:
-    """The receptacle among places."""
+    """The receptacle among places behind "in" and "on"."""
     first, *others = known
-    for each in known:
-        if each.motion:
-            return each
     if others and (
         _PRONOUN.fullmatch(what)  # a place behind "it" does not say which thing is meant
         or first.is_part_of(others[0])

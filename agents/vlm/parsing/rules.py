@@ -93,8 +93,8 @@ RULES: tuple[Rule, ...] = (
     Rule("verb parted", "pick the Mug up, turn the DeskLamp on"),
     Rule(
         "put form",
-        "put Apple into Fridge, put the Mug in my hand on/in DiningTable: the receptacle counts; it "
-        "stands behind 'into', 'onto' or 'to', else mostly behind the last preposition",
+        "put Apple into Fridge, put the Mug in my hand on/in DiningTable: the receptacle counts; "
+        "it stands behind 'into', 'onto' or 'to', else mostly behind the last preposition",
     ),
     Rule("article", "the Fridge"),
     Rule("clause", "more is said behind the name: Egg from Fridge, Fridge (it is closed)"),

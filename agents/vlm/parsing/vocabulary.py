@@ -37,7 +37,7 @@ CALL_TAGS = frozenset({TOOL_CALL, "toolcalls", "functioncall", "tooluse"})
 VERB_FIELDS = (
     "decisionmaking", "decision", "action", "nextaction", "actiontype", "actionname", "verb",
     "command", "act", "answer", "tool", "function", "toolname", "functionname", "name", "决策",
-    "动作", "actions", "type",
+    "动作", "actions",
 )  # fmt: skip
 """Fields of a JSON object that may hold the verb; the first that does counts. ``name`` is a tool's
 where it is a verb, else perhaps the object's."""
@@ -100,7 +100,7 @@ CLAUSE = re.compile(
 """Marks the end of a name and the start of a clause: ``Egg from the Fridge``, ``Fridge, which is
 closed``."""
 PART_OF = re.compile(
-    r"['’]s\s(?:current\s)?(?:location|position|spot|doors?|lid|handle)(?!\w)", re.IGNORECASE
+    r"['’]s\s(?:current\s)?(?:location|position|spot|doors?|lid|handle|switch)(?!\w)", re.IGNORECASE
 )
 """Follows a name: ``the egg's location``."""
 NO_NAME = frozenset(

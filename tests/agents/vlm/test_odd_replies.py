@@ -275,6 +275,9 @@ ODD = [
     ('{"action": "PutObject", "objectId": "Fridge|1|2|3"}', "put in Fridge"),
     (tagged('put_object(object="Bowl", to="Fridge")'), "put in Fridge"),
     (tagged('put_object(object="Fridge")'), "put in Fridge"),
+    ('{"action": "put", "object": "Egg", "from": "CounterTop", "to": "Fridge"}', "put in Fridge"),
+    ('{"action": "navigate", "to": "Fridge"}', "navigate to Fridge"),
+    (tagged("put(Apple, in=Fridge)"), "put in Fridge"),
     # the outermost action
     ('{"steps": [{"action": "pickup Egg", "done": true}], "action": "put in Fridge"}', "put in Fridge"),
     ('{"action": {"type": "navigate to", "object": "Fridge"}}', "navigate to Fridge"),
@@ -295,6 +298,7 @@ ODD = [
     (tagged("open the fridge's door"), "open Fridge"),
     (tagged("go open the fridge"), "open Fridge"),
     (tagged("go and get the egg"), "pickup Egg"),
+    (tagged("toggle the desk lamp's switch"), "toggle DeskLamp"),
     (tagged("navigate to the egg's location"), "navigate to Egg"),
     (tagged("go to the location of the egg"), "navigate to Egg"),
     (tagged("Since the egg is in the Fridge, open Fridge"), "open Fridge"),
@@ -356,9 +360,12 @@ def test_the_record_shows_what_was_taken(odd: tuple[str, str, tuple[str, ...]]) 
         '{"action": "put", "object": "Bowl", "xyz": "in the Fridge"}',
         '{"action": "put", "object": "Bowl", "item": "Fridge"}',
         '{"action": "put Bowl", "in": "Fridge"}',
+        '{"scene": [{"name": "Fridge", "type": "open"}]}',
         'put_object(object="Bowl", xyz="Fridge")',
         'put_object(xyz="Fridge", object="Bowl")',
         "put the Apple into the Frobnicator on the CounterTop",
+        "put the Apple in the Bowl into the Frobnicator",
+        "move the Apple into the Frobnicator on the CounterTop",
     ],
 )
 def test_what_is_no_action_stays_none(said: str) -> None:
