@@ -63,11 +63,15 @@ _VLM_OPTIONS = (
         type=click.IntRange(1, 1000),
         help="The number of simultaneous conversations.  [default: 8]",
     ),
-    click.option("--max-usd", type=Finite(min=0), help="Stop after spending this many US dollars."),
+    click.option(
+        "--max-usd",
+        type=Finite(min=0, min_open=True),
+        help="Stop after spending this many US dollars.",
+    ),
     click.option("--max-tokens", type=int, help="Stop after this many tokens."),
     click.option(
         "--max-minutes",
-        type=Finite(min=0),
+        type=Finite(min=0, min_open=True),
         help="Stop after this many minutes, even within a request.",
     ),
 )

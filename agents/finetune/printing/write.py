@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import secrets
-import shutil
 from pathlib import Path
 
 from agents.finetune.models import ChosenModel, choose_model, picture_tokens
@@ -17,7 +14,7 @@ from agents.finetune.printing.sources import Facts, PicturesToTokens, look_at, o
 from agents.finetune.printing.trl import TRL
 from agents.finetune.settings import FinetuneSettings
 from er_gym.data.trajectory import PictureRecord
-from er_gym.writing import make_folder, write_atomic
+from er_gym.writing import check_new_folder, whole_folder, write_atomic
 
 PROGRAMS: dict[str, Program] = {row.name: row for row in (LLAMA_FACTORY, MS_SWIFT, TRL, DEEPSPEED)}
 """All programs by name."""
@@ -37,7 +34,7 @@ def write_files(
 ) -> list[Path]:
     """Write all that a program needs to make a run.
 
-    Everything is written to a folder beside ``out``, which is renamed when it is complete.
+    Everything is there when it is complete, or nothing (:func:`er_gym.writing.whole_folder`).
 
     Args:
         program: a name of :data:`PROGRAMS`.
@@ -64,26 +61,18 @@ def write_files(
     if settings.training.optimizer != "adamw":
         raise ValueError(f"{program} cannot learn with training.optimizer=muon; set adamw")
     chosen = choose_model(model)
-    _check_out(out)
+    check_new_folder(out)
     count = gpus or (LORA_GPUS if settings.model.lora else FULL_GPUS)
     source = open_source(data, settings.data)
     facts = look_at(source, _counter(chosen, settings))
     _check_length(facts, settings)
     plan = PrintPlan(settings, chosen, source, facts, count, copy)
-    make_folder(out.parent)
-    draft = out.parent / f".{out.name}.{secrets.token_hex(4)}.draft"
-    draft.mkdir()
-    try:
+    with whole_folder(out) as draft:
         printed = PROGRAMS[program].write(plan, draft)
         for name, text in printed.texts.items():
             write_atomic(draft / name, text)
         write_atomic(draft / SCRIPT, script(printed), mode=0o755)
         write_atomic(draft / "README.md", readme(plan, printed, program))
-        if out.is_dir():
-            out.rmdir()
-        draft.rename(out)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
     beside = [path for path in out.iterdir() if path.is_file()]
     return sorted([*beside, *(path for path in (out / DATA).iterdir() if path.is_file())])
 
@@ -96,13 +85,6 @@ def _counter(model: ChosenModel, settings: FinetuneSettings) -> PicturesToTokens
         return picture_tokens(side, picture.width, picture.height, data.min_pixels, data.max_pixels)
 
     return count
-
-
-def _check_out(out: Path) -> None:
-    if os.path.lexists(out) and not (out.is_dir() and not out.is_symlink()):
-        raise ValueError(f"{out} is there already and is no folder; choose another output")
-    if out.is_dir() and any(out.iterdir()):
-        raise ValueError(f"{out} is not empty; choose another output, or remove it first")
 
 
 def _check_length(facts: Facts, settings: FinetuneSettings) -> None:
