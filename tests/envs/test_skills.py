@@ -47,6 +47,13 @@ def test_the_best_view_is_the_most_comfortable_of_all(scene: str) -> None:
         assert skills._best_view(floor, *centre) == most_comfortable(positions, centre)
 
 
+def test_a_pose_without_room_is_taken_only_by_force() -> None:
+    outside = AgentPose(50.0, 0.9, 50.0, 0.0, 0.0)
+    with make_controller(scene="FloorPlan1", gridSize=0.25, headless=True) as controller:
+        assert not skills.place(controller, outside).success
+        assert skills.place(controller, outside, force=True).success
+
+
 def test_what_can_be_reached_is_asked_for_once_in_a_process() -> None:
     asked = []
 

@@ -273,3 +273,16 @@ def test_what_was_not_played_or_crashed_does_not_keep_out_what_comes_after() -> 
     collector._take(directory, stratum, 9)
     assert [each.id for each in taken] == ["good", "better"]
     assert collector.summary.rejected == {"longer than 9": 1}
+
+
+def test_of_what_was_in_the_file_only_that_is_kept_which_is_not_taken_anew() -> None:
+    def trajectory(part: str, name: str, when: str) -> Any:
+        return SimpleNamespace(part=part, id=name, when=when)
+
+    new = [trajectory("imitation", "a", "now")]
+    old = [trajectory("imitation", "a", "before"), trajectory("anomalies", "a", "before")]
+    collector: Any = SimpleNamespace(
+        _taken=lambda: new, _collection=SimpleNamespace(trajectories=lambda: old)
+    )
+    kept = [(each.part, each.when) for each in Collector._taken_and_earlier(collector)]
+    assert kept == [("imitation", "now"), ("anomalies", "before")]
