@@ -15,11 +15,12 @@ from agents.expert.candidates import Candidate
 from agents.expert.collect import Collector
 from agents.expert.course import Intent, View
 from agents.expert.explorer import ExplorerCourse, Strength
-from agents.expert.legs import legs_of
+from agents.expert.legs import Leg, legs_of
 from agents.expert.own_words import split_speech
 from agents.expert.replayed_intents import replayed_intent, replayed_purpose
+from agents.expert.task_course import GiveUp
 from agents.expert.thinker import _event
-from agents.expert.writers.facts import facts_of
+from agents.expert.writers.facts import _in_view, facts_of
 from agents.expert.writers.nouns import nouns
 from er_gym.data.collection import CollectionError
 from er_gym.data.knowledge import Knowledge, LastAction
@@ -286,3 +287,40 @@ def test_of_what_was_in_the_file_only_that_is_kept_which_is_not_taken_anew() -> 
     )
     kept = [(each.part, each.when) for each in Collector._taken_and_earlier(collector)]
     assert kept == [("imitation", "now"), ("anomalies", "before")]
+
+
+def test_who_strays_may_lose_heart_and_does_if_only_finding_is_asked_for() -> None:
+    def gives_up(seed: int, leg: Leg) -> bool:
+        course = ExplorerCourse(TASK, Strength(), random.Random(seed))
+        course.view = view(5)
+        try:
+            return bool([*course._stray(leg)])
+        except GiveUp:
+            return True
+
+    leg, *_ = legs_of(TASK)
+    assert {gives_up(seed, leg) for seed in range(20)} == {True, False}
+    assert all(gives_up(seed, replace(leg, actions=())) for seed in range(20))
+
+
+def test_what_is_in_view_is_told_apart_by_side_distance_and_state() -> None:
+    known = Knowledge(
+        language="en",
+        instruction="Find the Egg.",
+        turn=0,
+        view=[
+            SeenObject(type="Mug", side="left", distance=0.5),
+            SeenObject(type="Fridge", side="ahead", distance=2.5, open=False),
+            SeenObject(type="Sofa", side="right", distance=5.0),
+        ],
+        held="",
+        at="",
+        decision=Action(verbs.OBSERVE),
+        purpose="search",
+        subgoal=Subgoal(thing="Egg"),
+    )
+    facts = _in_view(known, "Egg", random.Random(0))
+    told = {key: sorted(each["o"] for each in facts[key]) for key in ("view", "near", "shut")}
+    assert told == {"view": ["Fridge", "Mug", "Sofa"], "near": ["Mug"], "shut": ["Fridge"]}
+    sides = [[each["o"] for each in facts[side]] for side in ("left", "ahead", "right")]
+    assert sides == [["Mug"], ["Fridge"], ["Sofa"]]
